@@ -1,0 +1,133 @@
+"""The ground floor: a measurement is points, read on a machine.
+
+Every room of the package speaks of these two objects. ``jobs`` makes them from files, ``physics`` moves them,
+``artefacts`` turns them into observations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.errors import CmmUqError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+AXES = "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """What the physics must know of the machine.
+
+    Parameters
+    ----------
+    name : as on the certificate.
+    chain : carriages from the table to the ram, a permutation of ``XYZ``.
+    travel_mm : (3, 2) lowest and highest scale reading of each axis, mm; ``nan`` where the job does not say.
+    origin_mm : (3,) scale reading = recorded coordinate + origin, mm.
+    """
+
+    name: str = ""
+    chain: str = "XYZ"
+    travel_mm: Floats = field(default_factory=lambda: np.full((3, 2), np.nan))
+    origin_mm: Floats = field(default_factory=lambda: np.zeros(3))
+
+    def travel(self, axis: str) -> tuple[float, float]:
+        """Lowest and highest scale reading of an axis, mm.
+
+        Raises
+        ------
+        CmmUqError : the job does not give the travel of this axis.
+        """
+        low, high = self.travel_mm[AXES.index(axis)]
+        if np.isnan(low) or np.isnan(high):
+            raise CmmUqError(
+                f"the travel of axis {axis} is needed",
+                where="job.toml [machine] travel_mm",
+                fix=f"Give travel_mm = {{ {axis} = [lowest, highest] }} in mm",
+            )
+        return float(low), float(high)
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Indicated coordinates of one recording, and all that was recorded beside them.
+
+    Parameters
+    ----------
+    xyz : (n, 3) indicated coordinates, mm, in the recorded frame.
+    measurement, point, repeat : (n,) what belongs together; see the recording's columns of the same names.
+    machine : the machine that read them.
+    columns : further recorded columns by their name in the recording, each (n,).
+    lines : (n,) line of each point in its file, for messages; 0 where there is no file.
+    """
+
+    xyz: Floats
+    measurement: Ints
+    point: Ints
+    repeat: Ints
+    machine: Machine = field(default_factory=Machine)
+    columns: Mapping[str, Floats] = field(default_factory=dict)
+    lines: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    @cached_property
+    def readings(self) -> Floats:
+        """(n, 3) scale readings, mm: recorded coordinates plus the machine's origin."""
+        return self.xyz + self.machine.origin_mm
+
+    @cached_property
+    def group(self) -> Ints:
+        """(n,) index of the (measurement, repeat) that each point belongs to, in order of first appearance."""
+        _, first, inverse = np.unique(
+            np.column_stack([self.measurement, self.repeat]), axis=0, return_index=True, return_inverse=True
+        )
+        rank = np.empty(len(first), dtype=np.int64)
+        rank[np.argsort(first)] = np.arange(len(first))
+        return rank[inverse.ravel()]
+
+    def column(self, name: str) -> Floats:
+        """A recorded column, (n,).
+
+        Raises
+        ------
+        CmmUqError : the recording has no such column.
+        """
+        if name not in self.columns:
+            raise CmmUqError(
+                f"the recording has no column {name!r}, which the model needs",
+                where="job.toml [model] effects",
+                fix=f"Record {name}, or leave out the effect",
+            )
+        return self.columns[name]
+
+    def at(self, xyz: Floats) -> Points:
+        """The same points at other coordinates (n, 3), mm."""
+        return replace(self, xyz=xyz)
+
+    def select(self, rows: NDArray[np.bool_] | Ints) -> Points:
+        """Some of the points, by mask or index."""
+        return Points(
+            self.xyz[rows],
+            self.measurement[rows],
+            self.point[rows],
+            self.repeat[rows],
+            self.machine,
+            {name: values[rows] for name, values in self.columns.items()},
+            self.lines[rows] if len(self.lines) else self.lines,
+        )
+
+    def group_means(self, values: Floats) -> Floats:
+        """Mean of ``values`` (n,) or (n, k) over each point's (measurement, repeat), given back to every point."""
+        sums = np.zeros((self.group.max() + 1, *values.shape[1:])) if len(self) else np.zeros((0, *values.shape[1:]))
+        np.add.at(sums, self.group, values)
+        counts = np.bincount(self.group).reshape((-1,) + (1,) * (values.ndim - 1))
+        return np.asarray((sums / counts)[self.group], dtype=np.float64)
