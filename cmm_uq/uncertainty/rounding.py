@@ -1,0 +1,111 @@
+"""Results as text: the uncertainty to at most two significant digits, the value to the same decimal place.
+
+The rule is that of ILAC-P14:09/2020 5.4 with JCGM 100:2008 7.2.6: rounding comes last, to the nearest, ties away from
+zero (ISO 80000-1:2022 annex B, rule B); an uncertainty that this would lower by more than 5 % is rounded up instead
+(EA-4/02 M:2022 6.3), which can happen with one digit only. Numbers are read as the decimal they print as, so that 0.15
+is a tie and the noise of binary arithmetic behind the 13th digit decides nothing.
+"""
+
+from __future__ import annotations
+
+from decimal import ROUND_HALF_UP, ROUND_UP, Decimal
+from math import isfinite, isinf, isnan
+
+from cmm_uq.errors import CmmUqError
+
+MINUS = "−"
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_PLAIN_DECIMALS = 12
+_PLAIN_INTEGER_DIGITS = 15
+_LARGEST_LOSS = Decimal("0.05")
+
+
+def significant(u: float, digits: int = 2) -> str:
+    """An uncertainty to some significant digits.
+
+    Parameters
+    ----------
+    u : standard or expanded uncertainty, not negative; infinite gives ``∞``.
+    digits : significant digits, 1 or 2 for what a certificate states.
+
+    Raises
+    ------
+    CmmUqError : ``u`` is negative or not a number.
+    """
+    return rounded(0.0, u, digits)[1]
+
+
+def rounded(value: float, u: float, digits: int = 2) -> tuple[str, str]:
+    """A value and its uncertainty, both to the decimal place that the uncertainty supports.
+
+    Parameters
+    ----------
+    value : the estimate.
+    u : its standard or expanded uncertainty, same unit, not negative. Zero leaves the value as it is; infinite leaves
+        it with ``digits`` significant digits.
+    digits : significant digits of ``u``.
+
+    Returns
+    -------
+    value and uncertainty with the Unicode minus sign; a common power of ten is split off only where the decimals would
+    run past twelve places or fifteen integer digits.
+
+    Raises
+    ------
+    CmmUqError : ``u`` is negative or not a number, or ``value`` is not finite.
+
+    Examples
+    --------
+    >>> rounded(838.03, 71.62)
+    ('838', '72')
+    >>> rounded(12345.6, 123)
+    ('12350', '120')
+    """
+    _check(value, u, digits)
+    exact = _decimal(value)
+    if u == 0:
+        return _plain(exact.normalize()), "0"
+    if isinf(u):
+        return _plain(_to_place(exact, exact.adjusted() - digits + 1) if value else exact), "∞"
+    shown = _rounded_uncertainty(_decimal(u), digits)
+    place = shown.adjusted() - digits + 1
+    return _as_text(_to_place(exact, place), shown, place)
+
+
+def _check(value: float, u: float, digits: int) -> None:
+    if isnan(u) or u < 0:
+        raise CmmUqError(f"an uncertainty of {u} cannot be stated", fix="It must be a number that is not negative")
+    if not isfinite(value):
+        raise CmmUqError(f"a value of {value} cannot be stated", fix="Find out why the result is not finite")
+    if digits < 1:
+        raise CmmUqError(f"{digits} significant digits cannot be shown", fix="Use 1 or 2")
+
+
+def _decimal(number: float) -> Decimal:
+    return Decimal(f"{number:.12e}")
+
+
+def _to_place(number: Decimal, place: int, rounding: str = ROUND_HALF_UP) -> Decimal:
+    """Rounded to a multiple of 10**place."""
+    return number.scaleb(-place).to_integral_value(rounding).scaleb(place)
+
+
+def _rounded_uncertainty(u: Decimal, digits: int) -> Decimal:
+    place = u.adjusted() - digits + 1
+    nearest = _to_place(u, place)
+    return _to_place(u, place, ROUND_UP) if u - nearest > _LARGEST_LOSS * u else nearest
+
+
+def _as_text(value: Decimal, u: Decimal, place: int) -> tuple[str, str]:
+    exponent = max(value.adjusted() if value else u.adjusted(), u.adjusted())
+    if -place <= _PLAIN_DECIMALS and exponent < _PLAIN_INTEGER_DIGITS:
+        return _plain(value, place), _plain(u, place)
+    power = "×10" + str(exponent).translate(_SUPERSCRIPT)
+    scaled_place = place - exponent
+    return _plain(value.scaleb(-exponent), scaled_place) + power, _plain(u.scaleb(-exponent), scaled_place) + power
+
+
+def _plain(number: Decimal, place: int | None = None) -> str:
+    """Without exponent; with as many decimals as the place asks."""
+    text = f"{number:f}" if place is None else f"{number:.{max(0, -place)}f}"
+    return text.replace("-", MINUS) if number else text.replace("-", "")
