@@ -1,0 +1,78 @@
+"""What an artefact is: how points become observations, and what it leaves undetermined.
+
+An artefact of known sizes, placed somewhere on the table, says where its points truly are up to that placing. Hence three
+questions, asked of every kind: where would its points lie, placed as well as the recording allows (:meth:`~Artefact.fit`)?
+Along which directions does a recording speak about errors (:meth:`~Artefact.project`)? What remains free
+(:meth:`~Artefact.placing`, and sizes without a certificate)?
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.points import Floats, Ints, Points
+
+
+@dataclass(frozen=True)
+class Size:
+    """A dimension of the artefact at 20 °C, itself to be estimated.
+
+    Parameters
+    ----------
+    name, title : in results.json, and in words.
+    unit : as printed.
+    nominal : where to start, in mm.
+    sd : standard uncertainty of the certificate, mm; infinite without a certificate.
+    """
+
+    name: str
+    title: str
+    unit: str
+    nominal: float
+    sd: float
+
+    @property
+    def certified(self) -> bool:
+        """Whether a certificate gives this size."""
+        return bool(np.isfinite(self.sd))
+
+
+class Artefact(ABC):
+    """One artefact as recorded: m observations of n points.
+
+    Attributes
+    ----------
+    kind : as in ``[artefact] kind``.
+    title : in words.
+    points : the recording.
+    sizes : dimensions that enter the model.
+    noise_scale : (m,) standard uncertainty of each observation, per unit of that of one coordinate.
+    measurement, repeat : (m,) what each observation belongs to.
+    """
+
+    kind: str
+    title: str
+    points: Points
+    sizes: tuple[Size, ...]
+    noise_scale: Floats
+    measurement: Ints
+    repeat: Ints
+
+    @abstractmethod
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        """Points (n, 3) of an artefact with these sizes (s,), placed as near to ``true_xyz`` (n, 3) as it goes, mm."""
+
+    @abstractmethod
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        """Change of the observations, (m, k) in mm, when the points at ``xyz`` (n, 3) move by ``displacement`` (n, 3, k)."""
+
+    @abstractmethod
+    def size_change(self) -> Floats:
+        """Change of the observations, (m, s), for one mm of each size."""
+
+    def placing(self, xyz: Floats) -> Floats:
+        """Change of the observations, (m, q), for each freedom of the artefact's placing that they do not cancel."""
+        return np.zeros((len(self.noise_scale), 0))

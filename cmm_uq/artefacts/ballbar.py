@@ -1,0 +1,135 @@
+"""Ballbar: two balls a fixed distance apart, in many places.
+
+The observation is the distance of the two ball centres; placing and direction cancel, and a bar without a certificate
+leaves one scale common to all axes undetermined.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.artefacts.artefact import Artefact, Size
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.points import Floats, Points
+from cmm_uq.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
+
+UNIT_MISTAKES = {
+    1e-3: "metres", 1e3: "micrometres", 1 / 25.4: "inches", 25.4: "inches converted twice", 0.1: "centimetres",
+}  # fmt: skip
+
+
+class Ballbar(Artefact):
+    """A ballbar as recorded: m lengths of 2m points.
+
+    Parameters
+    ----------
+    facts : what the job says of the bar.
+    points : the recording; points 1 and 2 of every (measurement, repeat).
+
+    Raises
+    ------
+    CmmUqError : a bar lacks an end or has both in one place, or its length is off by a factor that a unit explains.
+    """
+
+    kind = "ballbar"
+    title = "Ballbar"
+
+    def __init__(self, facts: ArtefactFacts, points: Points, *, where: str | None = None) -> None:
+        self.points = points
+        self._ends = _ends(points, where)
+        first = self._ends[:, 0]
+        self.measurement, self.repeat = points.measurement[first], points.repeat[first]
+        self.noise_scale = np.full(len(first), np.sqrt(2.0))
+        if facts.cte_per_k and "temp_artefact_c" in points.columns:
+            excess = points.columns["temp_artefact_c"][self._ends].mean(axis=1) - REFERENCE_TEMPERATURE
+            self.expansion = 1 + facts.cte_per_k * excess
+        else:
+            self.expansion = np.ones(len(first))
+        lengths = self.lengths()
+        if np.any(lengths == 0):
+            line = points.lines[first[np.argmin(lengths)]] if len(points.lines) else 0
+            raise CmmUqError("both ends of the bar lie in one place", where=f"{where or 'recording'} line {line}",
+                             fix="Record the centres of two different balls")  # fmt: skip
+        mean = float(lengths.mean())
+        if facts.length_mm is None:
+            self.sizes = (Size("length_mm", "Length of the bar", "mm", mean, np.inf),)
+        else:
+            _check_units(mean, facts.length_mm, where)
+            self.sizes = (
+                Size("length_mm", "Length of the bar", "mm", facts.length_mm, (facts.u_um or 0.0) * MICROMETRE),
+            )
+
+    def lengths(self) -> Floats:
+        """Indicated lengths brought to 20 °C with the bar's stated expansion, (m,) mm."""
+        bars = self._bars(self.points.xyz)
+        return np.asarray(np.linalg.norm(bars, axis=1) / self.expansion, dtype=np.float64)
+
+    def middles(self) -> Floats:
+        """Middle of each bar, (m, 3) mm, in the recorded frame."""
+        return np.asarray(self.points.xyz[self._ends].mean(axis=1), dtype=np.float64)
+
+    def ends(self) -> Floats:
+        """Both ends of each bar, (m, 2, 3) mm, in the recorded frame."""
+        return self.points.xyz[self._ends]
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        """See :meth:`Artefact.fit`: same middle, same direction, the bar's length."""
+        bars = self._bars(true_xyz)
+        half = 0.5 * bars / np.linalg.norm(bars, axis=1, keepdims=True) * (sizes[0] * self.expansion)[:, None]
+        middle = true_xyz[self._ends].mean(axis=1)
+        placed = true_xyz.copy()
+        placed[self._ends[:, 0]], placed[self._ends[:, 1]] = middle - half, middle + half
+        return placed
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        """See :meth:`Artefact.project`: relative displacement of the ends along the bar."""
+        bars = self._bars(xyz)
+        directions = bars / np.linalg.norm(bars, axis=1, keepdims=True)
+        relative = displacement[self._ends[:, 1]] - displacement[self._ends[:, 0]]
+        return np.asarray(np.einsum("mi,mik->mk", directions, relative), dtype=np.float64)
+
+    def size_change(self) -> Floats:
+        """See :meth:`Artefact.size_change`."""
+        return self.expansion[:, None]
+
+    def _bars(self, xyz: Floats) -> Floats:
+        return np.asarray(xyz[self._ends[:, 1]] - xyz[self._ends[:, 0]], dtype=np.float64)
+
+
+def _ends(points: Points, where: str | None) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
+    """Rows of points 1 and 2 of every bar, (m, 2)."""
+    ends = []
+    for group in range(int(points.group.max()) + 1):
+        rows = np.flatnonzero(points.group == group)
+        numbers = points.point[rows]
+        if sorted(numbers.tolist()) != [1, 2]:
+            measurement, repeat = points.measurement[rows[0]], points.repeat[rows[0]]
+            line = points.lines[rows[0]] if len(points.lines) else 0
+            missing = sorted({1, 2} - set(numbers.tolist()))
+            problem = (
+                f"measurement {measurement}, repeat {repeat} has no point {missing[0]}: a bar with one end"
+                if missing
+                else f"measurement {measurement}, repeat {repeat} has points {sorted(numbers.tolist())}, a bar has 1 and 2"
+            )
+            raise CmmUqError(problem, where=f"{where or 'recording'} line {line}",
+                             fix="Record both balls, as points 1 and 2, or leave out the measurement")  # fmt: skip
+        ends.append(rows[np.argsort(numbers)])
+    return np.array(ends, dtype=np.int64)
+
+
+def _check_units(mean: float, certified: float, where: str | None) -> None:
+    ratio = mean / certified
+    for factor, unit in UNIT_MISTAKES.items():
+        if abs(ratio / factor - 1) < 0.02:
+            raise CmmUqError(
+                f"the recorded bars are {mean:.6g} mm long on average, the certified length is {certified:.6g} mm: "
+                f"the coordinates look like {unit}, not mm",
+                where=where, fix="Give x_mm, y_mm, z_mm and length_mm in mm",
+            )  # fmt: skip
+    if abs(ratio - 1) > 0.01:
+        raise CmmUqError(
+            f"the recorded bars are {mean:.6g} mm long on average, the certified length is {certified:.6g} mm: "
+            f"they differ by {abs(mean - certified) / certified * METRE:.3g} mm/m",
+            where=where, fix="Check length_mm in job.toml [artefact], and that the recording belongs to this bar",
+        )  # fmt: skip

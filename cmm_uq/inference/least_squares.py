@@ -1,0 +1,136 @@
+"""Least squares by singular values: what a recording determines, and what it leaves free.
+
+Normal equations and pseudo-inverses hide a rank deficiency; the singular value decomposition of the scaled design shows
+it, so that the combination of parameters that remains free can be named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.linear_model import LinearModel, Unknown
+from cmm_uq.points import Floats
+
+RANK_TOLERANCE = 1e-9
+"""Singular values below this part of the largest are zero: rounding alone leaves about 1e-13."""
+
+
+@dataclass(frozen=True, eq=False)
+class LeastSquares:
+    """A least-squares estimate.
+
+    Attributes
+    ----------
+    unknowns : k parameters; certified ones keep their certified value.
+    value : (k,) estimates; for an undetermined parameter the one nearest to its prior mean of many that fit equally well.
+    covariance : (k, k), with the certificates' uncertainty propagated (JCGM 100, 5.1.2); infinite variance where
+        undetermined.
+    determined : (k,) whether the observations (or a certificate) determine the parameter by itself.
+    null_space : (k, f) combinations, one a column and in the parameters' units, that leave every observation as it is.
+    rank, condition : of the design in units of the parameters' typical sizes; condition of its determined part.
+    residuals : (m,) mm, observed minus explained.
+    degrees_of_freedom : observations minus what was fitted to them.
+    residual_sd : mm, √(sum of squares / degrees of freedom); ``None`` without degrees of freedom.
+    sigma : mm, standard uncertainty of one coordinate that the covariance uses.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    value: Floats
+    covariance: Floats
+    determined: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    null_space: Floats
+    rank: int
+    condition: float
+    residuals: Floats
+    degrees_of_freedom: int
+    residual_sd: float | None
+    sigma: float
+
+
+def solve(model: LinearModel) -> LeastSquares:
+    """Least-squares estimate; certified parameters are held, physical priors are not used.
+
+    Raises
+    ------
+    CmmUqError : fewer observations than parameters, or none left to estimate the noise from.
+    """
+    unknowns, reduced = model.unknowns, model.reduced
+    held = np.array([u.known for u in unknowns])
+    free = np.flatnonzero(~held)
+    _enough(reduced.count, len(free), stated=model.sigma is not None)
+    value = model.prior_mean.copy()
+    scale = np.array([unknowns[i].scale for i in free])
+    target = reduced.observed - reduced.design @ value
+    U, s, Vt = linalg.svd(reduced.design[:, free] * scale, full_matrices=True)
+    rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s.size and s[0] > 0 else 0
+    forward = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T * scale[:, None]
+    value[free] += forward @ target
+    whitened = reduced.observed - reduced.design @ value
+    dof = reduced.count - rank
+    sum_of_squares = float(whitened @ whitened)
+    sigma = model.sigma if model.sigma is not None else float(np.sqrt(sum_of_squares / dof))
+    null_space = np.zeros((len(unknowns), len(free) - rank))
+    null_space[free] = _simplest(Vt[rank:].T) * scale[:, None]
+    for column in null_space.T:
+        column /= column[np.flatnonzero(column)[0]]
+    determined = np.ones(len(unknowns), dtype=bool)
+    determined[free] = np.all(null_space[free] == 0, axis=1)
+    return LeastSquares(
+        unknowns, value, _covariance(model, forward, free, held, sigma, determined), determined, null_space,
+        rank, float(s[0] / s[rank - 1]) if rank else float("inf"), whitened * model.noise_scale, dof,
+        _residual_sd(whitened * model.noise_scale, dof), sigma,
+    )  # fmt: skip
+
+
+def _enough(observations: int, parameters: int, *, stated: bool) -> None:
+    if observations < parameters:
+        raise CmmUqError(
+            f"{observations} observations cannot determine {parameters} parameters",
+            where="recording",
+            fix="Record more placings, or name fewer effects in job.toml [model] effects",
+        )
+    if observations == parameters and not stated:
+        raise CmmUqError(
+            f"{observations} observations for {parameters} parameters leave nothing to estimate the noise from",
+            where="recording",
+            fix="Record more placings, or state u_coordinate_um in job.toml [recording]",
+        )
+
+
+def _residual_sd(residuals: Floats, dof: int) -> float | None:
+    return float(np.sqrt(residuals @ residuals / dof)) if dof > 0 else None
+
+
+def _covariance(
+    model: LinearModel,
+    forward: Floats,
+    free: np.ndarray[tuple[int], np.dtype[np.int64]],
+    held: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    sigma: float,
+    determined: np.ndarray[tuple[int], np.dtype[np.bool_]],
+) -> Floats:
+    """σ² from the noise, plus what the certificates' uncertainty does to the estimates."""
+    k = len(model.unknowns)
+    covariance = np.zeros((k, k))
+    sensitivity = np.zeros((k, int(held.sum())))
+    sensitivity[free] = -forward @ model.reduced.design[:, held]
+    sensitivity[held] = np.eye(int(held.sum()))
+    covariance[np.ix_(free, free)] = sigma**2 * forward @ forward.T
+    covariance += (sensitivity * model.prior_sd[held] ** 2) @ sensitivity.T
+    for i in np.flatnonzero(~determined):
+        covariance[i, i] = np.inf
+    return covariance
+
+
+def _simplest(null_space: Floats) -> Floats:
+    """The same space, each column with a one where no other has anything: reads as few parameters as possible."""
+    if null_space.shape[1] == 0:
+        return null_space
+    _, _, order = linalg.qr(null_space.T, mode="economic", pivoting=True)
+    pivots = order[: null_space.shape[1]]
+    columns = null_space @ linalg.inv(null_space[pivots])
+    return np.where(np.abs(columns) < 1e-8, 0.0, columns)

@@ -1,0 +1,236 @@
+"""The typed contents of a job: what job.toml may say, key by key, and the recording it names."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from cmm_uq.points import Points
+
+ArtefactKind = Literal[
+    "ballbar", "bryan", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere", "plane", "shift"
+]
+Standard = Literal["ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617"]
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Range = Annotated[list[float], Field(min_length=2, max_length=2)]
+Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class _Table(BaseModel):
+    """A table of job.toml: no key beyond the known ones, no text where a number belongs, no NaN."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class JobFacts(_Table):
+    """``[job]``: identification, and free text for the certificate."""
+
+    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=100)]
+    date: datetime.date
+    number: str = ""
+    issued: datetime.date | None = None
+    customer: str = ""
+    address: str = ""
+    place: str = ""
+    operator: str = ""
+    procedure: str = ""
+    order: str = ""
+    conditions: str = ""
+    remarks: str = ""
+
+    @model_validator(mode="after")
+    def _names_a_folder(self) -> Self:
+        if set(self.id) == {"."}:
+            raise ValueError("must name a folder of its own, so it cannot consist of dots")
+        return self
+
+
+class Laboratory(_Table):
+    """``[laboratory]``: who answers for the certificate."""
+
+    name: str = ""
+    address: str = ""
+    accreditation: str = ""
+    signatory: str = ""
+    signatory_role: str = ""
+
+
+class Travel(_Table):
+    """``travel_mm``: lowest and highest scale reading of each axis."""
+
+    x: Range | None = None
+    y: Range | None = None
+    z: Range | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for axis in "xyz":
+            given = getattr(self, axis)
+            if given and not given[0] < given[1]:
+                raise ValueError(f"{axis} = {given}: the first number must be the lower one")
+        return self
+
+
+class ErrorMapFile(_Table):
+    """One error map and the temperature it was taken at."""
+
+    file: str
+    temperature_c: float
+
+
+class SquarenessFacts(_Table):
+    """``squareness_arcsec``: beside an error map."""
+
+    xy: float = 0.0
+    yz: float = 0.0
+    zx: float = 0.0
+
+
+class MachineFacts(_Table):
+    """``[machine]``."""
+
+    name: str
+    manufacturer: str = ""
+    model: str = ""
+    serial: str = ""
+    owner: str = ""
+    chain: Literal["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"] = "XYZ"
+    travel_mm: Travel = Travel()
+    origin_mm: Triple = [0.0, 0.0, 0.0]
+    error_map: list[ErrorMapFile] = []
+    squareness_arcsec: SquarenessFacts | None = None
+
+
+class Traceability(_Table):
+    """The artefact's own certificate."""
+
+    number: str = ""
+    laboratory: str = ""
+    date: datetime.date | None = None
+    due: datetime.date | None = None
+
+
+class KnownLength(_Table):
+    """A known length between two points of a shifted artefact."""
+
+    from_point: Annotated[int, Field(alias="from")]
+    to_point: Annotated[int, Field(alias="to")]
+    length_mm: Positive
+    u_um: NotNegative
+
+
+class ArtefactFacts(_Table):
+    """``[artefact]``; without ``length_mm`` it is uncalibrated."""
+
+    kind: ArtefactKind
+    name: str = ""
+    serial: str = ""
+    length_mm: Positive | None = None
+    u_um: NotNegative | None = None
+    cte_per_k: float = 0.0
+    certificate: Traceability | None = None
+    axis: Literal["x", "y", "z"] | None = None
+    shifts_mm: list[float] = []
+    u_shift_um: NotNegative = 0.0
+    known: KnownLength | None = None
+
+    @model_validator(mode="after")
+    def _uncertainty_of_something(self) -> Self:
+        if self.u_um is not None and self.length_mm is None:
+            raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
+        if abs(self.cte_per_k) > 1e-3:
+            raise ValueError(f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin")
+        return self
+
+
+class RecordingFacts(_Table):
+    """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates."""
+
+    file: str
+    u_coordinate_um: Positive | None = None
+    set_aside: list[int] = []
+
+
+class ModelFacts(_Table):
+    """``[model]``: the physics that the simulation is told about."""
+
+    effects: list[str]
+
+
+class MaximumPermissibleError(_Table):
+    """``mpe``: E = A + L/K, with L in mm and E in µm."""
+
+    a_um: NotNegative
+    k: Positive
+
+
+class GuardBand(_Table):
+    """A guard band of so many expanded uncertainties (ILAC-G8:09/2019, 4.2.2)."""
+
+    guard_band: NotNegative
+
+
+class FalseAccept(_Table):
+    """Accept only when the probability of not conforming is at most this."""
+
+    max_false_accept: Annotated[float, Field(gt=0, lt=1)]
+
+
+Rule = Literal["simple", "ISO 14253-1"] | GuardBand | FalseAccept
+
+
+class ConformityFacts(_Table):
+    """One ``[[conformity]]``: a standard, a limit and a decision rule."""
+
+    standard: Standard
+    limit_um: Positive | None = None
+    mpe: MaximumPermissibleError | None = None
+    rule: Rule = "ISO 14253-1"
+
+    @model_validator(mode="after")
+    def _one_limit(self) -> Self:
+        if (self.limit_um is None) == (self.mpe is None):
+            raise ValueError("give either limit_um or mpe = { a_um = …, k = … }")
+        return self
+
+
+class JobFile(_Table):
+    """All of job.toml."""
+
+    job: JobFacts
+    laboratory: Laboratory = Laboratory()
+    machine: MachineFacts
+    artefact: ArtefactFacts
+    recording: RecordingFacts
+    model: ModelFacts
+    conformity: list[ConformityFacts] = []
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A job as read: its facts, its recording, and the bytes of every file it was read from.
+
+    Parameters
+    ----------
+    folder : where it lies.
+    facts : job.toml.
+    points : the recording.
+    inputs : contents of each input by its path inside the folder, for hashes and attachments.
+    """
+
+    folder: Path
+    facts: JobFile
+    points: Points
+    inputs: Mapping[str, bytes]
+
+    @property
+    def recording_path(self) -> str:
+        """The recording, as messages name it."""
+        return str(self.folder / self.facts.recording.file)

@@ -1,0 +1,159 @@
+"""Reads a recording: a CSV with one row a point.
+
+Every cell is checked where it stands, so that a message can name line and column. What a column of a known name must
+look like is listed here once; any other numeric column is kept as a covariate.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.points import Floats, Machine, Points
+
+REQUIRED = ("measurement", "point", "x_mm", "y_mm", "z_mm")
+OPTIONAL = (
+    "repeat", "reference_mm", "approach_x", "approach_y", "approach_z", "reference_x_mm", "reference_y_mm",
+    "reference_z_mm", "nx", "ny", "nz", "time_s", "temp_x_c", "temp_y_c", "temp_z_c", "temp_artefact_c",
+    "temp_table_top_c", "temp_table_bottom_c", "temp_air_c", "pressure_hpa", "humidity_pct", "speed_mm_s", "gamma_deg",
+    "tip_x_mm", "tip_y_mm", "tip_z_mm", "radius_mm", "fit_rms_um", "n_points",
+)  # fmt: skip
+WHOLE = ("measurement", "point", "repeat")
+QUANTITIES: Mapping[str, str] = MappingProxyType(
+    {re.sub(r"_(mm|um|c|s|hpa|pct|deg|mm_s)$", "", name): name for name in (*REQUIRED, *OPTIONAL)}
+)
+OTHER_UNITS = re.compile(
+    r"_(m|cm|um|µm|mm|nm|in|inch|mil|k|f|c|min|ms|h|s|pa|kpa|hpa|mbar|mmhg|rad|deg|arcsec|pct|percent)$"
+)
+
+
+def read_recording(content: bytes, name: str, machine: Machine) -> Points:
+    """Points of a recording.
+
+    Parameters
+    ----------
+    content : the file's bytes, UTF-8.
+    name : the file's name, for messages.
+    machine : that read them.
+
+    Raises
+    ------
+    CmmUqError : a column is missing or twice there, a cell is no finite number, a row is incomplete, a point is there twice.
+    """
+    header, rows, lines = _cells(content, name)
+    _check_header(header, name)
+    table = {column: _numbers([row[i] for row in rows], column, lines, name) for i, column in enumerate(header)}
+    for column in WHOLE:
+        if column in table:
+            _check_whole(table[column], column, lines, name)
+    for axis in "xyz":
+        column = f"approach_{axis}"
+        if column in table:
+            _check_directions(table[column], column, lines, name)
+    number = {column: table.get(column, np.ones(len(rows))).astype(np.int64) for column in WHOLE}
+    points = Points(
+        np.column_stack([table["x_mm"], table["y_mm"], table["z_mm"]]),
+        number["measurement"], number["point"], number["repeat"], machine,
+        {column: values for column, values in table.items() if column not in (*REQUIRED, "repeat")},
+        np.array(lines, dtype=np.int64),
+    )  # fmt: skip
+    _check_unique(points, name)
+    return points
+
+
+def _cells(content: bytes, name: str) -> tuple[list[str], list[list[str]], list[int]]:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise CmmUqError("is not UTF-8 text", where=f"{name} line {line}", fix="Save the recording as UTF-8") from None
+    if "\0" in text:
+        raise CmmUqError("contains zero bytes: it is no text file", where=name, fix="Export the recording as CSV")
+    reader = csv.reader(io.StringIO(text, newline=""))
+    header: list[str] = []
+    rows, lines = [], []
+    for row in reader:
+        cells = [cell.strip() for cell in row]
+        if not any(cells) or cells[0].startswith("#"):
+            continue
+        if not header:
+            header = cells
+            continue
+        if len(cells) != len(header):
+            raise CmmUqError(
+                f"has {len(cells)} cells where the header has {len(header)}", where=f"{name} line {reader.line_num}",
+                fix="Complete the row; if it is the last one, the file was cut off: export it again",
+            )  # fmt: skip
+        rows.append(cells)
+        lines.append(reader.line_num)
+    if not rows:
+        raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
+    return header, rows, lines
+
+
+def _check_header(header: Sequence[str], name: str) -> None:
+    where = f"{name} line 1"
+    if len(header) == 1 and ";" in header[0]:
+        raise CmmUqError("cells are separated by semicolons", where=where,
+                         fix="Separate them by commas, with a decimal point in numbers")  # fmt: skip
+    for i, column in enumerate(header):
+        if not column:
+            raise CmmUqError(f"column {i + 1} has no name", where=where, fix="Name it, or remove it")
+        if column in header[:i]:
+            raise CmmUqError(f"the column {column!r} is there twice", where=where, fix="Keep one")
+    for column in header:
+        known = QUANTITIES.get(OTHER_UNITS.sub("", column))
+        if known and column not in (*REQUIRED, *OPTIONAL):
+            raise CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where,
+                             fix=f"Convert it and name it {known}")  # fmt: skip
+    for column in REQUIRED:
+        if column not in header:
+            raise CmmUqError(f"no column {column!r}", where=where, fix=suggestion(column, header))
+
+
+def _numbers(cells: Sequence[str], column: str, lines: Sequence[int], name: str) -> Floats:
+    values = np.empty(len(cells))
+    for i, cell in enumerate(cells):
+        try:
+            values[i] = float(cell)
+        except ValueError:
+            shown = f"{cell[:40]!r} is not a number" if cell else "no value"
+            fix = "Write decimals with a point" if "," in cell else "Give a number, or remove the column"
+            raise CmmUqError(shown, where=f"{name} line {lines[i]}, column {column}", fix=fix) from None
+        if not np.isfinite(values[i]):
+            raise CmmUqError(f"{cell!r} is not a finite number", where=f"{name} line {lines[i]}, column {column}",
+                             fix="Measure the point again, or leave out its measurement")  # fmt: skip
+    return values
+
+
+def _check_whole(values: Floats, column: str, lines: Sequence[int], name: str) -> None:
+    bad = np.flatnonzero((values != np.round(values)) | (np.abs(values) > 1e9))
+    if bad.size:
+        raise CmmUqError(f"{values[bad[0]]:g} is not a whole number",
+                         where=f"{name} line {lines[bad[0]]}, column {column}",
+                         fix="Number measurements, points and repeats 1, 2, …")  # fmt: skip
+
+
+def _check_directions(values: Floats, column: str, lines: Sequence[int], name: str) -> None:
+    bad = np.flatnonzero(~np.isin(values, (-1, 0, 1)))
+    if bad.size:
+        raise CmmUqError(f"{values[bad[0]]:g} is no direction", where=f"{name} line {lines[bad[0]]}, column {column}",
+                         fix="The direction of travel into the point is −1, 0 or +1")  # fmt: skip
+
+
+def _check_unique(points: Points, name: str) -> None:
+    seen: dict[tuple[int, int, int], int] = {}
+    keys = zip(points.measurement.tolist(), points.point.tolist(), points.repeat.tolist(), strict=True)
+    for key, line in zip(keys, points.lines.tolist(), strict=True):
+        if key in seen:
+            raise CmmUqError(
+                f"measurement {key[0]}, point {key[1]}, repeat {key[2]} is there twice",
+                where=f"{name} lines {seen[key]} and {line}", fix="Number repeated measurements in a column repeat",
+            )  # fmt: skip
+        seen[key] = line

@@ -1,0 +1,137 @@
+"""What an effect is: a named piece of physics that moves points.
+
+The sign rule is *true = indicated + e*. An effect gives e, in mm, for points read on a machine. Almost every parameter
+enters e linearly; such an effect only gives its :meth:`~Effect.basis`, and Jacobian, evidence and marginal posterior are
+exact linear algebra. What is truly nonlinear (a period) is a *shape* of the basis, to be searched or sampled.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.points import Floats, Points
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that describes how large an effect is.
+
+    Parameters
+    ----------
+    name : with its unit, as in results.json: ``angle_arcsec``.
+    unit : as printed: ``″``.
+    prior_sd : standard deviation that physics allows, about zero, in the same unit.
+    """
+
+    name: str
+    unit: str
+    prior_sd: float
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A nonlinear parameter: it shapes the basis, and lies between two bounds (uniform in its logarithm)."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+class Effect(ABC):
+    """One physical cause of a difference between true and indicated coordinates.
+
+    Attributes
+    ----------
+    name : as in ``[model] effects``.
+    title : in words, for certificates.
+    coefficients : what enters e linearly, k of them.
+    shape : what shapes the basis, if anything.
+    columns : columns that the recording must have.
+    """
+
+    name: str
+    title: str
+    coefficients: tuple[Parameter, ...]
+    shape: tuple[Shape, ...] = ()
+    columns: tuple[str, ...] = ()
+
+    @abstractmethod
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """Displacement e of every point for one unit of each coefficient, (n, 3, k) in mm.
+
+        Raises
+        ------
+        CmmUqError : a column or a machine's figure is missing.
+        """
+
+    @property
+    def reported(self) -> tuple[Parameter | Shape, ...]:
+        """The parameters as reported, in order; the linear ones first unless an effect says otherwise."""
+        return (*self.coefficients, *self.shape)
+
+    def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
+        """Reported parameters of coefficients (..., k) and shapes (..., s), each (...)."""
+        values = np.concatenate([coefficients, shape], axis=-1)
+        return {parameter.name: values[..., i] for i, parameter in enumerate(self.reported)}
+
+    def from_reported(self, parameters: Mapping[str, float]) -> tuple[Floats, tuple[float, ...]]:
+        """Coefficients (k,) and shape of reported parameters.
+
+        Raises
+        ------
+        CmmUqError : a parameter is missing or unknown.
+        """
+        names = [parameter.name for parameter in self.reported]
+        for name in parameters:
+            if name not in names:
+                raise CmmUqError(f"{self.name} has no parameter {name!r}", fix=suggestion(name, names))
+        for name in names:
+            if name not in parameters:
+                raise CmmUqError(f"{self.name} needs the parameter {name!r}")
+        return self._coefficients(parameters), tuple(float(parameters[s.name]) for s in self.shape)
+
+    def _coefficients(self, parameters: Mapping[str, float]) -> Floats:
+        return np.array([parameters[c.name] for c in self.coefficients], dtype=np.float64)
+
+    def displacement(self, points: Points, parameters: Mapping[str, float]) -> Floats:
+        """e of every point for reported parameters, (n, 3) in mm."""
+        coefficients, shape = self.from_reported(parameters)
+        return np.asarray(self.basis(points, shape) @ coefficients, dtype=np.float64)
+
+
+class Harmonic(Effect):
+    """An effect A·sin(… + φ) or A·cos(… + φ): linear in A·cos φ and A·sin φ, reported as amplitude and phase."""
+
+    amplitude: ClassVar[Parameter]
+
+    @property
+    def reported(self) -> tuple[Parameter | Shape, ...]:
+        """Amplitude, shape, phase."""
+        return (self.amplitude, *self.shape, Parameter("phase_rad", "rad", np.pi))
+
+    def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
+        """Amplitude ≥ 0, shape, and phase in (−π, π]."""
+        cosine, sine = coefficients[..., 0], coefficients[..., 1]
+        return {
+            self.amplitude.name: np.hypot(cosine, sine),
+            **{s.name: shape[..., i] for i, s in enumerate(self.shape)},
+            "phase_rad": np.arctan2(sine, cosine),
+        }
+
+    def _coefficients(self, parameters: Mapping[str, float]) -> Floats:
+        amplitude, phase = parameters[self.amplitude.name], parameters["phase_rad"]
+        return np.array([amplitude * np.cos(phase), amplitude * np.sin(phase)])
+
+
+def along(axis: str, component: Floats) -> Floats:
+    """A one-column basis (n, 3, 1) that moves points along one axis by ``component`` (n,), mm."""
+    basis = np.zeros((len(component), 3, 1))
+    basis[:, "xyz".index(axis), 0] = component
+    return basis

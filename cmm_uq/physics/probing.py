@@ -1,0 +1,75 @@
+"""Errors of probing and of the artefact's support: effective radius, lobing, sag of a bar."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmm_uq.physics.effect import Effect, Harmonic, Parameter
+from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.units import MICROMETRE
+
+
+def _normals(points: Points) -> Floats:
+    return np.column_stack([points.column(f"n{a}") for a in AXES])
+
+
+class ProbeRadius(Effect):
+    """Error of the effective stylus radius: true surface point = indicated + r·n."""
+
+    name = "probe_radius"
+    title = "Effective stylus radius"
+    coefficients = (Parameter("um", "µm", 10.0),)
+    columns = ("nx", "ny", "nz")
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        return MICROMETRE * _normals(points)[:, :, None]
+
+
+class ProbeLobing(Harmonic):
+    """Three-lobed pre-travel: true surface point = indicated + A·cos(3θ + φ)·n with θ = atan2(ny, nx)."""
+
+    name = "probe_lobing"
+    title = "Lobing of the probe"
+    amplitude = Parameter("amplitude_um", "µm", 5.0)
+    coefficients = (Parameter("cosine_um", "µm", 5.0), Parameter("sine_um", "µm", 5.0))
+    columns = ("nx", "ny", "nz")
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
+        normals = _normals(points)
+        angle = 3 * np.arctan2(normals[:, 1], normals[:, 0])
+        lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
+        return MICROMETRE * normals[:, :, None] * lobes[:, None, :]
+
+
+class ArtefactSag(Effect):
+    """Bar shortened by its own weight: true length = length − s·cos²(elevation above the table).
+
+    As a displacement it draws the points apart along the bar, in proportion to their place on it, to where they would lie
+    without sag.
+    """
+
+    name = "artefact_sag"
+    title = "Sag of the artefact"
+    coefficients = (Parameter("um", "µm", 10.0),)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        basis = np.zeros((len(points), 3, 1))
+        for group in range(int(points.group.max()) + 1):
+            rows = np.flatnonzero(points.group == group)
+            order = points.point[rows]
+            bar = points.xyz[rows[np.argmax(order)]] - points.xyz[rows[np.argmin(order)]]
+            length = float(np.linalg.norm(bar))
+            if length == 0:
+                continue
+            level = 1 - (bar[2] / length) ** 2
+            place = (points.xyz[rows] - points.xyz[rows].mean(axis=0)) @ bar / length**2
+            basis[rows, :, 0] = MICROMETRE * level * place[:, None] * bar / length
+        return basis
+
+
+EFFECTS: tuple[Effect, ...] = (ProbeRadius(), ProbeLobing(), ArtefactSag())
