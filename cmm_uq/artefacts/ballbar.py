@@ -71,7 +71,7 @@ class Ballbar(Artefact):
 
     def ends(self) -> Floats:
         """Both ends of each bar, (m, 2, 3) mm, in the recorded frame."""
-        return self.points.xyz[self._ends]
+        return np.asarray(self.points.xyz[self._ends], dtype=np.float64)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """See :meth:`Artefact.fit`: same middle, same direction, the bar's length."""
@@ -91,7 +91,7 @@ class Ballbar(Artefact):
 
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`."""
-        return self.expansion[:, None]
+        return np.asarray(self.expansion[:, None], dtype=np.float64)
 
     def _bars(self, xyz: Floats) -> Floats:
         return np.asarray(xyz[self._ends[:, 1]] - xyz[self._ends[:, 0]], dtype=np.float64)

@@ -92,7 +92,7 @@ class Density:
         Q, R = linalg.qr(reduced.design, mode="economic")
         explained = Q.T @ reduced.observed
         rest = reduced.observed - Q @ explained
-        return R, explained, float(rest @ rest), reduced.count
+        return np.asarray(R, dtype=np.float64), explained, float(rest @ rest), reduced.count
 
     @property
     def dimension(self) -> int:
@@ -225,7 +225,7 @@ def _run(
 
 def _independence(coordinates: Floats, random: Any) -> tuple[Floats, Floats]:
     """Proposal from a multivariate t about the origin of the whitened coordinates, with its Hastings ratio."""
-    proposed = _t_draws(*coordinates.shape, random)
+    proposed = _t_draws(len(coordinates), coordinates.shape[1], random)
     return proposed, _t_log_density(coordinates) - _t_log_density(proposed)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
+import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,9 +33,9 @@ class JobFacts(_Table):
     """``[job]``: identification, and free text for the certificate."""
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=100)]
-    date: datetime.date
+    date: dt.date
     number: str = ""
-    issued: datetime.date | None = None
+    issued: dt.date | None = None
     customer: str = ""
     address: str = ""
     place: str = ""
@@ -113,8 +113,8 @@ class Traceability(_Table):
 
     number: str = ""
     laboratory: str = ""
-    date: datetime.date | None = None
-    due: datetime.date | None = None
+    date: dt.date | None = None
+    due: dt.date | None = None
 
 
 class KnownLength(_Table):
@@ -146,7 +146,9 @@ class ArtefactFacts(_Table):
         if self.u_um is not None and self.length_mm is None:
             raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
         if abs(self.cte_per_k) > 1e-3:
-            raise ValueError(f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin")
+            raise ValueError(
+                f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
+            )
         return self
 
 

@@ -70,7 +70,7 @@ def _facts(content: bytes, path: Path) -> JobFile:
         raise CmmUqError(f"is not UTF-8 text (byte {error.start})", where=str(path), fix="Save it as UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
-                         fix="Text stands in quotes, dates as 2026-01-31, decimals with a point")  # fmt: skip
+                         fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip
     try:
         return JobFile.model_validate(data)
     except ValidationError as error:

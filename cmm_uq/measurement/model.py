@@ -12,9 +12,10 @@ own length they add up to the column of that length, and an uncalibrated bar sho
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.errors import CmmUqError
@@ -63,9 +64,11 @@ class MeasurementModel:
     artefact: Artefact
     effects: tuple[Effect, ...]
     sigma: float | None = None
-    used: np.ndarray[tuple[int], np.dtype[np.bool_]] | None = None
+    used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
+        if not len(self.used):
+            object.__setattr__(self, "used", np.ones(len(self.artefact.noise_scale), dtype=bool))
         for effect in self.effects:
             if effect.shape:
                 raise CmmUqError(
@@ -88,7 +91,7 @@ class MeasurementModel:
         return coefficients + sizes
 
     def errors(self, xyz: Floats, coefficients: Floats) -> Floats:
-        """e (n, 3), mm, of points indicated at ``xyz``."""
+        """Errors e (n, 3), mm, of points indicated at ``xyz``."""
         return np.asarray(self._basis(xyz) @ coefficients, dtype=np.float64)
 
     def indicated(self, true_xyz: Floats, coefficients: Floats) -> Floats:
@@ -127,7 +130,7 @@ class MeasurementModel:
 
     def linearised(self, values: Floats) -> LinearModel:
         """The model about parameters (k,): ``observed`` is what they leave unexplained plus what they explain."""
-        artefact, used = self.artefact, self._used()
+        artefact, used = self.artefact, self.used
         coefficients, sizes = self._split(values)
         xyz = artefact.points.xyz
         true = artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
@@ -144,7 +147,9 @@ class MeasurementModel:
         predicted = self.predicted(values)
         return self.artefact.project(predicted, (xyz - predicted)[:, :, None])[:, 0]
 
-    def simulate(self, parameters: Mapping[str, Mapping[str, float]], sizes: Floats, random: np.random.Generator) -> Floats:
+    def simulate(
+        self, parameters: Mapping[str, Mapping[str, float]], sizes: Floats, random: np.random.Generator
+    ) -> Floats:
         """Indicated points (n, 3) of a recording with the placings of this one, effects and noise drawn anew.
 
         Parameters
@@ -158,9 +163,6 @@ class MeasurementModel:
         )
         indicated = self.predicted(np.concatenate([coefficients, sizes]))
         return indicated + (self.sigma or 0.0) * random.standard_normal(indicated.shape)
-
-    def _used(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        return np.ones(len(self.artefact.noise_scale), dtype=bool) if self.used is None else self.used
 
     def _basis(self, xyz: Floats) -> Floats:
         points = self.artefact.points.at(xyz)

@@ -10,10 +10,7 @@ from cmm_uq.physics import drives, probing, rigid_body, thermal
 from cmm_uq.physics.effect import Effect
 
 CATALOGUE = MappingProxyType(
-    {
-        effect.name: effect
-        for effect in (*rigid_body.EFFECTS, *drives.EFFECTS, *thermal.EFFECTS, *probing.EFFECTS)
-    }
+    {effect.name: effect for effect in (*rigid_body.EFFECTS, *drives.EFFECTS, *thermal.EFFECTS, *probing.EFFECTS)}
 )
 """Effects by name."""
 

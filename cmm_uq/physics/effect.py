@@ -101,7 +101,7 @@ class Effect(ABC):
         return np.array([parameters[c.name] for c in self.coefficients], dtype=np.float64)
 
     def displacement(self, points: Points, parameters: Mapping[str, float]) -> Floats:
-        """e of every point for reported parameters, (n, 3) in mm."""
+        """Displacement e of every point for reported parameters, (n, 3) in mm."""
         coefficients, shape = self.from_reported(parameters)
         return np.asarray(self.basis(points, shape) @ coefficients, dtype=np.float64)
 

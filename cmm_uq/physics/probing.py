@@ -42,7 +42,7 @@ class ProbeLobing(Harmonic):
         normals = _normals(points)
         angle = 3 * np.arctan2(normals[:, 1], normals[:, 0])
         lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
-        return MICROMETRE * normals[:, :, None] * lobes[:, None, :]
+        return np.asarray(MICROMETRE * normals[:, :, None] * lobes[:, None, :], dtype=np.float64)
 
 
 class ArtefactSag(Effect):
