@@ -10,7 +10,6 @@ from scipy import special
 
 from cmm_uq.analysis.result import LACK_OF_FIT, Influence, Noise
 from cmm_uq.artefacts.artefact import Artefact
-from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.conformity.accuracy import with_uncertainty
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.errors import CmmUqError
@@ -121,9 +120,9 @@ def noise(posterior: Posterior, stated_um: float | None, p_value: float | None) 
 def accuracy(model: MeasurementModel, estimate: Estimate, posterior: Posterior, seed: int) -> Mapping[str, Quantity]:
     """Figures of performance of all recorded lengths; empty for an artefact that has none."""
     artefact = model.artefact
-    if not isinstance(artefact, Ballbar):
-        return {}
     lengths = artefact.lengths()
+    if lengths is None:
+        return {}
     linear = replace(model, used=np.ones_like(model.used)).linearised(estimate.least_squares.value)
     predicted = lengths - linear.observed + posterior.draws @ linear.design.T
-    return with_uncertainty(lengths, predicted, posterior.sigma * artefact.noise_scale[0], seed)
+    return with_uncertainty(lengths, predicted, posterior.sigma[:, None] * artefact.noise_scale, seed)

@@ -16,6 +16,24 @@ import numpy as np
 from cmm_uq.points import Floats, Ints, Points
 
 
+@dataclass(frozen=True, eq=False)
+class Indications:
+    """Measured lengths against calibrated ones.
+
+    Parameters
+    ----------
+    errors : (m,) measured minus calibrated, mm.
+    lengths : (m,) calibrated lengths, mm.
+    u : (m,) standard uncertainty of the calibrated lengths, mm.
+    nominal_lengths : how many different nominal lengths there are.
+    """
+
+    errors: Floats
+    lengths: Floats
+    u: Floats
+    nominal_lengths: int
+
+
 @dataclass(frozen=True)
 class Size:
     """A dimension of the artefact at 20 °C, itself to be estimated.
@@ -72,6 +90,14 @@ class Artefact(ABC):
     @abstractmethod
     def size_change(self) -> Floats:
         """Change of the observations, (m, s), for one mm of each size."""
+
+    def lengths(self) -> Floats | None:
+        """Lengths (m,), mm at 20 °C, whose scatter is a figure of performance; ``None`` when it has no meaning here."""
+        return None
+
+    def indications(self) -> Indications | None:
+        """Errors of indication of calibrated lengths; ``None`` without a calibration."""
+        return None
 
     def placing(self, xyz: Floats) -> Floats:
         """Change of the observations, (m, q), for each freedom of the artefact's placing that they do not cancel."""

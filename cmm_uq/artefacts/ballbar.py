@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.artefacts.artefact import Artefact, Size
+from cmm_uq.artefacts.artefact import Artefact, Indications, Size
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import Floats, Points
@@ -65,9 +65,13 @@ class Ballbar(Artefact):
         bars = self._bars(self.points.xyz)
         return np.asarray(np.linalg.norm(bars, axis=1) / self.expansion, dtype=np.float64)
 
-    def middles(self) -> Floats:
-        """Middle of each bar, (m, 3) mm, in the recorded frame."""
-        return np.asarray(self.points.xyz[self._ends].mean(axis=1), dtype=np.float64)
+    def indications(self) -> Indications | None:
+        """See :meth:`Artefact.indications`."""
+        size = self.sizes[0]
+        if not size.certified:
+            return None
+        every = np.full(len(self._ends), 1.0)
+        return Indications(self.lengths() - size.nominal, size.nominal * every, size.sd * every, 1)
 
     def ends(self) -> Floats:
         """Both ends of each bar, (m, 2, 3) mm, in the recorded frame."""

@@ -54,7 +54,7 @@ def with_uncertainty(lengths: Floats, predicted: Floats, noise: Floats, seed: in
     ----------
     lengths : (m,) as recorded, mm.
     predicted : (N, m) lengths that draws from the posterior predict, mm, without noise.
-    noise : (N,) standard uncertainty of one length in each draw, mm.
+    noise : (N, m) standard uncertainty of each length in each draw, mm.
     seed : of the repetitions.
     """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
@@ -62,7 +62,7 @@ def with_uncertainty(lengths: Floats, predicted: Floats, noise: Floats, seed: in
     repetitions = random.standard_normal((_REPETITIONS, len(lengths)))
     errors: dict[str, list[Floats]] = {name: [] for name in TITLES}
     for block in np.array_split(chosen, max(1, len(chosen) * repetitions.size // _BLOCK)):
-        repeated = figures(predicted[block, None, :] + noise[block, None, None] * repetitions)
+        repeated = figures(predicted[block, None, :] + noise[block, None, :] * repetitions)
         for name, values in repeated.items():
             errors[name].append((values - values.mean(axis=1, keepdims=True)).ravel())
     return {

@@ -8,15 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.artefacts.artefact import Artefact
-from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.conformity.decision import Decision, decide
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ConformityFacts
+from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 
 ISO_10360_2_LENGTHS = 105
 """Seven positions, five lengths, three repetitions (ISO 10360-2:2009, 6.3)."""
+
+ISO_10360_2_NOMINALS = 5
+"""Different nominal lengths of that test."""
 
 B89_LENGTHS = 20
 """Positions of the ballbar for a near-cubic volume (ASME B89.4.1-1997, 5.5.2)."""
@@ -58,46 +61,54 @@ def statement(facts: ConformityFacts, artefact: Artefact, accuracy: Mapping[str,
     ------
     CmmUqError : the recording is not what the standard is decided on.
     """
-    if not isinstance(artefact, Ballbar) or facts.standard == "ISO 10360-5:2010":
-        raise CmmUqError(f"{facts.standard} is not decided on a {artefact.kind}", where=f"job.toml {key} standard",
-                         fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
-    if facts.standard == "ASME B89.4.1-1997":
+    if facts.standard == "ASME B89.4.1-1997" and artefact.kind == "ballbar":
         return _volumetric_performance(facts, artefact, accuracy)
-    return _error_of_indication(facts, artefact, key)
+    if facts.standard in ("ISO 10360-2:2009", "VDI/VDE 2617"):
+        return _error_of_indication(facts, artefact, key)
+    raise CmmUqError(f"{facts.standard} is not decided on a {artefact.kind}", where=f"job.toml {key} standard",
+                     fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
 
 
-def _volumetric_performance(facts: ConformityFacts, bar: Ballbar, accuracy: Mapping[str, Quantity]) -> Statement:
+def _volumetric_performance(facts: ConformityFacts, artefact: Artefact, accuracy: Mapping[str, Quantity]) -> Statement:
     """Range of the ballbar's lengths (ASME B89.4.1-1997, 5.5.2)."""
     measured = accuracy["b89_range_um"]
-    limit = _limit_um(facts, bar.sizes[0].nominal)
-    count = len(bar.lengths())
-    remarks = () if count >= B89_LENGTHS else (
-        f"The standard asks for at least {B89_LENGTHS} positions; {count} lengths were recorded.",)  # fmt: skip
+    limit = _limits_um(facts, np.array([artefact.sizes[0].nominal]))[0]
+    count = len(artefact.measurement)
+    remark = f"The standard asks for at least {B89_LENGTHS} positions; {count} lengths were recorded."
     decision = decide(measured.value, measured.u, limit, facts.rule)
-    return Statement(facts, "range of the ballbar lengths", measured.value, measured.u, limit, decision, remarks)
+    return Statement(
+        facts, "range of the ballbar lengths", measured.value, measured.u, limit, decision,
+        () if count >= B89_LENGTHS else (remark,),
+    )  # fmt: skip
 
 
-def _error_of_indication(facts: ConformityFacts, bar: Ballbar, key: str) -> Statement:
-    """Largest error of indication against the maximum permissible error (ISO 10360-2:2009, 6.3; VDI/VDE 2617-2.1).
+def _error_of_indication(facts: ConformityFacts, artefact: Artefact, key: str) -> Statement:
+    """The error of indication nearest to (or farthest beyond) its maximum permissible error (ISO 10360-2:2009, 6.3).
 
     Its uncertainty is the test uncertainty (ISO/TS 23165): that of the calibrated length; the machine's own scatter is part
     of what is tested.
     """
-    size = bar.sizes[0]
-    if not size.certified:
-        raise CmmUqError(f"{facts.standard} compares with a calibrated length, and the bar has none",
-                         where=f"job.toml {key} standard", fix="Give length_mm and u_um of the bar in [artefact]")  # fmt: skip
-    errors = np.abs(bar.lengths() - size.nominal) / MICROMETRE
-    value, u = float(errors.max()), size.sd / MICROMETRE
-    limit = _limit_um(facts, size.nominal)
-    remarks = [f"The uncertainty is the test uncertainty (ISO/TS 23165): u of the calibrated length, {u:.3g} µm."]
-    if len(errors) < ISO_10360_2_LENGTHS:
+    found = artefact.indications()
+    if found is None:
+        raise CmmUqError(f"{facts.standard} compares with calibrated lengths, and the {artefact.kind} has none",
+                         where=f"job.toml {key} standard",
+                         fix="Give length_mm and u_um in [artefact], or leave the statement out")  # fmt: skip
+    limits = _limits_um(facts, found.lengths)
+    errors, u = np.abs(found.errors) / MICROMETRE, found.u / MICROMETRE
+    worst = int(np.argmax(errors - limits))
+    remarks = [f"u is the test uncertainty (ISO/TS 23165), from the calibrated length: {u[worst]:.3g} µm."]
+    if len(errors) < ISO_10360_2_LENGTHS or found.nominal_lengths < ISO_10360_2_NOMINALS:
         remarks.append(
-            f"{len(errors)} lengths of one nominal length were recorded; a complete test has {ISO_10360_2_LENGTHS} of five."
+            f"{len(errors)} lengths of {found.nominal_lengths} nominal were recorded; a complete test has "
+            f"{ISO_10360_2_LENGTHS} of {ISO_10360_2_NOMINALS}."
         )
-    decision = decide(value, u, limit, facts.rule)
-    return Statement(facts, "largest error of indication of a length", value, u, limit, decision, tuple(remarks))
+    value, limit = float(errors[worst]), float(limits[worst])
+    decision = decide(value, float(u[worst]), limit, facts.rule)
+    return Statement(facts, "error of indication of length, worst against its limit", value, float(u[worst]), limit,
+                     decision, tuple(remarks))  # fmt: skip
 
 
-def _limit_um(facts: ConformityFacts, length_mm: float) -> float:
-    return facts.limit_um or (facts.mpe.a_um + length_mm / facts.mpe.k if facts.mpe else float("inf"))
+def _limits_um(facts: ConformityFacts, lengths_mm: Floats) -> Floats:
+    if facts.mpe is not None:
+        return np.asarray(facts.mpe.a_um + lengths_mm / facts.mpe.k, dtype=np.float64)
+    return np.full(len(lengths_mm), facts.limit_um, dtype=np.float64)

@@ -1,0 +1,73 @@
+"""What a certificate shows of a ballbar: its lengths by position, and the residuals in the machine's volume."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from cmm_uq.analysis.result import Result
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.certificate.document import Column, Section, Table
+from cmm_uq.certificate.plots import length_plot, volume_plot
+from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.units import MICROMETRE
+
+_ROWS_SHOWN = 60
+
+
+def sections(result: Result) -> list[Section]:
+    """Lengths by position, and residuals in the volume."""
+    bar = cast("Ballbar", result.artefact)
+    lengths, residuals = bar.lengths(), result.residuals / MICROMETRE
+    certified = bar.sizes[0].certified
+    reference = bar.sizes[0].nominal if certified else float(lengths.mean())
+    name = "certified length" if certified else "mean length"
+    deviations = (lengths - reference) / MICROMETRE
+    expanded = 2 * result.noise.coordinate.value * float(bar.noise_scale[0])
+    odd = {m for finding in result.findings for m in finding.measurements}
+    flagged = np.isin(bar.measurement, list(odd))
+    plot = length_plot(
+        bar.measurement.astype(np.float64), deviations, residuals, expanded_before_um=expanded, expanded_after_um=expanded,
+        reference=name, reference_expanded_um=2 * bar.sizes[0].sd / MICROMETRE if certified else 0.0, flagged=flagged,
+        caption=f"Deviation of each length from the {name}, as recorded and after the fitted model, with U (k = 2).",
+        alternative=(
+            f"{len(lengths)} lengths: as recorded they deviate by {deviations.min():.0f} to {deviations.max():.0f} µm from "
+            f"the {name}; after the fitted model {residuals.min():.0f} to {residuals.max():.0f} µm remain."
+        ),
+    )  # fmt: skip
+    ends = bar.ends() + bar.points.machine.origin_mm
+    travel = bar.points.machine.travel_mm
+    volume = volume_plot(
+        ends[:, 0], residuals, end_mm=ends[:, 1], travel_mm=travel if np.all(np.isfinite(travel)) else None,
+        caption="Residuals after the fitted model in the machine's volume (scale readings).",
+        alternative=f"Three projections of the bars; residuals of {residuals.min():.0f} to {residuals.max():.0f} µm.",
+    )  # fmt: skip
+    return [Section("Lengths", (plot, volume, _table(result, bar, deviations, residuals, expanded, name, flagged)))]
+
+
+def _table(
+    result: Result,
+    bar: Ballbar,
+    deviations: np.ndarray[tuple[int], np.dtype[np.float64]],
+    residuals: np.ndarray[tuple[int], np.dtype[np.float64]],
+    expanded: float,
+    name: str,
+    flagged: np.ndarray[tuple[int], np.dtype[np.bool_]],
+) -> Table:
+    rows = []
+    marks = np.where(~result.model.used, "set aside", np.where(flagged, "see warnings", ""))
+    for i, length in enumerate(bar.lengths()[:_ROWS_SHOWN]):
+        shown, _ = rounded(float(length), expanded * MICROMETRE)
+        deviation, _ = rounded(float(deviations[i]), expanded)
+        residual, _ = rounded(float(residuals[i]), expanded)
+        place = f"{bar.measurement[i]}" + (f" ({bar.repeat[i]})" if bar.repeat.max() > 1 else "")
+        rows.append((place, shown, deviation, residual, str(marks[i])))
+    columns = (
+        Column("Position", numeric=False), Column("Length", "mm"), Column(f"From the {name}", "µm"),
+        Column("Residual", "µm"), Column("Remark", numeric=False),
+    )  # fmt: skip
+    left = len(bar.lengths()) - len(rows)
+    note = f"U = {rounded(0.0, expanded)[1]} µm (k = 2) for each length, from the standard uncertainty of a coordinate."
+    notes = (note, f"{left} more lengths are in the attached recording.") if left > 0 else (note,)
+    return Table("Lengths brought to 20 °C", columns, tuple(rows), notes)

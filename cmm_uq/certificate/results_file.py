@@ -1,0 +1,123 @@
+"""results.json: what other programs read of a result."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cmm_uq import __version__
+from cmm_uq.analysis.result import Result
+from cmm_uq.conformity.decision import rule_name
+from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.conformity.standards import Statement
+from cmm_uq.jobs.reading import sha256
+from cmm_uq.mismatch.screening import Finding
+from cmm_uq.units import MICROMETRE
+
+SCHEMA = "cmm-uq/results/1"
+
+
+def results(result: Result) -> dict[str, Any]:
+    """A result as plain data, in the layout of the schema ``cmm-uq/results/1``."""
+    job = result.job
+    return {
+        "schema": SCHEMA,
+        "software": {"name": "cmm-uq", "version": __version__},
+        "job": {"id": job.facts.job.id, "inputs_sha256": sha256(job.inputs)},
+        "estimates": {effect: _quantities(values) for effect, values in result.parameters.items()},
+        "artefact": _quantities(result.sizes),
+        "noise": {
+            "stated_coordinate_um": result.noise.stated_um,
+            "coordinate_um": _quantity(result.noise.coordinate),
+            "p_value": result.noise.p_value,
+            "contradicts_stated": result.noise.contradicts_stated,
+        },
+        "sampling": _sampling(result),
+        "least_squares": _least_squares(result),
+        "identifiability": _identifiability(result),
+        "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
+        "accuracy_uncertainty": {name: _quantity(quantity) for name, quantity in result.accuracy.items()},
+        "conformity": [_statement(statement) for statement in result.statements],
+        "screening": [_finding(finding, result) for finding in result.findings],
+    }
+
+
+def as_json(data: Mapping[str, Any]) -> bytes:
+    """Plain data as UTF-8 JSON with finite numbers of ten digits, so that the last bits of rounding do not show."""
+    return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _quantity(quantity: Quantity) -> dict[str, Any]:
+    return {"value": quantity.value, "u": quantity.u, "interval95": list(quantity.interval95)}
+
+
+def _quantities(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
+    return {name: _quantity(quantity) for name, quantity in quantities.items()}
+
+
+def _sampling(result: Result) -> dict[str, Any]:
+    posterior = result.posterior
+    return {
+        "sampler": posterior.sampler, "seed": posterior.seed, "draws": len(posterior.draws),
+        "ess_min": posterior.ess_min, "rhat_max": posterior.rhat_max, "steps": posterior.steps,
+        "autocorrelation_time": posterior.autocorrelation_time, "converged": posterior.converged,
+    }  # fmt: skip
+
+
+def _least_squares(result: Result) -> dict[str, Any]:
+    ls = result.least_squares
+    estimates: dict[str, dict[str, Any]] = {}
+    for i, unknown in enumerate(ls.unknowns):
+        owner, name = unknown.key
+        known = bool(ls.determined[i])
+        estimates.setdefault(owner, {})[name] = {
+            "value": float(ls.value[i]) if known else None,
+            "u": float(np.sqrt(ls.covariance[i, i])) if known else None,
+        }
+    return {
+        "estimates": estimates,
+        "observations": len(ls.residuals),
+        "degrees_of_freedom": ls.degrees_of_freedom,
+        "residual_rms_um": None if ls.residual_sd is None else ls.residual_sd / MICROMETRE,
+    }
+
+
+def _identifiability(result: Result) -> dict[str, Any]:
+    ls = result.least_squares
+    return {
+        "parameters": int(ls.rank + ls.null_space.shape[1]),
+        "rank": ls.rank,
+        "condition_number": ls.condition if np.isfinite(ls.condition) else None,
+        "undetermined": [
+            {f"{u.key[0]}.{u.key[1]}": float(part) for u, part in zip(ls.unknowns, column, strict=True) if part}
+            for column in ls.null_space.T
+        ],
+        "prior_share": {f"{u.key[0]}.{u.key[1]}": result.prior_share(u.key) for u in ls.unknowns},
+    }
+
+
+def _statement(statement: Statement) -> dict[str, Any]:
+    return {
+        "standard": statement.facts.standard, "quantity": statement.quantity, "value_um": statement.value_um,
+        "limit_um": statement.limit_um, "u_um": statement.u_um, "rule": rule_name(statement.facts.rule),
+        "guard_band_um": statement.decision.guard_band, "decision": statement.decision.outcome,
+        "probability_conforming": statement.decision.probability_conforming, "remarks": list(statement.remarks),
+    }  # fmt: skip
+
+
+def _finding(finding: Finding, result: Result) -> dict[str, Any]:
+    return {
+        "kind": finding.kind, "rows": [str(m) for m in finding.measurements], "lines": list(finding.lines),
+        "file": result.job.facts.recording.file, "why": finding.why, "set_aside": finding.set_aside,
+    }  # fmt: skip
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_rounded(item) for item in value]
+    return float(f"{value:.10g}") if isinstance(value, float) else value

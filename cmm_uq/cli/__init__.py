@@ -1,0 +1,53 @@
+"""The command ``cmm-uq``: one subcommand a file, heavy imports only where they are used."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from types import FrameType
+
+import typer
+
+from cmm_uq.cli import report
+from cmm_uq.errors import CmmUqError
+
+BAD_INPUT = 2
+"""Exit code of everything that the user can mend."""
+
+app = typer.Typer(
+    name="cmm-uq",
+    help="Uncertainty of coordinate measuring machines, and the certificates that state it.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("report")(report.command)
+
+
+@app.callback(invoke_without_command=True)
+def _version(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
+    if version:
+        from cmm_uq import __version__
+
+        typer.echo(f"cmm-uq {__version__}")
+        raise typer.Exit
+
+
+def main() -> None:
+    """Run the command; bad input ends with its message and exit code 2, an interruption without half a report."""
+    signal.signal(signal.SIGTERM, _stop)
+    try:
+        app(prog_name="cmm-uq")
+    except CmmUqError as error:
+        typer.echo(f"cmm-uq: {error}", err=True)
+        sys.exit(BAD_INPUT)
+    except KeyboardInterrupt:
+        typer.echo("cmm-uq: interrupted; nothing was written", err=True)
+        sys.exit(128 + signal.SIGINT)
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    """SIGTERM unwinds like Ctrl-C, so that unfinished files are removed."""
+    typer.echo("cmm-uq: terminated; nothing was written", err=True)
+    sys.exit(128 + number)

@@ -1,0 +1,78 @@
+"""``cmm-uq report JOB``: the certificate of a recording."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from cmm_uq.reporting import Report, Stage
+
+
+def command(
+    job: Annotated[Path, typer.Argument(help="Job folder: job.toml and the recording that it names.")],
+    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>]")] = None,
+    seed: Annotated[
+        int, typer.Option(help="Seed of everything random; the same seed gives the same bytes.", min=0)
+    ] = 0,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print results.json instead of the summary.")] = False,
+) -> None:
+    """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
+    with _progress(quiet=quiet or json) as stage:
+        from cmm_uq.reporting import write_report
+
+        report = write_report(job, out, seed=seed, stage=stage)
+    if json:
+        sys.stdout.write(report.results.decode())
+    elif not quiet:
+        _summarise(report)
+
+
+@contextmanager
+def _progress(*, quiet: bool) -> Iterator[Stage | None]:
+    """A progress bar on a terminal, a line a stage elsewhere, nothing when quiet."""
+    if quiet:
+        yield None
+    elif sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        columns = TextColumn("{task.description:<26}"), BarColumn(), TimeElapsedColumn()
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task("Starting", total=1.0)
+            yield lambda what, part: bar.update(task, description=what, completed=part)
+    else:
+        said: set[str] = set()
+
+        def tell(what: str, part: float) -> None:
+            if what not in said:
+                said.add(what)
+                typer.echo(what, err=True)
+
+        yield tell
+
+
+def _summarise(report: Report) -> None:
+    from cmm_uq.certificate.summary import summary
+
+    rows = summary(report.result) + [(name, str(path), "") for name, path in report.files.items()]
+    if sys.stdout.isatty():
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.table import Table
+
+        table = Table(title=escape(report.result.job.facts.job.id), show_header=False, title_justify="left")
+        for i in range(3):
+            table.add_column(overflow="fold", justify="left", style="bold" if i == 1 else None)
+        for row in rows:
+            table.add_row(*(escape(cell) for cell in row))
+        Console().print(table)
+    else:
+        for row in rows:
+            typer.echo("  ".join(cell for cell in row if cell))

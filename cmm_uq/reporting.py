@@ -1,0 +1,72 @@
+"""From a job folder to its certificate: analyse, compose, write."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from cmm_uq.analysis import Result, analyse
+from cmm_uq.writing import staging, write_whole
+
+Stage = Callable[[str, float], None]
+"""Told what is being done, and the part of the whole that is done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """A written report.
+
+    Parameters
+    ----------
+    result : what was found.
+    results : contents of results.json.
+    files : what was written, by name.
+    """
+
+    result: Result
+    results: bytes
+    files: dict[str, Path]
+
+
+def write_report(job: Path, out: Path | None = None, *, seed: int = 0, stage: Stage | None = None) -> Report:
+    """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
+
+    Parameters
+    ----------
+    job : the job folder.
+    out : where to write; ``reports/<job id>`` by default.
+    seed : of everything random.
+    stage : told of progress.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be analysed, or the folder cannot be written to.
+    """
+    tell = stage or (lambda what, part: None)
+    with ExitStack() as stack:
+        place = stack.enter_context(staging(out)) if out else None
+        tell("Reading the job", 0.0)
+        result = analyse(job, seed=seed, progress=lambda part: tell("Sampling the posterior", 0.1 + 0.4 * part))
+        folder = out or Path("reports") / result.job.facts.job.id
+        place = place or stack.enter_context(staging(folder))
+        contents = _contents(result, tell)
+        tell("Writing", 0.95)
+        files = write_whole(place, folder, contents)
+    tell("Done", 1.0)
+    return Report(result, contents["results.json"], files)
+
+
+def _contents(result: Result, tell: Stage) -> dict[str, bytes]:
+    from cmm_uq.certificate.compose import certificate
+    from cmm_uq.certificate.html import render_html
+    from cmm_uq.certificate.pdf import render_pdf
+    from cmm_uq.certificate.results_file import as_json, results
+
+    tell("Composing the certificate", 0.5)
+    document = certificate(result)
+    data = as_json(results(result))
+    tell("Rendering", 0.8)
+    pdf = render_pdf(document, {**result.job.inputs, "results.json": data})
+    return {"certificate.html": render_html(document).encode(), "certificate.pdf": pdf, "results.json": data}
