@@ -2,11 +2,15 @@
 
 HTML and PDF are two views of one :class:`Document`; every figure stands in it once, already as text, so that the views
 cannot differ. A section is a list of blocks, and a block is one of the small classes below: whoever adds an artefact, a
-budget or a diagnosis composes blocks and touches neither view. Text is plain Unicode without markup; both views escape it.
+budget or a diagnosis composes blocks and touches neither view. Text is plain Unicode without markup; a line feed is a new
+line; both views escape the rest.
 """
 
 from __future__ import annotations
 
+import datetime as dt
+import re
+from collections import Counter
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
@@ -48,6 +52,11 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
     kind: ClassVar[str] = "table"
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(f"table {self.caption!r}: {len(row)} cells under {len(self.columns)} headings: {row}")
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,9 @@ class Document:
     signatures : who authorises.
     attachments : names of the files that travel with the document.
     produced_by : program and version, seed and whatever else is needed to run it again.
+    date : date of issue, which is also the PDF's date; the clock is never read.
+    language : of the text, as BCP 47 tag, for screen readers and hyphenation.
+    end : the mark after the last line.
     """
 
     title: str
@@ -123,11 +135,61 @@ class Document:
     signatures: tuple[Signature, ...]
     attachments: tuple[str, ...]
     produced_by: str
+    date: dt.date | None = None
+    language: str = "en"
+    end: str = "End of certificate"
 
     def as_data(self) -> dict[str, Any]:
-        """The document as plain dicts and lists; every block carries its ``kind``."""
-        data = asdict(self)
+        """The document as plain dicts and lists of printable text, ready for JSON.
+
+        Every block carries its ``kind``; tables and plots also their ``label``, counted through the document
+        ("Table 2", "Figure 1"), so that the views number them alike; columns also their ``need``, the characters of
+        their longest line.
+        """
+        data: dict[str, Any] = _printable(asdict(self))
+        data["date"] = self.date.isoformat() if self.date else None
+        counted: Counter[str] = Counter()
         for section, plain in zip(self.sections, data["sections"], strict=True):
             for block, plain_block in zip(section.blocks, plain["blocks"], strict=True):
                 plain_block["kind"] = block.kind
+                if word := _NUMBERED.get(block.kind):
+                    counted[word] += 1
+                    plain_block["label"] = f"{word} {counted[word]}"
+                if block.kind == "table":
+                    _measure(plain_block)
         return data
+
+
+_NUMBERED = {"table": "Table", "plot": "Figure"}
+
+
+def _measure(table: dict[str, Any]) -> None:
+    """Give every column its longest line in characters; what is longer than any figure is set as text."""
+    for index, column in enumerate(table["columns"]):
+        cells = [column["heading"], column["unit"], *(row[index] for row in table["rows"])]
+        column["need"] = max(4, *(len(line) for cell in cells for line in cell.split("\n")))
+        column["numeric"] = column["numeric"] and column["need"] <= _LONGEST_FIGURE
+
+
+_LONGEST_FIGURE = 28
+
+_REORDERING = re.compile("[\u202a-\u202e\u2066-\u2069]")
+_UNPRINTABLE = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ue000-\uf8ff\ufdd0-\ufdef\ufffe\uffff\U000f0000-\U0010ffff]"
+)
+
+
+def _printable(value: Any) -> Any:
+    """The same data with every text made safe to show.
+
+    What no view may carry (control characters, lone surrogates, private and non-characters, which PDF/A forbids) becomes
+    the replacement character; marks that reorder the text around them (they could turn a figure round) are left out.
+    """
+    if isinstance(value, dict):
+        return {key: _printable(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_printable(item) for item in value]
+    if isinstance(value, str):
+        plain = value.replace("\r\n", "\n").replace("\r", "\n").replace("\t", " ")
+        return _UNPRINTABLE.sub("\ufffd", _REORDERING.sub("", plain))
+    return value
