@@ -1,0 +1,34 @@
+"""Least-squares features: line, plane, circle, sphere, cylinder and cone through measured points.
+
+Every fit minimises the sum of squared orthogonal distances, as ISO 10360-6 tests it, and returns the feature with its
+full covariance, its residuals and its form deviation. This room knows points and nothing of machines.
+"""
+
+from __future__ import annotations
+
+from cmm_uq.geometry.ball_form import BallForm, cap_directions
+from cmm_uq.geometry.circle import Circle, fit_circle
+from cmm_uq.geometry.cone import Cone, fit_cone
+from cmm_uq.geometry.cylinder import Cylinder, fit_cylinder
+from cmm_uq.geometry.feature import Feature
+from cmm_uq.geometry.line import Line, fit_line
+from cmm_uq.geometry.plane import Plane, fit_plane
+from cmm_uq.geometry.sphere import Sphere, fit_sphere
+
+__all__ = [
+    "BallForm",
+    "Circle",
+    "Cone",
+    "Cylinder",
+    "Feature",
+    "Line",
+    "Plane",
+    "Sphere",
+    "cap_directions",
+    "fit_circle",
+    "fit_cone",
+    "fit_cylinder",
+    "fit_line",
+    "fit_plane",
+    "fit_sphere",
+]
