@@ -27,8 +27,8 @@ UNITS: Mapping[str, str] = {
 }  # fmt: skip
 
 _DRAWS = 1000
-_REPETITIONS = 50
-_BLOCK = 2_000_000
+_NUMBERS = 3_000_000
+"""Random numbers to spend on repetitions."""
 
 
 def figures(lengths: Floats) -> dict[str, Floats]:
@@ -59,12 +59,14 @@ def with_uncertainty(lengths: Floats, predicted: Floats, noise: Floats, seed: in
     """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
     chosen = np.linspace(0, len(predicted) - 1, min(_DRAWS, len(predicted))).astype(int)
-    repetitions = random.standard_normal((_REPETITIONS, len(lengths)))
+    repetitions = int(np.clip(_NUMBERS // (len(chosen) * len(lengths)), 10, 100))
+    unbiased = np.sqrt(repetitions / (repetitions - 1))
     errors: dict[str, list[Floats]] = {name: [] for name in TITLES}
-    for block in np.array_split(chosen, max(1, len(chosen) * repetitions.size // _BLOCK)):
-        repeated = figures(predicted[block, None, :] + noise[block, None, :] * repetitions)
+    for block in np.array_split(chosen, 10):
+        scatter = random.standard_normal((len(block), repetitions, len(lengths)))
+        repeated = figures(predicted[block, None, :] + noise[block, None, :] * scatter)
         for name, values in repeated.items():
-            errors[name].append((values - values.mean(axis=1, keepdims=True)).ravel())
+            errors[name].append((unbiased * (values - values.mean(axis=1, keepdims=True))).ravel())
     return {
         name: Quantity.of_draws(float(value) - np.concatenate(errors[name]), UNITS[name], float(value))
         for name, value in figures(lengths).items()

@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""Runs cmm-uq, or its tests, on a machine that has nothing but Python 3.11 or newer.
+
+    python3 start.py report examples/iota-1102-20C     any cmm-uq command
+    python3 start.py test                              lint, types and tests
+
+Makes a virtual environment in .venv (or in the folder that CMM_UQ_ENV names) on the first call and reuses it until
+pyproject.toml changes; the system's Python is left alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+ENVIRONMENT = Path(os.environ.get("CMM_UQ_ENV") or ROOT / ".venv")
+SCRIPTS = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
+
+
+def main(arguments: list[str]) -> int:
+    """Make the environment ready and run what was asked for."""
+    if sys.version_info < (3, 11):
+        print(f"start.py: Python 3.11 or newer is needed, this is {sys.version.split()[0]}", file=sys.stderr)
+        return 2
+    testing = arguments[:1] == ["test"]
+    try:
+        prepare("test" if testing else "")
+        return test(arguments[1:]) if testing else run("cmm-uq", *arguments)
+    except subprocess.CalledProcessError as error:
+        print(f"start.py: {' '.join(map(str, error.cmd))} failed", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+def prepare(extra: str) -> None:
+    """Install the project with an extra, unless just that is installed already."""
+    wanted = hashlib.sha256((ROOT / "pyproject.toml").read_bytes() + str(ROOT).encode()).hexdigest()
+    marks = [ENVIRONMENT / f"installed-{name}" for name in {extra, "test"}]
+    if any(mark.is_file() and mark.read_text() == wanted for mark in marks):
+        return
+    print(f"Preparing {ENVIRONMENT} (once; a few minutes at most) ...", file=sys.stderr, flush=True)
+    if not (ENVIRONMENT / "pyvenv.cfg").is_file():
+        venv.create(ENVIRONMENT, with_pip=True)
+    target = f"{ROOT}[{extra}]" if extra else str(ROOT)
+    pip = [str(SCRIPTS / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, "--editable", target], check=True, stdout=sys.stderr)
+    (ENVIRONMENT / f"installed-{extra}").write_text(wanted)
+
+
+def test(arguments: list[str]) -> int:
+    """Lint, types, tests; all three run even when one fails."""
+    results = [
+        run("ruff", "check"),
+        run("ruff", "format", "--check"),
+        run("mypy"),
+        run("pytest", *(arguments or ["--cov", "--cov-report=term:skip-covered"])),
+    ]
+    return max(results)
+
+
+def run(command: str, *arguments: str) -> int:
+    """Run a command of the environment where the user stands; tests run in the project's folder."""
+    where = None if command == "cmm-uq" else ROOT
+    return subprocess.run([str(SCRIPTS / command), *arguments], cwd=where, check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,98 @@
+"""A job folder is read whole, or refused with file, line or key and the fix."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.reading import read_job, sha256
+
+
+def edit(job: Path, pattern: str, replacement: str) -> Path:
+    """job.toml with the first match of a pattern replaced; the pattern must be there."""
+    path = job / "job.toml"
+    text, count = re.subn(pattern, replacement, path.read_text(encoding="utf-8"), count=1, flags=re.MULTILINE)
+    assert count == 1
+    path.write_text(text, encoding="utf-8")
+    return job
+
+
+def refused(job: Path) -> str:
+    with pytest.raises(CmmUqError) as caught:
+        read_job(job)
+    return str(caught.value)
+
+
+def test_the_example_is_read_with_its_machine_and_points(iota: Path) -> None:
+    job = read_job(iota)
+    assert job.facts.job.id == "iota-1102-20C"
+    assert job.points.xyz.shape == (40, 3)
+    assert job.points.machine.travel("z") == (-500.0, 0.0)
+    np.testing.assert_allclose(job.points.readings[0], [-496.6823 + 805, -134.2409 + 303, 27.7912 - 294])
+    assert set(job.points.columns) == {"radius_mm", "fit_rms_um", "n_points"}
+
+
+def test_the_toml_itself_may_be_named(iota: Path) -> None:
+    assert read_job(iota / "job.toml").facts == read_job(iota).facts
+
+
+def test_every_input_is_hashed(iota: Path) -> None:
+    hashes = sha256(read_job(iota).inputs)
+    expected = hashlib.sha256((iota / "ballbar.csv").read_bytes()).hexdigest()
+    assert hashes.keys() == {"job.toml", "ballbar.csv"}
+    assert hashes["ballbar.csv"] == expected
+
+
+@pytest.mark.parametrize(
+    ("pattern", "replacement", "message"),
+    [
+        (r"^id = .*", "", r"job\.toml line \d+: \[job\] id: is missing\. Add it"),
+        (r"^date = .*", 'date = "yesterday"', r"line \d+: \[job\] date: .*date"),
+        (r"^id = .*", 'id = "../../etc"', r"\[job\] id: string should match"),
+        (r"^id = .*", 'id = ".."', r"cannot consist of dots"),
+        (r"^chain = .*", 'chain = "XYY"', r"\[machine\] chain: input should be 'XYZ'"),
+        (r"x = \[0, 900\]", "x = [900, 0]", r"travel_mm.*first number must be the lower"),
+        (r"^kind = .*", 'kind = "ballbat"', r"\[artefact\] kind: input should be 'ballbar'"),
+        (r"^length_mm = .*", 'length_mm = "404"', r"line \d+: \[artefact\] length_mm: input should be a valid number"),
+        (r"^length_mm = .*", "length_mm = nan", r"length_mm: input should be (a finite number|greater than 0)"),
+        (r"^length_mm = .*", "length_mm = inf", r"length_mm: input should be a finite number"),
+        (r"^length_mm = .*", "", r"u_um is given without length_mm"),
+        (r"^length_mm = .*", "length_mn = 404.2", r"\[artefact\] length_mn: unknown key\. Did you mean 'length_mm'"),
+        (r"^cte_per_k = .*", "cte_per_k = 12", r"12 is no expansion coefficient"),
+        (r"^\[model\]$", "[modle]", r"\[modle\]: unknown key\. Did you mean 'model'|\[model\]: is missing"),
+        (r"^standard = .*", 'standard = "ISO 9001"', r"\[conformity\] 0\.standard: input should be 'ASME"),
+        (r"^rule = .*", 'rule = "lenient"', r"\[conformity\] 0\.rule"),
+        (r"^limit_um = .*", "", r"give either limit_um or mpe"),
+        (r"^limit_um = .*", "limit_um = -1", r"limit_um: input should be greater than 0"),
+        (r"^\[job\]$", "[job", r"is not valid TOML"),
+        (r"^file = .*", 'file = "../ballbar.csv"', r"is not inside the job folder"),
+        (r"^file = .*", 'file = "barbell.csv"', r"barbell\.csv: no such file"),
+    ],
+)  # fmt: skip
+def test_a_wrong_job_is_refused_with_its_place(job: Path, pattern: str, replacement: str, message: str) -> None:
+    assert re.search(message, refused(edit(job, pattern, replacement)))
+
+
+def test_the_named_line_is_the_one_with_the_mistake(job: Path) -> None:
+    message = refused(edit(job, r"^u_um = .*", 'u_um = "five"'))
+    line = int(re.search(r"line (\d+)", message)[1])
+    assert (job / "job.toml").read_text(encoding="utf-8").splitlines()[line - 1] == 'u_um = "five"'
+
+
+def test_a_folder_without_a_job_is_refused(tmp_path: Path) -> None:
+    assert "job.toml: no such file" in refused(tmp_path)
+
+
+def test_a_job_that_is_no_text_is_refused(job: Path) -> None:
+    (job / "job.toml").write_bytes(b"\xff\xfe[job]")
+    assert "is not UTF-8 text" in refused(job)
+
+
+@pytest.mark.parametrize("rule", ['"simple"', '"ISO 14253-1"', "{ guard_band = 0.8 }", "{ max_false_accept = 0.02 }"])
+def test_every_decision_rule_is_understood(job: Path, rule: str) -> None:
+    assert read_job(edit(job, r"^rule = .*", f"rule = {rule}")).facts.conformity[0].rule

@@ -1,0 +1,74 @@
+"""A recording's cells are checked where they stand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.recording import read_recording
+from cmm_uq.points import Machine, Points
+
+HEADER = "measurement,point,x_mm,y_mm,z_mm"
+
+
+def read(text: str) -> Points:
+    return read_recording(text.encode(), "bar.csv", Machine())
+
+
+def test_points_carry_their_lines_groups_and_covariates() -> None:
+    points = read(f"{HEADER},repeat,mood\n# a comment\n3,1,1,2,3,1,7\n\n3,2,4,5,6,1,8\n3,1,1,2,3,2,9\n")
+    assert points.lines.tolist() == [3, 5, 6]
+    assert points.group.tolist() == [0, 0, 1]
+    assert points.column("mood").tolist() == [7, 8, 9]
+
+
+def test_a_byte_order_mark_and_windows_lines_do_no_harm() -> None:
+    assert read("\ufeff" + f"{HEADER}\r\n1,1,1,2,3\r\n").xyz.tolist() == [[1, 2, 3]]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "has no rows"),
+        (HEADER, "has no rows"),
+        ("measurement,point,x_mm,y_mm\n1,1,2,3", r"bar.csv line 1: no column 'z_mm'"),
+        ("measurement,point,x_mm,y_mm,z_um\n1,1,2,3,4", r"the column 'z_um' is not in the unit of 'z_mm'"),
+        ("measurement,point,x_mm,y_mm,z_mm,temp_x_k\n1,1,2,3,4,293", r"'temp_x_k' is not in the unit of 'temp_x_c'"),
+        ("measurement,point,x,y,z\n1,1,2,3,4", r"'x' is not in the unit of 'x_mm'"),
+        (f"{HEADER},x_mm\n1,1,1,2,3,4", r"the column 'x_mm' is there twice"),
+        (f"{HEADER},\n1,1,1,2,3,4", r"column 6 has no name"),
+        (f"{HEADER}\n1,1,1,2,3\n1,2,1,2", r"line 3: has 4 cells where the header has 5"),
+        (f"{HEADER}\n1,1,1,two,3", r"line 2, column y_mm: 'two' is not a number"),
+        (f'{HEADER}\n1,1,1,"2,5",3', r"column y_mm: '2,5' is not a number. Write decimals with a point"),
+        (f"{HEADER}\n1,1,1,,3", r"column y_mm: no value"),
+        (f"{HEADER}\n1,1,1,NaN,3", r"column y_mm: 'NaN' is not a finite number"),
+        (f"{HEADER}\n1,1,1,-inf,3", r"column y_mm: '-inf' is not a finite number"),
+        (f"{HEADER}\n1.5,1,1,2,3", r"column measurement: 1.5 is not a whole number"),
+        (f"{HEADER}\n1,1,1,2,3\n1,1,4,5,6", r"lines 2 and 3: measurement 1, point 1, repeat 1 is there twice"),
+        (f"{HEADER},approach_x\n1,1,1,2,3,0.5", r"0.5 is no direction"),
+        (HEADER.replace(",", ";") + "\n1;1;1;2;3", r"cells are separated by semicolons"),
+        (f"{HEADER}\n1,1,1,2,\0", r"no text file"),
+    ],
+)
+def test_a_spoiled_recording_is_refused_with_its_place(text: str, message: str) -> None:
+    with pytest.raises(CmmUqError, match=message):
+        read(text)
+
+
+def test_bytes_that_are_no_text_are_refused_with_their_line() -> None:
+    with pytest.raises(CmmUqError, match="line 2: is not UTF-8"):
+        read_recording(f"{HEADER}\n".encode() + b"1,1,\xff,2,3\n", "bar.csv", Machine())
+
+
+@given(st.text(max_size=300))
+def test_no_text_leads_to_anything_but_points_or_a_clear_error(text: str) -> None:
+    try:
+        points = read(f"{HEADER}\n{text}")
+    except CmmUqError:
+        return
+    except UnicodeEncodeError:
+        return
+    assert np.all(np.isfinite(points.xyz))

@@ -1,0 +1,33 @@
+"""Recordings made for tests: exact constructions, without any use of the code under test."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.points import Floats, Machine, Points
+
+TRAVEL = np.array([[0.0, 900.0], [0.0, 550.0], [-500.0, 0.0]])
+"""Of the DEA Iota 1102, mm."""
+
+
+def bars(random: np.random.Generator, count: int, length: float, machine: Machine) -> Points:
+    """A bar in random places inside the machine's travel."""
+    direction = random.standard_normal((count, 3))
+    half = 0.5 * length * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    room = TRAVEL[:, 1] - TRAVEL[:, 0] - 2 * np.abs(half)
+    low = TRAVEL[:, 0] + np.abs(half)
+    middle = low + np.maximum(room, 0) * random.random((count, 3))
+    xyz = np.stack([middle - half, middle + half], axis=1).reshape(-1, 3)
+    number = np.repeat(np.arange(1, count + 1), 2)
+    return Points(xyz, number, np.tile([1, 2], count), np.ones_like(number), machine, {}, np.arange(2, 2 * count + 2))
+
+
+def bar_facts(length_mm: float | None = 400.0, u_um: float | None = 0.5) -> ArtefactFacts:
+    return ArtefactFacts(kind="ballbar", length_mm=length_mm, u_um=None if length_mm is None else u_um)
+
+
+def with_columns(points: Points, **columns: Floats) -> Points:
+    """The same points with further recorded columns."""
+    return Points(points.xyz, points.measurement, points.point, points.repeat, points.machine,
+                  {**points.columns, **columns}, points.lines)  # fmt: skip
