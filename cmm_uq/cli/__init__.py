@@ -36,18 +36,16 @@ def _version(version: bool = typer.Option(False, "--version", help="Print the ve
 
 def main() -> None:
     """Run the command; bad input ends with its message and exit code 2, an interruption without half a report."""
-    signal.signal(signal.SIGTERM, _stop)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _stop)
     try:
         app(prog_name="cmm-uq")
     except CmmUqError as error:
         typer.echo(f"cmm-uq: {error}", err=True)
         sys.exit(BAD_INPUT)
-    except KeyboardInterrupt:
-        typer.echo("cmm-uq: interrupted; nothing was written", err=True)
-        sys.exit(128 + signal.SIGINT)
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
-    """SIGTERM unwinds like Ctrl-C, so that unfinished files are removed."""
-    typer.echo("cmm-uq: terminated; nothing was written", err=True)
+    """Ctrl-C and SIGTERM unwind the stack, so that unfinished files are removed."""
+    typer.echo("cmm-uq: interrupted; nothing was written", err=True)
     sys.exit(128 + number)

@@ -1,0 +1,175 @@
+"""The command as a user meets it: real processes, real files, real interruptions."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pikepdf
+import pytest
+
+COMMAND = [sys.executable, "-m", "cmm_uq"]
+FILES = ["certificate.html", "certificate.pdf", "results.json"]
+
+
+def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, cwd=cwd,
+                          encoding="utf-8")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
+    folder = tmp_path_factory.mktemp("empty")
+    example = Path(__file__).parents[2] / "examples" / "iota-1102-20C"
+    return folder, run("report", example, cwd=folder)
+
+
+def test_it_writes_three_files_below_reports(done: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
+    folder, process = done
+    assert process.returncode == 0, process.stderr
+    assert sorted(path.name for path in (folder / "reports" / "iota-1102-20C").iterdir()) == FILES
+
+
+def test_it_ends_with_a_summary_in_plain_lines(done: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
+    _, process = done
+    assert "404.2051" in process.stdout
+    assert "FAIL" in process.stdout
+    assert "certificate.pdf" in process.stdout
+    assert "\x1b" not in process.stdout + process.stderr
+    assert "Sampling the posterior" in process.stderr
+
+
+def test_the_pdf_carries_the_job_and_the_results(
+    done: tuple[Path, subprocess.CompletedProcess[str]], iota: Path
+) -> None:
+    folder, _ = done
+    report = folder / "reports" / "iota-1102-20C"
+    with pikepdf.open(report / "certificate.pdf") as pdf:
+        attached = {name: pdf.attachments[name].get_file().read_bytes() for name in pdf.attachments}
+    assert attached["results.json"] == (report / "results.json").read_bytes()
+    assert attached["job.toml"] == (iota / "job.toml").read_bytes()
+    assert attached["ballbar.csv"] == (iota / "ballbar.csv").read_bytes()
+
+
+def test_a_second_run_gives_the_same_bytes(
+    done: tuple[Path, subprocess.CompletedProcess[str]], iota: Path, tmp_path: Path
+) -> None:
+    folder, _ = done
+    assert run("report", iota, "--out", tmp_path / "again", "--quiet").returncode == 0
+    for name in FILES:
+        assert (tmp_path / "again" / name).read_bytes() == (folder / "reports" / "iota-1102-20C" / name).read_bytes()
+
+
+def test_json_goes_to_standard_output_and_quiet_says_nothing(iota: Path, tmp_path: Path) -> None:
+    printed = run("report", iota, "--out", tmp_path / "out", "--json", "--seed", "3")
+    data = json.loads(printed.stdout)
+    assert data["sampling"]["seed"] == 3
+    assert printed.stdout.encode() == (tmp_path / "out" / "results.json").read_bytes()
+    assert printed.stderr == ""
+
+
+def test_a_job_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> None:
+    process = run("report", tmp_path / "nothing", cwd=tmp_path)
+    assert process.returncode == 2
+    assert "no such file" in process.stderr
+    assert "Traceback" not in process.stderr
+    assert not (tmp_path / "reports").exists()
+
+
+def test_bad_input_leaves_nothing_behind(job: Path, tmp_path: Path) -> None:
+    path = job / "ballbar.csv"
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("404", "x", 1).replace("-496.6823", "nan", 1), encoding="utf-8"
+    )
+    process = run("report", job, "--out", tmp_path / "out")
+    assert process.returncode == 2
+    assert "line 2, column x_mm: 'nan' is not a finite number" in process.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="needs a user whom permissions bind")
+def test_an_unwritable_folder_is_refused_before_anything_is_computed(iota: Path, tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    process = run("report", iota, "--out", tmp_path / "out")
+    tmp_path.chmod(0o700)
+    assert process.returncode == 2
+    assert "Permission denied" in process.stderr
+
+
+def test_a_file_where_the_folder_should_be_is_refused(iota: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    process = run("report", iota, "--out", tmp_path / "out")
+    assert process.returncode == 2
+    assert "is a file, not a folder" in process.stderr
+    assert "Sampling" not in process.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_leaves_no_half_report(iota: Path, tmp_path: Path, number: signal.Signals) -> None:
+    out = tmp_path / "out"
+    with subprocess.Popen(
+        [*COMMAND, "report", str(iota), "--out", str(out)], stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if "Composing" in line:
+                break
+        process.send_signal(number)
+        rest = process.stderr.read()
+    assert process.returncode == 128 + number
+    assert "nothing was written" in rest
+    assert "Traceback" not in rest
+    assert not out.exists()
+
+
+def test_a_wrong_option_is_answered_with_exit_code_2(iota: Path) -> None:
+    assert run("report", iota, "--seed", "-1").returncode == 2
+    assert run("reprot", iota).returncode == 2
+
+
+def test_the_command_imports_nothing_heavy_to_show_its_help() -> None:
+    code = (
+        "import sys, cmm_uq.cli; "
+        "heavy = {'numpy', 'scipy', 'pandas', 'matplotlib', 'emcee', 'arviz', 'pydantic', 'jinja2', 'typst'}; "
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_the_version_is_printed() -> None:
+    from cmm_uq import __version__
+
+    assert run("--version").stdout.strip() == f"cmm-uq {__version__}"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals of POSIX")
+def test_on_a_terminal_there_is_a_table_and_progress(iota: Path, tmp_path: Path) -> None:
+    import pty
+
+    master, slave = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100"}
+    process = subprocess.Popen([*COMMAND, "report", str(iota), "--out", str(tmp_path / "out")], stdout=slave, stderr=slave,
+                               env=environment, close_fds=True)  # fmt: skip
+    os.close(slave)
+    shown = b""
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline:
+        try:
+            chunk = os.read(master, 65536)
+        except OSError:
+            break
+        if not chunk:
+            break
+        shown += chunk
+    assert process.wait() == 0
+    text = shown.decode()
+    assert "\x1b[" in text
+    assert "Sampling the posterior" in text
+    assert "┏" in text or "│" in text
