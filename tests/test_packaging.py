@@ -1,0 +1,47 @@
+"""The wheel is complete by itself: it writes a certificate from an empty folder, far from the checkout."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+
+@pytest.fixture(scope="module")
+def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
+        check=True, capture_output=True, cwd=ROOT,
+    )  # fmt: skip
+    (wheel,) = folder.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder / "site")
+    return folder / "site"
+
+
+def test_the_wheel_holds_the_templates_and_its_type_marker(unpacked: Path) -> None:
+    packed = {path.name for path in (unpacked / "cmm_uq" / "templates").iterdir()}
+    assert packed == {path.name for path in (ROOT / "templates").iterdir()}
+    assert (unpacked / "cmm_uq" / "py.typed").is_file()
+    assert not (unpacked / "tests").exists()
+
+
+def test_it_reports_from_an_empty_folder(unpacked: Path, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples" / "iota-1102-20C", tmp_path / "job")
+    script = (
+        "import sys, cmm_uq; assert 'site' in cmm_uq.__file__, cmm_uq.__file__; from cmm_uq.cli import main; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, "report", "job"], cwd=tmp_path, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(unpacked)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "reports" / "iota-1102-20C" / "certificate.pdf").read_bytes().startswith(b"%PDF")
