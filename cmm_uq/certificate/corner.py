@@ -113,7 +113,7 @@ def _ranges(draws: Floats) -> Floats:
 def _smooth(counts: Floats) -> Floats:
     """Counts along one or two axes smoothed by a Gaussian that is wider the fewer they are (Scott's n^(−1/6))."""
     index = np.arange(_BINS)
-    width = np.clip(0.19 * _BINS * counts.sum() ** (-1 / 6), 0.8, 0.08 * _BINS)
+    width = np.clip(0.22 * _BINS * counts.sum() ** (-1 / 6), 0.8, 0.08 * _BINS)
     kernel = np.exp(-0.5 * ((index[:, None] - index) / width) ** 2)
     kernel /= kernel.sum(axis=0)
     smoothed: Floats = kernel @ counts
@@ -168,7 +168,8 @@ class _Panels:
             y = base + _HEADROOM * _SCALE * density / density.max()
             inside = self.across(k, intervals[k])
             within = np.concatenate([inside[:1], x[(x > inside[0]) & (x < inside[1])], inside[1:]])
-            self.ax.fill_between(within, base, np.interp(within, x, y), color=ACCENT, alpha=0.18, lw=0)
+            under = np.concatenate([[base], np.interp(within, x, y), [base]])
+            self.ax.fill(within[[0, *range(len(within)), -1]], under, color=ACCENT, alpha=0.18, lw=0)
             self.ax.plot(x, y, color=ACCENT, lw=1.1)
             self.ax.plot(np.repeat(self.across(k, estimates[k]), 2), [base, base + _SCALE], color=INK, lw=0.7)
 
@@ -244,7 +245,7 @@ def _ticks(low: float, high: float, most: int) -> tuple[Floats, list[str]]:
     """Round figures inside a range, and their texts with as many decimals as tell them apart."""
     from matplotlib.ticker import MaxNLocator
 
-    room = 0.03 * (high - low)
+    room = 0.08 * (high - low)
     for intervals in range(most, most + 6):
         every = np.asarray(MaxNLocator(intervals, steps=[1, 2, 5, 10]).tick_values(low, high))
         values = every[(every >= low + room) & (every <= high - room)]

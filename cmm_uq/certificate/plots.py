@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmm_uq.certificate.corner import corner_plot
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plot_style import (
     ACCENT,
@@ -32,8 +31,6 @@ from cmm_uq.certificate.plot_style import (
     new_figure,
 )
 from cmm_uq.errors import CmmUqError
-
-__all__ = ["budget_bars", "corner_plot", "curve_with_band", "length_plot", "volume_plot"]
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -184,7 +181,7 @@ _PANELS = ((0, 1), (0, 2), (1, 2))
 def _projections(spans: Floats) -> tuple[Figure, list[Axes], Axes]:
     """Three panels side by side on one base line and to one scale, and a strip below for the colours."""
     across, up = [spans[a] for a, _ in _PANELS], [spans[b] for _, b in _PANELS]
-    label, right, base = 14.0, 1.5, 25.0  # mm beside each panel, at the right edge, below the panels
+    label, right, base = 14.0, 4.0, 25.0  # mm beside each panel, at the right edge, below the panels
     scale = min((WIDTH_MM - 3 * label - right) / sum(across), 70.0 / max(up))
     height = base + scale * max(up) + 2.0
     figure = new_figure(height)
@@ -244,8 +241,9 @@ def curve_with_band(
     with house_style():
         figure = new_figure(72)
         ax = figure.subplots()
-        figure.subplots_adjust(left=0.085, right=0.99, bottom=0.14, top=0.97)
-        ax.fill_between(across, values - half, values + half, color=ACCENT, alpha=0.16, lw=0)
+        figure.subplots_adjust(left=0.085, right=0.975, bottom=0.14, top=0.97)
+        around = np.append(values - half, (values + half)[::-1])
+        ax.fill(np.append(across, across[::-1]), around, color=ACCENT, alpha=0.16, lw=0)
         ax.plot(across, values, color=ACCENT, lw=1.3)
         ax.axhline(0, color=INK, lw=0.6, zorder=1)
         if points is not None:
