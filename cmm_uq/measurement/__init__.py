@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from cmm_uq.measurement.model import Estimate, MeasurementModel
+from cmm_uq.measurement.model import Estimate, MeasurementModel, Noise
 
-__all__ = ["Estimate", "MeasurementModel"]
+__all__ = ["Estimate", "MeasurementModel", "Noise"]

@@ -11,7 +11,7 @@ own length they add up to the column of that length, and an uncalibrated bar sho
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,6 +45,14 @@ class Estimate:
     linear: LinearModel
 
 
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of a coordinate, mm: of each reading, and of each placing (which its repeats share)."""
+
+    coordinate: float = 0.0
+    placing: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class MeasurementModel:
     """Effects acting on the points of an artefact.
@@ -52,25 +60,27 @@ class MeasurementModel:
     Parameters
     ----------
     artefact : with its recording.
-    effects : what acts; only effects without shape parameters.
+    effects : what acts.
     sigma : standard uncertainty of one recorded coordinate, mm; ``None`` when it is to be estimated.
     used : (m,) which observations to use; all by default.
+    shapes : nonlinear parameters, held, of the effects that have some, by the effect's name.
 
     Raises
     ------
-    CmmUqError : an effect has a nonlinear parameter.
+    CmmUqError : the nonlinear parameter of an effect is not given.
     """
 
     artefact: Artefact
     effects: tuple[Effect, ...]
     sigma: float | None = None
     used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not len(self.used):
             object.__setattr__(self, "used", np.ones(len(self.artefact.noise_scale), dtype=bool))
         for effect in self.effects:
-            if effect.shape:
+            if effect.shape and effect.name not in self.shapes:
                 raise CmmUqError(
                     f"{effect.name} has the nonlinear parameter {effect.shape[0].name}, which a report does not estimate",
                     where="job.toml [model] effects", fix="Leave it out",
@@ -147,26 +157,25 @@ class MeasurementModel:
         predicted = self.predicted(values)
         return self.artefact.project(predicted, (xyz - predicted)[:, :, None])[:, 0]
 
-    def simulate(
-        self, parameters: Mapping[str, Mapping[str, float]], sizes: Floats, random: np.random.Generator
-    ) -> Floats:
-        """Indicated points (n, 3) of a recording with the placings of this one, effects and noise drawn anew.
+    def simulate(self, coefficients: Floats, sizes: Floats, noise: Noise, random: np.random.Generator) -> Floats:
+        """Indicated points (n, 3), mm, of a recording with the placings of this one, errors and noise drawn anew.
 
         Parameters
         ----------
-        parameters : reported parameters of each effect, by name.
-        sizes : (s,) true sizes, mm.
-        random : source of the noise of ``sigma`` on every coordinate; without a stated ``sigma`` there is none.
+        coefficients : (k,) of the effects, in order.
+        sizes : (s,) true sizes of the artefact, mm.
+        noise : standard deviations.
+        random : their source.
         """
-        coefficients = np.concatenate(
-            [effect.from_reported(parameters[effect.name])[0] for effect in self.effects] or [np.zeros(0)]
-        )
-        indicated = self.predicted(np.concatenate([coefficients, sizes]))
-        return indicated + (self.sigma or 0.0) * random.standard_normal(indicated.shape)
+        points = self.artefact.points
+        _, placing = np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)
+        offsets = noise.placing * random.standard_normal((placing.max() + 1, 3))
+        scatter = noise.coordinate * random.standard_normal(points.xyz.shape)
+        return self.predicted(np.concatenate([coefficients, sizes])) + offsets[placing.ravel()] + scatter
 
     def _basis(self, xyz: Floats) -> Floats:
         points = self.artefact.points.at(xyz)
-        bases = [effect.basis(points) for effect in self.effects]
+        bases = [effect.basis(points, self.shapes.get(effect.name, ())) for effect in self.effects]
         return np.concatenate(bases, axis=2) if bases else np.zeros((len(points), 3, 0))
 
     def _split(self, values: Floats) -> tuple[Floats, Floats]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,23 +11,19 @@ from hypothesis import strategies as st
 
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.errors import CmmUqError
-from cmm_uq.measurement import MeasurementModel
+from cmm_uq.measurement import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine, Points
 from tests.recordings import TRAVEL, bar_facts, bars
 
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
-TRUTH = {
-    "scale_x": {"ppm": 250.0}, "scale_y": {"ppm": -90.0}, "scale_z": {"ppm": 30.0},
-    "squareness_xy": {"angle_arcsec": -173.0}, "squareness_yz": {"angle_arcsec": -19.0},
-    "squareness_zx": {"angle_arcsec": 210.0},
-}  # fmt: skip
-VALUES = np.array([next(iter(p.values())) for p in TRUTH.values()])
+VALUES = np.array([250.0, -90.0, 30.0, -173.0, -19.0, 210.0])
 
 
 def simulated(points: Points, true_length: float, sigma: float = 0.0, seed: int = 0) -> Points:
-    model = MeasurementModel(Ballbar(bar_facts(), points), effects(SIX), sigma or None)
-    return points.at(model.simulate(TRUTH, np.array([true_length]), np.random.default_rng(seed)))
+    model = MeasurementModel(Ballbar(bar_facts(), points), effects(SIX))
+    random = np.random.default_rng(seed)
+    return points.at(model.simulate(VALUES, np.array([true_length]), Noise(coordinate=sigma), random))
 
 
 def estimated(points: Points, length: float | None = 400.0, sigma: float | None = 1e-3) -> MeasurementModel:
@@ -115,6 +113,27 @@ def test_measurements_set_aside_do_not_count(ballbar_points: Points) -> None:
     assert abs(model.residuals(found.value)[0]) > 0.1
 
 
-def test_an_effect_with_a_period_is_not_estimated_here(ballbar_points: Points) -> None:
+def test_a_placing_is_off_by_the_same_in_all_its_repeats(ballbar_points: Points) -> None:
+    twice = replace(
+        ballbar_points,
+        xyz=np.repeat(ballbar_points.xyz, 2, axis=0),
+        measurement=np.repeat(ballbar_points.measurement, 2),
+        point=np.repeat(ballbar_points.point, 2),
+        repeat=np.tile([1, 2], len(ballbar_points)),
+        lines=np.zeros(0, dtype=np.int64),
+    )
+    model = MeasurementModel(Ballbar(bar_facts(), twice), effects([]))
+    drawn = model.simulate(np.zeros(0), np.array([400.0]), Noise(placing=2e-3), np.random.default_rng(3)) - twice.xyz
+    np.testing.assert_array_equal(drawn[::2], drawn[1::2])
+    assert drawn.std() == pytest.approx(2e-3, rel=0.2)
+
+
+def test_an_effect_with_a_period_needs_that_period(ballbar_points: Points) -> None:
+    artefact = Ballbar(bar_facts(), ballbar_points)
+    held = MeasurementModel(artefact, effects(["periodic_scale_x"]), shapes={"periodic_scale_x": (40.0,)})
+    assert held.estimate().least_squares.rank == 2
+
+
+def test_a_period_is_not_estimated_here(ballbar_points: Points) -> None:
     with pytest.raises(CmmUqError, match="nonlinear parameter period_mm"):
         MeasurementModel(Ballbar(bar_facts(), ballbar_points), effects(["periodic_scale_x"]))

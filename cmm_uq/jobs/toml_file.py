@@ -1,0 +1,93 @@
+"""TOML files as checked objects, with errors that name line and key."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from cmm_uq.errors import CmmUqError, suggestion
+
+Facts = TypeVar("Facts", bound=BaseModel)
+
+
+def checked(content: bytes, path: Path, model: type[Facts]) -> Facts:
+    """The contents of a TOML file as a checked object.
+
+    Parameters
+    ----------
+    content : the file's bytes, UTF-8.
+    path : of the file, for messages.
+    model : what it must say.
+
+    Raises
+    ------
+    CmmUqError : it is no TOML, or says something unknown, missing or contradictory; with line and key.
+    """
+    try:
+        text = content.decode("utf-8-sig")
+        data = tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        raise CmmUqError(f"is not UTF-8 text (byte {error.start})", where=str(path), fix="Save it as UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
+                         fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise _located(error.errors(include_url=False)[0], text, path, model) from None
+
+
+def _located(error: ErrorDetails, text: str, path: Path, model: type[BaseModel]) -> CmmUqError:
+    """The first validation error, with line and key."""
+    keys = [str(part) for part in error["loc"] if not (isinstance(part, str) and "[" in part)]
+    named = [key for key in keys if not re.match(r"^(GuardBand|FalseAccept|literal)", key)]
+    line = _line_of(named, text)
+    where = f"{path}{f' line {line}' if line else ''}: [{named[0]}]{' ' + '.'.join(named[1:]) if named[1:] else ''}"
+    if error["type"] == "missing":
+        return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}")
+    if error["type"] == "extra_forbidden":
+        return CmmUqError("unknown key", where=where, fix=suggestion(named[-1], _known_keys(named[:-1], model)))
+    message = error["msg"].removeprefix("Value error, ")
+    given = "" if isinstance(error["input"], dict) else f" (it says {error['input']!r})"
+    return CmmUqError(f"{message[0].lower()}{message[1:]}{given}", where=where)
+
+
+def _known_keys(parents: list[str], top: type[BaseModel]) -> list[str]:
+    model: object = top
+    for parent in parents:
+        if parent.isdigit() or not isinstance(model, type):
+            continue
+        model = _model_inside(model.model_fields[parent].annotation) if hasattr(model, "model_fields") else model
+    fields = getattr(model, "model_fields", {})
+    return [field.alias or name for name, field in fields.items()]
+
+
+def _model_inside(annotation: object) -> object:
+    """The table class in ``Table``, ``Table | None`` or ``list[Table]``."""
+    for candidate in (annotation, *getattr(annotation, "__args__", ())):
+        if hasattr(candidate, "model_fields"):
+            return candidate
+    return annotation
+
+
+def _line_of(keys: list[str], text: str) -> int | None:
+    """Line of the deepest of ``keys`` that stands in its table; the table's own line when none does."""
+    table, found, count = "", None, -1
+    wanted = int(keys[1]) if len(keys) > 1 and keys[1].isdigit() else None
+    for number, line in enumerate(text.splitlines(), 1):
+        header = re.match(r"\s*\[+\s*([^\]]+?)\s*\]+", line)
+        if header:
+            table = header[1]
+            count += table == keys[0]
+            here = table == keys[0] and wanted in (None, count)
+            found = number if here and found is None else found
+        elif table.split(".")[0] == keys[0] and wanted in (None, count):
+            key = re.match(r"\s*[\"']?([A-Za-z0-9_-]+)[\"']?\s*[.=]", line)
+            if key and key[1] in keys[1:]:
+                return number
+    return found

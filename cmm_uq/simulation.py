@@ -1,0 +1,100 @@
+"""Simulated recordings: drawn from exactly the model that the estimator fits."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from cmm_uq import __version__
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.artefacts.artefact import Artefact
+from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.reading import content_of, read_job
+from cmm_uq.jobs.toml_file import checked
+from cmm_uq.jobs.truth import Truth
+from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.units import MICROMETRE
+from cmm_uq.writing import staging, write_whole
+
+
+def simulate(job: Job, truth: Truth, *, seed: int | None = None) -> Points:
+    """The points of a recording with the placings of the job's own.
+
+    Parameters
+    ----------
+    job : its recording gives the placings and the columns.
+    truth : what acts.
+    seed : instead of the one in ``truth``.
+
+    Raises
+    ------
+    CmmUqError : an unknown effect, parameter or size, or a column that an effect needs is missing.
+    """
+    columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
+    points = replace(job.points, columns={**job.points.columns, **columns})
+    artefact = artefact_of(job.facts.artefact, points, where=job.recording_path)
+    acting = effects(tuple(truth.effects), where="truth.toml [effects]")
+    given = [effect.from_reported(truth.effects[effect.name]) for effect in acting]
+    model = MeasurementModel(
+        artefact, acting, shapes={effect.name: shape for effect, (_, shape) in zip(acting, given, strict=True)}
+    )
+    noise = Noise(truth.noise.coordinate_um * MICROMETRE, truth.noise.placing_um * MICROMETRE)
+    random = np.random.default_rng(truth.seed if seed is None else seed)
+    coefficients = np.concatenate([np.zeros(0), *(values for values, _ in given)])
+    return points.at(model.simulate(coefficients, _sizes(artefact, truth), noise, random))
+
+
+def write_simulation(job: Path, truth: Path, out: Path, *, seed: int | None = None) -> dict[str, Path]:
+    """Write a job folder with a simulated recording, and the truth that it was drawn from.
+
+    Returns
+    -------
+    path of each file.
+
+    Raises
+    ------
+    CmmUqError : bad input, or a folder that cannot be written to or already holds another recording.
+    """
+    read = read_job(job)
+    content = content_of(truth, "It gives the effects, the noise and the seed")
+    drawn = checked(content, truth, Truth)
+    if out.resolve() == read.folder.resolve():
+        raise CmmUqError("is the job that is simulated from", where=str(out), fix="Choose another --out")
+    points = simulate(read, drawn, seed=seed)
+    note = f"# simulated by cmm-uq {__version__}, seed {drawn.seed if seed is None else seed}, from truth.toml\n"
+    contents = {
+        **read.inputs,
+        read.facts.recording.file: note.encode() + recording(points),
+        "truth.toml": content,
+    }
+    with staging(out) as place:
+        return write_whole(place, out, contents)
+
+
+def recording(points: Points) -> bytes:
+    """Points as a recording's CSV: coordinates to 0.1 nm, everything else as it was read."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = ["measurement", "point", "repeat", *(f"{axis}_mm" for axis in AXES), *points.columns]
+    writer.writerow(names)
+    for i in range(len(points)):
+        numbers = [points.measurement[i], points.point[i], points.repeat[i]]
+        coordinates = [f"{value:.7f}" for value in points.xyz[i]]
+        writer.writerow([*numbers, *coordinates, *(f"{values[i]:.10g}" for values in points.columns.values())])
+    return text.getvalue().encode()
+
+
+def _sizes(artefact: Artefact, truth: Truth) -> Floats:
+    names = [size.name for size in artefact.sizes]
+    for name in truth.artefact:
+        if name not in names:
+            raise CmmUqError(f"a {artefact.kind} has no size {name!r}", where="truth.toml [artefact]",
+                             fix=suggestion(name, names) if names else "Leave it out")  # fmt: skip
+    return np.array([truth.artefact.get(size.name, size.nominal) for size in artefact.sizes], dtype=np.float64)
