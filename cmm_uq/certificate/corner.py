@@ -20,13 +20,13 @@ from cmm_uq.certificate.plot_style import (
     SMALL,
     TINY,
     WIDTH_MM,
-    Floats,
     as_svg,
     finite,
     house_style,
     new_figure,
 )
 from cmm_uq.errors import CmmUqError
+from cmm_uq.points import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,8 +58,9 @@ def corner_plot(
     ----------
     samples : (n, d) draws. Beyond twelve parameters the twelve with the strongest correlations are shown, and the
         caption says so.
-    names, units : (d,) words under the panels.
-    estimates : (d,) drawn as lines. intervals95 : (d, 2) shaded; from the samples where left out.
+    names, units : (d,) words over the densities.
+    estimates : (d,) drawn as lines and crosses; the medians where left out.
+    intervals95 : (d, 2) shaded; between the 2.5 % and 97.5 % quantiles where left out.
     priors : by parameter, (x, density) of its prior, dashed in grey.
 
     Raises
@@ -242,7 +243,7 @@ class _Panels:
 
 
 def _ticks(low: float, high: float, most: int) -> tuple[Floats, list[str]]:
-    """Round figures inside a range, and their texts with as many decimals as tell them apart."""
+    """Two or more round figures inside a range, about ``most``, and texts with the decimals that tell them apart."""
     from matplotlib.ticker import MaxNLocator
 
     room = 0.08 * (high - low)
@@ -251,5 +252,6 @@ def _ticks(low: float, high: float, most: int) -> tuple[Floats, list[str]]:
         values = every[(every >= low + room) & (every <= high - room)]
         if len(values) >= 2:
             break
+    values = values[:: -(-len(values) // (most + 1))]
     decimals = int(np.clip(np.ceil(-np.log10(every[1] - every[0]) - 1e-9), 0, 9))
     return values, [f"{value:.{decimals}f}".replace("-", "−") for value in values]

@@ -1,8 +1,9 @@
 """The look of every picture: one accent colour, quiet axes, and SVG that both views can take as it is.
 
 Text stays text in the SVG, without a font of its own. The browser then sets it in the page's face and the PDF in the
-document's, it can be searched, copied and read aloud, and a picture is a quarter of the size that outlines would need.
-Room is measured with DejaVu Sans, which is wider than any face used to show it, so nothing runs into its neighbour.
+document's, and it can be searched and copied; outlines would make the three pictures of a ballbar certificate half as
+large again and look the same in both, but like neither. Room is measured with DejaVu Sans, which is wider than the faces
+that show it, so nothing runs into its neighbour (a test looks at that in a browser).
 Series are drawn as one compound path each, not as an object per point: 600 lengths are as light as twenty.
 """
 
@@ -16,15 +17,14 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.points import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Floats = NDArray[np.float64]
 
 INK = "#1b2328"
 """Text and outlines; 15.9 : 1 on white."""
@@ -35,7 +35,7 @@ RULE = "#d3dade"
 TINT = "#eef4f6"
 """A wash of the accent behind text."""
 ACCENT = "#0b5c7a"
-"""The one accent colour; 7.3 : 1 on white."""
+"""The one accent colour; 7.4 : 1 on white."""
 BAND = "#d5e4ea"
 """A stronger wash, for bands behind data."""
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "tint": TINT, "accent": ACCENT}

@@ -22,7 +22,6 @@ from cmm_uq.certificate.plot_style import (
     RULE,
     TINY,
     WIDTH_MM,
-    Floats,
     as_svg,
     bars,
     dots,
@@ -31,6 +30,7 @@ from cmm_uq.certificate.plot_style import (
     new_figure,
 )
 from cmm_uq.errors import CmmUqError
+from cmm_uq.points import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
