@@ -67,7 +67,7 @@ _SQUARE = re.compile(r"(?:s|squareness)_?([xyz])([xyz])")
 
 
 def parametric_error(name: str) -> ParametricError:
-    """The error meant by a name of VDI/VDE 2617 (``ytx``) or of the δ/ε notation (``δx(y)``, ``epsilon_z(x)``, ``Sxy``).
+    """The error that a name of VDI/VDE 2617 (``ytx``) or of the δ/ε notation (``δx(y)``, ``epsilon_z(x)``) means.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def _chain(text: str) -> Chain:
         raise CmmUqError(
             f"{text!r} is no chain of three carriages",
             where="job.toml [machine] chain",
-            fix=f"Give the axes from the workpiece to the probe ({known}), with F for the frame where a carriage moves the "
+            fix=f"Give the axes from the workpiece to the probe ({known}), F for the frame where a carriage moves the "
             "workpiece, such as XFYZ",
         )
     i, j, k = (AXES.index(a) for a in axes)
@@ -160,12 +160,16 @@ def carried_offset(axis: str, readings: Floats, tip: Floats | None = None, chain
     -------
     (n, 3) in mm.
     """
-    chain = Chain.of(chain)
-    place = chain.order.index(AXES.index(axis))
-    carried = list(chain.order[place if place < chain.workpiece else place + 1 :])
+    carried = _carried(AXES.index(axis), Chain.of(chain))
     offset = np.zeros(np.shape(readings))
     offset[:, carried] = readings[:, carried]
     return offset if tip is None else offset + tip
+
+
+def _carried(carriage: int, chain: Chain) -> list[int]:
+    """Axes whose readings stand between a carriage and the end of the ram."""
+    place = chain.order.index(carriage)
+    return list(chain.order[place if place < chain.workpiece else place + 1 :])
 
 
 def first_order(
@@ -182,21 +186,35 @@ def first_order(
     ----------
     readings : (n, 3) scale readings, mm.
     errors : (n, 3, 6) of carriages x, y, z: displacements along x, y, z in mm, rotations about x, y, z in rad.
-    squareness : (3,) Sxy, Syz, Szx, rad.
+    squareness : (3,) or (n, 3) Sxy, Syz, Szx, rad.
     tip, chain : see :func:`carried_offset`.
 
     Returns
     -------
     (n, 3) e in mm, true = indicated + e.
     """
-    e = errors[:, :, :3].sum(axis=1)
-    for i, axis in enumerate(AXES):
-        e += np.cross(errors[:, i, 3:], carried_offset(axis, readings, tip, chain))
+    chain = Chain.of(chain)
+    tips = None if tip is None else np.broadcast_to(tip, readings.shape).T
+    # written by components: clouds of points spend their time here
+    e = errors[:, :, :3].sum(axis=1).T
+    for i in range(3):
+        rotation = errors[:, i, 3:].T
+        carried = _carried(i, chain)
+        for j in range(3):
+            along = [
+                a
+                for a in (readings[:, j] if j in carried else None, None if tips is None else tips[j])
+                if a is not None
+            ]
+            if along:
+                offset = along[0] if len(along) == 1 else along[0] + along[1]
+                e[(j + 1) % 3] += rotation[(j + 2) % 3] * offset
+                e[(j + 2) % 3] -= rotation[(j + 1) % 3] * offset
     if squareness is not None:
-        s_xy, s_yz, s_zx = squareness
-        e[:, 0] -= s_xy * readings[:, 1] + s_zx * readings[:, 2]
-        e[:, 1] -= s_yz * readings[:, 2]
-    return np.asarray(e)
+        s_xy, s_yz, s_zx = np.moveaxis(squareness, -1, 0)
+        e[0] -= s_xy * readings[:, 1] + s_zx * readings[:, 2]
+        e[1] -= s_yz * readings[:, 2]
+    return np.asarray(e.T)
 
 
 def jacobian(readings: Floats, *, tip: Floats | None = None, chain: str | Chain = "XYZ") -> Floats:
@@ -236,7 +254,7 @@ def exact(
     point = np.zeros(np.shape(readings)) if tip is None else np.broadcast_to(tip, np.shape(readings)).copy()
     for place in reversed(range(3)):
         i = chain.order[place]
-        motion = readings[:, i, None] * axes[i] + errors[:, i, :3]
+        motion = readings[:, i, None] * axes[..., i, :] + errors[:, i, :3]
         if place < chain.workpiece:
             point = rotate(errors[:, i, 3:], motion + point)
         else:
@@ -246,11 +264,22 @@ def exact(
 
 
 def axis_directions(squareness: Floats | None) -> Floats:
-    """(3, 3) unit vectors of the motions of carriages x, y, z, rows, that enclose 90° + S with each other, rad."""
-    s_xy, s_yz, s_zx = np.sin(np.zeros(3) if squareness is None else squareness)
-    y = np.array([-s_xy, np.sqrt(1 - s_xy**2), 0.0])
-    z_y = -(s_yz + s_xy * s_zx) / y[1]
-    return np.array([[1.0, 0.0, 0.0], y, [-s_zx, z_y, np.sqrt(1 - s_zx**2 - z_y**2)]])
+    """Unit vectors of the motions of carriages x, y, z that enclose 90° + S with each other.
+
+    Parameters
+    ----------
+    squareness : (..., 3) Sxy, Syz, Szx, rad.
+
+    Returns
+    -------
+    (..., 3, 3), a row for each carriage.
+    """
+    s_xy, s_yz, s_zx = np.moveaxis(np.sin(np.zeros(3) if squareness is None else squareness), -1, 0)
+    y_y = np.sqrt(1 - s_xy**2)
+    z_y = -(s_yz + s_xy * s_zx) / y_y
+    one, zero = np.ones_like(s_xy), np.zeros_like(s_xy)
+    rows = [[one, zero, zero], [-s_xy, y_y, zero], [-s_zx, z_y, np.sqrt(1 - s_zx**2 - z_y**2)]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def rotate(rotation: Floats, vectors: Floats) -> Floats:
