@@ -38,4 +38,4 @@ def summary(result: Result) -> list[tuple[str, str, str]]:
 
 
 def _chance(p: float) -> str:
-    return probability(p).replace("< ", "less than ").replace("> ", "more than ")
+    return probability(p).replace("<", "less than").replace(">", "more than")

@@ -25,10 +25,10 @@ def expanded(quantity: Quantity) -> tuple[str, str, str]:
 def probability(p: float) -> str:
     """A probability in per cent that never claims certainty."""
     if p < 1e-4:
-        return "< 0.01 %"
+        return "<\u00a00.01\u00a0%"
     if p > 1 - 1e-4:
-        return "> 99.99 %"
-    return f"{100 * p:.2g} %" if p < 0.5 else f"{100 * p:.3g} %"
+        return ">\u00a099.99\u00a0%"
+    return f"{100 * p:.{2 if p < 0.5 else 3}g}\u00a0%"
 
 
 def title_of(key: tuple[str, str], result: Result) -> str:

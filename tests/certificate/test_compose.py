@@ -63,7 +63,7 @@ def test_the_decision_names_rule_limit_and_probability(document: Document) -> No
     assert decision.outcome == "fail"
     assert decision.limit == "60 µm"
     assert "ISO 14253-1:2017" in decision.rule
-    assert "< 0.01 %" in decision.explanation
+    assert "<\u00a00.01\u00a0%" in decision.explanation
 
 
 def test_the_traceability_chain_of_the_artefact_is_printed(document: Document) -> None:
