@@ -59,9 +59,9 @@ def certificate(result: Result) -> Document:
 def _particulars(facts: JobFile) -> tuple[Facts, ...]:
     job, machine, laboratory = facts.job, facts.machine, facts.laboratory
     travel = [
-        f"{axis.upper()} {given[0]:g} … {given[1]:g}"
+        f"{axis.upper()} {given[0]:g} … {given[1]:g}".replace("-", "−")
         for axis in "xyz"
-        if (given := getattr(facts.machine.travel_mm, axis))
+        if (given := getattr(machine.travel_mm, axis))
     ]
     groups = (
         (

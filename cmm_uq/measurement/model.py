@@ -116,9 +116,7 @@ class MeasurementModel:
 
     def predicted(self, values: Floats) -> Floats:
         """Indicated points (n, 3) that parameters (k,) predict for this recording's placings, without noise."""
-        coefficients, sizes = self._split(values)
-        xyz = self.artefact.points.xyz
-        return self.indicated(self.artefact.fit(xyz + self.errors(xyz, coefficients), sizes), coefficients)
+        return self.indicated(self.placed(values), self._split(values)[0])
 
     def estimate(self) -> Estimate:
         """Iterate least squares until the estimates stand still.
@@ -141,15 +139,24 @@ class MeasurementModel:
     def linearised(self, values: Floats) -> LinearModel:
         """The model about parameters (k,): ``observed`` is what they leave unexplained plus what they explain."""
         artefact, used = self.artefact, self.used
-        coefficients, sizes = self._split(values)
-        xyz = artefact.points.xyz
-        true = artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
+        coefficients, _ = self._split(values)
+        xyz, true = artefact.points.xyz, self.placed(values)
         unexplained = artefact.project(true, (xyz - self.indicated(true, coefficients))[:, :, None])[:, 0]
         design = np.hstack([-artefact.project(true, self._basis(true)), artefact.size_change()])
         return LinearModel(
             (unexplained + design @ values)[used], design[used], self.unknowns,
             artefact.placing(true)[used], artefact.noise_scale[used], self.sigma,
         )  # fmt: skip
+
+    def seen(self, displacement: Floats, values: Floats) -> Floats:
+        """What used observations show, (m, k) in mm, of an error e of the points (n, 3, k) that ``values`` do not contain."""
+        return -self.artefact.project(self.placed(values), displacement)[self.used]
+
+    def placed(self, values: Floats) -> Floats:
+        """Points (n, 3), mm, of the artefact where parameters (k,) say that the recording found it."""
+        coefficients, sizes = self._split(values)
+        xyz = self.artefact.points.xyz
+        return self.artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
 
     def residuals(self, values: Floats) -> Floats:
         """Unexplained part of every observation, used or not, (m,) mm."""
