@@ -72,6 +72,18 @@ def rounded(value: float, u: float, digits: int = 2) -> tuple[str, str]:
     return _as_text(_to_place(exact, place), shown, place)
 
 
+def figure(number: float, digits: int = 4) -> str:
+    """A number that has no uncertainty of its own, such as a sensitivity, to some significant digits.
+
+    Trailing zeros say nothing here and are left out; a power of ten is split off below 0.001 and from a million on.
+    """
+    _check(number, 0.0, digits)
+    mantissa, exponent = f"{number:.{digits - 1}e}".split("e")
+    if -3 <= int(exponent) < 6:
+        return _plain(Decimal(f"{number:.{digits}g}").normalize())
+    return _plain(Decimal(mantissa).normalize()) + _power(int(exponent))
+
+
 def _check(value: float, u: float, digits: int) -> None:
     if isnan(u) or u < 0:
         raise CmmUqError(f"an uncertainty of {u} cannot be stated", fix="It must be a number that is not negative")
@@ -100,9 +112,13 @@ def _as_text(value: Decimal, u: Decimal, place: int) -> tuple[str, str]:
     exponent = max(value.adjusted() if value else u.adjusted(), u.adjusted())
     if -place <= _PLAIN_DECIMALS and exponent < _PLAIN_INTEGER_DIGITS:
         return _plain(value, place), _plain(u, place)
-    power = "×10" + str(exponent).translate(_SUPERSCRIPT)
+    power = _power(exponent)
     scaled_place = place - exponent
     return _plain(value.scaleb(-exponent), scaled_place) + power, _plain(u.scaleb(-exponent), scaled_place) + power
+
+
+def _power(exponent: int) -> str:
+    return "×10" + str(exponent).translate(_SUPERSCRIPT)
 
 
 def _plain(number: Decimal, place: int | None = None) -> str:

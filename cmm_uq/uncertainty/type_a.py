@@ -65,7 +65,7 @@ def multivariate_normal(names: Sequence[str], mean: Floats, covariance: Floats) 
         raise CmmUqError("a variance is not positive", where=", ".join(names), fix="Leave constants out of the matrix")
     u = np.sqrt(np.diagonal(matrix))
     inputs = {name: normal(float(x), float(s)) for name, x, s in zip(names, mean, u, strict=True)}
-    return JointInputs(inputs, _pairs(names, np.clip(correlation_of(matrix), -1, 1)))
+    return JointInputs(inputs, _pairs(names, correlation_of(matrix)))
 
 
 def joint_sample(draws: Mapping[str, Floats]) -> JointInputs:
@@ -152,4 +152,5 @@ def _table(readings: Mapping[str, Sequence[float] | Floats]) -> Floats:
 
 
 def _pairs(names: Sequence[str], matrix: Floats) -> dict[tuple[str, str], float]:
-    return {(names[i], names[j]): float(matrix[i, j]) for j in range(len(names)) for i in range(j) if matrix[i, j] != 0}
+    kept = np.clip(matrix, -1.0, 1.0)
+    return {(names[i], names[j]): float(kept[i, j]) for j in range(len(names)) for i in range(j) if kept[i, j] != 0}

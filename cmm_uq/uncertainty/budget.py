@@ -1,0 +1,275 @@
+"""Uncertainty budgets: what contributes, how much, and where each figure comes from.
+
+A budget is a list of lines; a line may itself be the result of a budget (nested). Correlations and terms of second order
+are lines of their own, so that the shares always add up to one; a share is negative where a correlation takes away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import copysign, inf, isfinite, sqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.points import Floats
+from cmm_uq.uncertainty.degrees_of_freedom import coverage_factor
+from cmm_uq.uncertainty.distributions import Distribution
+from cmm_uq.uncertainty.propagation import Propagated
+from cmm_uq.uncertainty.rounding import figure, rounded, significant
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from cmm_uq.uncertainty.measurement_model import MeasurementModel
+
+CERTIFICATE, SPECIFICATION, REPEATS, JUDGEMENT = "certificate", "specification", "repeats", "judgement"
+"""Where a figure comes from, in the fewest words; a line may say more (``"certificate 4711"``)."""
+
+
+_ROUNDING = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One source of uncertainty.
+
+    Parameters
+    ----------
+    name : the quantity.
+    u : its standard uncertainty, in ``unit``; None for a line that is no quantity (a correlation).
+    origin : where the figure comes from.
+    value : its estimate, where it has one.
+    unit : of value and u, as text.
+    distribution : by its name in JCGM 101 table 1.
+    dof : degrees of freedom of u.
+    sensitivity : change of the measurand by a change of the quantity; None where there is no single one.
+    variance : what the line adds to the variance of the measurand, where that is not (sensitivity × u)².
+    parts : the budget that ``u`` comes from.
+    """
+
+    name: str
+    u: float | None
+    origin: str
+    value: float | None = None
+    unit: str = ""
+    distribution: str = "normal"
+    dof: float = inf
+    sensitivity: float | None = 1.0
+    variance: float | None = None
+    parts: Budget | None = None
+
+    def __post_init__(self) -> None:
+        if self.u is not None and not (isfinite(self.u) and self.u >= 0):
+            raise CmmUqError(f"a standard uncertainty of {self.u}", where=f"budget line {self.name!r}")
+        if not self.dof >= 1:
+            raise CmmUqError(f"{self.dof} degrees of freedom", where=f"budget line {self.name!r}", fix="At least 1")
+
+    @property
+    def part(self) -> float:
+        """What the line adds to the variance of the measurand; negative for some correlations."""
+        return self.variance if self.variance is not None else ((self.sensitivity or 0.0) * (self.u or 0.0)) ** 2
+
+    @property
+    def contribution(self) -> float:
+        """Square root of :attr:`part`, with its sign."""
+        return copysign(sqrt(abs(self.part)), self.part)
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Units of inputs and outputs, and origins of the inputs' figures, as a budget shows them."""
+
+    units: Mapping[str, str] = field(default_factory=dict)
+    origins: Mapping[str, str] = field(default_factory=dict)
+
+
+def line_of(name: str, given: Distribution, labels: Labels | None = None, sensitivity: float = 1.0) -> Line:
+    """Line of an input by its distribution."""
+    told = labels or Labels()
+    origin, unit = told.origins.get(name, "not stated"), told.units.get(name, "")
+    return Line(name, float(given.u), origin, float(given.mean), unit, given.kind, float(given.dof), sensitivity)
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """What is known of a measurand, line by line.
+
+    Parameters
+    ----------
+    measurand : what is measured.
+    lines : its sources of uncertainty.
+    value : estimate; None where the budget is of an uncertainty alone.
+    unit : of the measurand, as text.
+    coverage : probability of the expanded uncertainty.
+    effective_dof : where the lines alone do not tell them (correlated inputs).
+    statement : what kind of uncertainty this is and what it is not, for the reader.
+    """
+
+    measurand: str
+    lines: Sequence[Line]
+    value: float | None = None
+    unit: str = ""
+    coverage: float = 0.95
+    effective_dof: float | None = None
+    statement: str = ""
+
+    @property
+    def variance(self) -> float:
+        """Combined variance."""
+        total = sum(line.part for line in self.lines)
+        # correlations can cancel the rest completely; what rounding leaves then is nothing
+        return total if total > 1e-14 * sum(abs(line.part) for line in self.lines) else 0.0
+
+    @property
+    def u(self) -> float:
+        """Combined standard uncertainty."""
+        return sqrt(self.variance)
+
+    @property
+    def dof(self) -> float:
+        """Effective degrees of freedom (JCGM 100:2008 G.4.1)."""
+        if self.effective_dof is not None:
+            return self.effective_dof
+        denominator = sum(line.part**2 / line.dof for line in self.lines)
+        return self.variance**2 / denominator if denominator else inf
+
+    @property
+    def k(self) -> float:
+        """Coverage factor."""
+        return float(coverage_factor(self.dof, self.coverage))
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty U = k u."""
+        return self.k * self.u
+
+    @property
+    def shares(self) -> list[float]:
+        """Part of each line in the variance; they add up to one (all zero where nothing contributes)."""
+        variance = self.variance
+        return [line.part / variance if variance else 0.0 for line in self.lines]
+
+    def as_line(self, name: str, sensitivity: float = 1.0) -> Line:
+        """Its result as one line of another budget."""
+        return Line(name, self.u, "budget", self.value, self.unit, "normal", self.dof, sensitivity, parts=self)
+
+    def flat(self, depth: int = 0, weight: float = 1.0) -> Iterator[tuple[int, Line, float]]:
+        """Every line with its depth and its share in this budget, nested lines after the line they make up."""
+        for line, share in zip(self.lines, self.shares, strict=True):
+            yield depth, line, weight * share
+            if line.parts is not None:
+                yield from line.parts.flat(depth + 1, weight * share)
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One plain dict a line, nested lines included."""
+        return [
+            {
+                "quantity": line.name,
+                "depth": depth,
+                "value": line.value,
+                "u": line.u,
+                "unit": line.unit,
+                "distribution": line.distribution,
+                "dof": line.dof,
+                "sensitivity": line.sensitivity,
+                "contribution": line.contribution,
+                "share": share,
+                "origin": line.origin,
+            }
+            for depth, line, share in self.flat()
+        ]
+
+    def as_dataframe(self) -> pd.DataFrame:
+        """The same as a table of pandas."""
+        import pandas as pd
+
+        return pd.DataFrame(self.as_rows())
+
+    def as_text(self) -> list[tuple[str, ...]]:
+        """The same as rows of text under :data:`HEADINGS`, for a page."""
+        return [_text(depth, line, share) for depth, line, share in self.flat()]
+
+
+HEADINGS = (
+    "Quantity",
+    "Estimate",
+    "Standard uncertainty",
+    "Unit",
+    "Distribution",
+    "ν",
+    "Sensitivity",
+    "Contribution",
+    "Share",
+    "Origin",
+)
+
+
+def _text(depth: int, line: Line, share: float) -> tuple[str, ...]:
+    value, u = "", "" if line.u is None else significant(line.u)
+    if line.value is not None and line.u is not None:
+        value, u = rounded(line.value, line.u)
+    return (
+        "\u2003" * depth + line.name,
+        value,
+        u,
+        "" if line.unit == "1" else line.unit,
+        line.distribution.replace("_", " "),
+        "" if line.u is None else "∞" if not isfinite(line.dof) else figure(line.dof, 3),
+        "" if line.sensitivity is None else figure(line.sensitivity),
+        _signed(line.contribution),
+        f"{100 * share:.1f} %".replace("-", "−"),
+        line.origin,
+    )
+
+
+def _signed(contribution: float) -> str:
+    return ("−" if contribution < 0 else "") + significant(abs(contribution))
+
+
+def budget_of(
+    model: MeasurementModel,
+    propagated: Propagated,
+    output: int = 0,
+    *,
+    labels: Labels | None = None,
+    coverage: float = 0.95,
+) -> Budget:
+    """Budget of one output of a model propagated at a single point: inputs, correlations, terms of second order."""
+    names, contribution = list(propagated.inputs), propagated.contribution[output]
+    slopes = dict(zip(names, propagated.sensitivity[output].tolist(), strict=True))
+    told, name = labels or Labels(), propagated.outputs[output]
+    lines = [line_of(key, given, told, slopes[key]) for key, given in model.inputs.items()]
+    joint = 2 * np.triu(np.outer(contribution, contribution) * propagated.correlation, 1)
+    lines += _joint_lines("correlation of", names, joint)
+    rounding = _ROUNDING * float(propagated.covariance[output, output])
+    bending = propagated.bending[output]
+    lines += _joint_lines("second order:", names, np.where(np.abs(bending) > rounding, bending, 0.0))
+    cubic = float(propagated.cubic[output])
+    if abs(cubic) > rounding:
+        lines.append(joint_line("third derivatives", cubic))
+    return Budget(
+        name,
+        lines,
+        float(propagated.value[output]),
+        told.units.get(name, ""),
+        coverage,
+        float(propagated.dof[output]),
+    )
+
+
+def joint_line(name: str, variance: float) -> Line:
+    """Line that is no quantity but what several of them add to, or take from, the variance together."""
+    return Line(name, None, "model", distribution="", sensitivity=None, variance=variance)
+
+
+def _joint_lines(what: str, names: Sequence[str], variance: Floats) -> list[Line]:
+    return [
+        joint_line(
+            f"{what} {names[i]}" + (f", {names[j]}" if i != j else " squared"),
+            float(variance[i, j]),
+        )
+        for i, j in zip(*np.nonzero(variance), strict=True)
+    ]

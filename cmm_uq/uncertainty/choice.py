@@ -1,0 +1,144 @@
+"""Which method states the result: the simplest one that Monte Carlo confirms, and the reason in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.uncertainty.monte_carlo import Simulated, numerical_tolerance
+from cmm_uq.uncertainty.propagation import Propagated, first_order, second_order
+from cmm_uq.uncertainty.rounding import figure
+from cmm_uq.uncertainty.validation import compare
+
+Method = Literal["first", "second", "monte_carlo"]
+_ROUNDING = 4e-16
+
+PROPAGATION: tuple[Method, ...] = ("first", "second")
+NAMES: Mapping[Method, str] = {"first": "first order", "second": "second order", "monte_carlo": "Monte Carlo"}
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """What each method gave; None where it was not asked for or is impossible, and then ``problems`` may say why."""
+
+    first: Propagated | None = None
+    second: Propagated | None = None
+    simulated: Simulated | None = None
+    problems: Mapping[Method, str] = field(default_factory=dict)
+
+    def propagated(self, method: Method) -> Propagated | None:
+        """Result by the law of propagation."""
+        return self.first if method == "first" else self.second
+
+
+def by_propagation(model: MeasurementModel) -> Ways:
+    """First and second order, as far as they are possible."""
+    found: dict[Method, Propagated] = {}
+    problems: dict[Method, str] = {}
+    for method, propagate in zip(PROPAGATION, (first_order, second_order), strict=True):
+        try:
+            found[method] = propagate(model)
+        except CmmUqError as error:
+            problems[method] = error.problem
+    return Ways(found.get("first"), found.get("second"), None, problems)
+
+
+def must_be_possible(model: MeasurementModel, ways: Ways, method: Method) -> None:
+    """Refuse a method that was asked for by name and does not give an uncertainty.
+
+    Raises
+    ------
+    CmmUqError : the derivatives are not finite, or an output has u = 0 although inputs are uncertain.
+    """
+    found = ways.propagated(method)
+    if found is None:
+        raise CmmUqError(ways.problems[method], where=f"method = {method!r}", fix="Use method 'auto' or 'monte_carlo'")
+    for row, output in enumerate(found.outputs):
+        if is_flat(model, found, row):
+            raise CmmUqError(
+                f"{NAMES[method]} gives u = 0 for {output} although its inputs are uncertain: "
+                "the derivatives vanish at the estimates, or correlations cancel",
+                where=f"method = {method!r}",
+                fix="Use method 'auto' or 'monte_carlo'",
+            )
+
+
+def beside(ways: Ways, method: Method, row: int, digits: int) -> str:
+    """What the other order says, where it says something else."""
+    if ways.first is None or ways.second is None:
+        return ""
+    other = ways.second if method == "first" else ways.first
+    name = NAMES["second" if method == "first" else "first"]
+    return (
+        f" {name.capitalize()} gives u = {figure(other.u[row], digits)}."
+        if _differ(ways.first, ways.second, row, digits)
+        else ""
+    )
+
+
+def _differ(first: Propagated, second: Propagated, row: int, digits: int) -> bool:
+    """Whether the terms of second order change estimate or uncertainty beyond the numerical tolerance."""
+    tolerance = numerical_tolerance(second.u, digits)[row]
+    return bool(max(abs(second.u[row] - first.u[row]), abs(second.value[row] - first.value[row])) > tolerance)
+
+
+def is_flat(model: MeasurementModel, found: Propagated, row: int) -> bool:
+    """Whether the law of propagation gives no uncertainty, beyond rounding, although inputs have some."""
+    uncertain = any(np.any(np.asarray(given.u) > 0) for given in model.inputs.values())
+    return uncertain and bool(found.u[row] <= _ROUNDING * abs(found.value[row]))
+
+
+def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[Method, str]:
+    """Method for one output, and why."""
+    if ways.simulated is None:
+        return _without_monte_carlo(ways, row, digits)
+    findings: list[str] = []
+    told = (
+        ""
+        if ways.simulated.stable
+        else f" Monte Carlo is not stable to {digits} digits after {ways.simulated.trials} trials."
+    )
+    for method in PROPAGATION:
+        confirmed, finding = _finding(model, ways, ways.simulated, method, row, digits)
+        findings.append(f"{NAMES[method]} {finding}")
+        if confirmed:
+            return method, _sentence(findings) + told
+    return "monte_carlo", _sentence(findings) + told
+
+
+def _finding(
+    model: MeasurementModel, ways: Ways, simulated: Simulated, method: Method, row: int, digits: int
+) -> tuple[bool, str]:
+    """Whether Monte Carlo confirms the method for one output, and what to say of it."""
+    found = ways.propagated(method)
+    if found is None:
+        return False, f"is impossible ({ways.problems[method]})"
+    if is_flat(model, found, row):
+        return False, "gives u = 0, since the model is flat at the estimates"
+    if found.dof[row] < 1:
+        return False, f"has no interval, with {found.dof[row]:.2g} effective degrees of freedom"
+    comparison = compare(found, simulated, row, digits)
+    return comparison.agrees, ("is confirmed: " if comparison.agrees else "is not enough: ") + comparison.words
+
+
+def _sentence(findings: Sequence[str]) -> str:
+    said = "; ".join(findings)
+    return f"{said[0].upper()}{said[1:]} (JCGM 101 clause 8)."
+
+
+def _without_monte_carlo(ways: Ways, row: int, digits: int) -> tuple[Method, str]:
+    first, second = ways.first, ways.second
+    unchecked = f"Not confirmed by Monte Carlo, which is impossible here: {ways.problems['monte_carlo']}."
+    if first is None or first.u[row] == 0:
+        raise CmmUqError(
+            f"no method gives an uncertainty of {first.outputs[row] if first else 'the outputs'}: "
+            f"{ways.problems.get('first', 'the derivatives vanish')}; {ways.problems['monte_carlo']}"
+        )
+    if second is not None and _differ(first, second, row, digits):
+        return "second", f"The terms of second order are not negligible. {unchecked}"
+    return "first", unchecked

@@ -1,0 +1,235 @@
+"""Propagation of distributions by Monte Carlo (JCGM 101:2008, JCGM 102:2011), in blocks, so that memory stays flat.
+
+:func:`simulate` makes a given number of trials, :func:`simulate_adaptively` as many as the digits asked for need (JCGM
+101 7.9). The same seed gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.points import Floats
+from cmm_uq.uncertainty.coverage_intervals import Tails, both_intervals
+from cmm_uq.uncertainty.degrees_of_freedom import check_coverage
+from cmm_uq.uncertainty.joint_draws import Draw, joint_draws
+from cmm_uq.uncertainty.measurement_model import MeasurementModel
+
+BLOCK = 10_000
+LARGEST = 20_000_000
+_FEWEST_BLOCKS = 10
+_BINS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """Outputs of a measurement model by Monte Carlo.
+
+    Parameters
+    ----------
+    outputs : p names.
+    trials : number of draws.
+    coverage : probability of the intervals.
+    seed : of the random numbers.
+    value : (p,) means.
+    covariance : (p, p).
+    interval : (p, 2) shortest coverage intervals.
+    symmetric_interval : (p, 2) probabilistically symmetric coverage intervals.
+    standard_error : (p, 6) standard deviations of value, u, and the ends of both intervals, from the scatter of blocks;
+        ``nan`` for fewer than two blocks.
+    stable : whether every figure is known to its numerical tolerance; None when no digits were asked for.
+    edges, density : (p, b + 1) and (p, b) histogram of the output, for pictures.
+    """
+
+    outputs: Sequence[str]
+    trials: int
+    coverage: float
+    seed: int
+    value: Floats
+    covariance: Floats
+    interval: Floats
+    symmetric_interval: Floats
+    standard_error: Floats
+    stable: bool | None
+    edges: Floats
+    density: Floats
+
+    @cached_property
+    def u(self) -> Floats:
+        """(p,) standard uncertainties: standard deviations of the draws."""
+        return np.asarray(np.sqrt(np.diagonal(self.covariance)))
+
+
+def simulate(model: MeasurementModel, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
+    """Make a given number of trials.
+
+    Raises
+    ------
+    CmmUqError : too few trials for the coverage probability, an input without standard deviation (t with ν ≤ 2), or a
+        model that gives no finite value for some trials.
+    """
+    check_coverage(coverage)
+    fewest = int(np.ceil(2 / (1 - coverage)))
+    if trials < fewest:
+        raise CmmUqError(
+            f"{trials} trials cannot give a {coverage:.4g} coverage interval", fix=f"Make at least {fewest}"
+        )
+    run = _Run(model, coverage, seed)
+    while run.trials < trials:
+        run.advance(min(BLOCK, trials - run.trials))
+    return run.result(None)
+
+
+def simulate_adaptively(
+    model: MeasurementModel,
+    coverage: float = 0.95,
+    digits: int = 2,
+    seed: int = 0,
+    largest: int = LARGEST,
+    settled: Callable[[Floats, Floats], bool] = lambda figures, errors: True,
+) -> Simulated:
+    """Make trials until value, u and the ends of the shortest interval are known to ``digits`` digits of u (7.9.4).
+
+    Parameters
+    ----------
+    digits : significant digits of u regarded as meaningful.
+    largest : trials after which it stops whether or not the figures are stable.
+    settled : further condition on the figures (p, 6) and their standard errors (p, 6), in the order of
+        :class:`Simulated`; a validation asks here for more.
+
+    Raises
+    ------
+    CmmUqError : as for :func:`simulate`.
+    """
+    check_coverage(coverage)
+    run = _Run(model, coverage, seed)
+    block = max(BLOCK, int(np.ceil(100 / (1 - coverage))))
+    stable = False
+    while not stable and run.trials + block <= max(largest, _FEWEST_BLOCKS * block):
+        run.advance(block)
+        if run.blocks >= _FEWEST_BLOCKS:
+            figures, errors = run.figures(), run.standard_errors()
+            tolerance = numerical_tolerance(figures[:, 1], digits)
+            stable = bool(np.all(2 * errors[:, :4] <= tolerance[:, None])) and settled(figures, errors)
+    return run.result(stable)
+
+
+def numerical_tolerance(u: Floats, digits: int) -> Floats:
+    """Δ of JCGM 101 7.9.2: half a unit of the last of ``digits`` significant digits of u; zero for u = 0."""
+    tolerance = np.zeros_like(np.asarray(u, dtype=np.float64))
+    for index, number in np.ndenumerate(u):
+        if number > 0:
+            exponent = int(f"{number:.{digits - 1}e}".split("e")[1])
+            tolerance[index] = 0.5 * 10.0 ** (exponent - digits + 1)
+    return tolerance
+
+
+class _Run:
+    """Trials made so far, and what must be remembered of them."""
+
+    def __init__(self, model: MeasurementModel, coverage: float, seed: int) -> None:
+        for name, given in model.inputs.items():
+            if np.ndim(given.mean) or np.ndim(given.u):
+                raise CmmUqError(f"{name} has several values", fix="Ask for Monte Carlo at one point at a time")
+            if not np.isfinite(given.standard_deviation):
+                raise CmmUqError(
+                    f"{name} has {given.dof:g} degrees of freedom, and so no standard deviation to draw with",
+                    fix="Repeat the readings (JCGM 101 6.4.9.5 needs four or more), or use the law of propagation",
+                )
+        self.model, self.coverage, self.seed = model, coverage, seed
+        self._draw: Draw = joint_draws(model.inputs, model.correlation_matrix)
+        self._rng = np.random.default_rng(seed)
+        p = len(model.outputs)
+        self.trials = 0
+        self._mean, self._comoment = np.zeros(p), np.zeros((p, p))
+        self._tails = [Tails(coverage) for _ in range(p)]
+        self._of_blocks: list[Floats] = []
+        self._bins: tuple[Floats, Floats] | None = None
+        self._counts = np.zeros((p, _BINS))
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks whose figures were kept."""
+        return len(self._of_blocks)
+
+    def advance(self, n: int) -> None:
+        """Make n more trials."""
+        outputs = self._evaluate(n)
+        mean = outputs.mean(axis=1)
+        centred = outputs - mean[:, None]
+        comoment = centred @ centred.T
+        shift, total = mean - self._mean, self.trials + n
+        self._comoment += comoment + np.outer(shift, shift) * (self.trials * n / total)
+        self._mean = self._mean + shift * (n / total)
+        self.trials = total
+        outputs.sort(axis=1)
+        if n >= BLOCK:
+            u = np.sqrt(np.diagonal(comoment) / (n - 1))
+            ends = [both_intervals(draws, self.coverage) for draws in outputs]
+            self._of_blocks.append(np.column_stack([mean, u, np.array(ends)]))
+        for tails, draws in zip(self._tails, outputs, strict=True):
+            tails.add(draws)
+        self._count(outputs)
+
+    def _evaluate(self, n: int) -> Floats:
+        inputs = self._draw(self._rng, n)
+        with np.errstate(all="ignore"):
+            outputs = self.model(*inputs)
+        stacked = np.stack([np.broadcast_to(np.asarray(y, dtype=np.float64), (n,)) for y in outputs])
+        finite = np.isfinite(stacked)
+        if not finite.all():
+            row = int(np.argmin(finite.all(axis=1)))
+            first = int(np.argmin(finite[row]))
+            example = ", ".join(f"{name} = {x[first]:.6g}" for name, x in zip(self.model.names, inputs, strict=True))
+            raise CmmUqError(
+                f"the model gives no finite {self.model.outputs[row]} in {n - int(finite[row].sum())} of "
+                f"{self.trials + n} trials, such as {example}",
+                fix="Give the inputs distributions that stay within the range of the model",
+            )
+        return stacked
+
+    def _count(self, ordered: Floats) -> None:
+        """Add to the histogram; its bins are laid about the first block."""
+        if self._bins is None:
+            low, high = ordered[:, 0], ordered[:, -1]
+            width = np.where(high > low, high - low, np.abs(low) + 1.0)
+            self._bins = low - 0.1 * width, 1.2 * width / _BINS
+        start, width = self._bins
+        edges = start[:, None] + width[:, None] * np.arange(_BINS + 1)
+        for row, draws in enumerate(ordered):
+            self._counts[row] += np.diff(np.searchsorted(draws, edges[row]))
+
+    def figures(self) -> Floats:
+        """(p, 6) value and u of all trials, and the mean ends of the blocks' intervals."""
+        means = np.mean(self._of_blocks, axis=0)
+        means[:, 0], means[:, 1] = self._mean, np.sqrt(np.diagonal(self._comoment) / (self.trials - 1))
+        return np.asarray(means)
+
+    def standard_errors(self) -> Floats:
+        """(p, 6) standard deviations of the averages over blocks (7.9.4 h, i)."""
+        if self.blocks < 2:
+            return np.full((len(self._mean), 6), np.nan)
+        return np.asarray(np.std(self._of_blocks, axis=0, ddof=1) / np.sqrt(self.blocks))
+
+    def result(self, stable: bool | None) -> Simulated:
+        """What the trials say."""
+        ends = np.array([tails.intervals() for tails in self._tails])
+        start, width = self._bins or (np.zeros(0), np.zeros(0))
+        return Simulated(
+            list(self.model.outputs),
+            self.trials,
+            self.coverage,
+            self.seed,
+            self._mean,
+            self._comoment / (self.trials - 1),
+            ends[:, :2],
+            ends[:, 2:],
+            self.standard_errors(),
+            stable,
+            start[:, None] + width[:, None] * np.arange(_BINS + 1),
+            self._counts / (self.trials * width[:, None]),
+        )
