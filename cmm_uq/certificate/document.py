@@ -173,7 +173,7 @@ def _measure(table: dict[str, Any]) -> None:
 
 _LONGEST_FIGURE = 28
 
-_REORDERING = re.compile("[\u202a-\u202e\u2066-\u2069]")
+_LEFT_OUT = re.compile("[\u202a-\u202e\u2066-\u2069\ufeff]")
 _UNPRINTABLE = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ue000-\uf8ff\ufdd0-\ufdef\ufffe\uffff\U000f0000-\U0010ffff]"
 )
@@ -183,7 +183,8 @@ def _printable(value: Any) -> Any:
     """The same data with every text made safe to show.
 
     What no view may carry (control characters, lone surrogates, private and non-characters, which PDF/A forbids) becomes
-    the replacement character; marks that reorder the text around them (they could turn a figure round) are left out.
+    the replacement character; byte order marks, and marks that reorder the text around them (they could turn a figure
+    round), are left out.
     """
     if isinstance(value, dict):
         return {key: _printable(item) for key, item in value.items()}
@@ -191,5 +192,5 @@ def _printable(value: Any) -> Any:
         return [_printable(item) for item in value]
     if isinstance(value, str):
         plain = value.replace("\r\n", "\n").replace("\r", "\n").replace("\t", " ")
-        return _UNPRINTABLE.sub("\ufffd", _REORDERING.sub("", plain))
+        return _UNPRINTABLE.sub("\ufffd", _LEFT_OUT.sub("", plain))
     return value

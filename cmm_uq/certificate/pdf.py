@@ -106,8 +106,8 @@ def _compile(content: Mapping[str, Any], *, system_fonts: bool) -> bytes:
 
 
 def _missing(error: Any) -> list[str]:
-    """Characters that no font had, as Typst names them: all of them at once, each in quotes or as its code."""
-    texts = re.findall(r'the text `"(.+?)"` could not be displayed', error.diagnostic)
+    """Characters that no font had or PDF/A forbids; Typst names all at once, each in quotes or as its code."""
+    texts = re.findall(r'(?:the text|codepoint) `"(.+?)"`', error.diagnostic)
     plain = (re.sub(r"\\u\{([0-9a-f]+)\}", lambda code: chr(int(code[1], 16)), text) for text in texts)
     return sorted({character for text in plain for character in text})
 
