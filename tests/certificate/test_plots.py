@@ -185,3 +185,11 @@ def test_matplotlib_is_imported_late_and_pyplot_never() -> None:
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_points_lie_on_the_curve_that_they_give() -> None:
+    x, y = np.linspace(0, 10, 11), np.linspace(-3, 7, 11) ** 2
+    drawing = Drawing(curve_with_band(x, y, np.ones(11), x_label="x", y_label="y", points=(x, y), **WORDS).svg)
+    [curve] = [outlines(d)[0] for d in drawing.drawn(stroke=ACCENT, fill="none")]
+    [dots] = [d for d in drawing.drawn(stroke=MUTED, stroke_linecap="round") if len(outlines(d)) == 11]
+    np.testing.assert_allclose(strokes(dots)[:, 0], curve, atol=0.02)
