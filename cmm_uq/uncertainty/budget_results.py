@@ -1,0 +1,158 @@
+"""An evaluation as plain data: what ``results.json`` of a measurement model holds, and the rows of its page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.uncertainty.evaluation import Evaluation, Stated
+from cmm_uq.uncertainty.monte_carlo import Simulated
+from cmm_uq.uncertainty.propagation import Propagated
+from cmm_uq.uncertainty.rounding import figure, rounded, significant
+
+SCHEMA = "cmm-uq/budget/1"
+
+
+def results_of(evaluation: Evaluation) -> dict[str, Any]:
+    """The evaluation as dicts, lists and finite numbers, ready for JSON; what has no value is None."""
+    outputs = {name: _output(evaluation, row, stated) for row, (name, stated) in enumerate(evaluation.stated.items())}
+    asked = evaluation.request
+    return {
+        "schema": SCHEMA,
+        "coverage": asked.coverage,
+        "digits": asked.digits,
+        "seed": asked.seed,
+        "outputs": outputs,
+        "output_correlation": [[_finite(r) for r in line] for line in evaluation.correlation.tolist()],
+    }
+
+
+def _finite(number: float) -> float | None:
+    return number if isfinite(number) else None
+
+
+def _output(evaluation: Evaluation, row: int, stated: Stated) -> dict[str, Any]:
+    ways, coverage = evaluation.ways, evaluation.request.coverage
+    return {
+        "value": stated.value,
+        "u": stated.u,
+        "dof": _finite(stated.dof),
+        "interval": list(stated.interval),
+        "coverage_factor": stated.coverage_factor,
+        "unit": stated.budget.unit or None,
+        "method": stated.method,
+        "reason": stated.reason,
+        "first": _propagated(ways.first, row, coverage),
+        "second": _propagated(ways.second, row, coverage),
+        "monte_carlo": _simulated(ways.simulated, row),
+        "budget": [
+            {
+                "input": line.name,
+                "value": line.value,
+                "u": line.u,
+                "unit": line.unit or None,
+                "distribution": line.distribution or None,
+                "dof": _finite(line.dof),
+                "sensitivity": line.sensitivity,
+                "contribution": line.contribution,
+                "share": share,
+                "source": line.origin,
+            }
+            for line, share in zip(stated.budget.lines, stated.budget.shares, strict=True)
+        ],
+    }
+
+
+def _propagated(found: Propagated | None, row: int, coverage: float) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    try:
+        ends = [float(end[row]) for end in found.interval(coverage)]
+    except CmmUqError:  # too few effective degrees of freedom for any interval
+        ends = []
+    return {
+        "value": float(found.value[row]),
+        "u": float(found.u[row]),
+        "dof": _finite(float(found.dof[row])),
+        "interval": ends or None,
+    }
+
+
+def _simulated(found: Simulated | None, row: int) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "value": float(found.value[row]),
+        "u": float(found.u[row]),
+        "interval": found.interval[row].tolist(),
+        "symmetric_interval": found.symmetric_interval[row].tolist(),
+        "trials": found.trials,
+        "stable": found.stable,
+    }
+
+
+SUMMARY = ("Quantity", "Estimate", "Standard uncertainty", "Unit", "Interval", "k", "ν", "Method")
+
+
+def summary_rows(evaluation: Evaluation) -> list[tuple[str, ...]]:
+    """One row of text an output under :data:`SUMMARY`, rounded to the digits asked for."""
+    return [_summary(name, stated, min(evaluation.request.digits, 2)) for name, stated in evaluation.stated.items()]
+
+
+_METHODS: Mapping[str, str] = {"first": "first order", "second": "second order", "monte_carlo": "Monte Carlo"}
+
+
+def _summary(name: str, stated: Stated, digits: int) -> tuple[str, ...]:
+    value, u = rounded(stated.value, stated.u, digits)
+    low, high = (rounded(end, stated.u, digits)[0] for end in stated.interval)
+    return (
+        name,
+        value,
+        u,
+        "" if stated.budget.unit == "1" else stated.budget.unit,
+        f"[{low}, {high}]",
+        figure(stated.coverage_factor, 3),
+        figure(np.floor(stated.dof), 3) if isfinite(stated.dof) else "∞",
+        _METHODS[stated.method],
+    )
+
+
+COMPARISON = ("Method", "Estimate", "Standard uncertainty", "Interval", "Trials")
+
+
+def comparison_rows(evaluation: Evaluation, output: str) -> list[tuple[str, ...]]:
+    """One row of text for each method that was possible, under :data:`COMPARISON`."""
+    told = results_of(evaluation)["outputs"][output]
+    rows: list[tuple[str, ...]] = []
+    for method, name in _METHODS.items():
+        if found := told[method]:
+            value, u = rounded(found["value"], found["u"])
+            ends = [rounded(end, found["u"])[0] for end in found["interval"] or ()]
+            interval = f"[{', '.join(ends)}]" if ends else ""
+            rows.append((f"{name[0].upper()}{name[1:]}", value, u, interval, str(found.get("trials", ""))))
+    return rows
+
+
+def statement(evaluation: Evaluation, output: str) -> str:
+    """The result of one output as a sentence that a certificate could carry (JCGM 100:2008 7.2.4)."""
+    stated, coverage = evaluation.stated[output], evaluation.request.coverage
+    unit = stated.budget.unit
+    end = "" if unit in ("", "1") else f" {unit}"
+    percent = figure(100 * coverage)
+    if stated.method == "monte_carlo":
+        low, high = (rounded(e, stated.u)[0] for e in stated.interval)
+        value, u = rounded(stated.value, stated.u)
+        return (
+            f"{output} = {value}{end} with standard uncertainty {u}{end}; the shortest {percent} % coverage interval is "
+            f"[{low}, {high}]{end}."
+        )
+    value, expanded = rounded(stated.value, stated.coverage_factor * stated.u)
+    known = f" for ν = {figure(np.floor(stated.dof), 4)}" if isfinite(stated.dof) else ""
+    return (
+        f"{output} = {value}{end} ± {expanded}{end}, the expanded uncertainty U = k u with u = {significant(stated.u)}{end} "
+        f"and k = {figure(stated.coverage_factor, 3)}{known}, coverage probability {percent} %."
+    )
