@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge import GaugeBlocks, StepGauge
+from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import Points
 
-KINDS = {"ballbar": Ballbar}
+KINDS: Mapping[str, Callable[..., Artefact]] = MappingProxyType(
+    {kind.kind: kind for kind in (Ballbar, StepGauge, GaugeBlocks, Sphere)}
+)
+"""Every kind of artefact by its name in ``[artefact] kind``."""
 
 
 def artefact_of(facts: ArtefactFacts, points: Points, *, where: str | None = None) -> Artefact:

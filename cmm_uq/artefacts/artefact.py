@@ -69,6 +69,7 @@ class Artefact(ABC):
     sizes : dimensions that enter the model.
     noise_scale : (m,) standard uncertainty of each observation, per unit of that of one coordinate.
     measurement, repeat : (m,) what each observation belongs to.
+    rows : (m, j) the points that each observation speaks of, as rows of the recording.
     """
 
     kind: str
@@ -78,6 +79,7 @@ class Artefact(ABC):
     noise_scale: Floats
     measurement: Ints
     repeat: Ints
+    rows: Ints
 
     @abstractmethod
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:

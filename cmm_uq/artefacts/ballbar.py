@@ -9,14 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.artefacts.artefact import Artefact, Indications, Size
+from cmm_uq.artefacts.recorded import check_length, expansion
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import Floats, Points
-from cmm_uq.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
-
-UNIT_MISTAKES = {
-    1e-3: "metres", 1e3: "micrometres", 1 / 25.4: "inches", 25.4: "inches converted twice", 0.1: "centimetres",
-}  # fmt: skip
+from cmm_uq.units import MICROMETRE
 
 
 class Ballbar(Artefact):
@@ -37,15 +34,11 @@ class Ballbar(Artefact):
 
     def __init__(self, facts: ArtefactFacts, points: Points, *, where: str | None = None) -> None:
         self.points = points
-        self._ends = _ends(points, where)
-        first = self._ends[:, 0]
+        self.rows = _ends(points, where)
+        first = self.rows[:, 0]
         self.measurement, self.repeat = points.measurement[first], points.repeat[first]
         self.noise_scale = np.full(len(first), np.sqrt(2.0))
-        if facts.cte_per_k and "temp_artefact_c" in points.columns:
-            excess = points.columns["temp_artefact_c"][self._ends].mean(axis=1) - REFERENCE_TEMPERATURE
-            self.expansion = 1 + facts.cte_per_k * excess
-        else:
-            self.expansion = np.ones(len(first))
+        self.expansion = expansion(facts, points)[self.rows].mean(axis=1)
         lengths = self.lengths()
         if np.any(lengths == 0):
             line = points.lines[first[np.argmin(lengths)]] if len(points.lines) else 0
@@ -55,7 +48,7 @@ class Ballbar(Artefact):
         if facts.length_mm is None:
             self.sizes = (Size("length_mm", "Length of the bar", "mm", mean, np.inf),)
         else:
-            _check_units(mean, facts.length_mm, where)
+            check_length(mean, facts.length_mm, "the recorded bars", where)
             self.sizes = (
                 Size("length_mm", "Length of the bar", "mm", facts.length_mm, (facts.u_um or 0.0) * MICROMETRE),
             )
@@ -70,27 +63,27 @@ class Ballbar(Artefact):
         size = self.sizes[0]
         if not size.certified:
             return None
-        every = np.full(len(self._ends), 1.0)
+        every = np.full(len(self.rows), 1.0)
         return Indications(self.lengths() - size.nominal, size.nominal * every, size.sd * every, 1)
 
     def ends(self) -> Floats:
         """Both ends of each bar, (m, 2, 3) mm, in the recorded frame."""
-        return np.asarray(self.points.xyz[self._ends], dtype=np.float64)
+        return np.asarray(self.points.xyz[self.rows], dtype=np.float64)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """See :meth:`Artefact.fit`: same middle, same direction, the bar's length."""
         bars = self._bars(true_xyz)
         half = 0.5 * bars / np.linalg.norm(bars, axis=1, keepdims=True) * (sizes[0] * self.expansion)[:, None]
-        middle = true_xyz[self._ends].mean(axis=1)
+        middle = true_xyz[self.rows].mean(axis=1)
         placed = true_xyz.copy()
-        placed[self._ends[:, 0]], placed[self._ends[:, 1]] = middle - half, middle + half
+        placed[self.rows[:, 0]], placed[self.rows[:, 1]] = middle - half, middle + half
         return placed
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
         """See :meth:`Artefact.project`: relative displacement of the ends along the bar."""
         bars = self._bars(xyz)
         directions = bars / np.linalg.norm(bars, axis=1, keepdims=True)
-        relative = displacement[self._ends[:, 1]] - displacement[self._ends[:, 0]]
+        relative = displacement[self.rows[:, 1]] - displacement[self.rows[:, 0]]
         return np.asarray(np.einsum("mi,mik->mk", directions, relative), dtype=np.float64)
 
     def size_change(self) -> Floats:
@@ -98,7 +91,7 @@ class Ballbar(Artefact):
         return np.asarray(self.expansion[:, None], dtype=np.float64)
 
     def _bars(self, xyz: Floats) -> Floats:
-        return np.asarray(xyz[self._ends[:, 1]] - xyz[self._ends[:, 0]], dtype=np.float64)
+        return np.asarray(xyz[self.rows[:, 1]] - xyz[self.rows[:, 0]], dtype=np.float64)
 
 
 def _ends(points: Points, where: str | None) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
@@ -120,20 +113,3 @@ def _ends(points: Points, where: str | None) -> np.ndarray[tuple[int, int], np.d
                              fix="Record both balls, as points 1 and 2, or leave out the measurement")  # fmt: skip
         ends.append(rows[np.argsort(numbers)])
     return np.array(ends, dtype=np.int64)
-
-
-def _check_units(mean: float, certified: float, where: str | None) -> None:
-    ratio = mean / certified
-    for factor, unit in UNIT_MISTAKES.items():
-        if abs(ratio / factor - 1) < 0.02:
-            raise CmmUqError(
-                f"the recorded bars are {mean:.6g} mm long on average, the certified length is {certified:.6g} mm: "
-                f"the coordinates look like {unit}, not mm",
-                where=where, fix="Give x_mm, y_mm, z_mm and length_mm in mm",
-            )  # fmt: skip
-    if abs(ratio - 1) > 0.01:
-        raise CmmUqError(
-            f"the recorded bars are {mean:.6g} mm long on average, the certified length is {certified:.6g} mm: "
-            f"they differ by {abs(mean - certified) / certified * METRE:.3g} mm/m",
-            where=where, fix="Check length_mm in job.toml [artefact], and that the recording belongs to this bar",
-        )  # fmt: skip

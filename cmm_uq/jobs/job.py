@@ -15,6 +15,9 @@ from cmm_uq.points import Points
 ArtefactKind = Literal[
     "ballbar", "bryan", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere", "plane", "shift"
 ]
+WITH_REFERENCES = ("step_gauge", "gauge_blocks", "plate")
+"""Kinds whose certified figures stand in the recording; their ``u_um`` may stand without ``length_mm``."""
+
 Standard = Literal["ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617"]
 
 Positive = Annotated[float, Field(gt=0)]
@@ -127,7 +130,7 @@ class KnownLength(_Table):
 
 
 class ArtefactFacts(_Table):
-    """``[artefact]``; without ``length_mm`` it is uncalibrated."""
+    """``[artefact]``; without ``length_mm`` it is uncalibrated, unless its certified figures stand in the recording."""
 
     kind: ArtefactKind
     name: str = ""
@@ -143,7 +146,7 @@ class ArtefactFacts(_Table):
 
     @model_validator(mode="after")
     def _uncertainty_of_something(self) -> Self:
-        if self.u_um is not None and self.length_mm is None:
+        if self.u_um is not None and self.length_mm is None and self.kind not in WITH_REFERENCES:
             raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
         if abs(self.cte_per_k) > 1e-3:
             raise ValueError(

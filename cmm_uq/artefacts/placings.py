@@ -1,0 +1,55 @@
+"""Which points stand in one placing of an artefact, and sums over them without a loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.points import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Placings:
+    """Points by their placing.
+
+    Parameters
+    ----------
+    index : (n,) placing of each point, 0 … q − 1.
+    numbers : (q,) the ``measurement`` that each placing is.
+    """
+
+    index: Ints
+    numbers: Ints
+
+    @classmethod
+    def of(cls, numbers: Ints) -> Placings:
+        """One placing for each different number of ``numbers`` (n,), in ascending order."""
+        known, index = np.unique(numbers, return_inverse=True)
+        return cls(index.ravel().astype(np.int64), known.astype(np.int64))
+
+    @cached_property
+    def _order(self) -> tuple[Ints, Ints]:
+        return np.argsort(self.index, kind="stable"), np.cumsum(self.sizes) - self.sizes
+
+    @cached_property
+    def sizes(self) -> Ints:
+        """(q,) points in each placing."""
+        return np.bincount(self.index, minlength=len(self.numbers)).astype(np.int64)
+
+    def sums(self, values: Floats) -> Floats:
+        """Sums of ``values`` (n, …) over the points of each placing, (q, …)."""
+        order, starts = self._order
+        return np.asarray(np.add.reduceat(values[order], starts, axis=0), dtype=np.float64)
+
+    def means(self, values: Floats) -> Floats:
+        """Means of ``values`` (n, …) over the points of each placing, given back to every point."""
+        counts = self.sizes.reshape((-1,) + (1,) * (values.ndim - 1))
+        return np.asarray((self.sums(values) / counts)[self.index], dtype=np.float64)
+
+    def columns(self, freedoms: Floats) -> Floats:
+        """Design of freedoms that each placing has for itself: (n, …, j) → (n, …, q·j), zero outside its placing."""
+        block = np.zeros((*freedoms.shape[:-1], len(self.numbers), freedoms.shape[-1]))
+        block[np.arange(len(self.index)), ..., self.index, :] = freedoms
+        return block.reshape((*freedoms.shape[:-1], -1))
