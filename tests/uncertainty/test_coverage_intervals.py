@@ -1,0 +1,48 @@
+"""Coverage intervals of JCGM 101:2008 7.7: against brute force, whatever the number of draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cmm_uq.uncertainty.coverage_intervals import Tails, both_intervals, inner_draws
+
+
+def by_definition(draws: np.ndarray, p: float) -> list[float]:
+    """7.7.1 to 7.7.4, numbering the draws from one."""
+    y, M = np.concatenate([[np.nan], np.sort(draws)]), len(draws)
+    q = int(p * M) if float(p * M).is_integer() else int(p * M + 0.5)
+    lengths = [y[r + q] - y[r] for r in range(1, M - q + 1)]
+    shortest = int(np.argmin(lengths)) + 1
+    r = (M - q) // 2 if (M - q) % 2 == 0 else (M - q + 1) // 2
+    return [y[shortest], y[shortest + q], y[r], y[r + q]]
+
+
+@given(
+    draws=st.lists(st.floats(-1e3, 1e3), min_size=100, max_size=150),
+    p=st.sampled_from([0.5, 0.68, 0.8, 0.9, 0.95]),
+)
+def test_both_intervals_are_those_of_the_definition(draws: list[float], p: float) -> None:
+    assert both_intervals(np.sort(draws), p).tolist() == by_definition(np.array(draws), p)
+
+
+@pytest.mark.parametrize("p", [0.3, 0.6827, 0.95, 0.99])
+def test_keeping_the_tails_only_changes_nothing(p: float) -> None:
+    draws = np.random.default_rng(1).gamma(2.0, size=333_333)
+    tails = Tails(p)
+    for block in np.array_split(draws, 40):
+        tails.add(np.sort(block))
+    assert tails.intervals().tolist() == both_intervals(np.sort(draws), p).tolist()
+
+
+def test_q_is_rounded_to_the_nearest_integer() -> None:
+    # 7.7.1: q = pM, or the integer part of pM + 1/2
+    assert inner_draws(10_000, 0.95) == 9500
+    assert inner_draws(101, 0.95) == 96
+    assert inner_draws(110, 0.95) == 105
+
+
+def test_draws_that_are_all_the_same_have_an_interval_of_no_length() -> None:
+    assert both_intervals(np.full(200, 3.0), 0.95).tolist() == [3.0] * 4
