@@ -7,6 +7,7 @@ number written in an expression takes whatever unit makes a sum consistent, so a
 from __future__ import annotations
 
 import re
+import tokenize
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -45,7 +46,16 @@ def unit_of(text: str, where: str | None = None) -> pint.Unit:
         raise CmmUqError(problem, where=where, fix=fix)
     try:
         return _registry().Unit(text.strip().replace("−", "-"))
-    except (pint.PintError, AttributeError, ValueError, TypeError, AssertionError, SyntaxError, KeyError) as error:
+    except (
+        pint.PintError,
+        tokenize.TokenError,
+        AttributeError,
+        ValueError,
+        TypeError,
+        AssertionError,
+        SyntaxError,
+        KeyError,
+    ) as error:
         raise CmmUqError(problem, where=where, fix=fix) from error
 
 
