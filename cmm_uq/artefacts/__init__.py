@@ -8,13 +8,14 @@ from types import MappingProxyType
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge import GaugeBlocks, StepGauge
+from cmm_uq.artefacts.plate import Plate
 from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import Points
 
 KINDS: Mapping[str, Callable[..., Artefact]] = MappingProxyType(
-    {kind.kind: kind for kind in (Ballbar, StepGauge, GaugeBlocks, Sphere)}
+    {kind.kind: kind for kind in (Ballbar, StepGauge, GaugeBlocks, Plate, Sphere)}
 )
 """Every kind of artefact by its name in ``[artefact] kind``."""
 

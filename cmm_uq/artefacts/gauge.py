@@ -16,11 +16,10 @@ import numpy as np
 
 from cmm_uq.artefacts.artefact import Artefact, Indications, Size
 from cmm_uq.artefacts.placings import Placings
-from cmm_uq.artefacts.recorded import check_length, columns_needed, expansion, place
+from cmm_uq.artefacts.recorded import certified_sd, check_length, columns_needed, expansion, place
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import AXES, Floats, Ints, Points
-from cmm_uq.units import MICROMETRE
 
 _SAME_FACE = 1e-6
 """mm; certified distances closer than this belong to one face."""
@@ -72,8 +71,7 @@ class StepGauge(Artefact):
         self.expansion = expansion(facts, points)
         longest = float(self._lines.sums(self._ends * self.reference).max())
         length = facts.length_mm or longest
-        self.sizes = (Size("length_mm", f"Length of the {self.title.lower()}", "mm", length,
-                           (facts.u_um or 0.0) * MICROMETRE),)  # fmt: skip
+        self.sizes = (Size("length_mm", f"Length of the {self.title.lower()}", "mm", length, certified_sd(facts)),)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """See :meth:`Artefact.fit`: every point moved along its line to its certified distance."""
@@ -95,6 +93,8 @@ class StepGauge(Artefact):
 
     def indications(self) -> Indications | None:
         """Distances from the first recorded face of each (measurement, repeat), against the certified ones."""
+        if not self.sizes[0].certified:
+            return None
         number = self.points.point.astype(np.float64)
         runs = Placings.of(self.points.group)
         order = np.lexsort((number, runs.index))

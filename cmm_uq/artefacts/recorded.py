@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import Floats, Points
-from cmm_uq.units import METRE, REFERENCE_TEMPERATURE
+from cmm_uq.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
 
 UNIT_MISTAKES = {
     1e-3: "metres", 1e3: "micrometres", 1 / 25.4: "inches", 25.4: "inches converted twice", 0.1: "centimetres",
@@ -23,6 +23,11 @@ def expansion(facts: ArtefactFacts, points: Points) -> Floats:
     if not (facts.cte_per_k and "temp_artefact_c" in points.columns):
         return np.ones(len(points))
     return np.asarray(1 + facts.cte_per_k * (points.columns["temp_artefact_c"] - REFERENCE_TEMPERATURE))
+
+
+def certified_sd(facts: ArtefactFacts) -> float:
+    """Standard uncertainty, mm, of a size that the recording's references carry; infinite when they are nominal."""
+    return np.inf if facts.nominal else (facts.u_um or 0.0) * MICROMETRE
 
 
 def columns_needed(points: Points, names: tuple[str, ...], of: str, where: str | None) -> Floats:

@@ -130,13 +130,17 @@ class KnownLength(_Table):
 
 
 class ArtefactFacts(_Table):
-    """``[artefact]``; without ``length_mm`` it is uncalibrated, unless its certified figures stand in the recording."""
+    """``[artefact]``; without ``length_mm`` it is uncalibrated, unless its certified figures stand in the recording.
+
+    ``nominal`` says that those figures are nominal only: their common scale then stays free.
+    """
 
     kind: ArtefactKind
     name: str = ""
     serial: str = ""
     length_mm: Positive | None = None
     u_um: NotNegative | None = None
+    nominal: bool = False
     cte_per_k: float = 0.0
     certificate: Traceability | None = None
     axis: Literal["x", "y", "z"] | None = None
@@ -148,6 +152,11 @@ class ArtefactFacts(_Table):
     def _uncertainty_of_something(self) -> Self:
         if self.u_um is not None and self.length_mm is None and self.kind not in WITH_REFERENCES:
             raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
+        if self.nominal and (self.u_um is not None or self.length_mm is not None or self.kind not in WITH_REFERENCES):
+            raise ValueError(
+                "nominal = true says that the recording's references are not certified: leave out length_mm and u_um; "
+                f"only {', '.join(WITH_REFERENCES)} have references"
+            )
         if abs(self.cte_per_k) > 1e-3:
             raise ValueError(
                 f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
