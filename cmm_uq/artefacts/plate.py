@@ -125,5 +125,5 @@ class Plate(Artefact):
                 f"the recorded positions do not have the shape that the references say: in measurement {number} they "
                 f"miss it by {100 * misfit[0]:.2g} % of its extent",
                 where=place(points, points.measurement == number, where),
-                fix="Check the numbering of the balls, and that the references are right-handed, not their mirror image",
+                fix="Check the numbering of the balls and their reference positions",
             )  # fmt: skip
