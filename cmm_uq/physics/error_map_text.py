@@ -126,7 +126,9 @@ def _numbers(text: str, where: str, wanted: int = 7) -> list[float]:
         values = []
     if len(values) != wanted or not np.isfinite(values).all():
         raise CmmUqError(
-            f"{text!r} is not {wanted} numbers", where=where, fix="Position, three displacements, three rotations"
+            f"{text!r} is not {'a number' if wanted == 1 else f'{wanted} numbers'}",
+            where=where,
+            fix="Position, three displacements, three rotations",
         )
     return values
 
