@@ -7,7 +7,7 @@ are lines of their own, so that the shares always add up to one; a share is nega
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import copysign, inf, isfinite, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +48,7 @@ class Line:
     sensitivity : change of the measurand by a change of the quantity; None where there is no single one.
     variance : what the line adds to the variance of the measurand, where that is not (sensitivity × u)².
     parts : the budget that ``u`` comes from.
+    shared : whether repetitions share it, so that it does not average out.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Line:
     sensitivity: float | None = 1.0
     variance: float | None = None
     parts: Budget | None = None
+    shared: bool = False
 
     def __post_init__(self) -> None:
         if self.u is not None and not (isfinite(self.u) and self.u >= 0):
@@ -105,6 +107,7 @@ class Budget:
     unit : of the measurand, as text.
     coverage : probability of the expanded uncertainty.
     effective_dof : where the lines alone do not tell them (correlated inputs).
+    factor : coverage factor where a standard prescribes one; None takes that of the degrees of freedom.
     statement : what kind of uncertainty this is and what it is not, for the reader.
     """
 
@@ -114,6 +117,7 @@ class Budget:
     unit: str = ""
     coverage: float = 0.95
     effective_dof: float | None = None
+    factor: float | None = None
     statement: str = ""
 
     @property
@@ -139,7 +143,7 @@ class Budget:
     @property
     def k(self) -> float:
         """Coverage factor."""
-        return float(coverage_factor(self.dof, self.coverage))
+        return self.factor if self.factor is not None else float(coverage_factor(self.dof, self.coverage))
 
     @property
     def expanded(self) -> float:
@@ -155,6 +159,11 @@ class Budget:
     def as_line(self, name: str, sensitivity: float = 1.0) -> Line:
         """Its result as one line of another budget."""
         return Line(name, self.u, "budget", self.value, self.unit, "normal", self.dof, sensitivity, parts=self)
+
+    def mean_of(self, repetitions: int, measurand: str) -> Budget:
+        """Budget of the mean of repetitions: what they do not share is divided by √n."""
+        lines = [line if line.shared else replace(line, variance=line.part / repetitions) for line in self.lines]
+        return replace(self, measurand=measurand, lines=lines)
 
     def flat(self, depth: int = 0, weight: float = 1.0) -> Iterator[tuple[int, Line, float]]:
         """Every line with its depth and its share in this budget, nested lines after the line they make up."""

@@ -187,7 +187,8 @@ def _simulated(
         "Each quantity's contribution is what it does alone, the others held at their estimates (JCGM 101 annex B); "
         "“together” is what they add or take away jointly, by correlation or nonlinearity."
     )
-    budget = Budget(name, lines, value, labels.units.get(name, ""), simulated.coverage, inf, statement)
+    unit = labels.units.get(name, "")
+    budget = Budget(name, lines, value, unit, simulated.coverage, effective_dof=inf, statement=statement)
     low, high = map(float, simulated.interval[row])
     return Stated("monte_carlo", reason, value, u, inf, (low, high), (high - low) / (2 * u) if u else 0.0, budget)
 

@@ -54,7 +54,8 @@ class Propagated:
     @cached_property
     def u(self) -> Floats:
         """(p, ...) combined standard uncertainties."""
-        return np.asarray(np.sqrt(_diagonal(self.covariance)))
+        # correlations can cancel the variance completely, and rounding then leaves less than nothing
+        return np.asarray(np.sqrt(np.maximum(_diagonal(self.covariance), 0.0)))
 
     def interval(self, coverage: float) -> tuple[Floats, Floats]:
         """Ends (p, ...) of the coverage intervals value ± k u."""
