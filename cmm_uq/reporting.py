@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.analysis import Result, analyse
+from cmm_uq.analysis.diagnosing import Diagnosed, diagnose_job
+from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
 from cmm_uq.writing import staging, write_whole
 
 Stage = Callable[[str, float], None]
@@ -56,6 +58,51 @@ def write_report(job: Path, out: Path | None = None, *, seed: int = 0, stage: St
         files = write_whole(place, folder, contents)
     tell("Done", 1.0)
     return Report(result, contents["results.json"], files)
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenDiagnosis:
+    """A written diagnosis: what was found, contents of results.json, and what was written, by name."""
+
+    diagnosed: Diagnosed
+    results: bytes
+    files: dict[str, Path]
+
+
+def write_diagnosis(
+    job: Path, out: Path | None = None, *, seed: int = 0, alpha: float = FALSE_ALARMS, stage: Stage | None = None
+) -> WrittenDiagnosis:
+    """Diagnose a job and write ``diagnosis.html`` and ``results.json``, both or none.
+
+    Parameters
+    ----------
+    job : the job folder.
+    out : where to write; ``reports/<job id>`` by default.
+    seed : of everything random.
+    alpha : rate of false alarms.
+    stage : told of progress.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be diagnosed, or the folder cannot be written to.
+    """
+    tell = stage or (lambda what, part: None)
+    with ExitStack() as stack:
+        place = stack.enter_context(staging(out)) if out else None
+        tell("Searching for what was left out", 0.0)
+        found = diagnose_job(job, seed=seed, alpha=alpha, progress=lambda part: tell("Sampling", 0.7 + 0.2 * part))
+        folder = out or Path("reports") / found.job.facts.job.id
+        place = place or stack.enter_context(staging(folder))
+        tell("Composing the page", 0.9)
+        from cmm_uq.certificate.diagnosis_page import diagnosis_document, diagnosis_results
+        from cmm_uq.certificate.html import render_html
+        from cmm_uq.certificate.results_file import as_json
+
+        data = as_json(diagnosis_results(found))
+        page = render_html(diagnosis_document(found)).encode()
+        files = write_whole(place, folder, {"diagnosis.html": page, "results.json": data})
+    tell("Done", 1.0)
+    return WrittenDiagnosis(found, data, files)
 
 
 def _contents(result: Result, tell: Stage) -> dict[str, bytes]:

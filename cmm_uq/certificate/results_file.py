@@ -31,7 +31,7 @@ def results(result: Result) -> dict[str, Any]:
         "artefact": _quantities(result.sizes),
         "noise": {
             "stated_coordinate_um": result.noise.stated_um,
-            "coordinate_um": _quantity(result.noise.coordinate),
+            "coordinate_um": quantity_data(result.noise.coordinate),
             "p_value": result.noise.p_value,
             "contradicts_stated": result.noise.contradicts_stated,
         },
@@ -39,9 +39,9 @@ def results(result: Result) -> dict[str, Any]:
         "least_squares": _least_squares(result),
         "identifiability": _identifiability(result),
         "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
-        "accuracy_uncertainty": {name: _quantity(quantity) for name, quantity in result.accuracy.items()},
+        "accuracy_uncertainty": {name: quantity_data(quantity) for name, quantity in result.accuracy.items()},
         "conformity": [_statement(statement) for statement in result.statements],
-        "screening": [_finding(finding, result) for finding in result.findings],
+        "screening": [finding_data(finding, job.facts.recording.file) for finding in result.findings],
     }
 
 
@@ -50,12 +50,13 @@ def as_json(data: Mapping[str, Any]) -> bytes:
     return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
-def _quantity(quantity: Quantity) -> dict[str, Any]:
+def quantity_data(quantity: Quantity) -> dict[str, Any]:
+    """Value, standard uncertainty and 95 % interval."""
     return {"value": quantity.value, "u": quantity.u, "interval95": list(quantity.interval95)}
 
 
 def _quantities(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
-    return {name: _quantity(quantity) for name, quantity in quantities.items()}
+    return {name: quantity_data(quantity) for name, quantity in quantities.items()}
 
 
 def _sampling(result: Result) -> dict[str, Any]:
@@ -108,10 +109,11 @@ def _statement(statement: Statement) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _finding(finding: Finding, result: Result) -> dict[str, Any]:
+def finding_data(finding: Finding, file: str) -> dict[str, Any]:
+    """One finding of the screening."""
     return {
         "kind": finding.kind, "rows": [str(m) for m in finding.measurements], "lines": list(finding.lines),
-        "file": result.job.facts.recording.file, "why": finding.why, "set_aside": finding.set_aside,
+        "file": file, "why": finding.why, "set_aside": finding.set_aside,
     }  # fmt: skip
 
 

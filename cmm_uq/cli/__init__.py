@@ -8,7 +8,7 @@ from types import FrameType
 
 import typer
 
-from cmm_uq.cli import report, simulate
+from cmm_uq.cli import diagnose, report, simulate
 from cmm_uq.errors import CmmUqError
 
 BAD_INPUT = 2
@@ -23,6 +23,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("report")(report.command)
+app.command("diagnose")(diagnose.command)
 app.command("simulate")(simulate.command)
 
 

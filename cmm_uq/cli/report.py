@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmm_uq.cli.progress import shown
+
 if TYPE_CHECKING:
-    from cmm_uq.reporting import Report, Stage
+    from cmm_uq.reporting import Report
 
 
 def command(
@@ -24,7 +24,7 @@ def command(
     json: Annotated[bool, typer.Option("--json", help="Print results.json instead of the summary.")] = False,
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
-    with _progress(quiet=quiet or json) as stage:
+    with shown(quiet=quiet or json) as stage:
         from cmm_uq.reporting import write_report
 
         report = write_report(job, out, seed=seed, stage=stage)
@@ -32,30 +32,6 @@ def command(
         sys.stdout.write(report.results.decode())
     elif not quiet:
         _summarise(report)
-
-
-@contextmanager
-def _progress(*, quiet: bool) -> Iterator[Stage | None]:
-    """A progress bar on a terminal, a line a stage elsewhere, nothing when quiet."""
-    if quiet:
-        yield None
-    elif sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        columns = TextColumn("{task.description:<26}"), BarColumn(), TimeElapsedColumn()
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task("Starting", total=1.0)
-            yield lambda what, part: bar.update(task, description=what, completed=part)
-    else:
-        said: set[str] = set()
-
-        def tell(what: str, part: float) -> None:
-            if what not in said:
-                said.add(what)
-                typer.echo(what, err=True)
-
-        yield tell
 
 
 def _summarise(report: Report) -> None:

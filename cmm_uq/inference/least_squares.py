@@ -36,6 +36,7 @@ class LeastSquares:
     degrees_of_freedom : observations minus what was fitted to them.
     residual_sd : mm, √(sum of squares / degrees of freedom); ``None`` without degrees of freedom.
     sigma : mm, standard uncertainty of one coordinate that the covariance uses.
+    sigma_of_residuals : mm, the same from the residuals alone; that in use where no degrees of freedom are left.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -49,6 +50,7 @@ class LeastSquares:
     degrees_of_freedom: int
     residual_sd: float | None
     sigma: float
+    sigma_of_residuals: float
 
 
 def solve(model: LinearModel) -> LeastSquares:
@@ -72,7 +74,9 @@ def solve(model: LinearModel) -> LeastSquares:
     whitened = reduced.observed - reduced.design @ value
     dof = reduced.count - rank
     sum_of_squares = float(whitened @ whitened)
-    sigma = model.sigma if model.sigma is not None else float(np.sqrt(sum_of_squares / dof))
+    stated = model.sigma if model.sigma is not None else 0.0
+    from_residuals = float(np.sqrt(sum_of_squares / dof)) if dof > 0 else stated
+    sigma = stated or from_residuals
     null_space = np.zeros((len(unknowns), len(free) - rank))
     null_space[free] = _simplest(Vt[rank:].T) * scale[:, None]
     for column in null_space.T:
@@ -82,7 +86,7 @@ def solve(model: LinearModel) -> LeastSquares:
     return LeastSquares(
         unknowns, value, _covariance(model, forward, free, held, sigma, determined), determined, null_space,
         rank, float(s[0] / s[rank - 1]) if rank else float("inf"), whitened * model.noise_scale, dof,
-        _residual_sd(whitened * model.noise_scale, dof), sigma,
+        _residual_sd(whitened * model.noise_scale, dof), sigma, from_residuals,
     )  # fmt: skip
 
 

@@ -1,0 +1,182 @@
+"""diagnosis.html as a document, and the ``diagnosis`` part of results.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cmm_uq import __version__
+from cmm_uq.analysis.diagnosing import Diagnosed
+from cmm_uq.certificate.diagnosis_words import VERDICTS, noise_words, sentence
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.plots import length_plot
+from cmm_uq.certificate.results_file import SCHEMA, finding_data, quantity_data
+from cmm_uq.jobs.reading import sha256
+from cmm_uq.units import MICROMETRE
+
+
+def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
+    """results.json of a diagnosis."""
+    posterior = found.diagnosis.posterior
+    return {
+        "schema": SCHEMA,
+        "software": {"name": "cmm-uq", "version": __version__},
+        "job": {"id": found.job.facts.job.id, "inputs_sha256": sha256(found.job.inputs)},
+        "sampling": {
+            "sampler": posterior.sampler, "seed": posterior.seed, "ess_min": posterior.ess_min,
+            "rhat_max": posterior.rhat_max, "converged": posterior.converged,
+        },
+        "diagnosis": diagnosis_data(found),
+    }  # fmt: skip
+
+
+def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
+    """The ``diagnosis`` part."""
+    d = found.diagnosis
+    return {
+        "verdict": d.verdict,
+        "p_value": d.p_value,
+        "where": [
+            {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,
+             "amplitude_um": place.amplitude_um, "what": place.what}
+            for place in d.where
+        ],
+        "effects": [
+            {"effect": item.effect, "probability": item.probability, "explained": item.explained,
+             "parameters": {name: quantity_data(q) for name, q in item.parameters.items()},
+             "words": sentence(item, d)}
+            for item in d.effects
+        ],
+        "indistinguishable": [list(group) for group in d.indistinguishable],
+        "suggested_measurements": [
+            {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions} for s in found.suggestions
+        ],
+        "noise": {
+            "stated_coordinate_um": found.job.facts.recording.u_coordinate_um,
+            "coordinate_um": quantity_data(d.noise.coordinate), "placing_um": quantity_data(d.noise.placing),
+            "correlated_in_time": d.noise.correlated_in_time, "heavy_tails": d.noise.heavy_tails,
+            "contradicts_stated": d.noise.contradicts_stated,
+        },
+        "screening": [finding_data(f, found.job.facts.recording.file) for f in found.findings],
+        "improvement": {
+            "rms_before_um": d.improvement.rms_before_um, "rms_after_um": d.improvement.rms_after_um,
+            "heldout_rms_before_um": d.improvement.heldout_rms_before_um,
+            "heldout_rms_after_um": d.improvement.heldout_rms_after_um,
+            "elpd_gain": d.improvement.elpd_gain, "elpd_gain_se": d.improvement.elpd_gain_se,
+        },
+        "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
+    }  # fmt: skip
+
+
+def diagnosis_document(found: Diagnosed) -> Document:
+    """The page of a diagnosis."""
+    facts, d = found.job.facts, found.diagnosis
+    sections = [
+        Section("What was left out", _left_out(found)),
+        Section("Before and after", _before_after(found)),
+        Section("Where the mismatch lives", _where(found)),
+        Section("Rival explanations", (_rivals(found),)),
+        Section("Noise", tuple(Paragraph(text) for text in noise_words(d, facts.recording.u_coordinate_um))),
+        Section("What to measure next", tuple(
+            Paragraph(f"{' and '.join(s.separates)}: {s.what}") for s in found.suggestions
+        )),
+    ]  # fmt: skip
+    return Document(
+        title="Diagnosis",
+        number=facts.job.id,
+        subject=f"{facts.machine.name}, measured on {facts.job.date.isoformat()}",
+        issuer=tuple(line for line in (facts.laboratory.name,) if line),
+        particulars=(
+            Facts((("Verdict", d.verdict), ("Probability that nothing is missing", f"p = {d.p_value:.2g}"),
+                   ("False-alarm rate", f"{100 * d.alpha:g} %"))),
+            Facts((("Machine", facts.machine.name), ("Artefact", d.before.artefact.title),
+                   ("Effects that the job names", ", ".join(facts.model.effects) or "none"))),
+        ),
+        warnings=tuple(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
+        sections=tuple(section for section in sections if section.blocks),
+        statements=(),
+        signatures=(),
+        attachments=(),
+        produced_by=f"cmm-uq {__version__}, {d.posterior.sampler}, seed {d.posterior.seed}",
+        date=facts.job.date,
+        end="End of diagnosis",
+    )  # fmt: skip
+
+
+def _left_out(found: Diagnosed) -> tuple[Block, ...]:
+    d = found.diagnosis
+    blocks: list[Block] = [Paragraph(VERDICTS[d.verdict])]
+    blocks += [Paragraph(sentence(item, d)) for item in d.effects]
+    blocks += [
+        Paragraph(f"This recording cannot tell apart: {', '.join(group)}.", tone="warning")
+        for group in d.indistinguishable
+    ]
+    return tuple(blocks)
+
+
+def _before_after(found: Diagnosed) -> tuple[Block, ...]:
+    d = found.diagnosis
+    before, after = (
+        model.residuals(model.estimate().least_squares.value) / MICROMETRE for model in (d.before, d.after)
+    )
+    expanded = 2 * d.noise.coordinate.value * d.before.artefact.noise_scale
+    odd = {m for f in found.findings for m in f.measurements}
+    gain = d.improvement
+    plot = length_plot(
+        d.before.artefact.measurement.astype(np.float64), before, after, expanded_before_um=expanded,
+        expanded_after_um=expanded, reference="no residual", flagged=np.isin(d.before.artefact.measurement, list(odd)),
+        before_label="Residuals of the job's model", after_label="With what was left out",
+        caption="Residual of each observation before and after, with U (k = 2) from the noise.",
+        alternative=f"Residual rms {gain.rms_before_um:.1f} µm before and {gain.rms_after_um:.1f} µm after.",
+    )  # fmt: skip
+    rows = (
+        ("Residual rms", f"{gain.rms_before_um:.2f}", f"{gain.rms_after_um:.2f}", "µm"),
+        ("Rms on held-out placings", f"{gain.heldout_rms_before_um:.2f}", f"{gain.heldout_rms_after_um:.2f}", "µm"),
+        ("Gain in log predictive density", "", f"{gain.elpd_gain:.1f} ± {gain.elpd_gain_se:.1f}", ""),
+    )
+    heads = (Column("Quantity", numeric=False), Column("Before"), Column("After"), Column("Unit", numeric=False))
+    changes = _changes(found)
+    table = Table(
+        "Improvement", heads, rows, ("Placings are left out with all their repeats; ± is one standard error.",)
+    )
+    return (plot, table, changes) if changes else (plot, table)
+
+
+def _changes(found: Diagnosed) -> Table | None:
+    """Estimates of the effects that the job names, before and after: how biased they were."""
+    d = found.diagnosis
+    if not d.effects:
+        return None
+    before, after = (model.estimate().least_squares for model in (d.before, d.after))
+    late = {u.key: value for u, value in zip(after.unknowns, after.value, strict=True)}
+    rows = tuple(
+        (f"{u.key[0]}, {u.key[1]}", f"{value:.4g}", f"{late[u.key]:.4g}", u.unit)
+        for u, value, known in zip(before.unknowns, before.value, before.determined, strict=True)
+        if known and not u.known
+    )
+    heads = (Column("Parameter", numeric=False), Column("Before"), Column("After"), Column("Unit", numeric=False))
+    return Table("What it changes in the estimates (least squares)", heads, rows) if rows else None
+
+
+def _where(found: Diagnosed) -> tuple[Block, ...]:
+    rows = tuple(
+        (place.what, place.covariate, f"{place.region[0]:.4g} … {place.region[1]:.4g}", f"{place.amplitude_um:.2g}",
+         f"{place.p_value:.1g}")
+        for place in found.diagnosis.where
+    )  # fmt: skip
+    if not rows:
+        return ()
+    heads = (Column("Smooth function", numeric=False), Column("Covariate", numeric=False), Column("Region"),
+             Column("Amplitude", "µm"), Column("p"))  # fmt: skip
+    return (
+        Table(
+            "Covariates on which the residuals depend", heads, rows, ("p is corrected for having looked everywhere.",)
+        ),
+    )
+
+
+def _rivals(found: Diagnosed) -> Table:
+    rows = tuple((name, f"{100 * p:.2g} %") for name, p in found.diagnosis.rivals)
+    heads = (Column("Explanation", numeric=False), Column("Probability"))
+    return Table("First race: one explanation alone", heads, rows, ("Nothing missing has the rest.",))

@@ -1,0 +1,53 @@
+"""``cmm-uq diagnose JOB``: what a recording shows that its model leaves out."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cmm_uq.cli.progress import shown
+
+if TYPE_CHECKING:
+    from cmm_uq.analysis.diagnosing import Diagnosed
+
+
+def command(
+    job: Annotated[Path, typer.Argument(help="Job folder: job.toml and the recording that it names.")],
+    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>]")] = None,
+    seed: Annotated[
+        int, typer.Option(help="Seed of everything random; the same seed gives the same bytes.", min=0)
+    ] = 0,
+    alpha: Annotated[float, typer.Option(help="Rate of false alarms.")] = 0.01,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print results.json instead of the summary.")] = False,
+) -> None:
+    """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
+    with shown(quiet=quiet or json) as stage:
+        from cmm_uq.reporting import write_diagnosis
+
+        written = write_diagnosis(job, out, seed=seed, alpha=alpha, stage=stage)
+    if json:
+        sys.stdout.write(written.results.decode())
+    elif not quiet:
+        _summarise(written.diagnosed)
+        for path in written.files.values():
+            typer.echo(path)
+
+
+def _summarise(found: Diagnosed) -> None:
+    from cmm_uq.certificate.diagnosis_words import VERDICTS, noise_words, sentence
+
+    diagnosis = found.diagnosis
+    typer.echo(f"{diagnosis.verdict.upper()} (p = {diagnosis.p_value:.2g}). {VERDICTS[diagnosis.verdict]}")
+    for item in diagnosis.effects:
+        typer.echo(sentence(item, diagnosis))
+    for group in diagnosis.indistinguishable:
+        typer.echo(f"Cannot be told apart by this recording: {', '.join(group)}.")
+    for suggestion in found.suggestions:
+        typer.echo(f"To part {' and '.join(suggestion.separates)}: {suggestion.what}")
+    for text in (*(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
+                 *noise_words(diagnosis, found.job.facts.recording.u_coordinate_um)):  # fmt: skip
+        typer.echo(text)

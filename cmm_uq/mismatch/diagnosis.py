@@ -1,0 +1,284 @@
+"""The diagnosis of a recording: whether something is missing, where, what, and whether modelling it predicts better."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.inference.posterior import Posterior, Progress, sample
+from cmm_uq.measurement import MeasurementModel
+from cmm_uq.mismatch.explanations import UNKNOWN, Explanation
+from cmm_uq.mismatch.held_out import Improvement, improvement
+from cmm_uq.mismatch.noise import Kind
+from cmm_uq.mismatch.search import Found, Race, race_of, search, tail_probability
+from cmm_uq.points import Floats
+from cmm_uq.units import MICROMETRE
+
+FALSE_ALARMS = 0.01
+"""Default rate at which a recording without any fault is found to have one."""
+
+_TOLD_APART = 0.95
+_RIVAL = 0.02
+_NOISE_KIND = 0.9
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a mismatch lives.
+
+    Parameters
+    ----------
+    covariate : column that it depends on.
+    region : of that covariate, where it is larger than half its maximum.
+    p_value : corrected for having looked at every covariate.
+    amplitude_um : largest value of the smooth function, in the observations.
+    what : the unknown function, in words.
+    """
+
+    covariate: str
+    region: tuple[float, float]
+    p_value: float
+    amplitude_um: float
+    what: str
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """An effect that the model left out.
+
+    Parameters
+    ----------
+    effect, title : its name, and in words.
+    probability : among all rivals that could stand in its place, nothing and the unknown included.
+    parameters : reported parameters, from the joint posterior.
+    explained : part of the misfit's sum of squares that it takes away.
+    """
+
+    effect: str
+    title: str
+    probability: float
+    parameters: Mapping[str, Quantity]
+    explained: float
+
+
+@dataclass(frozen=True)
+class NoiseFound:
+    """What the noise is like once everything found is modelled; lengths in µm."""
+
+    coordinate: Quantity
+    placing: Quantity
+    correlated_in_time: bool
+    heavy_tails: bool
+    contradicts_stated: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """See the module's docstring.
+
+    Parameters
+    ----------
+    verdict : ``consistent``, ``explained``, ``partial`` or ``unexplained``.
+    p_value : of "nothing is missing".
+    alpha : false-alarm rate asked for.
+    where : most significant first.
+    effects : what is asserted, most probable first.
+    indistinguishable : groups of effects that this recording cannot tell apart.
+    rivals : every explanation of the first race with its probability, most probable first.
+    noise, improvement : see their classes.
+    before, after : the job's model, and with what was left out.
+    posterior : joint, of the model after.
+    """
+
+    verdict: str
+    p_value: float
+    alpha: float
+    where: tuple[Place, ...]
+    effects: tuple[LeftOut, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    rivals: tuple[tuple[str, float], ...]
+    noise: NoiseFound
+    improvement: Improvement
+    before: MeasurementModel
+    after: MeasurementModel
+    posterior: Posterior
+
+
+def diagnose(
+    model: MeasurementModel, *, stated_um: float | None, alpha: float, seed: int, progress: Progress | None = None
+) -> Diagnosis:
+    """Diagnose a recording.
+
+    Parameters
+    ----------
+    model : what the job names, without gross outliers.
+    stated_um : standard uncertainty of a coordinate that the job states.
+    alpha : false-alarm rate.
+    seed : of everything random.
+    """
+    stated = None if stated_um is None else stated_um * MICROMETRE
+    found = search(model, stated, alpha=alpha, seed=seed)
+    gain = improvement(model, found.model)
+    if found.effects and gain.elpd_gain <= 0:
+        found = replace(found, last=found.first, model=model, effects=(), unexplained=found.first.best(UNKNOWN))
+        gain = improvement(model, model)
+    swaps = {name: _swap(found, name, stated) for name in found.effects}
+    noise = _noise(found.last, stated)
+    sampled = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
+    posterior = sample(sampled.estimate().linear, seed, progress)
+    return Diagnosis(
+        _verdict(found, alpha), found.first.p_value, alpha, _where(found.first, alpha), _left_out(found, swaps, posterior),
+        _indistinguishable(swaps), _rivals(found.first), noise, gain, model, sampled, posterior,
+    )  # fmt: skip
+
+
+def _verdict(found: Found, alpha: float) -> str:
+    if found.first.p_value >= alpha:
+        return "consistent"
+    if not found.effects:
+        return "unexplained"
+    return "partial" if found.unexplained is not None else "explained"
+
+
+def _swap(found: Found, name: str, stated: float | None) -> dict[str, float]:
+    """Probability of every explanation that could stand in an effect's place, the other effects kept."""
+    kept = tuple(effect for effect in found.model.effects if effect.name != name)
+    race = race_of(replace(found.model, effects=kept), stated, (), None)
+    return {e.name: float(p) for e, p in zip(race.explanations, race.probability, strict=True)}
+
+
+def _left_out(found: Found, swaps: Mapping[str, Mapping[str, float]], posterior: Posterior) -> tuple[LeftOut, ...]:
+    column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
+    total = _squares(found.first.model) - _squares(found.model)
+    listed = []
+    for effect in (e for e in found.model.effects if e.name in found.effects):
+        draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
+        shape = np.tile(np.array(found.model.shapes.get(effect.name, ()), dtype=np.float64), (len(draws), 1))
+        reported = effect.to_reported(draws, shape)
+        units = {parameter.name: parameter.unit for parameter in effect.reported}
+        without = replace(found.model, effects=tuple(e for e in found.model.effects if e is not effect))
+        share = (_squares(without) - _squares(found.model)) / _squares(found.first.model) if total > 0 else 0.0
+        parameters = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
+        listed.append(LeftOut(effect.name, effect.title, swaps[effect.name].get(effect.name, 0.0), parameters, share))
+    return tuple(sorted(listed, key=lambda item: -item.probability))
+
+
+def _squares(model: MeasurementModel) -> float:
+    return float(np.sum(model.estimate().least_squares.residuals ** 2))
+
+
+def _indistinguishable(swaps: Mapping[str, Mapping[str, float]]) -> tuple[tuple[str, ...], ...]:
+    groups = []
+    for name, probabilities in swaps.items():
+        if probabilities.get(name, 0.0) >= _TOLD_APART:
+            continue
+        rivals = [e for e, p in probabilities.items() if p > _RIVAL and e != name and not e.startswith("error ")]
+        if rivals:
+            groups.append((name, *sorted(rivals, key=lambda e: -probabilities[e])))
+    return tuple(groups)
+
+
+def _rivals(race: Race) -> tuple[tuple[str, float], ...]:
+    order = np.argsort(-race.probability)
+    return tuple((race.explanations[i].name, float(race.probability[i])) for i in order[:12])
+
+
+def _where(race: Race, alpha: float) -> tuple[Place, ...]:
+    if race.p_value >= alpha:
+        return ()
+    found = []
+    for explanation, odds in zip(race.explanations, race.log_odds, strict=True):
+        if explanation.kind != UNKNOWN or explanation.covariate is None or explanation.covariate_name is None:
+            continue
+        p_value = tail_probability(race.null_maximum, float(odds))
+        if p_value < alpha:
+            curve = _smoothed(race, explanation)
+            region = _region(explanation.covariate, curve)
+            amplitude = float(np.abs(curve).max()) / MICROMETRE
+            found.append(Place(explanation.covariate_name, region, p_value, amplitude, explanation.name))
+    return tuple(sorted(found, key=lambda place: place.p_value))
+
+
+def _smoothed(race: Race, explanation: Explanation) -> Floats:
+    """Best linear estimate of an unknown function in the observations, (m,) mm, at the noise of the residuals."""
+    comparison = race.comparison
+    columns = explanation.members[0].columns / comparison.noise_scale[:, None]
+    left = comparison.rest.T @ columns
+    sigma2 = float(np.mean(comparison.left**2)) / 2
+    coefficients = np.linalg.solve(left.T @ left + sigma2 * np.eye(left.shape[1]), left.T @ comparison.left)
+    return np.asarray(explanation.members[0].columns @ coefficients, dtype=np.float64)
+
+
+def _region(covariate: Floats, curve: Floats) -> tuple[float, float]:
+    """Range of the covariate about the curve's largest value where it exceeds half of it."""
+    order = np.argsort(covariate)
+    size = np.abs(curve[order])
+    top = int(np.argmax(size))
+    high = size >= 0.5 * size[top]
+    first, last = top, top
+    while first > 0 and high[first - 1]:
+        first -= 1
+    while last < len(size) - 1 and high[last + 1]:
+        last += 1
+    return float(covariate[order][first]), float(covariate[order][last])
+
+
+def _noise(race: Race, stated: float | None) -> NoiseFound:
+    """Posterior of the noise, given what is modelled; a kind is named when it has nine parts of ten."""
+    comparison = race.comparison
+    weight = comparison.noise_posterior()
+    sigma = comparison.sigma / MICROMETRE
+    sizes = np.array([kind.size if kind.name == "placing" else 0.0 for kind in comparison.kinds])
+    probability = _probabilities(comparison.kinds, weight)
+    placing = np.outer(sizes, sigma)
+    coordinate = _summary(np.broadcast_to(sigma, weight.shape), weight)
+    return NoiseFound(
+        coordinate,
+        _summary(placing, weight),
+        probability.get("correlated", 0.0) > _NOISE_KIND,
+        _heavy(race),
+        stated is not None
+        and _contradicts(stated, comparison.left, comparison.factors[int(weight.sum(axis=1).argmax())]),
+    )
+
+
+def _probabilities(kinds: Sequence[Kind], weight: Floats) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for kind, part in zip(kinds, weight.sum(axis=1), strict=True):
+        total[kind.name] = total.get(kind.name, 0.0) + float(part)
+    return total
+
+
+def _summary(values: Floats, weight: Floats) -> Quantity:
+    flat, w = values.ravel(), weight.ravel()
+    mean = float(w @ flat)
+    order = np.argsort(flat)
+    cumulative = np.cumsum(w[order])
+    low, high = (float(flat[order][min(int(np.searchsorted(cumulative, q)), len(flat) - 1)]) for q in (0.025, 0.975))
+    return Quantity(
+        mean, float(np.sqrt(max(float(w @ (flat - mean) ** 2), 0.0))), (min(low, mean), max(high, mean)), "µm"
+    )
+
+
+def _heavy(race: Race) -> bool:
+    """Whether Student's t with four degrees of freedom describes the residuals e⁴ times better than a normal."""
+    z: Floats = np.asarray(race.comparison.rest @ race.comparison.left, dtype=np.float64)
+    deviation = float(z.std())
+    if len(z) < 15 or deviation == 0:
+        return False
+    z = z / deviation
+    scales = np.geomspace(0.3, 1.2, 40)
+    t = np.outer(1 / scales, z)
+    log_t = (special.gammaln(2.5) - special.gammaln(2) - 0.5 * np.log(4 * np.pi) - 2.5 * np.log1p(t**2 / 4)).sum(axis=1)
+    return bool((log_t - len(z) * np.log(scales)).max() - (-0.5 * len(z) * (np.log(2 * np.pi) + 1)) > 4.0)
+
+
+def _contradicts(stated: float, left: Floats, factor: Floats) -> bool:
+    """Two-sided χ² test of the stated noise at 1 %."""
+    white = np.linalg.solve(factor, left) / stated
+    p = float(special.chdtrc(len(left), white @ white))
+    return min(p, 1 - p) < 0.005

@@ -1,0 +1,97 @@
+"""Whether what was found predicts placings that the fit has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.inference.posterior import Density
+from cmm_uq.measurement import MeasurementModel
+from cmm_uq.points import Floats
+from cmm_uq.units import MICROMETRE
+
+FOLDS = 10
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """Before and after, on the recording itself and on held-out placings.
+
+    Parameters
+    ----------
+    rms_before_um, rms_after_um : residual rms of the observations.
+    heldout_rms_before_um, heldout_rms_after_um : of predictions of placings that were left out of the fit.
+    elpd_gain, elpd_gain_se : gain in expected log predictive density, and its standard error over the placings.
+    """
+
+    rms_before_um: float
+    rms_after_um: float
+    heldout_rms_before_um: float
+    heldout_rms_after_um: float
+    elpd_gain: float
+    elpd_gain_se: float
+
+
+def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvement:
+    """Compare two models of one recording by cross-validation over its placings.
+
+    Repeats of a placing are left out together. The predictive density is normal, with the noise of each model's own fit.
+    """
+    rms = [_rms(model.estimate().least_squares.residuals) for model in (before, after)]
+    if before.effects == after.effects:
+        held = _held_out(before)[0]
+        return Improvement(rms[0], rms[1], held, held, 0.0, 0.0)
+    first, second = _held_out(before), _held_out(after)
+    gain = second[1] - first[1]
+    se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0
+    return Improvement(rms[0], rms[1], first[0], second[0], float(gain.sum()), se)
+
+
+def _held_out(model: MeasurementModel) -> tuple[float, Floats]:
+    """Rms of predictions, µm, and log predictive density of each placing."""
+    estimate = model.estimate()
+    linear = estimate.linear
+    sigma = max(estimate.least_squares.sigma_of_residuals, 1e-7)
+    errors, densities = [], []
+    for out in _folds(model.artefact.measurement[model.used]):
+        train = replace(
+            linear, observed=linear.observed[~out], design=linear.design[~out], placing=linear.placing[~out],
+            noise_scale=linear.noise_scale[~out], sigma=sigma,
+        )  # fmt: skip
+        mean, covariance, _ = Density(train).conditional(float(np.log(sigma)))
+        scale = linear.noise_scale[out]
+        y, A, B = (
+            linear.observed[out] / scale,
+            linear.design[out] / scale[:, None],
+            linear.placing[out] / scale[:, None],
+        )
+        Q = _complement(B)
+        error = Q.T @ (y - A @ mean)
+        spread = sigma**2 * np.eye(Q.shape[1]) + Q.T @ A @ covariance @ A.T @ Q
+        errors.append(error * scale.mean())
+        factor = np.linalg.cholesky(spread)
+        white = np.linalg.solve(factor, error)
+        densities.append(-0.5 * white @ white - np.log(np.diag(factor)).sum() - 0.5 * len(error) * np.log(2 * np.pi))
+    return _rms(np.concatenate(errors)), np.array(densities)
+
+
+def _folds(measurement: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
+    placings = np.unique(measurement)
+    count = min(len(placings), max(FOLDS, 2)) if len(placings) > 40 else len(placings)
+    for k in range(count):
+        yield np.isin(measurement, placings[k::count])
+
+
+def _complement(columns: Floats) -> Floats:
+    """Orthonormal basis of what columns (m, q) do not reach, (m, m − rank)."""
+    if not columns.shape[1]:
+        return np.eye(len(columns))
+    U, s, _ = np.linalg.svd(columns, full_matrices=True)
+    return U[:, int(np.sum(s > 1e-9 * max(float(s[0]), 1e-300))) :]
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)) / MICROMETRE) if len(values) else 0.0

@@ -1,0 +1,91 @@
+"""What the noise may be: white, with a common part in each placing, or correlated in time.
+
+The noise model belongs to the baseline. Set-up offsets or slow drifts of the noise that are not modelled look like physics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.points import Floats, Ints
+
+PLACING_RATIOS = (0.5, 1.0, 2.0)
+"""Standard deviation of a placing over that of a reading."""
+
+CORRELATIONS = (0.5, 0.85)
+"""Correlation of neighbours in time."""
+
+WHITE = 0.7
+"""Probability, beforehand, that noise is white; the rest is shared by the other kinds."""
+
+_STATED_IS_RIGHT = 0.9
+_STATED_SPREAD = 0.08
+_POINTS = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """One kind of noise.
+
+    Parameters
+    ----------
+    name : ``white``, ``placing`` or ``correlated``.
+    size : ratio of the placing's standard deviation to the reading's, or correlation of neighbours; 0 for white.
+    correlation : (m, m) covariance over the variance of a reading.
+    probability : beforehand.
+    """
+
+    name: str
+    size: float
+    correlation: Floats
+    probability: float
+
+
+def kinds(placing: Ints, order: Floats) -> list[Kind]:
+    """Kinds of noise that a recording could show.
+
+    Parameters
+    ----------
+    placing : (m,) which placing each observation belongs to.
+    order : (m,) time, or place in the recording, of each observation.
+    """
+    m = len(placing)
+    same = (placing[:, None] == placing[None, :]).astype(np.float64)
+    found = [Kind("white", 0.0, np.eye(m), WHITE)]
+    shared = same.sum() > m
+    share = (1 - WHITE) / (len(CORRELATIONS) + shared * len(PLACING_RATIOS))
+    if shared:
+        found += [Kind("placing", ratio, np.eye(m) + ratio**2 * same, share) for ratio in PLACING_RATIOS]
+    rank = np.argsort(np.argsort(order, kind="stable"), kind="stable")
+    apart = np.abs(rank[:, None] - rank[None, :])
+    found += [Kind("correlated", phi, phi**apart, share) for phi in CORRELATIONS]
+    return found
+
+
+def sigma_grid(stated: float | None, residual: float) -> tuple[Floats, Floats]:
+    """Values (s,) of the noise, mm, and their log probabilities beforehand.
+
+    A stated value is mostly right to 8 %, and now and then simply wrong; without one, the logarithm is uniform.
+
+    Parameters
+    ----------
+    stated : as the job states it.
+    residual : standard deviation of what the baseline leaves.
+    """
+    centre = np.log(residual)
+    grid = np.linspace(centre - 4.0, centre + 1.5, _POINTS)
+    if stated is None:
+        return np.exp(grid), np.full(_POINTS, -np.log(_POINTS))
+    at = np.log(stated)
+    grid = np.unique(np.concatenate([grid, np.linspace(at - 5 * _STATED_SPREAD, at + 5 * _STATED_SPREAD, 60)]))
+    right = np.exp(-0.5 * ((grid - at) / _STATED_SPREAD) ** 2) / _STATED_SPREAD
+    wrong = np.exp(-0.5 * (grid - at) ** 2)
+    weight = _STATED_IS_RIGHT * right + (1 - _STATED_IS_RIGHT) * wrong
+    return np.exp(grid), np.log(weight * np.gradient(grid) / np.sqrt(2 * np.pi))
+
+
+def order_of(time: Floats | None, count: int) -> Floats:
+    """Time of each observation, or its place in the recording."""
+    return np.arange(count, dtype=np.float64) if time is None else time
