@@ -94,7 +94,7 @@ def scan_plane(readings: Floats, towards: Floats, *, u_point: float | None = Non
     )
 
 
-def scan_roll(scan: Floats, readings: Floats, alpha: float, beta: float) -> float:
+def scan_roll(scan: Floats, readings: Floats, alpha: float, beta: float, nominal: float) -> float:
     """Euler angle γ in rad from the scan of a plane surface: the angle with which its points lie in one plane.
 
     Parameters
@@ -102,18 +102,17 @@ def scan_roll(scan: Floats, readings: Floats, alpha: float, beta: float) -> floa
     scan : (n, 2) u, v, mm.
     readings : (n, 3) scale readings, mm. They must move in two directions, else γ and the surface's slope are one.
     alpha, beta : rad.
+    nominal : γ as the wrist is indexed, rad; moves in two directions leave a second solution, half a turn away.
 
     Raises
     ------
-    CmmUqError : the motion does not determine γ.
+    CmmUqError : the motion does not determine γ, or it is far from the nominal one.
     """
 
     def placed(gamma: float) -> Floats:
         return np.asarray(scan @ euler_313(alpha, beta, gamma)[:, :2].T + readings)
 
-    starts = np.radians(np.arange(0, 360, 15))  # the steps of the wrist
-    start = min(starts, key=lambda gamma: fit_plane(placed(gamma), u_point=1.0).rms)
-    plane = fit_plane(placed(start), u_point=1.0)
+    plane = fit_plane(placed(nominal), u_point=1.0)
     size = float(np.abs(readings - readings.mean(axis=0)).max()) or 1.0
 
     def linearise(state: Floats) -> Floats:
@@ -130,12 +129,18 @@ def scan_roll(scan: Floats, readings: Floats, alpha: float, beta: float) -> floa
         n = n + step[1:3] @ frame_about(n)[:2]
         return np.array([state[0] + step[0], *(n / np.linalg.norm(n)), state[4] + size * step[3]])
 
-    found = minimise(np.array([start, *plane.normal, 0.0]), linearise, move, "roll of the scan plane")
+    found = minimise(np.array([nominal, *plane.normal, 0.0]), linearise, move, "roll of the scan plane")
     if found.condition > 1e6:
         raise CmmUqError(
             "these motions do not determine γ", fix="Scan the plane while moving in two directions across it"
         )
-    return float((found.state[0] + np.pi) % (2 * np.pi) - np.pi)
+    gamma = float(found.state[0])
+    if abs(gamma - nominal) > np.pi / 12:
+        raise CmmUqError(
+            f"γ = {np.degrees(gamma):.2f}° from the scan, the wrist is indexed at {np.degrees(nominal):.2f}°",
+            fix="Check the index of the wrist, and that every point lies on the plane",
+        )
+    return gamma
 
 
 def mount_axes(rotation: Floats) -> tuple[Floats, Floats, Floats]:
