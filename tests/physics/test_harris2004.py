@@ -26,7 +26,7 @@ OFFSET = np.array([1.001, 264.505, 129.575])
 """[U1 V1 W1] as published, mm."""
 POSES = np.radians([4.0] * 4 + [-2.0] * 6 + [4.0] * 4 + [-2, -46, -46, 4, -59, -59])
 """γ of each position, found from the change of the sphere centres; W along X. The wrist has steps of 15°."""
-SPHERE = np.array([769.0, 271.0, -525.5])
+SPHERE = np.array([769.0, 271.0, -524.5])
 """Place of the reference sphere, scale readings less the offset of the mount, mm."""
 
 
