@@ -28,8 +28,9 @@ def sections(result: Result) -> list[Section]:
     odd = {m for finding in result.findings for m in finding.measurements}
     flagged = np.isin(bar.measurement, list(odd))
     plot = length_plot(
-        bar.measurement.astype(np.float64), deviations, residuals, expanded_before_um=expanded, expanded_after_um=expanded,
-        reference=name, reference_expanded_um=2 * bar.sizes[0].sd / MICROMETRE if certified else 0.0, flagged=flagged,
+        bar.measurement.astype(np.float64), deviations, residuals, flagged=flagged,
+        expanded_before_um=expanded, expanded_after_um=expanded, reference=f"{name} {reference:.4f}\u00a0mm",
+        reference_expanded_um=2 * bar.sizes[0].sd / MICROMETRE if certified else 0.0,
         caption=f"Deviation of each length from the {name}, as recorded and after the fitted model, with U (k = 2).",
         alternative=(
             f"{len(lengths)} lengths: as recorded they deviate by {deviations.min():.0f} to {deviations.max():.0f} µm from "

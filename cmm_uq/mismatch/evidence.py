@@ -25,14 +25,14 @@ _SMALLEST = 0.4
 _ABSORBED = 1e-5
 """Part of its length below which a column is the baseline's own."""
 
-_BLOCK = 8_000_000
+_BLOCK = 1_500_000
 
 
 @dataclass(frozen=True, eq=False)
 class _Members:
     """Members with the same number of columns, r, in whitened coordinates.
 
-    ``owner`` (M,) is the explanation of each and ``weight`` (M,) its log probability within it; ``directions`` (M, m', r)
+    ``owner`` (M,) is the explanation of each and ``weight`` (M,) its log probability within it; ``directions`` (M, r, m')
     are orthonormal, ``strengths`` (M, r) their variances for coefficients of one, ``amplitudes`` (M, a) the standard
     deviations of the coefficients to try, in units of the noise.
     """
@@ -119,7 +119,7 @@ class Comparison:
         )
         strengths, turn = np.linalg.eigh(white.transpose(0, 2, 1) @ white)
         strengths = np.maximum(strengths, strengths[:, -1:] * 1e-12)
-        directions = (white @ turn) / np.sqrt(strengths)[:, None, :]
+        directions = np.ascontiguousarray(((white @ turn) / np.sqrt(strengths)[:, None, :]).transpose(0, 2, 1))
         rms = np.sqrt(strengths.sum(axis=1) / len(factor))
         largest = 1 / self.least_noise
         smallest = np.minimum(_SMALLEST / rms, largest)
@@ -177,10 +177,11 @@ class Comparison:
     def _add(self, total: Floats, members: _Members, white: Floats, log: float) -> None:
         """Add the evidence of members under one kind of noise to that of their explanations, in blocks."""
         squares = np.sum(white**2, axis=0)
-        block = max(1, _BLOCK // (_AMPLITUDES * white.shape[1] * members.directions.shape[2]))
+        block = max(1, _BLOCK // (_AMPLITUDES * white.shape[1] * members.directions.shape[1]))
         for start in range(0, len(members.owner), block):
             part = slice(start, start + block)
-            projected = np.einsum("kmr,mb->krb", members.directions[part], white) ** 2
+            some = members.directions[part]
+            projected = (some.reshape(-1, len(white)) @ white).reshape(*some.shape[:2], -1) ** 2
             ratio = members.amplitudes[part, :, None] ** 2 * members.strengths[part, None, :]  # (k, a, r)
             unexplained = squares - (ratio / (1 + ratio)) @ projected  # (k, a, b)
             log_each = self.over_sigma(unexplained) - 0.5 * np.log1p(ratio).sum(axis=2)[..., None] + log
