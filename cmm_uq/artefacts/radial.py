@@ -132,7 +132,8 @@ class Radial(Artefact):
         which = int(np.argmax(flat))
         rows = centred.index == which
         count = int(centred.sizes[which])
-        told = f"measurement {self.points.measurement[np.argmax(rows)]}: {count} points"
+        whose = f"measurement {self.points.measurement[np.argmax(rows)]}" if len(flat) > 1 else "the recording"
+        told = f"{whose}: {count} points"
         if count < LEAST_POINTS:
             raise CmmUqError(f"{told} are too few for a centre and a distance", where=place(self.points, rows, where),
                              fix=f"Record at least {LEAST_POINTS}")  # fmt: skip

@@ -16,6 +16,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry import fit_sphere
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import AXES, Floats, Ints, Points
+from cmm_uq.units import MICROMETRE
 
 LARGEST_ANGLE = np.radians(20.0)
 """Between a recorded normal and the direction away from the centre; beyond it the normals belong to something else."""
@@ -48,6 +49,10 @@ class Sphere(Radial):
     facts : what the job says of the sphere.
     points : the recording, with ``nx, ny, nz`` where they are known.
 
+    Attributes
+    ----------
+    form : form deviation of the ball by its certificate, mm; 0 when it is not given.
+
     Raises
     ------
     CmmUqError : too few points, points in one plane, normals that do not point away from the centre.
@@ -61,6 +66,7 @@ class Sphere(Radial):
 
     def __init__(self, facts: ArtefactFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(facts, points, Placings.of(points.measurement), expansion(facts, points), where)
+        self.form = (facts.form_um or 0.0) * MICROMETRE
         if all(f"n{a}" in points.columns for a in AXES):
             self._take_normals(where)
 

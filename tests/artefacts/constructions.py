@@ -112,3 +112,13 @@ def free(found: LeastSquares) -> list[dict[str, float]]:
         {unknown.key[0]: float(part) for unknown, part in zip(found.unknowns, column, strict=True) if part}
         for column in found.null_space.T
     ]
+
+
+def swept(count: int = 60, length: float = 400.0, *, everywhere: bool = False, seed: int = 3) -> Points:
+    """The free ball of a swept bar: over the upper half of its sphere, or where wanted all around the fixed ball."""
+    direction = np.random.default_rng(seed).standard_normal((count, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    if not everywhere:
+        direction[:, 2] = np.abs(direction[:, 2])
+    fixed = MIDDLE - [0, 0, 0 if everywhere else 230]
+    return recording(fixed + length * direction, np.arange(1, count + 1), np.ones(count, dtype=np.int64))

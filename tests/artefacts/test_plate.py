@@ -129,7 +129,7 @@ def test_a_beam_of_balls_is_a_plate_on_one_line() -> None:
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
-    truth, inside, points = [100.0, -60.0, 20.0, 30.0, -12.0, 5.0], 0, plate()
+    truth, inside, points = [100.0, -60.0, 20.0, 30.0, -12.0, 5.0], 0, plate(pitch=200.0, side=3)
     for seed in range(200):
         found = estimated(EXACT, indicated(EXACT, points, SIX, truth, sigma=1e-3, seed=seed), SIX)
         off = found.value[:6] - truth
