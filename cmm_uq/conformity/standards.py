@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.artefacts.artefact import Artefact
+from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.conformity.decision import Decision, decide
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.errors import CmmUqError
@@ -20,6 +21,9 @@ ISO_10360_2_LENGTHS = 105
 
 ISO_10360_2_NOMINALS = 5
 """Different nominal lengths of that test."""
+
+ISO_10360_5_POINTS = 25
+"""Points over a hemisphere of the test sphere (ISO 10360-5:2010, 6.2)."""
 
 B89_LENGTHS = 20
 """Positions of the ballbar for a near-cubic volume (ASME B89.4.1-1997, 5.5.2)."""
@@ -65,6 +69,8 @@ def statement(facts: ConformityFacts, artefact: Artefact, accuracy: Mapping[str,
         return _volumetric_performance(facts, artefact, accuracy)
     if facts.standard in ("ISO 10360-2:2009", "VDI/VDE 2617"):
         return _error_of_indication(facts, artefact, key)
+    if facts.standard == "ISO 10360-5:2010" and isinstance(artefact, Sphere):
+        return _form_error(facts, artefact)
     raise CmmUqError(f"{facts.standard} is not decided on a {artefact.kind}", where=f"job.toml {key} standard",
                      fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
 
@@ -106,6 +112,28 @@ def _error_of_indication(facts: ConformityFacts, artefact: Artefact, key: str) -
     decision = decide(value, float(u[worst]), limit, facts.rule)
     return Statement(facts, "error of indication of length, worst against its limit", value, float(u[worst]), limit,
                      decision, tuple(remarks))  # fmt: skip
+
+
+def _form_error(facts: ConformityFacts, sphere: Sphere) -> Statement:
+    """Probing form error: the largest range of radial distances from a least-squares sphere (ISO 10360-5:2010, 6.2).
+
+    Its uncertainty is the test uncertainty (ISO/TS 23165): half the form deviation of the test sphere.
+    """
+    probed = sphere.probed()
+    worst = int(np.argmax(probed.form))
+    value, u = float(probed.form[worst]) / MICROMETRE, sphere.form / 2 / MICROMETRE
+    limit = float(_limits_um(facts, np.array([sphere.sizes[0].nominal]))[0])
+    remarks = [
+        f"u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm."
+        if u > 0
+        else "The test sphere is taken as perfectly round: its form deviation (form_um) is not given."
+    ]
+    if np.any(probed.count != ISO_10360_5_POINTS):
+        counted = ", ".join(str(n) for n in sorted(set(probed.count.tolist())))
+        remarks.append(f"The standard asks for {ISO_10360_5_POINTS} points on each sphere; recorded: {counted}.")
+    if len(probed.form) > 1:
+        remarks.append(f"The largest of {len(probed.form)} spheres: measurement {probed.measurement[worst]}.")
+    return Statement(facts, "probing form error", value, u, limit, decide(value, u, limit, facts.rule), tuple(remarks))
 
 
 def _limits_um(facts: ConformityFacts, lengths_mm: Floats) -> Floats:

@@ -132,7 +132,8 @@ class KnownLength(_Table):
 class ArtefactFacts(_Table):
     """``[artefact]``; without ``length_mm`` it is uncalibrated, unless its certified figures stand in the recording.
 
-    ``nominal`` says that those figures are nominal only: their common scale then stays free.
+    ``nominal`` says that those figures are nominal only: their common scale then stays free. ``form_um`` is the form
+    deviation of a test sphere by its certificate.
     """
 
     kind: ArtefactKind
@@ -141,6 +142,7 @@ class ArtefactFacts(_Table):
     length_mm: Positive | None = None
     u_um: NotNegative | None = None
     nominal: bool = False
+    form_um: NotNegative | None = None
     cte_per_k: float = 0.0
     certificate: Traceability | None = None
     axis: Literal["x", "y", "z"] | None = None
@@ -157,6 +159,8 @@ class ArtefactFacts(_Table):
                 "nominal = true says that the recording's references are not certified: leave out length_mm and u_um; "
                 f"only {', '.join(WITH_REFERENCES)} have references"
             )
+        if self.form_um is not None and self.kind != "sphere":
+            raise ValueError(f"form_um is the form deviation of a test sphere, not of a {self.kind}: leave it out")
         if abs(self.cte_per_k) > 1e-3:
             raise ValueError(
                 f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
