@@ -118,6 +118,17 @@ def simulate_adaptively(
     return run.result(stable)
 
 
+def draw_outputs(model: MeasurementModel, trials: int, seed: int = 0) -> Floats:
+    """Draws (p, trials) of the outputs themselves, for regions and pictures; memory grows with the trials.
+
+    Raises
+    ------
+    CmmUqError : as for :func:`simulate`.
+    """
+    run = _Run(model, 0.95, seed)
+    return np.concatenate([run.evaluate(min(BLOCK, trials - k)) for k in range(0, trials, BLOCK)], axis=1)
+
+
 def numerical_tolerance(u: Floats, digits: int) -> Floats:
     """Δ of JCGM 101 7.9.2: half a unit of the last of ``digits`` significant digits of u; zero for u = 0."""
     tolerance = np.zeros_like(np.asarray(u, dtype=np.float64))
@@ -158,7 +169,7 @@ class _Run:
 
     def advance(self, n: int) -> None:
         """Make n more trials."""
-        outputs = self._evaluate(n)
+        outputs = self.evaluate(n)
         mean = outputs.mean(axis=1)
         centred = outputs - mean[:, None]
         comoment = centred @ centred.T
@@ -175,7 +186,8 @@ class _Run:
             tails.add(draws)
         self._count(outputs)
 
-    def _evaluate(self, n: int) -> Floats:
+    def evaluate(self, n: int) -> Floats:
+        """Outputs (p, n) of n new draws of the inputs."""
         inputs = self._draw(self._rng, n)
         with np.errstate(all="ignore"):
             outputs = self.model(*inputs)

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.uncertainty.coverage_intervals import Tails, both_intervals, inner_draws
+from cmm_uq.uncertainty.coverage_intervals import (
+    Tails,
+    both_intervals,
+    inner_draws,
+    settled_shortest_interval,
+    shortest_interval,
+    symmetric_interval,
+)
 
 
 def by_definition(draws: np.ndarray, p: float) -> list[float]:
@@ -34,7 +41,11 @@ def test_keeping_the_tails_only_changes_nothing(p: float) -> None:
     tails = Tails(p)
     for block in np.array_split(draws, 40):
         tails.add(np.sort(block))
-    assert tails.intervals().tolist() == both_intervals(np.sort(draws), p).tolist()
+    ordered = np.sort(draws)
+    outer = len(draws) - inner_draws(len(draws), p)
+    lowest, highest = ordered[:outer], ordered[-outer:]
+    expected = [*settled_shortest_interval(lowest, highest), *symmetric_interval(lowest, highest)]
+    assert tails.intervals().tolist() == expected
 
 
 def test_q_is_rounded_to_the_nearest_integer() -> None:
@@ -46,3 +57,32 @@ def test_q_is_rounded_to_the_nearest_integer() -> None:
 
 def test_draws_that_are_all_the_same_have_an_interval_of_no_length() -> None:
     assert both_intervals(np.full(200, 3.0), 0.95).tolist() == [3.0] * 4
+
+
+def ends_of(draws: np.ndarray, p: float) -> tuple[np.ndarray, np.ndarray]:
+    ordered, outer = np.sort(draws), len(draws) - inner_draws(len(draws), p)
+    return ordered[:outer], ordered[-outer:]
+
+
+@pytest.mark.parametrize("p", [0.95, 0.99])
+def test_the_settled_interval_scatters_less_about_the_same_ends_and_is_hardly_longer(p: float) -> None:
+    # a normal output: the shortest interval is the symmetric one, known exactly
+    from scipy import special
+
+    rng, k = np.random.default_rng(4), float(special.ndtri((1 + p) / 2))
+    exact, settled = [], []
+    for _ in range(100):
+        lowest, highest = ends_of(rng.standard_normal(100_000), p)
+        exact.append(shortest_interval(lowest, highest))
+        settled.append(settled_shortest_interval(lowest, highest))
+    by_definition, smooth = np.array(exact), np.array(settled)
+    assert np.all(smooth.std(axis=0) < 0.75 * by_definition.std(axis=0))
+    assert np.all(np.abs(smooth.mean(axis=0) - [-k, k]) < 5 * smooth.std(axis=0) / 10)
+    lengths = np.diff(smooth)[:, 0] / np.diff(by_definition)[:, 0]
+    assert np.all((lengths >= 1) & (lengths < 1.01))
+
+
+def test_a_density_that_only_falls_has_its_shortest_interval_at_the_edge() -> None:
+    lowest, highest = ends_of(np.random.default_rng(5).standard_exponential(200_000), 0.95)
+    assert settled_shortest_interval(lowest, highest) == shortest_interval(lowest, highest)
+    assert settled_shortest_interval(lowest, highest)[0] < 1e-3

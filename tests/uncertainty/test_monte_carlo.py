@@ -29,7 +29,8 @@ TRIALS = 400_000
 def within_five_errors(found: Simulated, value: float, u: float, low: float, high: float) -> None:
     """Value, u and the ends of the shortest interval.
 
-    The ends of a shortest interval converge as n^(-1/3): over b blocks their error is b^(1/6) times that of a mean.
+    The ends of the very shortest interval converge as n^(-1/3): over b blocks their error is b^(1/6) times that of a
+    mean. The settled ones do better.
     """
     errors = found.standard_error[0]
     assert abs(found.value[0] - value) <= 5 * errors[0]
