@@ -8,7 +8,7 @@ from types import FrameType
 
 import typer
 
-from cmm_uq.cli import diagnose, report, simulate
+from cmm_uq.cli import budget, compensate, diagnose, report, simulate
 from cmm_uq.errors import CmmUqError
 
 BAD_INPUT = 2
@@ -25,6 +25,8 @@ app = typer.Typer(
 app.command("report")(report.command)
 app.command("diagnose")(diagnose.command)
 app.command("simulate")(simulate.command)
+app.command("compensate")(compensate.command)
+app.command("budget")(budget.command)
 
 
 @app.callback(invoke_without_command=True)

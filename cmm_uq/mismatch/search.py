@@ -65,6 +65,11 @@ class Race:
         of_kind = [(p, i) for i, p in enumerate(self.probability) if self.explanations[i].kind == kind]
         return self.explanations[max(of_kind)[1]] if of_kind else None
 
+    def odds_of(self, name: str) -> float:
+        """Log evidence of an explanation over nothing; minus infinity when it does not compete."""
+        odds = {e.name: float(o) for e, o in zip(self.explanations, self.log_odds, strict=True)}
+        return odds.get(name, -np.inf)
+
     def share(self, kind: str) -> float:
         """Probability of all explanations of a kind together."""
         return float(sum(p for p, e in zip(self.probability, self.explanations, strict=True) if e.kind == kind))
@@ -103,18 +108,18 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     last, names = first, list[str]()
     while last.p_value < alpha and len(names) < MOST_EFFECTS:
         best = last.best(EFFECT)
-        if best is None or last.share(UNKNOWN) > last.share(EFFECT):
+        if best is None or last.odds_of(best.name) < _KEEP:
             break
         names.append(best.name)
         last = race_of(with_effect(last, best), stated, (), seed)
-    unexplained = last.best(UNKNOWN) if last.p_value < alpha else None
-    if unexplained is not None and names:
-        kept = [name for name in names if _holds(last, name, names, unexplained, stated)]
-        if len(kept) < len(names):
-            names = kept
-            last = race_of(_only(model, last.model, names), stated, (), seed)
-            unexplained = last.best(UNKNOWN) if last.p_value < alpha else None
-    return Found(first, last, last.model, tuple(names), unexplained)
+    while names:
+        remains = last.best(UNKNOWN) if last.p_value < alpha else None
+        doubtful = [name for name in names if _unknown_does_as_well(last, name, names, remains, stated)]
+        if not doubtful:
+            break
+        names.remove(doubtful[-1])
+        last = race_of(_only(model, last.model, names), stated, (), seed)
+    return Found(first, last, last.model, tuple(names), last.best(UNKNOWN) if last.p_value < alpha else None)
 
 
 def race_of(
@@ -217,18 +222,27 @@ def _only(model: MeasurementModel, extended: MeasurementModel, names: Sequence[s
     return replace(model, effects=(*model.effects, *kept), shapes=extended.shapes)
 
 
-def _holds(last: Race, name: str, names: Sequence[str], remains: Explanation, stated: float | None) -> bool:
-    """Whether an effect still has evidence once the unknown function is granted, at any amplitude."""
+def _unknown_does_as_well(
+    last: Race, name: str, names: Sequence[str], remains: Explanation | None, stated: float | None
+) -> bool:
+    """Whether an unknown function in an effect's place is more probable, or leaves it without evidence beside itself."""
     fewer = replace(last.model, effects=tuple(e for e in last.model.effects if e.name != name))
-    estimate = fewer.estimate()
+    others = [other for other in names if other != name]
+    race = race_of(fewer, stated, (), None, leave_out=others)
+    if race.share(UNKNOWN) > race.share(EFFECT):
+        return True
+    return remains is not None and _granted(fewer, remains, stated, others).odds_of(name) < _KEEP
+
+
+def _granted(model: MeasurementModel, unknown_: Explanation, stated: float | None, others: Sequence[str]) -> Race:
+    """The race once an unknown function is granted, at any amplitude, as if it were noise."""
+    estimate = model.estimate()
     scale = estimate.linear.noise_scale[:, None]
     sigma = max(estimate.least_squares.sigma_of_residuals, 1e-6)
-    plain = noise_kinds(fewer, sigma)[0]
+    plain = noise_kinds(model, sigma)[0]
     granted = [
         Kind("granted", a, plain.correlation + (a * m.columns / scale) @ (a * m.columns / scale).T / sigma**2, 1.0)
-        for m in remains.members
+        for m in unknown_.members
         for a in (0.01, 0.03, 0.1, 0.3, 1.0)
     ]
-    race = race_of(fewer, stated, granted, None, leave_out=[other for other in names if other != name])
-    odds = {e.name: float(o) for e, o in zip(race.explanations, race.log_odds, strict=True)}
-    return odds.get(name, -np.inf) > _KEEP
+    return race_of(model, stated, granted, None, leave_out=others)

@@ -1,0 +1,73 @@
+"""An uncertainty budget as a document."""
+
+from __future__ import annotations
+
+from cmm_uq import __version__
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.plots import budget_bars
+from cmm_uq.uncertainty.budget import HEADINGS
+from cmm_uq.uncertainty.budget_results import SUMMARY, summary_rows
+from cmm_uq.uncertainty.evaluation import Evaluation, Stated
+from cmm_uq.uncertainty.model_file import ModelFile
+
+_TEXT = {"Quantity", "Unit", "Distribution", "Origin", "Method", "Interval"}
+
+
+def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Document:
+    """The page of an evaluated model file.
+
+    Parameters
+    ----------
+    file, evaluation : what was asked and what was found.
+    name : of the file.
+    """
+    asked = evaluation.request
+    summary = Table("Results", _columns(SUMMARY), tuple(summary_rows(evaluation)), (
+        f"Intervals are for a coverage probability of {100 * asked.coverage:g} %; the shortest one where the method is "
+        "Monte Carlo.",
+    ))  # fmt: skip
+    expressions = Facts(tuple((output, f"{output} = {text}") for output, text in _expressions(file).items()))
+    described = Facts(tuple(file.descriptions.items()))
+    model: tuple[Block, ...] = (expressions, described) if file.descriptions else (expressions,)
+    sections = [Section("Measurement model", model), Section("Results", (summary,))]
+    sections += [
+        Section(f"Budget of {output}", _budget(output, stated)) for output, stated in evaluation.stated.items()
+    ]
+    return Document(
+        title="Uncertainty budget",
+        number=file.title,
+        subject=f"Evaluated by the law of propagation of uncertainty and by Monte Carlo from {name}",
+        issuer=(),
+        particulars=(Facts((("File", name), ("SHA-256", file.sha256))),),
+        warnings=(),
+        sections=tuple(sections),
+        statements=(),
+        signatures=(),
+        attachments=(name, "results.json"),
+        produced_by=f"cmm-uq {__version__}, seed {asked.seed}",
+        end="End of budget",
+    )
+
+
+def _expressions(file: ModelFile) -> dict[str, str]:
+    return {output: expression.text for output, expression in file.expressions.items()}
+
+
+def _budget(output: str, stated: Stated) -> tuple[Block, ...]:
+    budget = stated.budget
+    blocks: list[Block] = [Paragraph(f"{stated.reason[0].upper()}{stated.reason[1:]}.".replace("..", "."), tone="note")]
+    if budget.statement:
+        blocks.append(Paragraph(budget.statement, tone="note"))
+    blocks.append(Table(f"Contributions to {output}", _columns(HEADINGS), tuple(budget.as_text())))
+    shares = [(line.name, share) for depth, line, share in budget.flat() if depth == 0 and share]
+    if len(shares) > 1:
+        names = ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares)
+        blocks.append(budget_bars(
+            [name for name, _ in shares], [share for _, share in shares],
+            caption=f"Share of each contribution in the variance of {output}.", alternative=f"Shares: {names}.",
+        ))  # fmt: skip
+    return tuple(blocks)
+
+
+def _columns(headings: tuple[str, ...]) -> tuple[Column, ...]:
+    return tuple(Column(heading, numeric=heading not in _TEXT) for heading in headings)

@@ -1,0 +1,30 @@
+"""``cmm-uq budget FILE``: the uncertainty of any measurement model."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def command(
+    file: Annotated[Path, typer.Argument(help="Measurement model: outputs, inputs, correlations, in TOML.")],
+    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<name of the file>]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Instead of the file's seed.", min=0)] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print results.json instead of the summary.")] = False,
+) -> None:
+    """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
+    from cmm_uq.budgeting import write_budget
+    from cmm_uq.uncertainty.budget_results import summary_rows
+
+    written = write_budget(file, out, seed=seed)
+    if json:
+        sys.stdout.write(written.results.decode())
+    elif not quiet:
+        for row in summary_rows(written.evaluation):
+            typer.echo("  ".join(row))
+        for path in written.files.values():
+            typer.echo(path)

@@ -1,0 +1,23 @@
+"""``cmm-uq compensate JOB --out DIR``: the recording corrected by the machine's error maps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def command(
+    job: Annotated[Path, typer.Argument(help="Job folder with [machine] error_map.")],
+    out: Annotated[Path, typer.Option(help="Folder for the compensated job.")],
+    extrapolate: Annotated[bool, typer.Option(help="Extrapolate beyond the maps, and flag those points.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Correct a recording by its machine's error maps, as a job folder of its own."""
+    from cmm_uq.compensating import write_compensated
+
+    files = write_compensated(job, out, beyond="extrapolate" if extrapolate else "refuse")
+    if not quiet:
+        for path in files.values():
+            typer.echo(path)

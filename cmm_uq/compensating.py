@@ -1,0 +1,71 @@
+"""Compensated recordings: a job's readings corrected by its machine's error maps."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from cmm_uq import __version__
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.reading import read_job, sha256
+from cmm_uq.physics.compensation import compensate_points, machine_compensation
+from cmm_uq.physics.error_map import parse_error_map
+from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
+from cmm_uq.points import Points
+from cmm_uq.simulation import recording
+from cmm_uq.writing import staging, write_whole
+
+
+def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> Points:
+    """The recording of a job at the coordinates that its error maps make of it.
+
+    Parameters
+    ----------
+    job : with ``[machine] error_map``.
+    beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
+
+    Raises
+    ------
+    CmmUqError : the job has no error map, or it does not serve these points.
+    """
+    machine = job.facts.machine
+    if not machine.error_map:
+        raise CmmUqError("the job has no error map", where="job.toml [machine] error_map",
+                         fix='Name it: error_map = [ { file = "map.csv", temperature_c = 20.0 } ]')  # fmt: skip
+    maps = []
+    for given in machine.error_map:
+        found = parse_error_map(job.inputs[given.file], str(job.folder / given.file), temperature=given.temperature_c)
+        square = machine.squareness_arcsec
+        maps.append(found.with_squareness_arcsec(square.xy, square.yz, square.zx) if square else found)
+    return compensate_points(job.points, machine_compensation(job.points, ErrorMaps(maps), beyond=beyond))
+
+
+def write_compensated(job: Path, out: Path, *, beyond: Beyond = "refuse") -> dict[str, Path]:
+    """Write a job folder with the compensated recording; its job.toml names no error map any more.
+
+    Returns
+    -------
+    path of each file.
+
+    Raises
+    ------
+    CmmUqError : bad input, or a folder that cannot be written to.
+    """
+    read = read_job(job)
+    if out.resolve() == read.folder.resolve():
+        raise CmmUqError("is the job that is compensated", where=str(out), fix="Choose another --out")
+    points = compensate_job(read, beyond=beyond)
+    sources = ", ".join(f"{name} sha256 {value[:16]}" for name, value in sha256(read.inputs).items())
+    note = f"# compensated by cmm-uq {__version__} from {sources}\n".encode()
+    contents = {"job.toml": _without_maps(read.inputs["job.toml"]), read.facts.recording.file: note + recording(points)}
+    with staging(out) as place:
+        return write_whole(place, out, contents)
+
+
+def _without_maps(toml: bytes) -> bytes:
+    """job.toml without its error maps, so that what is compensated is not compensated again."""
+    text = toml.decode("utf-8-sig")
+    text = re.sub(r"(?ms)^\s*error_map\s*=\s*\[.*?\]\s*(#[^\n]*)?$\n?", "", text)
+    text = re.sub(r"(?m)^\s*squareness_arcsec\s*=.*\n?", "", text)
+    return text.encode()
