@@ -21,6 +21,8 @@ from cmm_uq.units import ARCSECOND
 SETTLED = 1e-10
 """Change of a coordinate, mm, at which the inverse is found."""
 MAX_ROUNDS = 50
+BLOCK = 8192
+"""Points computed at a time: as many as a processor's cache holds with all that is between."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +39,13 @@ class Circumstances:
     tip: Floats | None = None
     temperatures: Floats | float | None = None
     lines: Ints | None = None
+
+    def of(self, rows: slice) -> Circumstances:
+        """The circumstances of some of the points."""
+        tip = self.tip[rows] if self.tip is not None and self.tip.ndim == 2 else self.tip
+        each = isinstance(self.temperatures, np.ndarray) and self.temperatures.ndim == 2
+        temperatures = np.asarray(self.temperatures)[rows] if each else self.temperatures
+        return Circumstances(tip, temperatures, self.lines[rows] if self.lines is not None else None)
 
 
 NOMINAL = Circumstances()
@@ -74,10 +83,15 @@ class Compensation:
         CmmUqError : a point lies beyond the maps and ``beyond`` is "refuse".
         """
         readings = indicated + np.asarray(self.origin)
-        looked_up = self.maps.at(readings, when.temperatures, beyond=self.beyond, lines=when.lines)
         form = exact if self.rigid else first_order
-        e = form(readings, looked_up.errors, looked_up.squareness, tip=when.tip, chain=self.chain)
-        return e, looked_up.extrapolated
+        e, extrapolated = np.empty(readings.shape), np.empty(len(readings), dtype=bool)
+        for start in range(0, len(readings), BLOCK):
+            rows = slice(start, start + BLOCK)
+            here, part = when.of(rows), readings[rows]
+            found = self.maps.at(part, here.temperatures, beyond=self.beyond, lines=here.lines, first=start + 1)
+            e[rows] = form(part, found.errors, found.squareness, tip=here.tip, chain=self.chain)
+            extrapolated[rows] = found.extrapolated
+        return e, extrapolated
 
     def compensate(self, indicated: Floats, when: Circumstances = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
         """True coordinates (n, 3) in mm, and which points (n,) were extrapolated; parameters as :meth:`error`."""

@@ -19,12 +19,10 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry import fit_plane
 from cmm_uq.geometry.frame import frame_about
 from cmm_uq.geometry.orthogonal_distance import minimise
-from cmm_uq.physics.compensation import Compensation
+from cmm_uq.physics.compensation import BLOCK, Circumstances, Compensation
 from cmm_uq.physics.kinematics import first_order
+from cmm_uq.physics.map_interpolation import LookedUp
 from cmm_uq.points import Floats
-
-BLOCK = 8192
-"""Points computed at a time: as many as a processor's cache holds with all that is between."""
 
 
 def euler_313(alpha: float, beta: float, gamma: float) -> Floats:
@@ -192,14 +190,13 @@ class Digitizer:
         -------
         (n, 3) in mm, and (n,) whether a point was extrapolated beyond the error maps.
         """
-        n = len(readings)
+        n, when = len(readings), Circumstances(temperatures=temperatures)
         xyz, extrapolated = np.empty((n, 3)), np.empty(n, dtype=bool)
         for start in range(0, n, BLOCK):
             rows = slice(start, start + BLOCK)
-            here = temperatures
-            if isinstance(temperatures, np.ndarray) and temperatures.ndim == 2:
-                here = temperatures[rows]
-            extrapolated[rows] = self._block(scan[rows], readings[rows], here, xyz[rows])
+            here = when.of(rows).temperatures
+            looked_up = self._block(scan[rows], readings[rows], here, start + 1, xyz[rows])
+            extrapolated[rows] = looked_up.extrapolated
         return xyz, extrapolated
 
     def transform(
@@ -219,16 +216,16 @@ class Digitizer:
         return coordinates
 
     def _block(
-        self, scan: Floats, readings: Floats, temperatures: Floats | float | None, out: Floats
-    ) -> NDArray[np.bool_]:
+        self, scan: Floats, readings: Floats, temperatures: Floats | float | None, first: int, out: Floats
+    ) -> LookedUp:
         # by components throughout, each of them contiguous
         D = np.ascontiguousarray((readings + np.asarray(self.compensation.origin)).T)
         u, v = np.ascontiguousarray(scan.T)
-        looked_up = self.compensation.maps.at(D.T, temperatures, beyond=self.compensation.beyond)
+        looked_up = self.compensation.maps.at(D.T, temperatures, beyond=self.compensation.beyond, first=first)
         e = first_order(D.T, looked_up.errors, looked_up.squareness, chain=self.compensation.chain).T
         X, Y, Z = mount_axes(looked_up.errors[:, :, 3:].sum(axis=1).T)
         E, mount = self.attitude, -self.attitude @ self.offset
         qx, qy, qz = (mount[i] + E[i, 0] * u + E[i, 1] * v for i in range(3))
         for i in range(3):
             np.add(readings[:, i] + e[i], X[i] * qx + Y[i] * qy + Z[i] * qz, out=out[:, i])
-        return looked_up.extrapolated
+        return looked_up

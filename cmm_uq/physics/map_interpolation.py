@@ -74,14 +74,17 @@ class _Stack:
                 table = tables[lower] + weight * (tables[lower + 1] - tables[lower]) if weight else tables[lower]
                 np.add(table.take(interval), along * np.diff(table).take(interval), out=row)
             return
-        # the tables of all maps one behind another
-        here = lower * count + interval
+        # the tables of all maps one behind another: four corners, between positions and between maps
+        cold = lower * count + interval
+        hot, cold_next, hot_next = cold + count, cold + 1, cold + count + 1
         for row, tables in zip(out, self.values, strict=True):
             table = tables.ravel()
-            cold = table.take(here) + along * (table.take(here + 1) - table.take(here))
-            there = here + count
-            hot = table.take(there) + along * (table.take(there + 1) - table.take(there))
-            np.add(cold, weight * (hot - cold), out=row)
+            low, high = table.take(cold), table.take(hot)
+            low += along * (table.take(cold_next) - low)
+            high += along * (table.take(hot_next) - high)
+            high -= low
+            high *= weight
+            np.add(low, high, out=row)
 
 
 class ErrorMaps:
@@ -121,6 +124,7 @@ class ErrorMaps:
         *,
         beyond: Beyond = "refuse",
         lines: Ints | None = None,
+        first: int = 1,
     ) -> LookedUp:
         """Errors of every carriage at scale readings.
 
@@ -130,6 +134,7 @@ class ErrorMaps:
         temperatures : of the three scales, (n, 3) or (3,), or of all, °C. One map needs none.
         beyond : what to do beyond the mapped positions and temperatures.
         lines : (n,) of the points in their file, for messages.
+        first : number of the first point, for messages where there are no lines.
 
         Raises
         ------
@@ -137,10 +142,10 @@ class ErrorMaps:
         """
         outside = self._outside(readings)
         if beyond == "refuse" and outside.any():
-            self._refuse_position(readings, outside, lines)
+            self._refuse_position(readings, outside, lines, first)
         weights, hot = self._weights(temperatures, len(readings))
         if beyond == "refuse" and hot.any():
-            self._refuse_temperature(temperatures, hot, lines)
+            self._refuse_temperature(temperatures, hot, lines, first)
         errors = np.empty((3, 6, len(readings)))
         for i, stack in enumerate(self._axes):
             lower, weight = weights[i]
@@ -200,17 +205,17 @@ class ErrorMaps:
         weight = (held - known[lower]) / (known[lower + 1] - known[lower])
         return (int(lower), float(weight)) if np.ndim(temperature) == 0 else (lower, weight)
 
-    def _refuse_position(self, readings: Floats, outside: NDArray[np.bool_], lines: Ints | None) -> None:
+    def _refuse_position(self, readings: Floats, outside: NDArray[np.bool_], lines: Ints | None, first: int) -> None:
         row, axis = np.argwhere(outside)[0]
         low, high = self.span(AXES[axis])
         raise CmmUqError(
             f"{AXES[axis]} reads {readings[row, axis]:.6g} mm, the error map reaches from {low:g} to {high:g} mm",
-            where=_point(row, lines),
+            where=_point(row, lines, first),
             fix="Check origin_mm and the map's range, or allow it to be extrapolated",
         )
 
     def _refuse_temperature(
-        self, temperatures: Floats | float | None, hot: NDArray[np.bool_], lines: Ints | None
+        self, temperatures: Floats | float | None, hot: NDArray[np.bool_], lines: Ints | None, first: int
     ) -> None:
         row = int(np.flatnonzero(hot)[0])
         all_given = np.asarray(temperatures, dtype=np.float64)
@@ -218,10 +223,10 @@ class ErrorMaps:
         raise CmmUqError(
             f"a scale is at {np.round(given, 3)} °C, the error maps are from {self.temperatures[0]:g} to "
             f"{self.temperatures[-1]:g} °C",
-            where=_point(row, lines),
+            where=_point(row, lines, first),
             fix="Measure within those temperatures, add a map, or allow it to be extrapolated",
         )
 
 
-def _point(row: int, lines: Ints | None) -> str:
-    return f"line {lines[row]}" if lines is not None and len(lines) else f"point {row + 1}"
+def _point(row: int, lines: Ints | None, first: int) -> str:
+    return f"line {lines[row]}" if lines is not None and len(lines) else f"point {row + first}"

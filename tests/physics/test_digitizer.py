@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.physics.compensation import Compensation
-from cmm_uq.physics.digitizer import BLOCK, Digitizer, euler_313, euler_angles, mount_axes, scan_plane, scan_roll
+from cmm_uq.physics.compensation import BLOCK, Compensation
+from cmm_uq.physics.digitizer import Digitizer, euler_313, euler_angles, mount_axes, scan_plane, scan_roll
 from cmm_uq.physics.error_map import AxisErrors, ErrorMap, read_error_map
 from cmm_uq.physics.kinematics import exact, rotate
 from cmm_uq.physics.map_interpolation import ErrorMaps
@@ -118,6 +118,15 @@ def test_temperatures_come_by_time_stamp():
         digitizer.transform(log.at)(rows), digitizer.coordinates(scan, readings, 22.0)[0], atol=1e-12
     )
     np.testing.assert_array_equal(digitizer.transform(22.0)(rows), digitizer.coordinates(scan, readings, 22.0)[0])
+
+
+def test_a_refused_point_is_numbered_through_all_blocks():
+    scan, readings = cloud(BLOCK + 10)
+    readings[BLOCK + 4, 2] = 7.0
+    with pytest.raises(CmmUqError, match=f"point {BLOCK + 5}: z reads 7 mm"):
+        Digitizer(np.eye(3), OFFSET, published_machine(20)).coordinates(scan, readings)
+    with pytest.raises(CmmUqError, match=f"point {BLOCK + 5}: z reads 7 mm"):
+        published_machine(20).compensate(readings)
 
 
 def test_points_beyond_the_map_are_marked():
