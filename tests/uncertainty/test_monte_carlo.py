@@ -11,14 +11,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.uncertainty.distributions import (
-    arcsine,
-    constant,
-    normal,
-    rectangular,
-    rectangular_uncertain,
-    student_t,
-)
+from cmm_uq.uncertainty.distributions import constant, normal, rectangular, student_t
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.uncertainty.monte_carlo import BLOCK, Simulated, numerical_tolerance, simulate, simulate_adaptively
 from cmm_uq.uncertainty.propagation import first_order
@@ -83,49 +76,11 @@ def test_comparison_loss(
     within_five_errors(simulate(loss(x1, r), TRIALS, seed=15), value, u, low, high)  # 9.4
 
 
-def test_gauge_block() -> None:
+def test_gauge_block(gauge_block: MeasurementModel) -> None:
     # 9.5: estimate 838 nm, u = 36 nm, shortest 99 % interval [745, 932] nm
-    model = MeasurementModel(
-        lambda ls, d, d1, d2, a, t, swing, da, dt: ls + d + d1 + d2 - ls * (da * (t + swing) + a * dt) - 50_000_000,
-        {
-            "ls": student_t(50_000_623, 25, 18),
-            "d": student_t(215, 6, 24),
-            "d1": student_t(0, 4, 5),
-            "d2": student_t(0, 7, 8),
-            "a": rectangular(9.5e-6, 13.5e-6),
-            "t": normal(-0.1, 0.2),
-            "swing": arcsine(-0.5, 0.5),
-            "da": rectangular_uncertain(-1e-6, 1e-6, 0.1e-6),
-            "dt": rectangular_uncertain(-0.05, 0.05, 0.025),
-        },
-    )
-    found = simulate_adaptively(model, coverage=0.99, digits=2, seed=16)
+    found = simulate_adaptively(gauge_block, coverage=0.99, digits=2, seed=16)
     assert found.stable
     within_five_errors(found, 838.0, 35.81, 744.4, 931.6)
-
-
-@pytest.mark.parametrize(
-    ("x1", "modulus", "u_modulus", "phase", "u_phase"),
-    [
-        (0.001, 0.0126, 0.0066, 0.0, 1.744),
-        (0.010, 0.0155, 0.0078, 0.0, 1.118),
-        (0.1, 0.1005, 0.0100, 0.0, 0.101),
-    ],
-)
-def test_polar_coordinates_of_jcgm_102(
-    x1: float, modulus: float, u_modulus: float, phase: float, u_phase: float
-) -> None:
-    model = MeasurementModel(
-        lambda x1, x2: {"modulus": np.sqrt(x1**2 + x2**2), "phase": np.arctan2(x2, x1)},
-        {"x1": normal(x1, 0.010), "x2": normal(0.0, 0.010)},
-        ("modulus", "phase"),
-    )
-    found = simulate(model, TRIALS, seed=17)
-    half = 5e-5 + 5 * found.standard_error  # half a unit of the last printed digit
-    assert abs(found.value[0] - modulus) <= half[0, 0]
-    assert abs(found.u[0] - u_modulus) <= half[0, 1]
-    assert abs(found.value[1] - phase) <= half[1, 0] + 5e-4
-    assert abs(found.u[1] - u_phase) <= half[1, 1] + 5e-4
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_one_other_bytes(mass: MeasurementModel) -> None:
