@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import differential_evolution, minimize
 
-from cmm_uq.physics.compensation import Compensation
+from cmm_uq.physics.compensation import Circumstances, Compensation
 from cmm_uq.physics.digitizer import euler_313
 from cmm_uq.physics.error_map import read_error_map
 from cmm_uq.physics.map_interpolation import ErrorMaps
@@ -41,19 +41,21 @@ def bars(spheres: np.ndarray) -> np.ndarray:
     return spheres[:, 1] - spheres[:, 0]
 
 
-def errors(readings: np.ndarray) -> tuple[np.ndarray, int]:
-    e, outside = Compensation(MAPS, beyond="extrapolate").error(readings.reshape(-1, 3))
+def errors(readings: np.ndarray, tip: np.ndarray | None = None) -> tuple[np.ndarray, int]:
+    when = Circumstances(tip=None if tip is None else tip.reshape(-1, 3))
+    e, outside = Compensation(MAPS, beyond="extrapolate").error(readings.reshape(-1, 3), when)
     return e.reshape(20, 2, 3), int(outside.sum())
 
 
-def posed(parameters: np.ndarray) -> np.ndarray:
-    """Scale readings for the place of the reference sphere and one γ a group."""
+def posed(parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Scale readings, and the digitizer's offset, for the place of the reference sphere and one γ a group."""
     to_mount = np.array([euler_313(np.pi / 2, np.pi / 2, g) @ OFFSET for g in parameters[3:][GROUPS]])
-    return BEFORE + parameters[:3] + to_mount[:, None]
+    to_mount = np.repeat(to_mount[:, None], 2, axis=1)
+    return BEFORE + parameters[:3] + to_mount, -to_mount
 
 
-def report(title: str, readings: np.ndarray) -> None:
-    e, outside = errors(readings)
+def report(title: str, readings: np.ndarray, tip: np.ndarray | None = None) -> None:
+    e, outside = errors(readings, tip)
     ours = BEFORE + e
     lengths = [np.linalg.norm(bars(s), axis=1) for s in (BEFORE, AFTER, ours)]
     gap = bars(ours) - bars(AFTER)
@@ -78,17 +80,21 @@ def main() -> None:
     best = min(fits, key=lambda f: f.fun)
     report(f"one origin, fitted to the bars: {np.round(best.x)}", BEFORE + best.x)
 
-    def centre_misfit(parameters: np.ndarray) -> float:
-        e, outside = errors(posed(parameters))
-        return rms_um(e - AFTER + BEFORE) + outside
+    for title, turned in (("offset not turned", False), ("offset turned with the mount, eq. 35", True)):
 
-    bounds = [(550, 850), (230, 320), (-560, -480), *(np.radians([g - 10, g + 10]) for g in (0, 0, -45, -60))]
-    rough = differential_evolution(centre_misfit, bounds, seed=1, maxiter=100, popsize=8, polish=False)
-    best = minimize(
-        centre_misfit, rough.x, method="Nelder-Mead", options={"maxiter": 6000, "xatol": 1e-3, "fatol": 1e-4}
-    )
-    print(f"\nplace of the sphere {np.round(best.x[:3])} mm, γ {np.round(np.degrees(best.x[3:]), 1)}°", end="")
-    report("four poses, fitted to the centres", posed(best.x))
+        def centre_misfit(parameters: np.ndarray, turned: bool = turned) -> float:
+            readings, tip = posed(parameters)
+            e, outside = errors(readings, tip if turned else None)
+            return rms_um(e - AFTER + BEFORE) + outside
+
+        bounds = [(550, 850), (230, 320), (-560, -480), *(np.radians([g - 10, g + 10]) for g in (0, 0, -45, -60))]
+        rough = differential_evolution(centre_misfit, bounds, seed=1, maxiter=100, popsize=8, polish=False)
+        best = minimize(
+            centre_misfit, rough.x, method="Nelder-Mead", options={"maxiter": 6000, "xatol": 1e-3, "fatol": 1e-4}
+        )
+        print(f"\nplace of the sphere {np.round(best.x[:3])} mm, γ {np.round(np.degrees(best.x[3:]), 1)}°", end="")
+        readings, tip = posed(best.x)
+        report(f"four poses, fitted to the centres, {title}", readings, tip if turned else None)
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ def test_the_published_maps_are_read_and_written_without_change(temperature, tmp
         np.testing.assert_allclose(before.errors, after.errors, rtol=1e-12)
 
 
-def test_the_x_scale_of_the_published_machine_is_43_um_long_of_900_at_22_and_what_the_table_says_at_20():
+def test_half_a_metre_along_x_the_published_machine_has_the_errors_of_table_8():
     x = read_error_map(HARRIS / "error_map_20C.csv").axes[0]
     assert x.errors[x.positions == 500.0, 0] == pytest.approx(48.3e-3)
     assert x.errors[x.positions == 500.0, 4] == pytest.approx(6.93 * ARCSECOND)
