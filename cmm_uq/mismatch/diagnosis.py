@@ -15,6 +15,7 @@ from cmm_uq.mismatch.explanations import UNKNOWN, Explanation
 from cmm_uq.mismatch.held_out import Improvement, improvement
 from cmm_uq.mismatch.noise import Kind
 from cmm_uq.mismatch.search import Found, Race, race_of, search, tail_probability
+from cmm_uq.physics.catalogue import CATALOGUE
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 
@@ -176,7 +177,7 @@ def _indistinguishable(swaps: Mapping[str, Mapping[str, float]]) -> tuple[tuple[
     for name, probabilities in swaps.items():
         if probabilities.get(name, 0.0) >= _TOLD_APART:
             continue
-        rivals = [e for e, p in probabilities.items() if p > _RIVAL and e != name and not e.startswith("error ")]
+        rivals = [e for e, p in probabilities.items() if p > _RIVAL and e != name and e in CATALOGUE]
         if rivals:
             groups.append((name, *sorted(rivals, key=lambda e: -probabilities[e])))
     return tuple(groups)

@@ -6,7 +6,7 @@ for the unknown, plausibility) allows; how much smaller they may be is left to t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from cmm_uq.physics.catalogue import CATALOGUE
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import AXES, Floats, Points
 
-EFFECT, UNKNOWN = "effect", "unknown"
+EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
 
 LENGTH_SCALES = (0.6, 0.25)
 """Of unknown smooth functions, in parts of the covariate's range."""
@@ -49,7 +49,7 @@ class Explanation:
     Parameters
     ----------
     name : the effect's name; for an unknown function what it depends on.
-    kind : ``effect`` or ``unknown``.
+    kind : ``effect``, ``several`` (known effects at once) or ``unknown``.
     members : equally probable versions.
     covariate : (m,) what an unknown function depends on, as the observations have it.
     covariate_name : its name in the recording.
@@ -85,6 +85,23 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
         if any(np.any(member.columns) for member in members):
             found.append(Explanation(effect.name, EFFECT, members))
     return found
+
+
+def several(singles: Sequence[Explanation]) -> list[Explanation]:
+    """All known effects at once, each as large as the others in the observations.
+
+    It names none of them, but opens the gate to those that are visible together only.
+    """
+    columns = [e.members[0].columns for e in singles if len(e.members) == 1]
+    if len(columns) < 2:
+        return []
+    together = np.hstack(columns)
+    rms = np.sqrt(np.mean(together**2, axis=0))
+    return [
+        Explanation(
+            "several effects together", SEVERAL, (Member(_UNKNOWN_SD * together / np.where(rms > 0, rms, 1.0)),)
+        )
+    ]
 
 
 def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:

@@ -6,6 +6,7 @@ statistic is the evidence of "something" over "nothing"; its distribution under 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -15,13 +16,15 @@ from scipy import special
 
 from cmm_uq.measurement import MeasurementModel
 from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation, known, mean_of, unknown
+from cmm_uq.mismatch.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, known, mean_of, several, unknown
 from cmm_uq.mismatch.noise import Kind, kinds, order_of, sigma_grid
 from cmm_uq.physics.catalogue import CATALOGUE
 from cmm_uq.points import Floats
 
-NOTHING, KNOWN_SHARE = 0.5, 0.35
-"""Probability, beforehand, of nothing missing and of an effect of the catalogue; the rest is for the unknown."""
+SHARES = {EFFECT: 0.3, SEVERAL: 0.05, UNKNOWN: 0.15}
+"""Probability, beforehand, of one effect of the catalogue, of several, and of the unknown; the rest is for nothing missing."""
+
+NOTHING = 1 - sum(SHARES.values())
 
 MOST_EFFECTS = 4
 DRAWS = 200
@@ -29,8 +32,8 @@ _TAIL = 0.8
 _MISFIT = 20.0
 """Largest misfit, over the noise, that is reckoned with when the noise is not stated."""
 
-_KEEP = 3.0
-"""Log Bayes factor that an effect must keep beside an unknown function."""
+_TRY, _KEEP = 0.5, 3.0
+"""Log Bayes factors from which an effect is tried once the gate is open, and that it must have in the end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,16 +111,16 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     last, names = first, list[str]()
     while last.p_value < alpha and len(names) < MOST_EFFECTS:
         best = last.best(EFFECT)
-        if best is None or last.odds_of(best.name) < _KEEP:
+        if best is None or last.odds_of(best.name) < _TRY:
             break
         names.append(best.name)
         last = race_of(with_effect(last, best), stated, (), seed)
     while names:
         remains = last.best(UNKNOWN) if last.p_value < alpha else None
-        doubtful = [name for name in names if _unknown_does_as_well(last, name, names, remains, stated)]
+        doubtful = [name for name in reversed(names) if _is_doubtful(last, name, names, remains, stated)]
         if not doubtful:
             break
-        names.remove(doubtful[-1])
+        names.remove(doubtful[0])
         last = race_of(_only(model, last.model, names), stated, (), seed)
     return Found(first, last, last.model, tuple(names), last.best(UNKNOWN) if last.p_value < alpha else None)
 
@@ -140,7 +143,8 @@ def race_of(
     estimate = model.estimate()
     values, linear = estimate.least_squares.value, estimate.linear
     named = (*(effect.name for effect in model.effects), *leave_out)
-    rivals = known(model, values, named) + unknown(model, values)
+    singles = known(model, values, named)
+    rivals = singles + several(singles) + unknown(model, values)
     sigma_left = max(estimate.least_squares.sigma_of_residuals, 1e-6)
     sigma, log_sigma = sigma_grid(stated, sigma_left)
     held = _held(model)
@@ -188,9 +192,8 @@ def _held(model: MeasurementModel) -> NDArray[np.bool_]:
 
 
 def _log_prior(rivals: Sequence[Explanation]) -> Floats:
-    count = {kind: max(1, sum(e.kind == kind for e in rivals)) for kind in (EFFECT, UNKNOWN)}
-    share = {EFFECT: KNOWN_SHARE, UNKNOWN: 1 - NOTHING - KNOWN_SHARE}
-    return np.log([share[e.kind] / count[e.kind] for e in rivals])
+    count = Counter(e.kind for e in rivals)
+    return np.log([SHARES[e.kind] / count[e.kind] for e in rivals])
 
 
 def _gate(comparison: Comparison, log_prior: Floats, log_odds: Floats, seed: int) -> tuple[float, Floats]:
@@ -222,14 +225,14 @@ def _only(model: MeasurementModel, extended: MeasurementModel, names: Sequence[s
     return replace(model, effects=(*model.effects, *kept), shapes=extended.shapes)
 
 
-def _unknown_does_as_well(
+def _is_doubtful(
     last: Race, name: str, names: Sequence[str], remains: Explanation | None, stated: float | None
 ) -> bool:
-    """Whether an unknown function in an effect's place is more probable, or leaves it without evidence beside itself."""
+    """Whether an effect lacks evidence, or an unknown function in its place is more probable or leaves it without evidence."""
     fewer = replace(last.model, effects=tuple(e for e in last.model.effects if e.name != name))
     others = [other for other in names if other != name]
     race = race_of(fewer, stated, (), None, leave_out=others)
-    if race.share(UNKNOWN) > race.share(EFFECT):
+    if race.odds_of(name) < _KEEP or race.share(UNKNOWN) > race.share(EFFECT):
         return True
     return remains is not None and _granted(fewer, remains, stated, others).odds_of(name) < _KEEP
 
