@@ -8,7 +8,7 @@ from types import FrameType
 
 import typer
 
-from cmm_uq.cli import budget, compensate, diagnose, report, simulate
+from cmm_uq.cli import budget, compensate, diagnose, report, selftest, simulate
 from cmm_uq.errors import CmmUqError
 
 BAD_INPUT = 2
@@ -27,6 +27,7 @@ app.command("diagnose")(diagnose.command)
 app.command("simulate")(simulate.command)
 app.command("compensate")(compensate.command)
 app.command("budget")(budget.command)
+app.command("selftest")(selftest.command)
 
 
 @app.callback(invoke_without_command=True)
