@@ -6,10 +6,11 @@ full covariance, its residuals and its form deviation. This room knows points an
 
 from __future__ import annotations
 
-from cmm_uq.geometry.ball_form import BallForm, cap_directions
+from cmm_uq.geometry.ball_form import BallForm
 from cmm_uq.geometry.circle import Circle, fit_circle
 from cmm_uq.geometry.cone import Cone, fit_cone
 from cmm_uq.geometry.cylinder import Cylinder, fit_cylinder
+from cmm_uq.geometry.directions import cap_directions
 from cmm_uq.geometry.feature import Feature
 from cmm_uq.geometry.line import Line, fit_line
 from cmm_uq.geometry.plane import Plane, fit_plane

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.geometry.directions import cap_directions
 from cmm_uq.geometry.orthogonal_distance import principal
 from cmm_uq.points import Floats
 
@@ -28,7 +29,7 @@ def axis_candidates(about: Floats, *, tapered: bool) -> list[Floats]:
     """
     x, y, z = about
     monomials = np.array([np.ones_like(x), x, y, z, x * x, y * y, z * z, x * y, x * z, y * z])
-    directions = np.vstack([principal(about), _hemisphere(DIRECTIONS)])
+    directions = np.vstack([principal(about), cap_directions(np.pi / 2, DIRECTIONS)])
     misfits = _misfits(monomials @ monomials.T / len(x), directions, tapered)
     # short rings and long thin bodies have their axis among the principal directions, whatever the misfits say
     chosen: list[Floats] = list(directions[:3])
@@ -70,12 +71,3 @@ def _misfits(M: Floats, directions: Floats, tapered: bool) -> Floats:
     squared = fitted[:, 0] + 0.25 * np.sum(fitted[:, 1:4] ** 2, axis=1)
     misfits = np.einsum("ij,jk,ik->i", left, M, left) / (4 * np.where(squared > 0, squared, np.inf))
     return np.where(squared > 0, misfits, np.inf)
-
-
-def _hemisphere(n: int) -> Floats:
-    """Unit directions (n, 3) spread evenly over a hemisphere (Fibonacci's spiral)."""
-    i = np.arange(n)
-    z = (i + 0.5) / n
-    turn = np.pi * (3 - np.sqrt(5)) * i
-    r = np.sqrt(1 - z**2)
-    return np.column_stack([r * np.cos(turn), r * np.sin(turn), z])

@@ -61,20 +61,6 @@ class BallForm:
         return np.asarray((0.5 * self.sphericity) ** 2 * 4 / 45 * spread)
 
 
-def cap_directions(polar_angle: float, n: int = 20_000) -> Floats:
-    """Unit directions (n, 3) spread evenly over the cap of a sphere about +z, as a digitizer sees it from above.
-
-    Parameters
-    ----------
-    polar_angle : of the cap's edge from +z, rad: π/2 for a hemisphere.
-    """
-    i = np.arange(n)
-    z = 1 - (1 - np.cos(polar_angle)) * (i + 0.5) / n
-    turn = np.pi * (3 - np.sqrt(5)) * i
-    r = np.sqrt(1 - z**2)
-    return np.column_stack([r * np.cos(turn), r * np.sin(turn), z])
-
-
 def _projection(directions: Floats) -> Floats:
     """(4, n) of the least-squares fit of n·δc + δr to radial deviations.
 
