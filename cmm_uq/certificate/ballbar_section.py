@@ -8,8 +8,12 @@ import numpy as np
 
 from cmm_uq.analysis.result import Result
 from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.distance_equations import DistanceSolution, solve_distances
+from cmm_uq.certificate import adjustment_section
 from cmm_uq.certificate.document import Column, Section, Table
-from cmm_uq.certificate.plots import length_plot, volume_plot
+from cmm_uq.certificate.plots import length_plot
+from cmm_uq.certificate.residual_volume import flagged, residual_volume
+from cmm_uq.errors import CmmUqError
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
 
@@ -25,10 +29,8 @@ def sections(result: Result) -> list[Section]:
     name = "certified length" if certified else "mean length"
     deviations = (lengths - reference) / MICROMETRE
     expanded = 2 * result.noise.coordinate.value * float(bar.noise_scale[0])
-    odd = {m for finding in result.findings for m in finding.measurements}
-    flagged = np.isin(bar.measurement, list(odd))
     plot = length_plot(
-        bar.measurement.astype(np.float64), deviations, residuals, flagged=flagged,
+        bar.measurement.astype(np.float64), deviations, residuals, flagged=flagged(result),
         expanded_before_um=expanded, expanded_after_um=expanded, reference=f"{name} {reference:.4f}\u00a0mm",
         reference_expanded_um=2 * bar.sizes[0].sd / MICROMETRE if certified else 0.0,
         caption=f"Deviation of each length from the {name}, as recorded and after the fitted model, with U (k = 2).",
@@ -37,14 +39,22 @@ def sections(result: Result) -> list[Section]:
             f"the {name}; after the fitted model {residuals.min():.0f} to {residuals.max():.0f} µm remain."
         ),
     )  # fmt: skip
-    ends = bar.ends() + bar.points.machine.origin_mm
-    travel = bar.points.machine.travel_mm
-    volume = volume_plot(
-        ends[:, 0], residuals, end_mm=ends[:, 1], travel_mm=travel if np.all(np.isfinite(travel)) else None,
-        caption="Residuals after the fitted model in the machine's volume (scale readings).",
-        alternative=f"Three projections of the bars; residuals of {residuals.min():.0f} to {residuals.max():.0f} µm.",
-    )  # fmt: skip
-    return [Section("Lengths", (plot, volume, _table(result, bar, deviations, residuals, expanded, name, flagged)))]
+    volume = residual_volume(result, "bars")
+    return [
+        Section("Lengths", (plot, volume, _table(result, bar, deviations, residuals, expanded, name))),
+        adjustment_section.section(result, _second_way(result, bar)),
+    ]
+
+
+def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | str:
+    """The distance equations of all used lengths, or why they have no solution."""
+    size, ends, used = bar.sizes[0], bar.ends(), result.model.used
+    if not size.certified:
+        return "The length of the bar is not certified."
+    try:
+        return solve_distances((ends[:, 1] - ends[:, 0])[used], (size.nominal * bar.expansion)[used])
+    except CmmUqError as refusal:
+        return str(refusal)
 
 
 def _table(
@@ -54,10 +64,9 @@ def _table(
     residuals: np.ndarray[tuple[int], np.dtype[np.float64]],
     expanded: float,
     name: str,
-    flagged: np.ndarray[tuple[int], np.dtype[np.bool_]],
 ) -> Table:
     rows = []
-    marks = np.where(~result.model.used, "set aside", np.where(flagged, "see warnings", ""))
+    marks = np.where(~result.model.used, "set aside", np.where(flagged(result), "see warnings", ""))
     for i, length in enumerate(bar.lengths()[:_ROWS_SHOWN]):
         shown, _ = rounded(float(length), expanded * MICROMETRE)
         deviation, _ = rounded(float(deviations[i]), expanded)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from cmm_uq import __version__
 from cmm_uq.analysis.result import Result
-from cmm_uq.certificate import ballbar_section
+from cmm_uq.certificate import ballbar_section, bryan_section, gauge_section, plate_section, sphere_section
 from cmm_uq.certificate.corner import corner_plot
 from cmm_uq.certificate.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
 from cmm_uq.certificate.warning import warnings
@@ -15,6 +15,7 @@ from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.standards import Statement
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.uncertainty.rounding import rounded, significant
+from cmm_uq.units import MICROMETRE
 
 STATEMENTS = (
     "The results relate only to the item named above, in its condition and place at the time of the measurement.",
@@ -28,7 +29,14 @@ UNCERTAINTY = (
 )
 
 
-ARTEFACT_SECTIONS: Mapping[str, Callable[[Result], list[Section]]] = {"ballbar": ballbar_section.sections}
+ARTEFACT_SECTIONS: Mapping[str, Callable[[Result], list[Section]]] = {
+    "ballbar": ballbar_section.sections,
+    "bryan": bryan_section.sections,
+    "step_gauge": gauge_section.sections,
+    "gauge_blocks": gauge_section.sections,
+    "plate": plate_section.sections,
+    "sphere": sphere_section.sections,
+}
 """What each kind of artefact adds to a certificate."""
 
 
@@ -185,19 +193,20 @@ def _traceability(result: Result) -> Section:
         ("Artefact", artefact.name or result.artefact.title),
         ("Serial number", artefact.serial),
     ]
-    if artefact.length_mm is not None:
-        rows.append(("Certified length at 20 °C", f"{artefact.length_mm:.10g} mm, u = {artefact.u_um or 0.0:g} µm"))
-    else:
+    certified = [size for size in result.artefact.sizes if size.certified]
+    for size in certified:
+        what = size.title.split(" of ")[0].lower()
+        rows.append((f"Certified {what} at 20 °C", f"{size.nominal:.10g} {size.unit}, u = {size.sd / MICROMETRE:g} µm"))
+    if not certified:
         rows.append(("Certified length", "none: uncalibrated artefact (auto-calibration)"))
     if artefact.cte_per_k:
         rows.append(("Coefficient of thermal expansion", f"{artefact.cte_per_k * 1e6:g} × 10⁻⁶ /K"))
     if chain is not None:
         dates = [f"{word} {date.isoformat()}" for word, date in (("of", chain.date), ("due", chain.due)) if date]
         rows += [("Its certificate", " ".join(filter(None, (chain.number, *dates)))), ("Issued by", chain.laboratory)]
-    for size in result.artefact.sizes:
+    for size in certified:
         value, U, k = expanded(result.sizes[size.name])
-        if size.certified:
-            rows.append((f"{size.title} after the fit", f"{value} {size.unit}, U = {U} {size.unit} (k = {k})"))
+        rows.append((f"{size.title} after the fit", f"{value} {size.unit}, U = {U} {size.unit} (k = {k})"))
     return Section("Artefact and traceability", (Facts(tuple((label, text) for label, text in rows if text)),))
 
 

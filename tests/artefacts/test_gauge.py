@@ -144,7 +144,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     """200 simulated recordings: squared distance from the truth over the covariance is χ² with six degrees of freedom."""
     truth, inside = [100.0, -60.0, 20.0, 30.0, -12.0, 5.0], 0
     exact = ArtefactFacts(kind="step_gauge")
-    points = step_gauge()
+    points = step_gauge(faces=np.linspace(0, 420, 5))
     for seed in range(200):
         found = estimated(exact, indicated(exact, points, SIX, truth, sigma=1e-3, seed=seed), SIX)
         off = found.value[:6] - truth

@@ -1,0 +1,234 @@
+"""Writes the simulated example jobs: each artefact on a machine whose errors are stated in the job's remarks.
+
+Run:  python benchmarks/examples/simulated_jobs.py [FOLDER]
+
+The recordings come from the model that the package fits, with the seed below; two runs write the same bytes.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.points import Floats, Ints, Machine, Points
+
+SEED = 20260101
+TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
+MIDDLE = TRAVEL.mean(axis=1)
+MACHINE = Machine("Simulated bridge machine", "XYZ", TRAVEL)
+
+SQUARE = {"squareness_xy": 12.0, "squareness_yz": -7.5, "squareness_zx": 4.0}
+SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """One example.
+
+    Parameters
+    ----------
+    id, title : of the job, and what was measured.
+    artefact : lines of its table in job.toml, and the same as facts.
+    points : where the artefact stood.
+    truth : the effects that act, each with its parameters in order.
+    named : the effects that the job names.
+    noise_um : of one coordinate.
+    size : true size of the artefact, mm; its certified one by default.
+    extra : further lines of job.toml.
+    columns : of the CSV beside measurement, point, repeat and coordinates.
+    """
+
+    id: str
+    title: str
+    artefact: Mapping[str, object]
+    points: Points
+    truth: Mapping[str, float | Sequence[float]]
+    named: Sequence[str]
+    noise_um: float
+    size: float | None = None
+    extra: str = ""
+    columns: Sequence[str] = ()
+
+
+def recording(xyz: Floats, measurement: Ints, point: Ints, repeat: Ints | None = None, **columns: Floats) -> Points:
+    repeats = np.ones(len(xyz), dtype=np.int64) if repeat is None else repeat
+    return Points(xyz, measurement, point, repeats, MACHINE, columns)
+
+
+def step_gauge() -> Simulated:
+    """Seven lines of ISO 10360-2, five lengths and the way back, three times."""
+    faces, lines = np.array([0.0, 140, 280, 420, 560, 700, 820]), []
+    diagonals = [np.array([x, y, 1.0]) * (TRAVEL[:, 1] - TRAVEL[:, 0]) for x in (1, -1) for y in (1, -1)]
+    for number, u in enumerate([*diagonals, *np.eye(3)], 1):
+        u = u / np.linalg.norm(u)
+        own = faces[faces <= 560] if number == 7 else faces
+        reference = np.tile(np.concatenate([own, own[::-1]]), 3)
+        sense = np.tile(np.repeat([1.0, -1.0], len(own)), 3)
+        place = MIDDLE + (reference - own.max() / 2)[:, None] * u
+        travel = np.where(np.abs(u) > 0.1, np.sign(u), 0)
+        count = 2 * len(own)
+        lines.append((place, np.full(3 * count, number), np.tile(np.arange(1, count + 1), 3), np.repeat([1, 2, 3], count),
+                      reference, sense[:, None] * travel))  # fmt: skip
+    xyz, measurement, point, repeat, reference, approach = (np.concatenate(part) for part in zip(*lines, strict=True))
+    points = recording(xyz, measurement, point, repeat, reference_mm=reference,
+                       approach_x=approach[:, 0], approach_y=approach[:, 1], approach_z=approach[:, 2])  # fmt: skip
+    hysteresis = {"hysteresis_x": 1.8, "hysteresis_y": -0.9, "hysteresis_z": 1.2}
+    return Simulated(
+        "step-gauge-simulated", "ISO 10360-2, seven positions of a step gauge, faces met outwards and on the way back, "
+        "three times", {"kind": "step_gauge", "name": "Step gauge, 820 mm", "u_um": 0.4, "cte_per_k": 11.5e-6}, points,
+        {**SCALE, **SQUARE, **hysteresis}, [*SCALE, *SQUARE, *hysteresis], 0.6,
+        extra='\n[[conformity]]\nstandard = "ISO 10360-2:2009"\nmpe = { a_um = 4.0, k = 100.0 }\n',
+        columns=("reference_mm", "approach_x", "approach_y", "approach_z"),
+    )  # fmt: skip
+
+
+def gauge_blocks() -> Simulated:
+    """Four blocks along X and along Y, each in the middle of the axis, both faces three times."""
+    lengths, parts = (100.0, 250.0, 500.0, 800.0), []
+    for number, (axis, length) in enumerate([(a, length) for a in (0, 1) for length in lengths], 1):
+        u = np.eye(3)[axis]
+        reference = np.tile([0.0, length], 3)
+        parts.append((MIDDLE + (reference - length / 2)[:, None] * u, np.full(6, number), np.tile([1, 2], 3),
+                      np.repeat([1, 2, 3], 2), reference, np.tile([1.0, -1.0], 3)[:, None] * u))  # fmt: skip
+    xyz, measurement, point, repeat, reference, approach = (np.concatenate(part) for part in zip(*parts, strict=True))
+    points = recording(xyz, measurement, point, repeat, reference_mm=reference, approach_x=approach[:, 0],
+                       approach_y=approach[:, 1], approach_z=approach[:, 2],
+                       nx=-approach[:, 0], ny=-approach[:, 1], nz=-approach[:, 2])  # fmt: skip
+    truth = {"scale_x": 9.0, "scale_y": -6.0, "probe_radius": 0.7}
+    return Simulated(
+        "gauge-blocks-simulated", "Four gauge blocks along X and along Y, outer faces, three times",
+        {"kind": "gauge_blocks", "name": "Gauge blocks, grade K", "u_um": 0.15, "cte_per_k": 11.5e-6}, points, truth,
+        list(truth), 0.3, extra='\n[[conformity]]\nstandard = "VDI/VDE 2617"\nmpe = { a_um = 3.0, k = 80.0 }\n',
+        columns=("reference_mm", "approach_x", "approach_y", "approach_z", "nx", "ny", "nz"),
+    )  # fmt: skip
+
+
+def sphere() -> Simulated:
+    """Three times twenty-five points over the upper half of a ceramic ball."""
+    z = 1 - np.arange(25) / 25
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(25)
+    flat = np.sqrt(1 - z**2)
+    n = np.tile(np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z]).round(6), (3, 1))
+    centres = MIDDLE + np.array([[0, 0, 0], [250, -300, 120], [-250, 300, -120]])
+    points = recording(np.repeat(centres, 25, axis=0) + 12.5 * n / np.linalg.norm(n, axis=1, keepdims=True),
+                       np.repeat([1, 2, 3], 25), np.tile(np.arange(1, 26), 3),
+                       nx=n[:, 0], ny=n[:, 1], nz=n[:, 2])  # fmt: skip
+    truth = {"probe_radius": 0.8, "probe_lobing": (0.9, 0.4)}
+    return Simulated(
+        "sphere-simulated", "ISO 10360-5, 25 points of a sphere in three places",
+        {"kind": "sphere", "name": "Ceramic sphere, 25 mm", "length_mm": 25.0012, "u_um": 0.1, "form_um": 0.1}, points,
+        truth, list(truth), 0.35,
+        extra='\n[[conformity]]\nstandard = "ISO 10360-5:2010"\nlimit_um = 5.0\n', columns=("nx", "ny", "nz"),
+    )  # fmt: skip
+
+
+def plate() -> Simulated:
+    """A plate of 5 × 5 balls flat on the table, and upright along X."""
+    steps = 100.0 * np.arange(5)
+    reference = np.array([[x, y, 0.0] for y in steps for x in steps])
+    attitudes = (Rotation.identity(), Rotation.from_euler("xz", (90, 0.4), degrees=True))
+    xyz = np.vstack([MIDDLE + turn.apply(reference - 200 * np.array([1, 1, 0])) for turn in attitudes])
+    x, y, z = np.tile(reference, (2, 1)).T
+    points = recording(xyz, np.repeat([1, 2], 25), np.tile(np.arange(1, 26), 2),
+                       reference_x_mm=x, reference_y_mm=y, reference_z_mm=z)  # fmt: skip
+    truth = {**SCALE, "squareness_xy": 12.0, "squareness_zx": 4.0, "straightness_x_y": 3.5}
+    return Simulated(
+        "plate-simulated", "Ball plate of 25 balls, flat and upright", {"kind": "plate", "name": "Ball plate, 400 mm × 400 mm",
+        "u_um": 0.5, "cte_per_k": 11.5e-6}, points, truth, list(truth), 0.7,
+        columns=("reference_x_mm", "reference_y_mm", "reference_z_mm"),
+    )  # fmt: skip
+
+
+def bryan() -> Simulated:
+    """A bar swept over the upper half of its sphere; its length is not certified."""
+    z = (np.arange(48) + 0.5) / 48
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(48)
+    flat = np.sqrt(1 - z**2)
+    xyz = MIDDLE - [0, 0, 220] + 400 * np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
+    truth = {**SCALE, **SQUARE}
+    return Simulated(
+        "bryan-simulated", "Bryan gauge swept over 48 positions; length of the bar not certified",
+        {"kind": "bryan", "name": "Swept bar, about 400 mm"}, recording(xyz, np.arange(1, 49), np.ones(48, dtype=np.int64)),
+        truth, list(truth), 1.0, size=400.0132,
+    )  # fmt: skip
+
+
+EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, bryan)
+
+
+def write(example: Simulated, folder: Path) -> None:
+    """The job folder of one example."""
+    artefact = artefact_of(ArtefactFacts.model_validate(dict(example.artefact)), example.points)
+    model = MeasurementModel(artefact, effects(list(example.truth)))
+    coefficients = np.concatenate([np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in example.truth.values()])
+    sizes = np.array([example.size or size.nominal for size in artefact.sizes])
+    random = np.random.default_rng(SEED)
+    xyz = model.simulate(coefficients, sizes, Noise(coordinate=example.noise_um * 1e-3), random)
+    place = folder / example.id
+    place.mkdir(parents=True, exist_ok=True)
+    (place / "recording.csv").write_text(_csv(example, xyz), encoding="utf-8", newline="\n")
+    (place / "job.toml").write_text(_toml(example, model), encoding="utf-8", newline="\n")
+
+
+def _csv(example: Simulated, xyz: Floats) -> str:
+    points = example.points
+    rows = [",".join(["measurement", "point", "repeat", "x_mm", "y_mm", "z_mm", *example.columns])]
+    for i in range(len(points)):
+        cells = [points.measurement[i], points.point[i], points.repeat[i], *(f"{value:.5f}" for value in xyz[i])]
+        cells += [f"{points.columns[name][i]:.10g}" for name in example.columns]
+        rows.append(",".join(map(str, cells)))
+    return "\n".join(rows) + "\n"
+
+
+def _toml(example: Simulated, model: MeasurementModel) -> str:
+    said = []
+    for effect in model.effects:
+        given = np.atleast_1d(np.asarray(example.truth[effect.name], dtype=np.float64))
+        said += [f"{effect.name} {c.name} = {value:g}" for c, value in zip(effect.coefficients, given, strict=True)]
+    size = f"; true length of the bar {example.size} mm" if example.size else ""
+    artefact = "\n".join(f"{key} = {_value(value)}" for key, value in example.artefact.items())
+    names = ", ".join(f'"{name}"' for name in example.named)
+    return f"""\
+# Simulated with benchmarks/examples/simulated_jobs.py, seed {SEED}: no machine was measured.
+
+[job]
+id = "{example.id}"
+date = 2026-01-01
+procedure = "{example.title}"
+remarks = \"\"\"
+Simulated, no machine was measured. True errors: {"; ".join(said)}{size}; \\
+noise of a coordinate {example.noise_um:g} µm.\"\"\"
+
+[machine]
+name = "{MACHINE.name}"
+chain = "{MACHINE.chain}"
+travel_mm = {{ x = [0, 900], y = [0, 1200], z = [-600, 0] }}
+
+[artefact]
+{artefact}
+
+[recording]
+file = "recording.csv"
+
+[model]
+effects = [{names}]
+{example.extra}"""
+
+
+def _value(value: object) -> str:
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[2] / "examples"
+    for make in EXAMPLES:
+        write(make(), target)
