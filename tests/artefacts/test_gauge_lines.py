@@ -25,7 +25,7 @@ def test_a_periodic_error_is_found_with_its_period_and_amplitude() -> None:
 
 
 def test_scatter_alone_is_called_periodic_as_rarely_as_stated() -> None:
-    """1000 lines of pure scatter: 1 % at most are called periodic (expected 10 or fewer; 23 has probability 0.02 %)."""
+    """1000 lines of pure scatter: one in a hundred is called periodic; 23 or more would be, with probability 0.02 %."""
     random, x = np.random.default_rng(11), np.arange(0.0, 421.0, 20.0)
     assert sum(periodic_part(x, random.standard_normal(len(x))) is not None for _ in range(1000)) < 23
 
@@ -43,6 +43,6 @@ def test_each_line_has_slope_linearity_and_backlash() -> None:
     assert lines[1].gap == pytest.approx(0.0, abs=1e-12)
     assert lines[2].scale_ppm == pytest.approx(0, abs=1e-6)
     assert lines[2].gap == pytest.approx(-6e-3)
-    assert lines[2].gap_noise == pytest.approx(np.sqrt(2 / 21))
+    assert lines[2].gap_noise == pytest.approx(np.sqrt(2 / 22))
     assert lines[1].linearity < 1e-9
-    assert (lines[4].length, lines[4].faces) == (420.0, 21)
+    assert (lines[4].length, lines[4].faces) == (420.0, 22)
