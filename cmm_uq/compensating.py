@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -17,8 +18,8 @@ from cmm_uq.simulation import recording
 from cmm_uq.writing import staging, write_whole
 
 
-def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> Points:
-    """The recording of a job at the coordinates that its error maps make of it.
+def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict[str, object]]:
+    """The recording of a job at the coordinates that its error maps make of it, and how it came about.
 
     Parameters
     ----------
@@ -38,7 +39,12 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> Points:
         found = parse_error_map(job.inputs[given.file], str(job.folder / given.file), temperature=given.temperature_c)
         square = machine.squareness_arcsec
         maps.append(found.with_squareness_arcsec(square.xy, square.yz, square.zx) if square else found)
-    return compensate_points(job.points, machine_compensation(job.points, ErrorMaps(maps), beyond=beyond))
+    compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
+    try:
+        return compensate_points(job.points, compensation), compensation.provenance()
+    except CmmUqError as error:
+        where = ", ".join(part for part in (job.recording_path, error.where) if part)
+        raise CmmUqError(error.problem, where=where, fix=error.fix) from error
 
 
 def write_compensated(job: Path, out: Path, *, beyond: Beyond = "refuse") -> dict[str, Path]:
@@ -55,10 +61,14 @@ def write_compensated(job: Path, out: Path, *, beyond: Beyond = "refuse") -> dic
     read = read_job(job)
     if out.resolve() == read.folder.resolve():
         raise CmmUqError("is the job that is compensated", where=str(out), fix="Choose another --out")
-    points = compensate_job(read, beyond=beyond)
-    sources = ", ".join(f"{name} sha256 {value[:16]}" for name, value in sha256(read.inputs).items())
-    note = f"# compensated by cmm-uq {__version__} from {sources}\n".encode()
-    contents = {"job.toml": _without_maps(read.inputs["job.toml"]), read.facts.recording.file: note + recording(points)}
+    points, provenance = compensate_job(read, beyond=beyond)
+    note = f"# compensated by cmm-uq {__version__}; see compensation.json\n".encode()
+    told = {"software": f"cmm-uq {__version__}", "inputs_sha256": sha256(read.inputs), **provenance}
+    contents = {
+        "job.toml": _without_maps(read.inputs["job.toml"]),
+        read.facts.recording.file: note + recording(points),
+        "compensation.json": (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
+    }
     with staging(out) as place:
         return write_whole(place, out, contents)
 

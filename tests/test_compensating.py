@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -54,7 +55,9 @@ def test_the_compensated_job_is_not_compensated_again_and_tells_its_source(job: 
     assert compensated.facts.machine.chain == "XYZ"
     first = (tmp_path / "out" / "ballbar.csv").read_text(encoding="utf-8").splitlines()[0]
     assert first.startswith("# compensated by cmm-uq")
-    assert "map.csv sha256" in first
+    told = json.loads((tmp_path / "out" / "compensation.json").read_text(encoding="utf-8"))
+    assert told["inputs_sha256"].keys() == {"job.toml", "ballbar.csv", "map.csv"}
+    assert told["error_maps"][0]["squareness_arcsec"] == {"xy": -173.0, "yz": -19.0, "zx": 21.0}
 
 
 def test_the_thesis_map_brings_the_rms_accuracy_error_to_12_5_micrometres(job: Path, tmp_path: Path) -> None:
@@ -76,6 +79,17 @@ def test_a_map_that_does_not_cover_the_travel_is_refused(job: Path, tmp_path: Pa
     with pytest.raises(CmmUqError, match=r"map\.csv"):
         write_compensated(named(job, straight(high=600.0)), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_points_beyond_the_map_are_refused_with_their_line_or_flagged(job: Path, tmp_path: Path) -> None:
+    """Position 16 reads X = 731 mm; a map that ends at 720 mm needs a travel that ends there too."""
+    path = job / "job.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace("x = [0, 900]", "x = [0, 720]"), encoding="utf-8")
+    short = named(job, straight(high=720.0))
+    with pytest.raises(CmmUqError, match=r"ballbar\.csv.*line \d+"):
+        write_compensated(short, tmp_path / "out")
+    write_compensated(short, tmp_path / "flagged", beyond="extrapolate")
+    assert read_job(tmp_path / "flagged").points.columns["extrapolated"].sum() == 1
 
 
 def test_the_job_itself_is_not_written_over(job: Path) -> None:

@@ -104,11 +104,19 @@ class MachineFacts(_Table):
     model: str = ""
     serial: str = ""
     owner: str = ""
-    chain: Literal["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"] = "XYZ"
+    chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
     travel_mm: Travel = Travel()
     origin_mm: Triple = [0.0, 0.0, 0.0]
     error_map: list[ErrorMapFile] = []
     squareness_arcsec: SquarenessFacts | None = None
+
+    @model_validator(mode="after")
+    def _three_carriages(self) -> Self:
+        if sorted(self.chain.replace("F", "", 1)) != ["X", "Y", "Z"]:
+            raise ValueError(
+                f"chain = {self.chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves"
+            )
+        return self
 
 
 class Traceability(_Table):

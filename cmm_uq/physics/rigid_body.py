@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.physics.effect import Effect, Parameter, along
-from cmm_uq.physics.kinematics import carried_offset
+from cmm_uq.physics.kinematics import Chain, carried_offset
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, PPM
 
@@ -81,8 +81,10 @@ class Rotation(Effect):
 
 def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
     """Basis (n, 3, 1) of carriage ``axis`` turning about ``about`` by ``angle`` (n,) rad: ε × what it carries."""
+    chain = Chain.of(points.machine.chain)
     tip = np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
-    carried = carried_offset(axis, points.readings, tip, points.machine.chain)
+    ram = axis == AXES[chain.order[-1]]  # by convention the tip counts for the ram alone; the other levers are long
+    carried = carried_offset(axis, points.readings, tip if ram else None, chain)
     rotation = np.zeros((len(points), 3))
     rotation[:, AXES.index(about)] = angle
     return np.cross(rotation, carried)[:, :, None]

@@ -98,6 +98,18 @@ def test_the_rotation_of_the_table_carriage_in_the_chain_yxz_carries_x_and_z() -
     np.testing.assert_allclose(e, moved(x * 10 * ARCSECOND * y / 1000, "y"), atol=1e-15)
 
 
+def test_the_stylus_tip_is_the_lever_of_the_ram_alone() -> None:
+    n = len(POINTS)
+    tipped = with_columns(POINTS, tip_x_mm=np.full(n, 30.0), tip_y_mm=np.full(n, -20.0), tip_z_mm=np.full(n, -150.0))
+    same = CATALOGUE["rotation_x_y"].displacement(tipped, {"arcsec_per_m": 9.0})
+    np.testing.assert_array_equal(same, CATALOGUE["rotation_x_y"].displacement(POINTS, {"arcsec_per_m": 9.0}))
+    angle = 9 * ARCSECOND * (Z + 500) / 1000
+    expected = moved(20 * angle, "x") + moved(30 * angle, "y")
+    np.testing.assert_allclose(
+        CATALOGUE["rotation_z_z"].displacement(tipped, {"arcsec_per_m": 9.0}), expected, atol=1e-15
+    )
+
+
 def bar_lengths(points: Points, e: Floats) -> Floats:
     xyz = (points.xyz + e).reshape(-1, 2, 3)
     return np.asarray(np.linalg.norm(xyz[:, 1] - xyz[:, 0], axis=1))
