@@ -91,8 +91,9 @@ def lines_of(gauge: StepGauge) -> tuple[GaugeLine, ...]:
 def periodic_part(position: Floats, deviation: Floats) -> Periodic | None:
     """The sinusoid that explains most of what a straight line leaves of deviations (n,) at positions (n,), mm.
 
-    Periods from twice the mean distance of the faces to half the line are looked at; the F test's probability becomes
-    that of the largest of all by the mean number of upcrossings (Baluev 2008, MNRAS 385, 1279). ``None`` below :data:`LEAST_FACES`, or when chance explains it as well.
+    Periods from twice the mean distance of the faces to half the line are looked at. The probability of the F test becomes
+    that of the largest of all periods by the mean number of upcrossings (Baluev 2008, MNRAS 385, 1279). ``None`` below
+    :data:`LEAST_FACES`, or when chance explains it as well.
     """
     n = len(position)
     if n < LEAST_FACES:
