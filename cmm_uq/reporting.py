@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.analysis import Result, analyse
-from cmm_uq.analysis.diagnosing import Diagnosed, diagnose_job
+from cmm_uq.analysis.diagnosing import diagnose_job
+from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
 from cmm_uq.writing import staging, write_whole
 

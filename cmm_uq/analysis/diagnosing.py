@@ -2,35 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.analysis.estimation import model_of, without_outliers
+from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import read_job
-from cmm_uq.mismatch.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
+from cmm_uq.measurement import MeasurementModel
+from cmm_uq.mismatch.diagnosis import FALSE_ALARMS, diagnose
 from cmm_uq.mismatch.screening import Finding, screen
-from cmm_uq.mismatch.suggestion import Suggestion, suggestions
-
-
-@dataclass(frozen=True, eq=False)
-class Diagnosed:
-    """A job with its diagnosis.
-
-    Parameters
-    ----------
-    job, findings : what was read, and what the screening found.
-    diagnosis : what is missing.
-    suggestions : what to measure next.
-    """
-
-    job: Job
-    findings: tuple[Finding, ...]
-    diagnosis: Diagnosis
-    suggestions: tuple[Suggestion, ...]
+from cmm_uq.mismatch.suggestion import suggestions
 
 
 def diagnose_job(
@@ -51,11 +35,35 @@ def diagnose_job(
     if not 1e-6 <= alpha <= 0.5:
         raise CmmUqError(f"a false-alarm rate of {alpha:g}", fix="Give one between 0.000001 and 0.5; 0.01 is usual")
     job = read_job(folder)
+    model, findings = screened_model(job)
+    return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
+
+
+def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
+    """The model that a job names, without gross outliers, and all that the screening found.
+
+    Raises
+    ------
+    CmmUqError : the recording does not fit the model.
+    """
     artefact = artefact_of(job.facts.artefact, job.points, where=job.recording_path)
     model = model_of(job, artefact)
     needed = {column for effect in model.effects for column in effect.columns}
     found = screen(job.points, needed=needed, set_aside=job.facts.recording.set_aside, where=job.recording_path)
     model, outliers = without_outliers(model)
+    return model, (*found, *outliers)
+
+
+def diagnosed(
+    job: Job,
+    model: MeasurementModel,
+    findings: tuple[Finding, ...],
+    *,
+    seed: int,
+    alpha: float = FALSE_ALARMS,
+    progress: Progress | None = None,
+) -> Diagnosed:
+    """Diagnose the screened model of a job."""
     stated = job.facts.recording.u_coordinate_um
     diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress)
-    return Diagnosed(job, (*found, *outliers), diagnosis, suggestions(diagnosis, job.facts.artefact))
+    return Diagnosed(job, findings, diagnosis, suggestions(diagnosis, job.facts.artefact))

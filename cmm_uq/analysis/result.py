@@ -13,7 +13,9 @@ from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
 from cmm_uq.measurement import Estimate, MeasurementModel
+from cmm_uq.mismatch.diagnosis import Diagnosis
 from cmm_uq.mismatch.screening import Finding
+from cmm_uq.mismatch.suggestion import Suggestion
 from cmm_uq.points import Floats
 
 LACK_OF_FIT = 0.01
@@ -60,6 +62,23 @@ class Influence:
 
 
 @dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """A job with its diagnosis.
+
+    Parameters
+    ----------
+    job, findings : what was read, and what the screening found.
+    diagnosis : what is missing.
+    suggestions : what to measure next.
+    """
+
+    job: Job
+    findings: tuple[Finding, ...]
+    diagnosis: Diagnosis
+    suggestions: tuple[Suggestion, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Result:
     """All that is known of a job after its analysis.
 
@@ -75,6 +94,7 @@ class Result:
     noise : of a coordinate.
     accuracy : figures of the lengths, by name; empty for artefacts without lengths.
     statements : of conformity, in the job's order.
+    diagnosed : what the job's model leaves out, if anything.
     """
 
     job: Job
@@ -88,6 +108,7 @@ class Result:
     noise: Noise
     accuracy: Mapping[str, Quantity]
     statements: tuple[Statement, ...]
+    diagnosed: Diagnosed
 
     @property
     def artefact(self) -> Artefact:

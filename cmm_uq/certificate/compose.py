@@ -8,6 +8,7 @@ from cmm_uq import __version__
 from cmm_uq.analysis.result import Result
 from cmm_uq.certificate import ballbar_section, bryan_section, gauge_section, plate_section, sphere_section
 from cmm_uq.certificate.corner import corner_plot
+from cmm_uq.certificate.diagnosis_page import diagnosis_sections
 from cmm_uq.certificate.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
 from cmm_uq.certificate.warning import warnings
 from cmm_uq.certificate.wording import expanded, listed, probability, title_of, units_of
@@ -45,6 +46,8 @@ def certificate(result: Result) -> Document:
     facts = result.job.facts
     sections = [_performance(result), _conformity(result), _errors(result), _traceability(result)]
     sections += ARTEFACT_SECTIONS[result.artefact.kind](result)
+    if facts.job.diagnosis_on_certificate:
+        sections += diagnosis_sections(result.diagnosed)
     sections += [_posterior(result), _method(result)]
     return Document(
         title="Calibration certificate",

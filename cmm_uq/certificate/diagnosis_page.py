@@ -1,4 +1,4 @@
-"""diagnosis.html as a document, and the ``diagnosis`` part of results.json."""
+"""A diagnosis as a document, and its results.json."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.diagnosing import Diagnosed
+from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.certificate.diagnosis_words import VERDICTS, noise_words, sentence
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.plots import length_plot
-from cmm_uq.certificate.results_file import SCHEMA, finding_data, quantity_data
+from cmm_uq.certificate.results_file import SCHEMA, diagnosis_data
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.units import MICROMETRE
 
@@ -31,57 +31,9 @@ def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
-    """The ``diagnosis`` part."""
-    d = found.diagnosis
-    return {
-        "verdict": d.verdict,
-        "p_value": d.p_value,
-        "where": [
-            {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,
-             "amplitude_um": place.amplitude_um, "what": place.what}
-            for place in d.where
-        ],
-        "effects": [
-            {"effect": item.effect, "probability": item.probability, "explained": item.explained,
-             "parameters": {name: quantity_data(q) for name, q in item.parameters.items()},
-             "words": sentence(item, d)}
-            for item in d.effects
-        ],
-        "indistinguishable": [list(group) for group in d.indistinguishable],
-        "suggested_measurements": [
-            {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions} for s in found.suggestions
-        ],
-        "noise": {
-            "stated_coordinate_um": found.job.facts.recording.u_coordinate_um,
-            "coordinate_um": quantity_data(d.noise.coordinate), "placing_um": quantity_data(d.noise.placing),
-            "correlated_in_time": d.noise.correlated_in_time, "heavy_tails": d.noise.heavy_tails,
-            "contradicts_stated": d.noise.contradicts_stated,
-        },
-        "screening": [finding_data(f, found.job.facts.recording.file) for f in found.findings],
-        "improvement": {
-            "rms_before_um": d.improvement.rms_before_um, "rms_after_um": d.improvement.rms_after_um,
-            "heldout_rms_before_um": d.improvement.heldout_rms_before_um,
-            "heldout_rms_after_um": d.improvement.heldout_rms_after_um,
-            "elpd_gain": d.improvement.elpd_gain, "elpd_gain_se": d.improvement.elpd_gain_se,
-        },
-        "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
-    }  # fmt: skip
-
-
 def diagnosis_document(found: Diagnosed) -> Document:
     """The page of a diagnosis."""
     facts, d = found.job.facts, found.diagnosis
-    sections = [
-        Section("What was left out", _left_out(found)),
-        Section("Before and after", _before_after(found)),
-        Section("Where the mismatch lives", _where(found)),
-        Section("Rival explanations", (_rivals(found),)),
-        Section("Noise", tuple(Paragraph(text) for text in noise_words(d, facts.recording.u_coordinate_um))),
-        Section("What to measure next", tuple(
-            Paragraph(f"{' and '.join(s.separates)}: {s.what}") for s in found.suggestions
-        )),
-    ]  # fmt: skip
     return Document(
         title="Diagnosis",
         number=facts.job.id,
@@ -94,7 +46,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
                    ("Effects that the job names", ", ".join(facts.model.effects) or "none"))),
         ),
         warnings=tuple(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
-        sections=tuple(section for section in sections if section.blocks),
+        sections=diagnosis_sections(found),
         statements=(),
         signatures=(),
         attachments=(),
@@ -102,6 +54,22 @@ def diagnosis_document(found: Diagnosed) -> Document:
         date=facts.job.date,
         end="End of diagnosis",
     )  # fmt: skip
+
+
+def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
+    """What a diagnosis says, as sections of any document."""
+    noise = noise_words(found.diagnosis, found.job.facts.recording.u_coordinate_um)
+    sections = (
+        Section("What was left out", _left_out(found)),
+        Section("Before and after", _before_after(found)),
+        Section("Where the mismatch lives", _where(found)),
+        Section("Rival explanations", (_rivals(found),)),
+        Section("Noise", tuple(Paragraph(text) for text in noise)),
+        Section("What to measure next", tuple(
+            Paragraph(f"{' and '.join(s.separates)}: {s.what}") for s in found.suggestions
+        )),
+    )  # fmt: skip
+    return tuple(section for section in sections if section.blocks)
 
 
 def _left_out(found: Diagnosed) -> tuple[Block, ...]:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.result import Result
+from cmm_uq.analysis.result import Diagnosed, Result
+from cmm_uq.certificate.diagnosis_words import sentence
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import Statement
@@ -31,7 +32,7 @@ def results(result: Result) -> dict[str, Any]:
         "artefact": _quantities(result.sizes),
         "noise": {
             "stated_coordinate_um": result.noise.stated_um,
-            "coordinate_um": quantity_data(result.noise.coordinate),
+            "coordinate_um": _quantity(result.noise.coordinate),
             "p_value": result.noise.p_value,
             "contradicts_stated": result.noise.contradicts_stated,
         },
@@ -39,10 +40,49 @@ def results(result: Result) -> dict[str, Any]:
         "least_squares": _least_squares(result),
         "identifiability": _identifiability(result),
         "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
-        "accuracy_uncertainty": {name: quantity_data(quantity) for name, quantity in result.accuracy.items()},
+        "accuracy_uncertainty": {name: _quantity(quantity) for name, quantity in result.accuracy.items()},
         "conformity": [_statement(statement) for statement in result.statements],
-        "screening": [finding_data(finding, job.facts.recording.file) for finding in result.findings],
+        "diagnosis": diagnosis_data(result.diagnosed),
+        "screening": [_finding(finding, job.facts.recording.file) for finding in result.findings],
     }
+
+
+def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
+    """The ``diagnosis`` part."""
+    d = found.diagnosis
+    return {
+        "verdict": d.verdict,
+        "p_value": d.p_value,
+        "where": [
+            {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,
+             "amplitude_um": place.amplitude_um, "what": place.what}
+            for place in d.where
+        ],
+        "effects": [
+            {"effect": item.effect, "probability": item.probability, "explained": item.explained,
+             "parameters": {name: _quantity(q) for name, q in item.parameters.items()},
+             "words": sentence(item, d)}
+            for item in d.effects
+        ],
+        "indistinguishable": [list(group) for group in d.indistinguishable],
+        "suggested_measurements": [
+            {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions} for s in found.suggestions
+        ],
+        "noise": {
+            "stated_coordinate_um": found.job.facts.recording.u_coordinate_um,
+            "coordinate_um": _quantity(d.noise.coordinate), "placing_um": _quantity(d.noise.placing),
+            "correlated_in_time": d.noise.correlated_in_time, "heavy_tails": d.noise.heavy_tails,
+            "contradicts_stated": d.noise.contradicts_stated,
+        },
+        "screening": [_finding(f, found.job.facts.recording.file) for f in found.findings],
+        "improvement": {
+            "rms_before_um": d.improvement.rms_before_um, "rms_after_um": d.improvement.rms_after_um,
+            "heldout_rms_before_um": d.improvement.heldout_rms_before_um,
+            "heldout_rms_after_um": d.improvement.heldout_rms_after_um,
+            "elpd_gain": d.improvement.elpd_gain, "elpd_gain_se": d.improvement.elpd_gain_se,
+        },
+        "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
+    }  # fmt: skip
 
 
 def as_json(data: Mapping[str, Any]) -> bytes:
@@ -50,13 +90,13 @@ def as_json(data: Mapping[str, Any]) -> bytes:
     return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
-def quantity_data(quantity: Quantity) -> dict[str, Any]:
+def _quantity(quantity: Quantity) -> dict[str, Any]:
     """Value, standard uncertainty and 95 % interval."""
     return {"value": quantity.value, "u": quantity.u, "interval95": list(quantity.interval95)}
 
 
 def _quantities(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
-    return {name: quantity_data(quantity) for name, quantity in quantities.items()}
+    return {name: _quantity(quantity) for name, quantity in quantities.items()}
 
 
 def _sampling(result: Result) -> dict[str, Any]:
@@ -109,7 +149,7 @@ def _statement(statement: Statement) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def finding_data(finding: Finding, file: str) -> dict[str, Any]:
+def _finding(finding: Finding, file: str) -> dict[str, Any]:
     """One finding of the screening."""
     return {
         "kind": finding.kind, "rows": [str(m) for m in finding.measurements], "lines": list(finding.lines),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.analysis.result import Result
+from cmm_uq.certificate.diagnosis_words import VERDICTS
 from cmm_uq.certificate.wording import listed, title_of
 from cmm_uq.uncertainty.rounding import significant
 
@@ -14,7 +15,14 @@ def warnings(result: Result) -> tuple[str, ...]:
     """All warnings, the gravest first."""
     return tuple(
         text
-        for texts in (_convergence(result), _noise(result), _undetermined(result), _screening(result), _missing(result))
+        for texts in (
+            _convergence(result),
+            _mismatch(result),
+            _noise(result),
+            _undetermined(result),
+            _screening(result),
+            _missing(result),
+        )
         for text in texts
     )
 
@@ -27,6 +35,15 @@ def _convergence(result: Result) -> list[str]:
         f"The sampling did not converge (least effective sample size {posterior.ess_min:.0f}, R-hat "
         f"{posterior.rhat_max:.3f}): estimates and uncertainties must not be used."
     ]
+
+
+def _mismatch(result: Result) -> list[str]:
+    diagnosis = result.diagnosed.diagnosis
+    if diagnosis.verdict == "consistent":
+        return []
+    named = [item.title for item in diagnosis.effects]
+    found = f" It shows: {listed(named)}." if named else ""
+    return [f"{VERDICTS[diagnosis.verdict]}{found} The figures below hold for the named model; see the diagnosis."]
 
 
 def _noise(result: Result) -> list[str]:

@@ -11,7 +11,7 @@ import typer
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
-    from cmm_uq.analysis.diagnosing import Diagnosed
+    from cmm_uq.analysis.result import Diagnosed
 
 
 def command(

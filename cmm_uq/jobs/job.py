@@ -47,6 +47,7 @@ class JobFacts(_Table):
     order: str = ""
     conditions: str = ""
     remarks: str = ""
+    diagnosis_on_certificate: bool = False
 
     @model_validator(mode="after")
     def _names_a_folder(self) -> Self:

@@ -129,6 +129,21 @@ def test_the_copied_position_is_told_with_its_influence(document: Document) -> N
     )
 
 
+def test_a_recording_that_contradicts_its_model_is_a_warning_and_the_diagnosis_is_printed_on_demand(job: Path) -> None:
+    path = job / "job.toml"
+    text = re.sub(r"(?m)^effects = .*", 'effects = ["scale_x", "scale_y", "scale_z"]', path.read_text(encoding="utf-8"))
+    path.write_text(text.replace("[job]\n", "[job]\ndiagnosis_on_certificate = true\n", 1), encoding="utf-8")
+    document = certificate(analyse(job))
+    assert "does not agree with the model" in document.warnings[0]
+    assert "Squareness X–Y" in document.warnings[0]
+    assert "What was left out" in [section.title for section in document.sections]
+
+
+def test_a_consistent_recording_prints_no_diagnosis_unless_asked(document: Document) -> None:
+    assert not any("does not agree" in text for text in document.warnings)
+    assert "What was left out" not in [section.title for section in document.sections]
+
+
 def test_the_summary_carries_the_certificates_figures(result: Result, document: Document) -> None:
     lines = [" ".join(row) for row in summary(result)]
     for row in table(document, "Figures of performance").rows:

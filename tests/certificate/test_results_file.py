@@ -47,6 +47,13 @@ def test_the_screening_names_measurements_and_file(data: dict[str, Any]) -> None
     assert (finding["kind"], finding["rows"], finding["file"]) == ("duplicate", ["14", "18"], "ballbar.csv")
 
 
+def test_the_diagnosis_is_part_of_the_working_file(data: dict[str, Any]) -> None:
+    diagnosis = data["diagnosis"]
+    assert diagnosis["verdict"] == "consistent"
+    assert diagnosis["effects"] == []
+    assert diagnosis["screening"] == data["screening"]
+
+
 def test_an_undetermined_parameter_has_no_least_squares_value(data: dict[str, Any]) -> None:
     free = data["identifiability"]["undetermined"]
     scale = data["least_squares"]["estimates"]["scale_x"]["ppm"]
