@@ -120,6 +120,6 @@ def _positions(gauge: StepGauge, lines: tuple[GaugeLine, ...]) -> list[Block]:
     if missing:
         texts.append(f"Not measured of the seven positions of ISO 10360-2:2009: {listed(missing)}.")
     if short:
-        share = f"{100 * LEAST_SHARE:.0f} %"
-        texts.append(f"Shorter than the {share} of the travel that ISO 10360-2:2009 asks for: {listed(short)}.")
+        least = f"{100 * LEAST_SHARE:.0f} %"
+        texts.append(f"Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {listed(short)}.")
     return [Paragraph(" ".join(texts), tone="note")] if texts else []

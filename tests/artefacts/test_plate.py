@@ -147,7 +147,7 @@ def renumbered(points: Points) -> Points:
     [
         (lambda p: p.at(p.xyz / 1000), "look like metres"),
         (lambda p: p.select((p.measurement > 1) | (p.point == 1)), "measurement 1 has no two different balls"),
-        (renumbered, "do not have the shape that the references say"),
+        (renumbered, "do not have the shape of this plate"),
         (lambda p: Points(p.xyz, p.measurement, p.point, p.repeat, p.machine), "no column 'reference_x_mm'"),
     ],
 )  # fmt: skip
