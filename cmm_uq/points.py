@@ -31,12 +31,15 @@ class Machine:
     chain : carriages from the table to the ram, a permutation of ``XYZ``.
     travel_mm : (3, 2) lowest and highest scale reading of each axis, mm; ``nan`` where the job does not say.
     origin_mm : (3,) scale reading = recorded coordinate + origin, mm.
+    tip_on_every_carriage : whether rotations of all carriages act on the stylus tip offset, as they do in truth, or those
+        of the ram alone, as job files have it, where the other levers are so much longer.
     """
 
     name: str = ""
     chain: str = "XYZ"
     travel_mm: Floats = field(default_factory=lambda: np.full((3, 2), np.nan))
     origin_mm: Floats = field(default_factory=lambda: np.zeros(3))
+    tip_on_every_carriage: bool = False
 
     def travel(self, axis: str) -> tuple[float, float]:
         """Lowest and highest scale reading of an axis, mm.

@@ -83,8 +83,8 @@ def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
     """Basis (n, 3, 1) of carriage ``axis`` turning about ``about`` by ``angle`` (n,) rad: ε × what it carries."""
     chain = Chain.of(points.machine.chain)
     tip = np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
-    ram = axis == AXES[chain.order[-1]]  # by convention the tip counts for the ram alone; the other levers are long
-    carried = carried_offset(axis, points.readings, tip if ram else None, chain)
+    acts_on_tip = points.machine.tip_on_every_carriage or axis == AXES[chain.order[-1]]
+    carried = carried_offset(axis, points.readings, tip if acts_on_tip else None, chain)
     rotation = np.zeros((len(points), 3))
     rotation[:, AXES.index(about)] = angle
     return np.cross(rotation, carried)[:, :, None]
