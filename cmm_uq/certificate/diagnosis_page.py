@@ -10,8 +10,9 @@ from cmm_uq import __version__
 from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.certificate.diagnosis_words import VERDICTS, noise_words, sentence
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
-from cmm_uq.certificate.plots import length_plot
+from cmm_uq.certificate.plots import curve_with_band, length_plot
 from cmm_uq.certificate.results_file import SCHEMA, diagnosis_data
+from cmm_uq.certificate.wording import probability
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.units import MICROMETRE
 
@@ -40,7 +41,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
         subject=f"{facts.machine.name}, measured on {facts.job.date.isoformat()}",
         issuer=tuple(line for line in (facts.laboratory.name,) if line),
         particulars=(
-            Facts((("Verdict", d.verdict), ("Probability that nothing is missing", f"p = {d.p_value:.2g}"),
+            Facts((("Verdict", d.verdict), ("p-value of “nothing is missing”", f"{d.p_value:.2g}"),
                    ("False-alarm rate", f"{100 * d.alpha:g} %"))),
             Facts((("Machine", facts.machine.name), ("Artefact", d.before.artefact.title),
                    ("Effects that the job names", ", ".join(facts.model.effects) or "none"))),
@@ -137,14 +138,20 @@ def _where(found: Diagnosed) -> tuple[Block, ...]:
         return ()
     heads = (Column("Smooth function", numeric=False), Column("Covariate", numeric=False), Column("Region"),
              Column("Amplitude", "µm"), Column("p"))  # fmt: skip
-    return (
-        Table(
-            "Covariates on which the residuals depend", heads, rows, ("p is corrected for having looked everywhere.",)
-        ),
+    first = found.diagnosis.where[0]
+    x, y, u = first.curve
+    plot = curve_with_band(
+        x, y, 2 * u, x_label=first.covariate, y_label="Error / µm",
+        caption=f"What the residuals show: {first.what}, with U (k = 2).",
+        alternative=f"A smooth function with a largest value of {first.amplitude_um:.2g} µm.",
+    )  # fmt: skip
+    note = (
+        "p is corrected for having looked everywhere; the region is where the function exceeds half its largest value."
     )
+    return (plot, Table("Covariates on which the residuals depend", heads, rows, (note,)))
 
 
 def _rivals(found: Diagnosed) -> Table:
-    rows = tuple((name, f"{100 * p:.2g} %") for name, p in found.diagnosis.rivals)
+    rows = tuple((name, probability(p)) for name, p in found.diagnosis.rivals)
     heads = (Column("Explanation", numeric=False), Column("Probability"))
     return Table("First race: one explanation alone", heads, rows, ("Nothing missing has the rest.",))

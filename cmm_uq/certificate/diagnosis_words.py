@@ -38,14 +38,17 @@ def cause_of(effect: str) -> str:
 
 def sentence(item: LeftOut, diagnosis: Diagnosis) -> str:
     """One left-out effect: size, cause, and what it explains."""
-    sizes = []
-    for name, quantity in item.parameters.items():
-        value, U, k = expanded(quantity)
-        sizes.append(f"{name} = {value} ± {U}\u00a0{quantity.unit} (k\u00a0=\u00a0{k})" if quantity.u > 0 else
-                     f"{name} = {quantity.value:.4g}\u00a0{quantity.unit}")  # fmt: skip
+    alone = len(item.parameters) == 1
+    sizes = [(name, *expanded(quantity), quantity) for name, quantity in item.parameters.items()]
+    words = [
+        f"{'' if alone else f'{name} = '}{value} ± {U}\u00a0{quantity.unit} (k\u00a0=\u00a0{k})"
+        if quantity.u > 0
+        else f"{name} = {quantity.value:.4g}\u00a0{quantity.unit}"
+        for name, value, U, k, quantity in sizes
+    ]
     gain = diagnosis.improvement
     return (
-        f"{item.title}: {', '.join(sizes)}. What it points to: {cause_of(item.effect)}. "
+        f"{item.title}: {', '.join(words)}. What it points to: {cause_of(item.effect)}. "
         f"Probability {100 * item.probability:.1f}\u00a0%; explains {100 * item.explained:.0f}\u00a0% of the misfit; "
         "on placings that the fit had not seen the rms falls from "
         f"{gain.heldout_rms_before_um:.1f} to {gain.heldout_rms_after_um:.1f}\u00a0µm."

@@ -27,7 +27,7 @@ _RIVAL = 0.02
 _NOISE_KIND = 0.9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Place:
     """Where a mismatch lives.
 
@@ -36,8 +36,9 @@ class Place:
     covariate : column that it depends on.
     region : of that covariate, where it is larger than half its maximum.
     p_value : corrected for having looked at every covariate.
-    amplitude_um : largest value of the smooth function, in the observations.
+    amplitude_um : largest value of the smooth function.
     what : the unknown function, in words.
+    curve : covariate, function and its standard uncertainty in µm, each (p,).
     """
 
     covariate: str
@@ -45,6 +46,7 @@ class Place:
     p_value: float
     amplitude_um: float
     what: str
+    curve: tuple[Floats, Floats, Floats]
 
 
 @dataclass(frozen=True)
@@ -193,39 +195,39 @@ def _where(race: Race, alpha: float) -> tuple[Place, ...]:
         return ()
     found = []
     for explanation, odds in zip(race.explanations, race.log_odds, strict=True):
-        if explanation.kind != UNKNOWN or explanation.covariate is None or explanation.covariate_name is None:
+        name, covariate, values = explanation.covariate_name, explanation.covariate, explanation.values
+        if explanation.kind != UNKNOWN or covariate is None or values is None or name is None:
             continue
         p_value = tail_probability(race.null_maximum, float(odds))
         if p_value < alpha:
-            curve = _smoothed(race, explanation)
-            region = _region(explanation.covariate, curve)
-            amplitude = float(np.abs(curve).max()) / MICROMETRE
-            found.append(Place(explanation.covariate_name, region, p_value, amplitude, explanation.name))
+            order = np.unique(covariate, return_index=True)[1]
+            x, (y, u) = covariate[order], _smoothed(race, explanation, values[order])
+            amplitude = float(np.abs(y).max()) / MICROMETRE
+            curve = (x, y / MICROMETRE, u / MICROMETRE)
+            found.append(Place(name, _region(x, y), p_value, amplitude, explanation.name, curve))
     return tuple(sorted(found, key=lambda place: place.p_value))
 
 
-def _smoothed(race: Race, explanation: Explanation) -> Floats:
-    """Best linear estimate of an unknown function in the observations, (m,) mm, at the noise of the residuals."""
+def _smoothed(race: Race, explanation: Explanation, values: Floats) -> tuple[Floats, Floats]:
+    """Best linear estimate (p,) of an unknown function and its standard uncertainty, mm, at the noise of the residuals."""
     comparison = race.comparison
-    columns = explanation.members[0].columns / comparison.noise_scale[:, None]
-    left = comparison.rest.T @ columns
-    sigma2 = float(np.mean(comparison.left**2)) / 2
-    coefficients = np.linalg.solve(left.T @ left + sigma2 * np.eye(left.shape[1]), left.T @ comparison.left)
-    return np.asarray(explanation.members[0].columns @ coefficients, dtype=np.float64)
+    left = comparison.rest.T @ (explanation.members[0].columns / comparison.noise_scale[:, None])
+    least = comparison.left - left @ np.linalg.lstsq(left, comparison.left, rcond=None)[0]
+    variance = max(float(least @ least) / max(len(least) - left.shape[1], 1), comparison.least_noise**2)
+    covariance = np.linalg.inv(left.T @ left / variance + np.eye(left.shape[1]))
+    estimate = values @ (covariance @ left.T @ comparison.left) / variance
+    return estimate, np.sqrt(np.einsum("pi,ij,pj->p", values, covariance, values))
 
 
 def _region(covariate: Floats, curve: Floats) -> tuple[float, float]:
-    """Range of the covariate about the curve's largest value where it exceeds half of it."""
-    order = np.argsort(covariate)
-    size = np.abs(curve[order])
-    top = int(np.argmax(size))
-    high = size >= 0.5 * size[top]
-    first, last = top, top
+    """Range of the sorted covariate about the curve's largest value where it exceeds half of it."""
+    high = np.abs(curve) >= 0.5 * np.abs(curve).max()
+    first = last = int(np.argmax(np.abs(curve)))
     while first > 0 and high[first - 1]:
         first -= 1
-    while last < len(size) - 1 and high[last + 1]:
+    while last < len(high) - 1 and high[last + 1]:
         last += 1
-    return float(covariate[order][first]), float(covariate[order][last])
+    return float(covariate[first]), float(covariate[last])
 
 
 def _noise(race: Race, stated: float | None) -> NoiseFound:

@@ -51,7 +51,8 @@ class Explanation:
     name : the effect's name; for an unknown function what it depends on.
     kind : ``effect``, ``several`` (known effects at once) or ``unknown``.
     members : equally probable versions.
-    covariate : (m,) what an unknown function depends on, as the observations have it.
+    covariate : (p,) where an unknown function is evaluated: the points' readings, or the observations' covariate.
+    values : (p, r) the function there, mm, for one unit of each coefficient of the first member.
     covariate_name : its name in the recording.
     """
 
@@ -59,6 +60,7 @@ class Explanation:
     kind: str
     members: tuple[Member, ...]
     covariate: Floats | None = None
+    values: Floats | None = None
     covariate_name: str | None = None
 
 
@@ -133,17 +135,21 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
         if np.ptp(readings) < 1.0:
             continue
         for j, direction in enumerate(AXES):
-            members = []
-            for factor in _smooth(readings):
-                displacement = np.zeros((len(points), 3, factor.shape[1]))
-                displacement[:, j] = _UNKNOWN_SD * factor
-                members.append(Member(model.seen(displacement, values)))
             name = f"error along {direction.upper()} as a function of {axis.upper()}"
-            found.append(Explanation(name, UNKNOWN, tuple(members), mean_of(model, readings), f"{axis}_mm"))
+            factors = [_UNKNOWN_SD * factor for factor in _smooth(readings)]
+            members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
+            found.append(Explanation(name, UNKNOWN, members, readings, factors[0], f"{axis}_mm"))
     for name, covariate in covariates(model).items():
-        members = [Member(_UNKNOWN_SD * factor) for factor in _smooth(covariate)]
-        found.append(Explanation(f"error as a function of {name}", UNKNOWN, tuple(members), covariate, name))
+        factors = [_UNKNOWN_SD * factor for factor in _smooth(covariate)]
+        members = tuple(Member(factor) for factor in factors)
+        found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, factors[0], name))
     return found
+
+
+def _along(axis: int, factor: Floats) -> Floats:
+    displacement = np.zeros((len(factor), 3, factor.shape[1]))
+    displacement[:, axis] = factor
+    return displacement
 
 
 def covariates(model: MeasurementModel) -> dict[str, Floats]:

@@ -106,6 +106,8 @@ def test_an_effect_that_nobody_knows_is_called_unexplained_and_located() -> None
     assert not found.effects
     assert found.where[0].covariate == "x_mm"
     assert found.where[0].p_value < 1e-3
+    low, high = found.where[0].region
+    assert low < 600.0 < high
 
 
 def test_false_alarms_are_as_frequent_as_the_p_value_says() -> None:
