@@ -123,6 +123,11 @@ def _finding(
     if found.dof[row] < 1:
         return False, f"has no interval, with {found.dof[row]:.2g} effective degrees of freedom"
     comparison = compare(found, simulated, row, digits)
+    if not comparison.clear:
+        doubt = f", but Monte Carlo's own error is {figure(comparison.error, 2)}"
+        return max(comparison.low, comparison.high) <= comparison.tolerance + 2 * comparison.error, (
+            f"is neither confirmed nor refuted: {comparison.words}{doubt}"
+        )
     return comparison.agrees, ("is confirmed: " if comparison.agrees else "is not enough: ") + comparison.words
 
 

@@ -23,6 +23,8 @@ _DEGREE = 4
 _POINTS = 200
 _EDGE = 0.01
 _LONGER = 0.01
+_FEWEST_FOR_FLATNESS = 5000
+_FLAT = 10.0
 
 
 def inner_draws(trials: int, coverage: float) -> int:
@@ -40,10 +42,13 @@ def settled_shortest_interval(lowest: Floats, highest: Floats) -> tuple[float, f
     """Shortest coverage interval whose place is not decided by noise, from the same draws.
 
     The lengths are followed over the log-odds of r/(M − q), in which they bend evenly. Where the shortest interval is at
-    the edge (a density that only falls), or there are few draws, it is the very shortest one.
+    the edge (a density that only falls), or there are few draws, it is the very shortest one; where all are equally
+    short (a rectangular density), it is the symmetric one.
     """
     lengths = highest - lowest
     n, first = len(lengths), int(np.argmin(lengths))
+    if _all_alike(lengths, lowest):
+        return symmetric_interval(lowest, highest)
     if n < _FEWEST_FOR_CURVE or not _EDGE * n < first < (1 - _EDGE) * n:
         return shortest_interval(lowest, highest)
     middle = np.log((first + 0.5) / (n - first - 0.5))
@@ -57,6 +62,13 @@ def settled_shortest_interval(lowest: Floats, highest: Floats) -> tuple[float, f
     if lengths[settled] > (1 + _LONGER) * lengths[first]:
         return shortest_interval(lowest, highest)
     return float(lowest[settled]), float(highest[settled])
+
+
+def _all_alike(lengths: Floats, lowest: Floats) -> bool:
+    """Whether the lengths differ by no more than the places of single draws scatter."""
+    n = len(lengths)
+    inner = slice(n // 20, n - n // 20)
+    return n >= _FEWEST_FOR_FLATNESS and bool(np.ptp(lengths[inner]) < _FLAT * np.ptp(lowest[inner]) / np.sqrt(n))
 
 
 def symmetric_interval(lowest: Floats, highest: Floats) -> tuple[float, float]:

@@ -170,12 +170,14 @@ class _Run:
     def advance(self, n: int) -> None:
         """Make n more trials."""
         outputs = self.evaluate(n)
-        mean = outputs.mean(axis=1)
-        centred = outputs - mean[:, None]
-        comoment = centred @ centred.T
-        shift, total = mean - self._mean, self.trials + n
-        self._comoment += comoment + np.outer(shift, shift) * (self.trials * n / total)
-        self._mean = self._mean + shift * (n / total)
+        total = self.trials + n
+        with np.errstate(all="ignore"):  # what overflows is told by result()
+            mean = outputs.mean(axis=1)
+            centred = outputs - mean[:, None]
+            comoment = centred @ centred.T
+            shift = mean - self._mean
+            self._comoment += comoment + np.outer(shift, shift) * (self.trials * n / total)
+            self._mean = self._mean + shift * (n / total)
         self.trials = total
         outputs.sort(axis=1)
         if n >= BLOCK:
@@ -225,11 +227,20 @@ class _Run:
         """(p, 6) standard deviations of the averages over blocks (7.9.4 h, i)."""
         if self.blocks < 2:
             return np.full((len(self._mean), 6), np.nan)
-        return np.asarray(np.std(self._of_blocks, axis=0, ddof=1) / np.sqrt(self.blocks))
+        with np.errstate(all="ignore"):
+            return np.asarray(np.std(self._of_blocks, axis=0, ddof=1) / np.sqrt(self.blocks))
 
     def result(self, stable: bool | None) -> Simulated:
         """What the trials say."""
         ends = np.array([tails.intervals() for tails in self._tails])
+        for name, variance, length in zip(
+            self.model.outputs, np.diagonal(self._comoment), ends[:, 3] - ends[:, 2], strict=True
+        ):
+            if not np.isfinite(variance) or (variance == 0 and length > 0):
+                raise CmmUqError(
+                    f"the variance of {name} is beyond what floating-point numbers hold",
+                    fix="State the quantities in units that make their numbers moderate",
+                )
         start, width = self._bins or (np.zeros(0), np.zeros(0))
         return Simulated(
             list(self.model.outputs),

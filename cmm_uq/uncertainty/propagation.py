@@ -90,9 +90,15 @@ def second_order(model: MeasurementModel) -> Propagated:
             "second derivatives by complex steps are not exact",
             fix="Write the model with NumPy's elementary functions, or use Monte Carlo",
         )
-    u, correlation = _uncertainties(model), model.correlation_matrix
+    u = _uncertainties(model)
     found = derivatives(model, model.means, order=2)
     linear = _first_order(model, found, u)
+    with np.errstate(all="ignore"):  # what is not finite is told below
+        return _second_order(model, found, linear, u)
+
+
+def _second_order(model: MeasurementModel, found: Derivatives, linear: Propagated, u: Sequence[Any]) -> Propagated:
+    correlation = model.correlation_matrix
     spread = np.stack(np.broadcast_arrays(*u, found.value[0])[:-1])
     scaled = np.asarray(found.hessian) * spread[:, None] * spread[None, :]
     correlated = np.einsum("pij...,jk->pik...", scaled, correlation)

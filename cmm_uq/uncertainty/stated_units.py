@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 _LONGEST = 60
 _SPELLED = re.compile(r"[\w\s.*/^()·%°′″µμΩ−+\-⁰¹²³⁴⁵⁶⁷⁸⁹⁻]*")
+_POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-−+]?\d{1,2}(?:[./]\d{1,2})?\s*\)?(?!\s*(?:\*\*|\^|\d))")
+_NOT_PLAIN = re.compile(r"\*\*|\^|(?<!\w)(?!1\b)\d|[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]{4,}")
+"""What is left of a unit without its powers must hold no further power, and no number but 1: pint would compute it."""
 _QUANTITY = re.compile(r"\s*([-+−]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
 _CELSIUS = re.compile(r"\b(?:degC|celsius|degree_Celsius)\b|°C")
 
@@ -42,7 +45,7 @@ def unit_of(text: str, where: str | None = None) -> pint.Unit:
 
     problem = f"{text[:_LONGEST]!r} is no known unit"
     fix = "Write it as in mm, µm/m, 1/K, degC, kg/m^3, percent"
-    if len(text) > _LONGEST or not _SPELLED.fullmatch(text):
+    if len(text) > _LONGEST or not _SPELLED.fullmatch(text) or _NOT_PLAIN.search(_POWER.sub("", text)):
         raise CmmUqError(problem, where=where, fix=fix)
     try:
         return _registry().Unit(text.strip().replace("−", "-"))
@@ -55,6 +58,7 @@ def unit_of(text: str, where: str | None = None) -> pint.Unit:
         AssertionError,
         SyntaxError,
         KeyError,
+        ZeroDivisionError,
     ) as error:
         raise CmmUqError(problem, where=where, fix=fix) from error
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.degrees_of_freedom import coverage_factor
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.uncertainty.monte_carlo import LARGEST, Simulated, numerical_tolerance, simulate_adaptively
 from cmm_uq.uncertainty.propagation import Propagated
@@ -43,6 +44,12 @@ class Comparison:
         return max(self.low, self.high) <= self.tolerance
 
     @property
+    def clear(self) -> bool:
+        """Whether Monte Carlo's own error leaves the comparison as it is."""
+        difference = abs(max(self.low, self.high) - self.tolerance)
+        return 2 * self.error <= max(difference, self.tolerance / _OF_TOLERANCE)
+
+    @property
     def words(self) -> str:
         """The comparison as part of a sentence."""
         low, high, tolerance = (figure(number, 2) for number in (self.low, self.high, self.tolerance))
@@ -57,10 +64,15 @@ def compare(propagated: Propagated, simulated: Simulated, row: int, digits: int)
     CmmUqError : the law of propagation has no interval (fewer than one effective degree of freedom).
     """
     low, high = (float(end[row]) for end in propagated.interval(simulated.coverage))
+    drawn_low, drawn_high = simulated.symmetric_interval[row]
+    u = simulated.u[row]
+    if not simulated.stable:
+        # the standard deviation of draws without one (a ratio, a Cauchy distribution) must not widen the tolerance
+        u = min(u, (drawn_high - drawn_low) / (2 * float(coverage_factor(np.inf, simulated.coverage))))
     return Comparison(
-        abs(low - simulated.symmetric_interval[row, 0]),
-        abs(high - simulated.symmetric_interval[row, 1]),
-        float(numerical_tolerance(simulated.u, digits)[row]),
+        abs(low - drawn_low),
+        abs(high - drawn_high),
+        float(numerical_tolerance(np.array([u]), digits)[0]),
         float(np.max(simulated.standard_error[row, 4:])),
     )
 

@@ -86,3 +86,10 @@ def test_a_density_that_only_falls_has_its_shortest_interval_at_the_edge() -> No
     lowest, highest = ends_of(np.random.default_rng(5).standard_exponential(200_000), 0.95)
     assert settled_shortest_interval(lowest, highest) == shortest_interval(lowest, highest)
     assert settled_shortest_interval(lowest, highest)[0] < 1e-3
+
+
+def test_where_all_intervals_are_equally_short_it_is_the_symmetric_one() -> None:
+    lowest, highest = ends_of(np.random.default_rng(6).random(300_000), 0.95)
+    assert settled_shortest_interval(lowest, highest) == symmetric_interval(lowest, highest)
+    skewed = ends_of(np.random.default_rng(6).gamma(4.0, size=300_000), 0.95)
+    assert settled_shortest_interval(*skewed) != symmetric_interval(*skewed)

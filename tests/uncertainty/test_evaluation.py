@@ -113,6 +113,22 @@ def test_labels_reach_the_budget() -> None:
     assert (budget.unit, budget.lines[0].unit, budget.lines[0].origin) == ("mm", "mm", "specification")
 
 
+def test_what_monte_carlo_cannot_decide_is_neither_confirmed_nor_refuted() -> None:
+    model = MeasurementModel(lambda x: x, {"x": normal(0.0, 0.999)})
+    stated = evaluate(model, Request(digits=3, largest=200_000)).stated["y"]
+    assert stated.method == "first"
+    assert "neither confirmed nor refuted" in stated.reason
+    assert "not stable to 3 digits after 200000 trials" in stated.reason
+
+
+def test_the_spread_of_a_quantity_without_standard_deviation_confirms_nothing() -> None:
+    # a ratio whose denominator comes near zero: the standard deviation of its draws grows without end
+    model = MeasurementModel(lambda x, y: x / y, {"x": normal(1.0, 0.1), "y": normal(1.0, 0.3)})
+    stated = evaluate(model, Request(largest=300_000, seed=5)).stated["y"]
+    assert stated.method == "monte_carlo"
+    assert "not stable" in stated.reason
+
+
 @pytest.mark.parametrize(
     ("wrong", "problem"),
     [

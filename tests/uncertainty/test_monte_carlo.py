@@ -158,3 +158,10 @@ def test_what_cannot_be_drawn_is_refused() -> None:
 def test_a_constant_output_is_no_trouble() -> None:
     found = simulate(MeasurementModel(lambda c: c * 2.0, {"c": constant(3.0)}), 1000)
     assert (found.value[0], found.u[0], found.interval.tolist()) == (6.0, 0.0, [[6.0, 6.0]])
+
+
+@pytest.mark.parametrize("scale", [1e300, 1e-300])
+def test_numbers_too_large_or_too_small_for_a_variance_are_refused(scale: float) -> None:
+    model = MeasurementModel(lambda x: x, {"x": normal(scale, 0.01 * scale)})
+    with pytest.raises(CmmUqError, match="beyond what floating-point numbers hold"):
+        simulate(model, 20_000)

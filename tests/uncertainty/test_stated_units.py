@@ -53,7 +53,20 @@ def test_quantities_written_with_a_unit(text: str, unit: str, difference: bool, 
     assert number_in(text, unit, difference=difference) == pytest.approx(number, rel=1e-12)
 
 
-@pytest.mark.parametrize("text", ["foo", "mm mmm", "10 mm", "__import__('os')", "'", "(" * 50, "m" * 100, "mm\n;x"])
+@pytest.mark.parametrize(
+    "text", ["mm", "1", "µm/m", "kg/m^3", "kg m**-3", "1/K", "mm²", "V·s", "(m/s)**2", "percent", "%"]
+)
+def test_units_as_they_are_written(text: str) -> None:
+    unit_of(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "foo", "mm mmm", "10 mm", "__import__('os')", "'", "(" * 50, "m" * 100, "mm\n;x", "mm/0",
+        "mm**9**9**9", "9**9**9**9 mm", "mm**(9**9**9)", "mm^999999999", "mm⁹⁹⁹⁹⁹⁹",  # would be computed for hours
+    ],
+)  # fmt: skip
 def test_what_is_no_unit_is_refused(text: str) -> None:
     with pytest.raises(CmmUqError, match="no known unit"):
         unit_of(text, "model.toml")
