@@ -122,6 +122,8 @@ def _bounded(build: Callable[..., Distribution], variance: float) -> Callable[[K
 
 def _trapezoidal(keys: Keys) -> Distribution:
     (beta,) = _need(keys, "beta")
+    if not 0 <= beta <= 1:
+        raise CmmUqError(f"beta is {beta}", fix="The ratio of top to base lies between 0 and 1")
     low, high = _limits(keys, sqrt(6 / (1 + beta**2)))
     return make.trapezoidal(low, high, beta, keys.get("dof", np.inf))
 

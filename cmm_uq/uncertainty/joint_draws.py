@@ -136,7 +136,7 @@ def _underlying_correlation(a: tuple[str, Distribution], b: tuple[str, Distribut
     low, high = -1.0, 1.0
     if not reached(low) - _SERIES_REMAINDER <= wanted <= reached(high) + _SERIES_REMAINDER:
         raise CmmUqError(
-            f"a {a[1].kind} and a {b[1].kind} distribution can have correlations from {reached(low):.3f} to "
+            f"{a[1].kind} and {b[1].kind} distributions can have correlations from {reached(low):.3f} to "
             f"{reached(high):.3f} only, not {wanted}",
             where=f"correlation {a[0]},{b[0]}",
         )

@@ -28,6 +28,7 @@ from cmm_uq.uncertainty.type_a import simultaneous_readings
 
 _TOP = ("model", "inputs", "correlation")
 _MODEL = ("outputs", "coverage", "method", "digits", "seed", "title", "units")
+_SMALLEST, _LARGEST = 1e-70, 1e70
 _TEXTS = ("distribution", "unit", "source", "description", "simultaneous")
 
 
@@ -147,6 +148,9 @@ class _Reader:
     def _number(self, number: Any, key: str) -> float:
         if isinstance(number, bool) or not isinstance(number, (int, float)) or not isfinite(number):
             raise CmmUqError(f"{number!r} is not a finite number", where=self._where(key), fix="Write it as in 0.05")
+        if number and not _SMALLEST < abs(number) < _LARGEST:
+            problem = f"{number:g} is too {'large' if abs(number) > 1 else 'small'} to be squared and added up"
+            raise CmmUqError(problem, where=self._where(key), fix="State it in another unit")
         return float(number)
 
     def _input(self, name: str, keys: Any) -> Distribution:
