@@ -26,7 +26,7 @@ def bar_of(lengths: list[float], facts: ArtefactFacts) -> Ballbar:
 def judged(standard: Standard, facts: ArtefactFacts | None = None, **limit: object) -> Statement:
     bar = bar_of([400.001, 399.997, 400.002], facts or bar_facts(400.0, 0.4))
     span = Quantity(5.0, 0.5, (4.0, 6.0), "µm")
-    return statement(ConformityFacts(standard=standard, **limit), bar, {"b89_range_um": span}, "[[conformity]] 1")  # type: ignore[arg-type]
+    return statement(ConformityFacts(standard=standard, **limit), bar, {"b89_range_um": span}, "[[conformity]] 1")
 
 
 def test_b89_compares_the_range_of_the_lengths() -> None:

@@ -19,7 +19,7 @@ def model(
     design: Floats, observed: Floats, *, sigma: float | None = None, placing: Floats | None = None, **first: object
 ) -> LinearModel:
     m, k = design.shape
-    unknowns = (unknown(0, **first), *(unknown(i) for i in range(1, k)))  # type: ignore[arg-type]
+    unknowns = (unknown(0, **first), *(unknown(i) for i in range(1, k)))
     return LinearModel(observed, design, unknowns, np.zeros((m, 0)) if placing is None else placing, np.ones(m), sigma)
 
 
