@@ -74,11 +74,8 @@ def beside(ways: Ways, method: Method, row: int, digits: int) -> str:
         return ""
     other = ways.second if method == "first" else ways.first
     name = NAMES["second" if method == "first" else "first"]
-    return (
-        f" {name.capitalize()} gives u = {figure(other.u[row], digits)}."
-        if _differ(ways.first, ways.second, row, digits)
-        else ""
-    )
+    differs = _differ(ways.first, ways.second, row, digits)
+    return f" {name.capitalize()} gives u = {figure(other.u[row], digits)}." if differs else ""
 
 
 def _differ(first: Propagated, second: Propagated, row: int, digits: int) -> bool:
@@ -93,16 +90,19 @@ def is_flat(model: MeasurementModel, found: Propagated, row: int) -> bool:
     return uncertain and bool(found.u[row] <= _ROUNDING * abs(found.value[row]))
 
 
+def stability(ways: Ways, digits: int) -> str:
+    """A sentence where Monte Carlo gave up before its figures were stable, else nothing."""
+    if ways.simulated is None or ways.simulated.stable:
+        return ""
+    return f" Monte Carlo is not stable to {digits} digits after {ways.simulated.trials} trials."
+
+
 def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[Method, str]:
     """Method for one output, and why."""
     if ways.simulated is None:
         return _without_monte_carlo(ways, row, digits)
     findings: list[str] = []
-    told = (
-        ""
-        if ways.simulated.stable
-        else f" Monte Carlo is not stable to {digits} digits after {ways.simulated.trials} trials."
-    )
+    told = stability(ways, digits)
     for method in PROPAGATION:
         confirmed, finding = _finding(model, ways, ways.simulated, method, row, digits)
         findings.append(f"{NAMES[method]} {finding}")

@@ -14,12 +14,12 @@ import numpy as np
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.budget import Budget, Labels, budget_of, joint_line, line_of
-from cmm_uq.uncertainty.choice import Method, Ways, beside, by_propagation, choose, must_be_possible
+from cmm_uq.uncertainty.choice import Method, Ways, beside, by_propagation, choose, must_be_possible, stability
 from cmm_uq.uncertainty.correlation import correlation_of
 from cmm_uq.uncertainty.degrees_of_freedom import check_coverage, coverage_factor
 from cmm_uq.uncertainty.distributions import constant
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.uncertainty.monte_carlo import LARGEST, Simulated, simulate, simulate_adaptively
+from cmm_uq.uncertainty.monte_carlo import HIGHEST_COVERAGE, LARGEST, Simulated, simulate, simulate_adaptively
 from cmm_uq.uncertainty.propagation import Propagated
 from cmm_uq.uncertainty.validation import simulate_to_validate
 
@@ -106,6 +106,7 @@ def evaluate(model: MeasurementModel, request: Request | None = None, labels: La
     CmmUqError : the method asked for is impossible here, or the input is.
     """
     asked, told = request or Request(), labels or Labels()
+    model.must_be_at_one_point()
     ways = _ways(model, asked)
     chosen = [_chosen(model, ways, row, asked) for row in range(len(model.outputs))]
     methods = {method for method, _ in chosen}
@@ -132,10 +133,13 @@ def _ways(model: MeasurementModel, asked: Request) -> Ways:
 
 
 def _with_validation(model: MeasurementModel, ways: Ways, asked: Request) -> Ways:
-    spreads = {name: float(np.max(given.standard_deviation)) for name, given in model.inputs.items()}
-    without = [name for name, spread in spreads.items() if not np.isfinite(spread)]
+    problem = ""
+    without = [name for name, given in model.inputs.items() if not np.isfinite(given.standard_deviation)]
     if without:
         problem = f"{', '.join(without)} has too few degrees of freedom for a standard deviation (ν ≤ 2)"
+    elif asked.coverage > HIGHEST_COVERAGE:
+        problem = f"a coverage probability above {HIGHEST_COVERAGE} needs too many trials"
+    if problem:
         return replace(ways, problems={**ways.problems, "monte_carlo": problem})
     candidates = [found for found in (ways.first, ways.second) if found is not None]
     simulated = simulate_to_validate(model, candidates, asked.coverage, asked.digits, asked.seed, asked.largest)
@@ -146,7 +150,7 @@ def _chosen(model: MeasurementModel, ways: Ways, row: int, asked: Request) -> tu
     if asked.method == "auto":
         return choose(model, ways, row, asked.digits)
     if asked.method == "monte_carlo":
-        return "monte_carlo", "Asked for."
+        return "monte_carlo", "Asked for." + stability(ways, asked.digits)
     method: Method = "first" if asked.method == "first" else "second"
     return method, "Asked for; not confirmed by Monte Carlo." + beside(ways, method, row, asked.digits)
 

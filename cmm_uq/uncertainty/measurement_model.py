@@ -59,6 +59,17 @@ class MeasurementModel:
                     found[a, b] = float(np.corrcoef(np.asarray(first.draws), np.asarray(second.draws))[0, 1])
         return found
 
+    def must_be_at_one_point(self) -> None:
+        """Refuse a model whose inputs have several values.
+
+        Raises
+        ------
+        CmmUqError : names such an input.
+        """
+        for name, given in self.inputs.items():
+            if np.ndim(given.mean) or np.ndim(given.u) or np.ndim(given.dof):
+                raise CmmUqError(f"{name} has several values", fix="Evaluate one point at a time, or use first_order")
+
     def __call__(self, *values: Any) -> tuple[Any, ...]:
         """The p outputs at the m inputs, both in order."""
         result = self.function(**dict(zip(self.inputs, values, strict=True)))

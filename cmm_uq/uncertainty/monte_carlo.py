@@ -21,7 +21,11 @@ from cmm_uq.uncertainty.measurement_model import MeasurementModel
 
 BLOCK = 10_000
 LARGEST = 20_000_000
+HIGHEST_COVERAGE = 0.9999
+"""Of the adaptive procedure, whose blocks have 100/(1 − p) trials (JCGM 101 7.9.4 b)."""
+
 _FEWEST_BLOCKS = 10
+_FEWEST_TRIALS = 1_000_000
 _BINS = 200
 
 
@@ -94,6 +98,8 @@ def simulate_adaptively(
 ) -> Simulated:
     """Make trials until value, u and the ends of the shortest interval are known to ``digits`` digits of u (7.9.4).
 
+    At least a million are made (7.2.2), since the first few blocks can agree by chance and they cost little.
+
     Parameters
     ----------
     digits : significant digits of u regarded as meaningful.
@@ -106,12 +112,19 @@ def simulate_adaptively(
     CmmUqError : as for :func:`simulate`.
     """
     check_coverage(coverage)
+    if coverage > HIGHEST_COVERAGE:
+        raise CmmUqError(
+            f"a coverage probability of {coverage} needs {100 / (1 - coverage):.2g} trials for one look at the tails",
+            fix=f"Ask for at most {HIGHEST_COVERAGE}, or use the law of propagation",
+        )
     run = _Run(model, coverage, seed)
     block = max(BLOCK, int(np.ceil(100 / (1 - coverage))))
+    most = max(largest // block, _FEWEST_BLOCKS)
+    fewest = min(max(_FEWEST_TRIALS // block, _FEWEST_BLOCKS), most)
     stable = False
-    while not stable and run.trials + block <= max(largest, _FEWEST_BLOCKS * block):
+    while not stable and run.blocks < most:
         run.advance(block)
-        if run.blocks >= _FEWEST_BLOCKS:
+        if run.blocks >= fewest:
             figures, errors = run.figures(), run.standard_errors()
             tolerance = numerical_tolerance(figures[:, 1], digits)
             stable = bool(np.all(2 * errors[:, :4] <= tolerance[:, None])) and settled(figures, errors)
@@ -143,9 +156,8 @@ class _Run:
     """Trials made so far, and what must be remembered of them."""
 
     def __init__(self, model: MeasurementModel, coverage: float, seed: int) -> None:
+        model.must_be_at_one_point()
         for name, given in model.inputs.items():
-            if np.ndim(given.mean) or np.ndim(given.u):
-                raise CmmUqError(f"{name} has several values", fix="Ask for Monte Carlo at one point at a time")
             if not np.isfinite(given.standard_deviation):
                 raise CmmUqError(
                     f"{name} has {given.dof:g} degrees of freedom, and so no standard deviation to draw with",
@@ -158,14 +170,10 @@ class _Run:
         self.trials = 0
         self._mean, self._comoment = np.zeros(p), np.zeros((p, p))
         self._tails = [Tails(coverage) for _ in range(p)]
-        self._of_blocks: list[Floats] = []
+        self.blocks = 0
+        self._block_mean, self._block_squares = np.zeros((p, 6)), np.zeros((p, 6))
         self._bins: tuple[Floats, Floats] | None = None
         self._counts = np.zeros((p, _BINS))
-
-    @property
-    def blocks(self) -> int:
-        """Number of blocks whose figures were kept."""
-        return len(self._of_blocks)
 
     def advance(self, n: int) -> None:
         """Make n more trials."""
@@ -183,10 +191,18 @@ class _Run:
         if n >= BLOCK:
             u = np.sqrt(np.diagonal(comoment) / (n - 1))
             ends = [both_intervals(draws, self.coverage) for draws in outputs]
-            self._of_blocks.append(np.column_stack([mean, u, np.array(ends)]))
+            self._remember(np.column_stack([mean, u, np.array(ends)]))
         for tails, draws in zip(self._tails, outputs, strict=True):
             tails.add(draws)
         self._count(outputs)
+
+    def _remember(self, figures: Floats) -> None:
+        """Count the figures (p, 6) of a block into the mean of blocks and their scatter."""
+        self.blocks += 1
+        with np.errstate(all="ignore"):
+            step = figures - self._block_mean
+            self._block_mean = self._block_mean + step / self.blocks
+            self._block_squares = self._block_squares + step * (figures - self._block_mean)
 
     def evaluate(self, n: int) -> Floats:
         """Outputs (p, n) of n new draws of the inputs."""
@@ -219,16 +235,15 @@ class _Run:
 
     def figures(self) -> Floats:
         """(p, 6) value and u of all trials, and the mean ends of the blocks' intervals."""
-        means = np.mean(self._of_blocks, axis=0)
+        means = self._block_mean.copy()
         means[:, 0], means[:, 1] = self._mean, np.sqrt(np.diagonal(self._comoment) / (self.trials - 1))
-        return np.asarray(means)
+        return means
 
     def standard_errors(self) -> Floats:
         """(p, 6) standard deviations of the averages over blocks (7.9.4 h, i)."""
         if self.blocks < 2:
             return np.full((len(self._mean), 6), np.nan)
-        with np.errstate(all="ignore"):
-            return np.asarray(np.std(self._of_blocks, axis=0, ddof=1) / np.sqrt(self.blocks))
+        return np.asarray(np.sqrt(self._block_squares / ((self.blocks - 1) * self.blocks)))
 
     def result(self, stable: bool | None) -> Simulated:
         """What the trials say."""

@@ -129,6 +129,21 @@ def test_the_spread_of_a_quantity_without_standard_deviation_confirms_nothing() 
     assert "not stable" in stated.reason
 
 
+def test_a_coverage_that_needs_too_many_trials_leaves_the_law_of_propagation_unconfirmed() -> None:
+    model = MeasurementModel(lambda x: x, {"x": normal(0.0, 1.0)})
+    stated = evaluate(model, Request(coverage=0.999999)).stated["y"]
+    assert (stated.method, stated.coverage_factor) == ("first", pytest.approx(4.8916, abs=1e-4))
+    assert "needs too many trials" in stated.reason
+    with pytest.raises(CmmUqError, match="one look at the tails"):
+        evaluate(model, Request(method="monte_carlo", coverage=0.999999))
+
+
+def test_an_evaluation_is_of_one_point() -> None:
+    model = MeasurementModel(lambda x: x, {"x": normal(np.zeros(3), 1.0)})
+    with pytest.raises(CmmUqError, match="x has several values"):
+        evaluate(model, Request(method="first"))
+
+
 @pytest.mark.parametrize(
     ("wrong", "problem"),
     [

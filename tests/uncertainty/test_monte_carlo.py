@@ -108,14 +108,21 @@ def test_blocks_add_up_to_the_moments_of_all_trials() -> None:
 
 
 def test_the_adaptive_procedure_stops_when_twice_the_error_is_below_the_tolerance() -> None:
-    model = MeasurementModel(lambda x: x, {"x": normal(0.0, 36.0)})
+    model = MeasurementModel(lambda x: x, {"x": normal(0.0, 95.0)})
     found = simulate_adaptively(model, digits=2, seed=5)
     tolerance = numerical_tolerance(found.u, 2)
     assert tolerance.tolist() == [0.5]
     assert found.stable
+    assert found.trials > 1_000_000
     assert np.all(2 * found.standard_error[:, :4] <= tolerance)
     fewer = simulate(model, found.trials - 10_000, seed=5)  # one block less was not enough
     assert np.any(2 * fewer.standard_error[:, :4] > tolerance)
+
+
+def test_the_adaptive_procedure_makes_a_million_trials_unless_told_otherwise() -> None:
+    model = MeasurementModel(lambda x: x, {"x": normal(0.0, 11.0)})
+    assert simulate_adaptively(model, digits=1).trials == 1_000_000
+    assert simulate_adaptively(model, digits=1, largest=150_000).trials == 150_000
 
 
 def test_the_adaptive_procedure_says_when_it_gave_up() -> None:
