@@ -106,6 +106,15 @@ def test_contributions_by_monte_carlo_are_those_of_each_input_alone(loss: Callab
     assert budget.u == pytest.approx(67.3e-6, rel=0.01)
 
 
+def test_an_input_that_has_no_effect_alone_is_counted_with_the_others() -> None:
+    # with a held at 0 the model has no value for b alone
+    model = MeasurementModel(lambda a, b: np.log(a**2) + b, {"a": normal(0.0, 1.0), "b": normal(0.0, 1.0)})
+    alone = one_at_a_time(model)
+    assert alone[0, 1] == 0
+    assert alone[0, 0] > 0
+    assert sum(evaluate(model).stated["y"].budget.shares) == pytest.approx(1)
+
+
 def test_labels_reach_the_budget() -> None:
     model = MeasurementModel(lambda x: x, {"x": rectangular(-1.0, 1.0)})
     labels = Labels({"x": "mm", "y": "mm"}, {"x": "specification"})
