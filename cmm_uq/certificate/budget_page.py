@@ -6,7 +6,7 @@ from cmm_uq import __version__
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.plots import budget_bars
 from cmm_uq.uncertainty.budget import HEADINGS
-from cmm_uq.uncertainty.budget_results import SUMMARY, summary_rows
+from cmm_uq.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
 from cmm_uq.uncertainty.evaluation import Evaluation, Stated
 from cmm_uq.uncertainty.model_file import ModelFile
 
@@ -31,7 +31,8 @@ def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Docum
     model: tuple[Block, ...] = (expressions, described) if file.descriptions else (expressions,)
     sections = [Section("Measurement model", model), Section("Results", (summary,))]
     sections += [
-        Section(f"Budget of {output}", _budget(output, stated)) for output, stated in evaluation.stated.items()
+        Section(f"Budget of {output}", _budget(evaluation, output, stated))
+        for output, stated in evaluation.stated.items()
     ]
     return Document(
         title="Uncertainty budget",
@@ -53,7 +54,7 @@ def _expressions(file: ModelFile) -> dict[str, str]:
     return {output: expression.text for output, expression in file.expressions.items()}
 
 
-def _budget(output: str, stated: Stated) -> tuple[Block, ...]:
+def _budget(evaluation: Evaluation, output: str, stated: Stated) -> tuple[Block, ...]:
     budget = stated.budget
     blocks: list[Block] = [Paragraph(f"{stated.reason[0].upper()}{stated.reason[1:]}.".replace("..", "."), tone="note")]
     if budget.statement:
@@ -66,7 +67,10 @@ def _budget(output: str, stated: Stated) -> tuple[Block, ...]:
             [name for name, _ in shares], [share for _, share in shares],
             caption=f"Share of each contribution in the variance of {output}.", alternative=f"Shares: {names}.",
         ))  # fmt: skip
-    return tuple(blocks)
+    rows = tuple(comparison_rows(evaluation, output))
+    if len(rows) > 1:
+        blocks.append(Table(f"The methods beside each other for {output}", _columns(COMPARISON), rows))
+    return (*blocks, Paragraph(statement(evaluation, output)))
 
 
 def _columns(headings: tuple[str, ...]) -> tuple[Column, ...]:
