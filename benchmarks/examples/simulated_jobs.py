@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.artefacts import artefact_of
+from cmm_uq.artefacts.triangle_placings import placed_triangle
+from cmm_uq.artefacts.triangle_standard import TriangleStandard
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.measurement import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
@@ -43,7 +45,7 @@ class Simulated:
     named : the effects that the job names.
     noise_um : of one coordinate.
     size : true size of the artefact, mm; its certified one by default.
-    extra : further lines of job.toml.
+    extra, model : further lines of job.toml, and of its table [model].
     columns : of the CSV beside measurement, point, repeat and coordinates.
     """
 
@@ -56,6 +58,7 @@ class Simulated:
     noise_um: float
     size: float | None = None
     extra: str = ""
+    model: str = ""
     columns: Sequence[str] = ()
 
 
@@ -162,7 +165,27 @@ def bryan() -> Simulated:
     )  # fmt: skip
 
 
-EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, bryan)
+def triangle() -> Simulated:
+    """Seven placings of a triangle with sides of 500, 300 and 400 mm on a machine whose Y carriage carries the others."""
+    artefact = {"kind": "triangle", "name": "Triangle of gauge blocks and cylinders", "cte_per_k": 11.5e-6,
+                "blocks_mm": [480.0, 280.0, 380.0], "u_blocks_um": 0.1, "cylinders_mm": [20.0, 20.0, 20.0],
+                "u_cylinders_um": 0.1}  # fmt: skip
+    machine = replace(MACHINE, chain="YXZ")
+    standard = TriangleStandard.of(ArtefactFacts.model_validate(artefact))
+    rotations = {
+        "rotation_x_x": 4.0, "rotation_x_y": -3.0, "rotation_x_z": 2.0, "rotation_y_x": 1.5, "rotation_y_y": -2.5,
+        "rotation_y_z": 3.0, "rotation_z_x": -4.0, "rotation_z_y": 2.0, "rotation_z_z": 5.0,
+    }  # fmt: skip
+    truth = {**SCALE, **SQUARE, **rotations}
+    tolerances = ", ".join(f"{name} = {8 if name in SQUARE else 12}" for name in truth)
+    return Simulated(
+        "triangle-simulated", "Triangle standard in seven placings, three times", artefact,
+        placed_triangle(machine, standard.sides, repeats=3), truth, list(truth), 0.3,
+        model=f"tolerances = {{ {tolerances} }}\n", columns=("tip_x_mm", "tip_y_mm", "tip_z_mm"),
+    )  # fmt: skip
+
+
+EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, bryan, triangle)
 
 
 def write(example: Simulated, folder: Path) -> None:
@@ -171,7 +194,7 @@ def write(example: Simulated, folder: Path) -> None:
     model = MeasurementModel(artefact, effects(list(example.truth)))
     coefficients = np.concatenate([np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in example.truth.values()])
     sizes = np.array([example.size or size.nominal for size in artefact.sizes])
-    random = np.random.default_rng(SEED)
+    random = np.random.default_rng([SEED, *example.id.encode()])
     xyz = model.simulate(coefficients, sizes, Noise(coordinate=example.noise_um * 1e-3), random)
     place = folder / example.id
     place.mkdir(parents=True, exist_ok=True)
@@ -210,7 +233,7 @@ noise of a coordinate {example.noise_um:g} µm.\"\"\"
 
 [machine]
 name = "{MACHINE.name}"
-chain = "{MACHINE.chain}"
+chain = "{example.points.machine.chain}"
 travel_mm = {{ x = [0, 900], y = [0, 1200], z = [-600, 0] }}
 
 [artefact]
@@ -221,7 +244,7 @@ file = "recording.csv"
 
 [model]
 effects = [{names}]
-{example.extra}"""
+{example.model}{example.extra}"""
 
 
 def _value(value: object) -> str:

@@ -11,12 +11,13 @@ from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.artefacts.gauge import GaugeBlocks, StepGauge
 from cmm_uq.artefacts.plate import Plate
 from cmm_uq.artefacts.sphere import Sphere
+from cmm_uq.artefacts.triangle import Triangle
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import Points
 
 KINDS: Mapping[str, Callable[..., Artefact]] = MappingProxyType(
-    {kind.kind: kind for kind in (Ballbar, Bryan, StepGauge, GaugeBlocks, Plate, Sphere)}
+    {kind.kind: kind for kind in (Ballbar, Bryan, StepGauge, GaugeBlocks, Plate, Triangle, Sphere)}
 )
 """Every kind of artefact by its name in ``[artefact] kind``."""
 

@@ -6,7 +6,15 @@ from collections.abc import Callable, Mapping
 
 from cmm_uq import __version__
 from cmm_uq.analysis.result import Result
-from cmm_uq.certificate import ballbar_section, bryan_section, gauge_section, plate_section, sphere_section
+from cmm_uq.certificate import (
+    ballbar_section,
+    bryan_section,
+    gauge_section,
+    plate_section,
+    sphere_section,
+    tolerance_section,
+    triangle_section,
+)
 from cmm_uq.certificate.corner import corner_plot
 from cmm_uq.certificate.diagnosis_page import diagnosis_sections
 from cmm_uq.certificate.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
@@ -37,6 +45,7 @@ ARTEFACT_SECTIONS: Mapping[str, Callable[[Result], list[Section]]] = {
     "gauge_blocks": gauge_section.sections,
     "plate": plate_section.sections,
     "sphere": sphere_section.sections,
+    "triangle": triangle_section.sections,
 }
 """What each kind of artefact adds to a certificate."""
 
@@ -45,6 +54,7 @@ def certificate(result: Result) -> Document:
     """The certificate of a result, complete but for its looks."""
     facts = result.job.facts
     sections = [_performance(result), _conformity(result), _errors(result), _traceability(result)]
+    sections += tolerance_section.sections(result)
     sections += ARTEFACT_SECTIONS[result.artefact.kind](result)
     if facts.job.diagnosis_on_certificate:
         sections += diagnosis_sections(result.diagnosed)

@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from cmm_uq.errors import suggestion
 from cmm_uq.points import Points
 
 ArtefactKind = Literal[
@@ -142,7 +143,8 @@ class ArtefactFacts(_Table):
     """``[artefact]``; without ``length_mm`` it is uncalibrated, unless its certified figures stand in the recording.
 
     ``nominal`` says that those figures are nominal only: their common scale then stays free. ``form_um`` is the form
-    deviation of a test sphere by its certificate.
+    deviation of a test sphere by its certificate. ``blocks_mm`` (1–2, 2–3, 3–1) and the diameters ``cylinders_mm`` (1, 2, 3)
+    make a triangle, with the standard uncertainty of each.
     """
 
     kind: ArtefactKind
@@ -152,6 +154,10 @@ class ArtefactFacts(_Table):
     u_um: NotNegative | None = None
     nominal: bool = False
     form_um: NotNegative | None = None
+    blocks_mm: Triple | None = None
+    u_blocks_um: NotNegative = 0.0
+    cylinders_mm: Triple | None = None
+    u_cylinders_um: NotNegative = 0.0
     cte_per_k: float = 0.0
     certificate: Traceability | None = None
     axis: Literal["x", "y", "z"] | None = None
@@ -167,6 +173,12 @@ class ArtefactFacts(_Table):
             raise ValueError(
                 "nominal = true says that the recording's references are not certified: leave out length_mm and u_um; "
                 f"only {', '.join(WITH_REFERENCES)} have references"
+            )
+        given = self.blocks_mm is not None, self.cylinders_mm is not None
+        if given != (self.kind == "triangle",) * 2:
+            raise ValueError(
+                "a triangle is made of blocks_mm = [1–2, 2–3, 3–1] and cylinders_mm = [1, 2, 3], and nothing else is: give "
+                'both for kind = "triangle", neither for another kind'
             )
         if self.form_um is not None and self.kind != "sphere":
             raise ValueError(f"form_um is the form deviation of a test sphere, not of a {self.kind}: leave it out")
@@ -186,9 +198,22 @@ class RecordingFacts(_Table):
 
 
 class ModelFacts(_Table):
-    """``[model]``: the physics that the simulation is told about."""
+    """``[model]``: the physics that the simulation is told about.
+
+    ``tolerances``: largest permissible size of an effect's (first) parameter, by its name and in its unit.
+    """
 
     effects: list[str]
+    tolerances: dict[str, Positive] = {}
+
+    @model_validator(mode="after")
+    def _tolerances_of_effects(self) -> Self:
+        for name in self.tolerances:
+            if name not in self.effects:
+                raise ValueError(
+                    f"tolerances names {name!r}, which is not among the effects: {suggestion(name, self.effects)}"
+                )
+        return self
 
 
 class MaximumPermissibleError(_Table):
