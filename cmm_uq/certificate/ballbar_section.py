@@ -10,10 +10,12 @@ from cmm_uq.analysis.result import Result
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.distance_equations import DistanceSolution, solve_distances
 from cmm_uq.certificate import adjustment_section
+from cmm_uq.certificate.budget_page import budget_blocks
 from cmm_uq.certificate.document import Column, Section, Table
 from cmm_uq.certificate.plots import length_plot
 from cmm_uq.certificate.residual_volume import flagged, residual_volume
 from cmm_uq.errors import CmmUqError
+from cmm_uq.uncertainty.budget import Budget, Line
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
 
@@ -42,8 +44,26 @@ def sections(result: Result) -> list[Section]:
     volume = residual_volume(result, "bars")
     return [
         Section("Lengths", (plot, volume, _table(result, bar, deviations, residuals, expanded, name))),
+        Section("Budget of one length", tuple(budget_blocks("the deviation of one length", _budget(result, bar)))),
         adjustment_section.section(result, _second_way(result, bar)),
     ]
+
+
+def _budget(result: Result, bar: Ballbar) -> Budget:
+    """What one length's deviation from the reference is uncertain by: the readings, and the certified length."""
+    coordinate = result.noise.coordinate
+    origin = "residuals of this recording" if coordinate.u > 0 else "stated in the job"
+    dof = float(result.least_squares.degrees_of_freedom) if coordinate.u > 0 else np.inf
+    lines = [
+        Line("Coordinate of a ball, along the bar, twice", coordinate.value, origin, unit="µm", dof=max(dof, 1.0),
+             sensitivity=float(bar.noise_scale[0]))
+    ]  # fmt: skip
+    size = bar.sizes[0]
+    if size.certified and size.sd > 0:
+        chain = result.job.facts.artefact.certificate
+        source = " ".join(filter(None, ("certificate", chain.number if chain else "")))
+        lines.append(Line("Certified length", size.sd / MICROMETRE, source, unit="µm", sensitivity=-1.0))
+    return Budget("deviation of one length", lines, unit="µm")
 
 
 def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | str:

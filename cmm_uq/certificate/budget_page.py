@@ -5,7 +5,7 @@ from __future__ import annotations
 from cmm_uq import __version__
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.plots import budget_bars
-from cmm_uq.uncertainty.budget import HEADINGS
+from cmm_uq.uncertainty.budget import HEADINGS, Budget
 from cmm_uq.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
 from cmm_uq.uncertainty.evaluation import Evaluation, Stated
 from cmm_uq.uncertainty.model_file import ModelFile
@@ -59,18 +59,25 @@ def _budget(evaluation: Evaluation, output: str, stated: Stated) -> tuple[Block,
     blocks: list[Block] = [Paragraph(f"{stated.reason[0].upper()}{stated.reason[1:]}.".replace("..", "."), tone="note")]
     if budget.statement:
         blocks.append(Paragraph(budget.statement, tone="note"))
-    blocks.append(Table(f"Contributions to {output}", _columns(HEADINGS), tuple(budget.as_text())))
-    shares = [(line.name, share) for depth, line, share in budget.flat() if depth == 0 and share]
-    if len(shares) > 1:
-        names = ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares)
-        blocks.append(budget_bars(
-            [name for name, _ in shares], [share for _, share in shares],
-            caption=f"Share of each contribution in the variance of {output}.", alternative=f"Shares: {names}.",
-        ))  # fmt: skip
+    blocks += budget_blocks(output, budget)
     rows = tuple(comparison_rows(evaluation, output))
     if len(rows) > 1:
         blocks.append(Table(f"The methods beside each other for {output}", _columns(COMPARISON), rows))
     return (*blocks, Paragraph(statement(evaluation, output)))
+
+
+def budget_blocks(measurand: str, budget: Budget) -> list[Block]:
+    """A budget as a table, and as a picture when it has more than one line."""
+    table = Table(f"Contributions to {measurand}", _columns(HEADINGS), tuple(budget.as_text()))
+    shares = [(line.name, share) for depth, line, share in budget.flat() if depth == 0 and share]
+    if len(shares) < 2:
+        return [table]
+    names = ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares)
+    picture = budget_bars(
+        [name for name, _ in shares], [share for _, share in shares],
+        caption=f"Share of each contribution in the variance of {measurand}.", alternative=f"Shares: {names}.",
+    )  # fmt: skip
+    return [table, picture]
 
 
 def _columns(headings: tuple[str, ...]) -> tuple[Column, ...]:

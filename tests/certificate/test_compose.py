@@ -58,6 +58,15 @@ def test_the_error_factors_stand_beside_their_least_squares_estimate(document: D
     assert rows["Squareness X–Y"][5] == "″"
 
 
+def test_the_budget_of_one_length_says_where_each_figure_comes_from(document: Document) -> None:
+    """u = √(2·9.5² + 5²) µm: the readings of both balls and the certified length."""
+    rows = {row[0]: row for row in table(document, "Contributions to the deviation of one length").rows}
+    assert rows["Certified length"][-1] == "certificate Harris 2004, Table 21"
+    assert any("residuals" in cell for cell in rows["Coordinate of a ball, along the bar, twice"])
+    share = 2 * 9.506**2 / (2 * 9.506**2 + 5.0**2)
+    assert any(cell.startswith(f"{100 * share:.0f}") for cell in rows["Coordinate of a ball, along the bar, twice"])
+
+
 def test_the_decision_names_rule_limit_and_probability(document: Document) -> None:
     (decision,) = [block for section in document.sections for block in section.blocks if isinstance(block, Decision)]
     assert decision.outcome == "fail"
