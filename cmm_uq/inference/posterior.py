@@ -1,40 +1,21 @@
-"""The posterior of a linear model, sampled by emcee.
-
-The ensembles start from the Laplace approximation and move in coordinates whitened by it, so that most steps are
-independence proposals from a multivariate t distribution; differential-evolution steps repair what the approximation
-misses. (emcee's snooker move is not used: its normalisation is wrong in release 3.1.6.) Several independent ensembles run
-until the autocorrelation time says enough.
-"""
+"""The posterior of a linear model, sampled by emcee from its Laplace approximation (:mod:`cmm_uq.inference.ensembles`)."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy import linalg, optimize
 
+from cmm_uq.inference.ensembles import Progress, converged, run_ensembles
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.points import Floats
 
+__all__ = ["SIGMA_BOUNDS", "Density", "Posterior", "Progress", "sample"]
+
 SIGMA_BOUNDS = (1e-6, 10.0)
 """mm: from a nanometre to a centimetre; between them an unknown noise is uniform in its logarithm."""
-
-ENSEMBLES = 4
-STEPS_AT_ONCE = 300
-MOST_STEPS = 6000
-BURN_IN = 60
-EFFECTIVE_SAMPLES = 4000
-"""Asked of every parameter: the interval's ends are then stable to about 3 % of u, below the last digit printed."""
-
-LEAST_EFFECTIVE_SAMPLES = 1000
-LARGEST_RHAT = 1.01
-_T_DOF = 6.0
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +45,8 @@ class Posterior:
 
     @property
     def converged(self) -> bool:
-        """At least 1000 effective samples, R-hat below 1.01, and chains longer than 50 autocorrelation times."""
-        return bool(
-            self.ess_min >= LEAST_EFFECTIVE_SAMPLES
-            and self.rhat_max < LARGEST_RHAT
-            and self.steps > 50 * self.autocorrelation_time
-        )
+        """Enough effective samples, ensembles that agree, chains long against their autocorrelation time."""
+        return converged(self.ess_min, self.rhat_max, self.steps, self.autocorrelation_time)
 
     @cached_property
     def covariance(self) -> Floats:
@@ -176,83 +153,12 @@ def sample(model: LinearModel, seed: int, progress: Progress | None = None) -> P
     seed : the same seed gives the same draws.
     progress : told the part done, from 0 to 1.
     """
-    import emcee
-
     density = Density(model)
     centre, factor = density.laplace()
-    d, k = density.dimension, len(model.unknowns)
-    walkers = max(32, 4 * d + 4 * d % 2)
-    samplers = []
-    for child in np.random.SeedSequence(seed).spawn(ENSEMBLES):
-        sampler = emcee.EnsembleSampler(
-            walkers, d, lambda z: density(centre + z @ factor.T), vectorize=True,
-            moves=[(emcee.moves.MHMove(_independence), 0.9), (emcee.moves.DEMove(), 0.1)],
-        )  # fmt: skip
-        random = np.random.RandomState(np.random.MT19937(child))
-        sampler.random_state = random.get_state()
-        sampler.run_mcmc(_t_draws(walkers, d, random), BURN_IN, store=False)
-        samplers.append((sampler, sampler._previous_state))
-    return _run(model, density, samplers, centre, factor, seed, progress, f"emcee {emcee.__version__}", k)
-
-
-def _run(
-    model: LinearModel,
-    density: Density,
-    samplers: list[tuple[Any, Any]],
-    centre: Floats,
-    factor: Floats,
-    seed: int,
-    progress: Progress | None,
-    name: str,
-    k: int,
-) -> Posterior:
-    steps, states = 0, [state for _, state in samplers]
-    while True:
-        for i, (sampler, _) in enumerate(samplers):
-            states[i] = sampler.run_mcmc(states[i], STEPS_AT_ONCE, skip_initial_state_check=True)
-        steps += STEPS_AT_ONCE
-        chains = np.stack([sampler.get_chain() for sampler, _ in samplers])
-        time, effective = _effective_samples(chains)
-        if progress:
-            progress(min(1.0, effective / EFFECTIVE_SAMPLES))
-        if (effective >= EFFECTIVE_SAMPLES and steps > 50 * time) or steps >= MOST_STEPS:
-            break
-    rhat = _rhat(chains.reshape(ENSEMBLES, -1, density.dimension))
-    draws = centre + chains.reshape(-1, density.dimension) @ factor.T
-    sigma = np.full(len(draws), model.sigma) if model.sigma is not None else np.exp(draws[:, k])
-    return Posterior(model.unknowns, draws[:, :k], sigma, seed, name, effective, rhat, steps, time)
-
-
-def _independence(coordinates: Floats, random: Any) -> tuple[Floats, Floats]:
-    """Proposal from a multivariate t about the origin of the whitened coordinates, with its Hastings ratio."""
-    proposed = _t_draws(len(coordinates), coordinates.shape[1], random)
-    return proposed, _t_log_density(coordinates) - _t_log_density(proposed)
-
-
-def _t_draws(count: int, d: int, random: Any) -> Floats:
-    normal = random.standard_normal((count, d))
-    return np.asarray(normal / np.sqrt(random.chisquare(_T_DOF, size=(count, 1)) / _T_DOF))
-
-
-def _t_log_density(z: Floats) -> Floats:
-    d = z.shape[1]
-    return np.asarray(-0.5 * (_T_DOF + d) * np.log1p(np.einsum("wi,wi->w", z, z) / _T_DOF))
-
-
-def _effective_samples(chains: Floats) -> tuple[float, float]:
-    """Longest integrated autocorrelation time, and the effective samples that follow, over all parameters."""
-    from emcee.autocorr import integrated_time
-
-    ensembles, steps, walkers, d = chains.shape
-    merged = chains.transpose(1, 0, 2, 3).reshape(steps, ensembles * walkers, d)
-    time = float(np.max(np.maximum(integrated_time(merged, quiet=True, tol=0), 1.0)))
-    return time, steps * ensembles * walkers / time
-
-
-def _rhat(chains: Floats) -> float:
-    """Largest rank-normalised split R-hat, each ensemble one chain: walkers of one ensemble are not independent."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)
-        import arviz
-    result = arviz.rhat(arviz.convert_to_dataset({"z": chains}), method="rank")
-    return float(result["z"].max())
+    chains = run_ensembles(density, centre, factor, seed, progress)
+    k = len(model.unknowns)
+    sigma = np.full(len(chains.draws), model.sigma) if model.sigma is not None else np.exp(chains.draws[:, k])
+    return Posterior(
+        model.unknowns, chains.draws[:, :k], sigma, seed, chains.sampler, chains.ess_min, chains.rhat_max, chains.steps,
+        chains.autocorrelation_time,
+    )  # fmt: skip

@@ -1,0 +1,149 @@
+"""Several ensembles of emcee on one density, until the autocorrelation time says enough.
+
+The walkers move in coordinates whitened by an approximation of the density, so that most steps are independence
+proposals from a multivariate t distribution; differential-evolution steps repair what the approximation misses. (emcee's
+snooker move is not used: its normalisation is wrong in release 3.1.6.) Walkers of one ensemble are not independent, so
+the ensembles are compared with each other.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.points import Floats
+
+ENSEMBLES = 4
+STEPS_AT_ONCE = 300
+MOST_STEPS = 6000
+BURN_IN = 60
+EFFECTIVE_SAMPLES = 4000
+"""Asked of every parameter: the interval's ends are then stable to about 3 % of u, below the last digit printed."""
+
+LEAST_EFFECTIVE_SAMPLES = 1000
+LARGEST_RHAT = 1.01
+_T_DOF = 6.0
+
+Progress = Callable[[float], None]
+LogDensity = Callable[[Floats], Floats]
+"""Of (w, d) parameters, up to a constant: (w,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """Draws from a density, and whether they can be trusted.
+
+    Attributes
+    ----------
+    draws : (N, d) in the density's own parameters: ensembles, steps and walkers in this order.
+    sampler : program and version.
+    ess_min, rhat_max : effective samples and rank-normalised R-hat, worst over all parameters.
+    steps, autocorrelation_time : length of each chain, and the longest time.
+    """
+
+    draws: Floats
+    sampler: str
+    ess_min: float
+    rhat_max: float
+    steps: int
+    autocorrelation_time: float
+
+    @property
+    def converged(self) -> bool:
+        """See :func:`converged`."""
+        return converged(self.ess_min, self.rhat_max, self.steps, self.autocorrelation_time)
+
+
+def converged(ess_min: float, rhat_max: float, steps: int, autocorrelation_time: float) -> bool:
+    """At least 1000 effective samples, R-hat below 1.01, and chains longer than 50 autocorrelation times."""
+    return bool(ess_min >= LEAST_EFFECTIVE_SAMPLES and rhat_max < LARGEST_RHAT and steps > 50 * autocorrelation_time)
+
+
+def run_ensembles(
+    density: LogDensity,
+    centre: Floats,
+    factor: Floats,
+    seed: int,
+    progress: Progress | None = None,
+    *,
+    effective_samples: int = EFFECTIVE_SAMPLES,
+) -> Chains:
+    """Sample a density with emcee.
+
+    Parameters
+    ----------
+    density : its logarithm.
+    centre, factor : (d,) and (d, d): the density is roughly that of ``centre + factor @ z`` with standard normal z.
+    seed : the same seed gives the same draws.
+    progress : told the part done, from 0 to 1.
+    effective_samples : to reach in every parameter.
+    """
+    import emcee
+
+    d = len(centre)
+    walkers = max(32, 4 * d + 4 * d % 2)
+    samplers, states = [], []
+    for child in np.random.SeedSequence(seed).spawn(ENSEMBLES):
+        sampler = emcee.EnsembleSampler(
+            walkers, d, lambda z: density(centre + z @ factor.T), vectorize=True,
+            moves=[(emcee.moves.MHMove(_independence), 0.9), (emcee.moves.DEMove(), 0.1)],
+        )  # fmt: skip
+        random = np.random.RandomState(np.random.MT19937(child))
+        sampler.random_state = random.get_state()
+        states.append(sampler.run_mcmc(_t_draws(walkers, d, random), BURN_IN, store=False))
+        samplers.append(sampler)
+    steps = 0
+    while True:
+        states = [
+            sampler.run_mcmc(state, STEPS_AT_ONCE, skip_initial_state_check=True)
+            for sampler, state in zip(samplers, states, strict=True)
+        ]
+        steps += STEPS_AT_ONCE
+        chains = np.stack([sampler.get_chain() for sampler in samplers])
+        time, effective = _effective_samples(chains)
+        if progress:
+            progress(min(1.0, effective / effective_samples))
+        if (effective >= effective_samples and steps > 50 * time) or steps >= MOST_STEPS:
+            break
+    rhat = _rhat(chains.reshape(ENSEMBLES, -1, d))
+    draws = centre + chains.reshape(-1, d) @ factor.T
+    return Chains(draws, f"emcee {emcee.__version__}", effective, rhat, steps, time)
+
+
+def _independence(coordinates: Floats, random: Any) -> tuple[Floats, Floats]:
+    """Proposal from a multivariate t about the origin of the whitened coordinates, with its Hastings ratio."""
+    proposed = _t_draws(len(coordinates), coordinates.shape[1], random)
+    return proposed, _t_log_density(coordinates) - _t_log_density(proposed)
+
+
+def _t_draws(count: int, d: int, random: Any) -> Floats:
+    normal = random.standard_normal((count, d))
+    return np.asarray(normal / np.sqrt(random.chisquare(_T_DOF, size=(count, 1)) / _T_DOF))
+
+
+def _t_log_density(z: Floats) -> Floats:
+    d = z.shape[1]
+    return np.asarray(-0.5 * (_T_DOF + d) * np.log1p(np.einsum("wi,wi->w", z, z) / _T_DOF))
+
+
+def _effective_samples(chains: Floats) -> tuple[float, float]:
+    """Longest integrated autocorrelation time, and the effective samples that follow, over all parameters."""
+    from emcee.autocorr import integrated_time
+
+    ensembles, steps, walkers, d = chains.shape
+    merged = chains.transpose(1, 0, 2, 3).reshape(steps, ensembles * walkers, d)
+    time = float(np.max(np.maximum(integrated_time(merged, quiet=True, tol=0), 1.0)))
+    return time, steps * ensembles * walkers / time
+
+
+def _rhat(chains: Floats) -> float:
+    """Largest rank-normalised split R-hat, each ensemble one chain: walkers of one ensemble are not independent."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)
+        import arviz
+    result = arviz.rhat(arviz.convert_to_dataset({"z": chains}), method="rank")
+    return float(result["z"].max())
