@@ -185,7 +185,22 @@ def triangle() -> Simulated:
     )  # fmt: skip
 
 
-EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, bryan, triangle)
+def plane() -> Simulated:
+    """A granite surface plate probed at 7 × 5 points from above, twice, with the direction point before each."""
+    x, y = np.meshgrid(np.linspace(60, 840, 7), np.linspace(100, 1100, 5))
+    touched = np.column_stack([x.ravel(), y.ravel(), np.full(35, -560.0) + 2e-5 * x.ravel()])
+    ahead = touched[:1] + np.array([0, 0, 8.0])
+    xyz = np.vstack([ahead, touched, ahead, touched])
+    truth = {"straightness_x_z": 4.0, "straightness_y_z": -2.5}
+    return Simulated(
+        "plane-simulated", "Surface plate probed from above at 35 points, twice",
+        {"kind": "plane", "name": "Granite surface plate, 1000 mm × 800 mm", "probe_offset_mm": 1.9986,
+         "u_probe_offset_um": 0.3},
+        recording(xyz, np.repeat([1, 2], 36), np.tile(np.arange(36), 2)), truth, list(truth), 0.4,
+    )  # fmt: skip
+
+
+EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, bryan, triangle, plane)
 
 
 def write(example: Simulated, folder: Path) -> None:

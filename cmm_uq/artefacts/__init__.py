@@ -9,6 +9,7 @@ from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.artefacts.gauge import GaugeBlocks, StepGauge
+from cmm_uq.artefacts.plane import PlaneSurface
 from cmm_uq.artefacts.plate import Plate
 from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.artefacts.triangle import Triangle
@@ -17,7 +18,7 @@ from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import Points
 
 KINDS: Mapping[str, Callable[..., Artefact]] = MappingProxyType(
-    {kind.kind: kind for kind in (Ballbar, Bryan, StepGauge, GaugeBlocks, Plate, Triangle, Sphere)}
+    {kind.kind: kind for kind in (Ballbar, Bryan, StepGauge, GaugeBlocks, Plate, Triangle, Sphere, PlaneSurface)}
 )
 """Every kind of artefact by its name in ``[artefact] kind``."""
 

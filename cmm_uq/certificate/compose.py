@@ -10,6 +10,7 @@ from cmm_uq.certificate import (
     ballbar_section,
     bryan_section,
     gauge_section,
+    plane_section,
     plate_section,
     sphere_section,
     tolerance_section,
@@ -43,6 +44,7 @@ ARTEFACT_SECTIONS: Mapping[str, Callable[[Result], list[Section]]] = {
     "bryan": bryan_section.sections,
     "step_gauge": gauge_section.sections,
     "gauge_blocks": gauge_section.sections,
+    "plane": plane_section.sections,
     "plate": plate_section.sections,
     "sphere": sphere_section.sections,
     "triangle": triangle_section.sections,
@@ -210,7 +212,7 @@ def _traceability(result: Result) -> Section:
     for size in certified:
         what = size.title.split(" of ")[0].lower()
         rows.append((f"Certified {what} at 20 °C", f"{size.nominal:.10g} {size.unit}, u = {size.sd / MICROMETRE:g} µm"))
-    if not certified:
+    if result.artefact.sizes and not certified:
         rows.append(("Certified length", "none: uncalibrated artefact (auto-calibration)"))
     if artefact.cte_per_k:
         rows.append(("Coefficient of thermal expansion", f"{artefact.cte_per_k * 1e6:g} × 10⁻⁶ /K"))
@@ -225,6 +227,8 @@ def _traceability(result: Result) -> Section:
 
 def _posterior(result: Result) -> Section:
     posterior = result.posterior
+    if not posterior.unknowns:
+        return Section("Posterior distribution", ())
     names = [title_of(unknown.key, result) for unknown in posterior.unknowns]
     plot = corner_plot(
         posterior.draws, names, units=[unknown.unit for unknown in posterior.unknowns],

@@ -61,7 +61,7 @@ def solve(model: LinearModel) -> LeastSquares:
     CmmUqError : fewer observations than parameters, or none left to estimate the noise from.
     """
     unknowns, reduced = model.unknowns, model.reduced
-    held = np.array([u.known for u in unknowns])
+    held = np.array([u.known for u in unknowns], dtype=bool)
     free = np.flatnonzero(~held)
     _enough(reduced.count, len(free), stated=model.sigma is not None)
     value = model.prior_mean.copy()

@@ -144,7 +144,8 @@ class ArtefactFacts(_Table):
 
     ``nominal`` says that those figures are nominal only: their common scale then stays free. ``form_um`` is the form
     deviation of a test sphere by its certificate. ``blocks_mm`` (1–2, 2–3, 3–1) and the diameters ``cylinders_mm`` (1, 2, 3)
-    make a triangle, with the standard uncertainty of each.
+    make a triangle, with the standard uncertainty of each. ``probe_offset_mm`` is the effective radius by which a probed
+    plane is moved to the surface.
     """
 
     kind: ArtefactKind
@@ -158,6 +159,8 @@ class ArtefactFacts(_Table):
     u_blocks_um: NotNegative = 0.0
     cylinders_mm: Triple | None = None
     u_cylinders_um: NotNegative = 0.0
+    probe_offset_mm: Positive | None = None
+    u_probe_offset_um: NotNegative = 0.0
     cte_per_k: float = 0.0
     certificate: Traceability | None = None
     axis: Literal["x", "y", "z"] | None = None
@@ -180,6 +183,8 @@ class ArtefactFacts(_Table):
                 "a triangle is made of blocks_mm = [1–2, 2–3, 3–1] and cylinders_mm = [1, 2, 3], and nothing else is: give "
                 'both for kind = "triangle", neither for another kind'
             )
+        if self.probe_offset_mm is not None and self.kind != "plane":
+            raise ValueError(f"probe_offset_mm moves a probed plane, not a {self.kind}: leave it out")
         if self.form_um is not None and self.kind != "sphere":
             raise ValueError(f"form_um is the form deviation of a test sphere, not of a {self.kind}: leave it out")
         if abs(self.cte_per_k) > 1e-3:
