@@ -45,7 +45,8 @@ class Simulated:
     named : the effects that the job names.
     noise_um : of one coordinate.
     size : true size of the artefact, mm; its certified one by default.
-    extra, model : further lines of job.toml, and of its table [model].
+    extra, model, recording : further lines of job.toml, and of its tables of these names.
+    before : effects of an earlier recording, which is written too; then what is told is the change.
     columns : of the CSV beside measurement, point, repeat and coordinates.
     """
 
@@ -59,6 +60,8 @@ class Simulated:
     size: float | None = None
     extra: str = ""
     model: str = ""
+    recording: str = ""
+    before: Mapping[str, float | Sequence[float]] | None = None
     columns: Sequence[str] = ()
 
 
@@ -151,6 +154,20 @@ def plate() -> Simulated:
     )  # fmt: skip
 
 
+def plate_two_dates() -> Simulated:
+    """The plate of a year ago and of today, flat and upright; its balls are not where their nominal positions say."""
+    points = plate().points
+    astray = np.tile(np.random.default_rng(SEED).normal(0, 5e-3, (25, 3)), (2, 1))
+    columns = {f"reference_{a}_mm": points.columns[f"reference_{a}_mm"] + astray[:, i] for i, a in enumerate("xyz")}
+    before = {"scale_x": 9.0, "scale_y": -6.0, "squareness_xy": 12.0, "straightness_x_y": 30.0}
+    return Simulated(
+        "plate-two-dates-simulated", "The same ball plate in the same two places at two dates",
+        {"kind": "plate", "name": "Ball plate, 400 mm × 400 mm, not certified", "cte_per_k": 11.5e-6},
+        replace(points, columns=columns), before | {"scale_x": 14.0, "squareness_xy": 9.0}, list(before), 0.5,
+        before=before, recording='earlier = "earlier.csv"\nearlier_date = 2025-01-01\n',
+    )  # fmt: skip
+
+
 def bryan() -> Simulated:
     """A bar swept over the upper half of its sphere; its length is not certified."""
     z = (np.arange(48) + 0.5) / 48
@@ -200,21 +217,27 @@ def plane() -> Simulated:
     )  # fmt: skip
 
 
-EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, bryan, triangle, plane)
+EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, triangle, plane)
 
 
 def write(example: Simulated, folder: Path) -> None:
     """The job folder of one example."""
-    artefact = artefact_of(ArtefactFacts.model_validate(dict(example.artefact)), example.points)
-    model = MeasurementModel(artefact, effects(list(example.truth)))
-    coefficients = np.concatenate([np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in example.truth.values()])
-    sizes = np.array([example.size or size.nominal for size in artefact.sizes])
     random = np.random.default_rng([SEED, *example.id.encode()])
-    xyz = model.simulate(coefficients, sizes, Noise(coordinate=example.noise_um * 1e-3), random)
     place = folder / example.id
     place.mkdir(parents=True, exist_ok=True)
-    (place / "recording.csv").write_text(_csv(example, xyz), encoding="utf-8", newline="\n")
-    (place / "job.toml").write_text(_toml(example, model), encoding="utf-8", newline="\n")
+    artefact = artefact_of(ArtefactFacts.model_validate(dict(example.artefact)), example.points)
+    sizes = np.array([example.size or size.nominal for size in artefact.sizes])
+    for name, truth in (("recording.csv", example.truth), ("earlier.csv", example.before)):
+        if truth is None:
+            continue
+        model = MeasurementModel(artefact, effects(list(truth)))
+        xyz = model.simulate(_coefficients(truth), sizes, Noise(coordinate=example.noise_um * 1e-3), random)
+        (place / name).write_text(_csv(example, xyz), encoding="utf-8", newline="\n")
+    (place / "job.toml").write_text(_toml(example), encoding="utf-8", newline="\n")
+
+
+def _coefficients(truth: Mapping[str, float | Sequence[float]]) -> Floats:
+    return np.concatenate([np.atleast_1d(np.asarray(value, dtype=np.float64)) for value in truth.values()])
 
 
 def _csv(example: Simulated, xyz: Floats) -> str:
@@ -227,11 +250,14 @@ def _csv(example: Simulated, xyz: Floats) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _toml(example: Simulated, model: MeasurementModel) -> str:
+def _toml(example: Simulated) -> str:
     said = []
-    for effect in model.effects:
+    for effect in effects(list(example.truth)):
         given = np.atleast_1d(np.asarray(example.truth[effect.name], dtype=np.float64))
+        if example.before is not None:
+            given = given - example.before[effect.name]
         said += [f"{effect.name} {c.name} = {value:g}" for c, value in zip(effect.coefficients, given, strict=True)]
+    what = "True errors" if example.before is None else "True changes between the dates"
     size = f"; true length of the bar {example.size} mm" if example.size else ""
     artefact = "\n".join(f"{key} = {_value(value)}" for key, value in example.artefact.items())
     names = ", ".join(f'"{name}"' for name in example.named)
@@ -243,7 +269,7 @@ id = "{example.id}"
 date = 2026-01-01
 procedure = "{example.title}"
 remarks = \"\"\"
-Simulated, no machine was measured. True errors: {"; ".join(said)}{size}; \\
+Simulated, no machine was measured. {what}: {"; ".join(said)}{size}; \\
 noise of a coordinate {example.noise_um:g} µm.\"\"\"
 
 [machine]
@@ -256,7 +282,7 @@ travel_mm = {{ x = [0, 900], y = [0, 1200], z = [-600, 0] }}
 
 [recording]
 file = "recording.csv"
-
+{example.recording}
 [model]
 effects = [{names}]
 {example.model}{example.extra}"""

@@ -14,6 +14,7 @@ from cmm_uq.artefacts.placings import Placings
 from cmm_uq.artefacts.recorded import certified_sd, check_length, columns_needed, expansion, place
 from cmm_uq.artefacts.rigid import Rigid
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.earlier import NOISE_RATIO
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.points import Floats, Points
 
@@ -27,7 +28,7 @@ class Plate(Rigid):
     ----------
     facts : what the job says of the plate; ``u_um`` belongs to ``length_mm``, or to the farthest ball from the first.
     points : the recording, with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm``.
-    noise_scale : of every coordinate; √2 when the references are themselves one recording.
+        An earlier recording in place of references (:mod:`cmm_uq.jobs.earlier`) adds its own noise.
 
     Raises
     ------
@@ -37,10 +38,10 @@ class Plate(Rigid):
     kind = "plate"
     title = "Plate"
 
-    def __init__(
-        self, facts: ArtefactFacts, points: Points, *, where: str | None = None, noise_scale: float = 1.0
-    ) -> None:
-        super().__init__(points, noise_scale)
+    def __init__(self, facts: ArtefactFacts, points: Points, *, where: str | None = None) -> None:
+        super().__init__(points)
+        if NOISE_RATIO in points.columns:
+            self.noise_scale = points.columns[NOISE_RATIO][self.rows[:, 0]]
         self.reference = columns_needed(points, REFERENCES, self.kind, where)
         self.expansion = expansion(facts, points)
         longest = float(np.linalg.norm(self.reference - self.reference[0], axis=1).max())

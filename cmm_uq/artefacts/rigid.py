@@ -32,12 +32,12 @@ class Rigid(Artefact):
 
     body: Floats
 
-    def __init__(self, points: Points, noise_scale: float = 1.0) -> None:
+    def __init__(self, points: Points) -> None:
         self.points = points
         self.placings = Placings.of(points.measurement)
         self.rows = np.repeat(np.arange(len(points)), 3)[:, None]
         self.measurement, self.repeat = points.measurement[self.rows[:, 0]], points.repeat[self.rows[:, 0]]
-        self.noise_scale = np.full(3 * len(points), noise_scale)
+        self.noise_scale = np.ones(3 * len(points))
 
     @abstractmethod
     def shape(self, sizes: Floats) -> Floats:

@@ -208,11 +208,14 @@ def _traceability(result: Result) -> Section:
         ("Artefact", artefact.name or result.artefact.title),
         ("Serial number", artefact.serial),
     ]
-    certified = [size for size in result.artefact.sizes if size.certified]
+    compared = result.job.facts.recording.earlier
+    certified = [] if compared else [size for size in result.artefact.sizes if size.certified]
     for size in certified:
         what = size.title.split(" of ")[0].lower()
         rows.append((f"Certified {what} at 20 °C", f"{size.nominal:.10g} {size.unit}, u = {size.sd / MICROMETRE:g} µm"))
-    if result.artefact.sizes and not certified:
+    if compared:
+        rows.append(("References", f"the earlier recording {compared}"))
+    elif result.artefact.sizes and not certified:
         rows.append(("Certified length", "none: uncalibrated artefact (auto-calibration)"))
     if artefact.cte_per_k:
         rows.append(("Coefficient of thermal expansion", f"{artefact.cte_per_k * 1e6:g} × 10⁻⁶ /K"))

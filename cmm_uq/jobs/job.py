@@ -195,9 +195,15 @@ class ArtefactFacts(_Table):
 
 
 class RecordingFacts(_Table):
-    """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates."""
+    """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
+
+    ``earlier`` names a recording of the same plate in the same placings at an earlier date: what is estimated then is what
+    changed between.
+    """
 
     file: str
+    earlier: str | None = None
+    earlier_date: dt.date | None = None
     u_coordinate_um: Positive | None = None
     set_aside: list[int] = []
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.job import Job, JobFile, MachineFacts
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.toml_file import checked
@@ -31,9 +32,21 @@ def read_job(folder: Path) -> Job:
     content = content_of(path, "A job is a folder with a job.toml and the recording that it names")
     facts = checked(content, path, JobFile)
     inputs = {"job.toml": content}
-    for name in (facts.recording.file, *(error_map.file for error_map in facts.machine.error_map)):
+    earlier = facts.recording.earlier
+    if earlier is not None and facts.artefact.kind != "plate":
+        raise CmmUqError(f"earlier compares two recordings of a plate, not of a {facts.artefact.kind}",
+                         where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
+    for name in (
+        facts.recording.file,
+        *filter(None, [earlier]),
+        *(error_map.file for error_map in facts.machine.error_map),
+    ):
         inputs[name] = content_of(_inside(folder, name, path), f"Put it beside job.toml, or mend its name in {path}")
-    points = read_recording(inputs[facts.recording.file], str(folder / facts.recording.file), _machine(facts.machine))
+    machine, where = _machine(facts.machine), str(folder / facts.recording.file)
+    points = read_recording(inputs[facts.recording.file], where, machine)
+    if earlier is not None:
+        then = read_recording(inputs[earlier], str(folder / earlier), machine)
+        points = against_earlier(points, then, facts.artefact.cte_per_k, where)
     return Job(folder, facts, points, inputs)
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.document import Facts, Paragraph, Plot
 from tests.certificate.simulated import SCALE, blocks, recovered, table
 from tests.conftest import ROOT
 
@@ -39,3 +41,17 @@ def test_every_placing_is_drawn_as_arrows() -> None:
     assert len(arrows) == 2
     assert "Plate x / mm" in arrows[0].svg
     assert "Arrows at 25 balls" in arrows[0].alternative
+
+
+def test_a_comparison_of_two_dates_says_what_changed_and_what_looks_alike() -> None:
+    """Scale X changed by 5 ppm, squareness by −3″, Y and the bow of 30 µm not at all; 11.5 ppm is one kelvin of steel."""
+    job = "plate-two-dates-simulated"
+    recovered(job, {"scale_x": 5.0, "scale_y": 0.0, "squareness_xy": -3.0, "straightness_x_y": 0.0})
+    (text,) = [b.text for b in blocks(job) if isinstance(b, Paragraph) and "looks the same" in b.text]
+    assert "2025-01-01" in text
+    said = re.search(r"changed by (\S+) ppm.*colder by (\S+) K", text)
+    assert said is not None
+    assert float(said[2]) == pytest.approx(float(said[1]) / 11.5, abs=0.01)
+    labels = {label: value for b in blocks(job) if isinstance(b, Facts) for label, value in b.rows}
+    assert labels["References"] == "the earlier recording earlier.csv"
+    assert "Certified length at 20 °C" not in labels
