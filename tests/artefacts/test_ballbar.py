@@ -84,7 +84,9 @@ def test_sag_looks_like_the_scales_of_x_and_y() -> None:
     """cos² of the elevation is (dX² + dY²)/L²: 1 µm of sag on 400 mm is −2.5 ppm of X and of Y, exactly."""
     (combination,) = free(estimated(BAR, placed(), [*SIX, "artefact_sag"]))
     sag = combination.pop("artefact_sag")
-    assert {effect: part / sag for effect, part in combination.items()} == pytest.approx({"scale_x": -2.5, "scale_y": -2.5})
+    assert {effect: part / sag for effect, part in combination.items()} == pytest.approx(
+        {"scale_x": -2.5, "scale_y": -2.5}
+    )
 
 
 def test_a_warm_bar_of_known_expansion_is_brought_to_20_degrees() -> None:
