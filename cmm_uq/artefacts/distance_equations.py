@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
 from cmm_uq.artefacts.symmetric_systems import by_doolittle, by_jacobi
 from cmm_uq.errors import CmmUqError
@@ -107,7 +106,7 @@ def solve_distances(differences: Floats, distance: float | Floats, method: str =
     residuals = b - A @ e
     freedom = len(b) - UNKNOWNS
     sd = float(np.sqrt(residuals @ residuals / freedom)) if freedom else 0.0
-    inverse = linalg.solve_triangular(linalg.qr(A, mode="r")[0][:UNKNOWNS], np.eye(UNKNOWNS))
+    inverse = np.linalg.inv(np.linalg.qr(A, mode="r"))
     return DistanceSolution(e, sd**2 * inverse @ inverse.T, residuals, sd)
 
 
@@ -122,14 +121,14 @@ def missing_placings(differences: Floats) -> tuple[str, ...]:
     directions = differences / np.linalg.norm(differences, axis=1, keepdims=True)
     candidates = np.array(list(PLACINGS.values()), dtype=np.float64)
     candidates /= np.linalg.norm(candidates, axis=1, keepdims=True)
-    _, s, Vt = linalg.svd(quadratic_terms(directions), full_matrices=True)
+    _, s, Vt = np.linalg.svd(quadratic_terms(directions), full_matrices=len(directions) < UNKNOWNS)
     open_space = Vt[np.append(s, np.zeros(UNKNOWNS))[:UNKNOWNS] < POORLY_POSED * s[0]].T
     wanted = []
     while open_space.shape[1]:
         seen = quadratic_terms(candidates) @ open_space
         best = int(np.argmax(np.round(np.linalg.norm(seen, axis=1), 6)))
         wanted.append(list(PLACINGS)[best])
-        open_space = open_space @ linalg.null_space(seen[best : best + 1])
+        open_space = open_space @ np.linalg.svd(seen[best : best + 1])[2][1:].T
     return tuple(wanted)
 
 
@@ -148,7 +147,7 @@ def refuse_poor_placings(differences: Floats) -> None:
     if not wanted:
         return
     directions = differences / apart[:, None]
-    spread = linalg.svdvals(directions)
+    spread = np.linalg.svd(directions, compute_uv=False)
     if len(differences) < UNKNOWNS:
         problem = f"{len(differences)} distances are too few for the six factors of scale and squareness"
     elif spread[1] < POORLY_POSED * spread[0]:
@@ -165,8 +164,8 @@ def refuse_poor_placings(differences: Floats) -> None:
 
 
 def _by_qr(A: Floats, b: Floats) -> Floats:
-    Q, R = linalg.qr(A, mode="economic")
-    return np.asarray(linalg.solve_triangular(R, Q.T @ b), dtype=np.float64)
+    Q, R = np.linalg.qr(A)
+    return np.asarray(np.linalg.solve(R, Q.T @ b), dtype=np.float64)
 
 
 def _cosines(e: Floats) -> Floats:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from scipy import linalg
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import Floats
@@ -32,8 +31,7 @@ def by_doolittle(matrix: Floats, right: Floats) -> Floats:
         if U[i, i] == 0:
             raise CmmUqError(f"normal equations: pivot {i + 1} is zero", fix="Record placings in more directions")
         L[i + 1 :, i] = (matrix[i + 1 :, i] - L[i + 1 :, :i] @ U[:i, i]) / U[i, i]
-    y = linalg.solve_triangular(L, right, lower=True, unit_diagonal=True)
-    return np.asarray(linalg.solve_triangular(U, y), dtype=np.float64)
+    return np.asarray(np.linalg.solve(U, np.linalg.solve(L, right)), dtype=np.float64)
 
 
 def by_jacobi(matrix: Floats, right: Floats) -> Floats:
@@ -54,7 +52,7 @@ def jacobi_eigenvalues(matrix: Floats) -> tuple[Floats, Floats]:
     A, n = matrix.astype(np.float64, copy=True), len(matrix)
     V = np.eye(n)
     for _ in range(_SWEEPS):
-        if linalg.norm(A - np.diag(np.diag(A))) <= np.finfo(np.float64).eps * linalg.norm(A):
+        if np.linalg.norm(A - np.diag(np.diag(A))) <= np.finfo(np.float64).eps * np.linalg.norm(A):
             break
         for p, q in combinations(range(n), 2):
             if A[p, q] == 0:
