@@ -14,8 +14,7 @@ from cmm_uq.measurement import MeasurementModel
 from cmm_uq.mismatch.explanations import UNKNOWN, Explanation
 from cmm_uq.mismatch.held_out import Improvement, improvement
 from cmm_uq.mismatch.noise import Kind
-from cmm_uq.mismatch.search import Found, Race, race_of, search, tail_probability
-from cmm_uq.physics.catalogue import CATALOGUE
+from cmm_uq.mismatch.search import NOT_TOLD_APART, Found, Race, search, tail_probability
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 
@@ -23,7 +22,7 @@ FALSE_ALARMS = 0.01
 """Default rate at which a recording without any fault is found to have one."""
 
 _TOLD_APART = 0.95
-_RIVAL = 0.02
+_UNKNOWN = 0.5
 _NOISE_KIND = 0.9
 
 
@@ -127,15 +126,14 @@ def diagnose(
     found = search(model, stated, alpha=alpha, seed=seed)
     gain = improvement(model, found.model)
     if found.effects and gain.elpd_gain <= 0:
-        found = replace(found, last=found.first, model=model, effects=(), unexplained=found.first.best(UNKNOWN))
+        found = replace(found, last=found.first, model=model, chosen=frozenset(), unexplained=1.0)
         gain = improvement(model, model)
-    swaps = {name: _swap(found, name, stated) for name in found.effects}
     noise = _noise(found.last, stated)
     sampled = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     posterior = sample(sampled.estimate().linear, seed, progress)
     return Diagnosis(
-        _verdict(found, alpha), found.first.p_value, alpha, _where(found.first, alpha), _left_out(found, swaps, posterior),
-        _indistinguishable(swaps), _rivals(found.first), noise, gain, model, sampled, posterior,
+        _verdict(found, alpha), found.first.p_value, alpha, _where(found.first, alpha), _left_out(found, posterior),
+        _indistinguishable(found), _rivals(found.first), noise, gain, model, sampled, posterior,
     )  # fmt: skip
 
 
@@ -144,17 +142,11 @@ def _verdict(found: Found, alpha: float) -> str:
         return "consistent"
     if not found.effects:
         return "unexplained"
-    return "partial" if found.unexplained is not None else "explained"
+    return "partial" if found.unexplained > _UNKNOWN else "explained"
 
 
-def _swap(found: Found, name: str, stated: float | None) -> dict[str, float]:
-    """Probability of every explanation that could stand in an effect's place, the other effects kept."""
-    kept = tuple(effect for effect in found.model.effects if effect.name != name)
-    race = race_of(replace(found.model, effects=kept), stated, (), None)
-    return {e.name: float(p) for e, p in zip(race.explanations, race.probability, strict=True)}
-
-
-def _left_out(found: Found, swaps: Mapping[str, Mapping[str, float]], posterior: Posterior) -> tuple[LeftOut, ...]:
+def _left_out(found: Found, posterior: Posterior) -> tuple[LeftOut, ...]:
+    index = {found.first.explanations[i].name: i for i in found.chosen}
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
     total = _squares(found.first.model) - _squares(found.model)
     listed = []
@@ -166,7 +158,8 @@ def _left_out(found: Found, swaps: Mapping[str, Mapping[str, float]], posterior:
         without = replace(found.model, effects=tuple(e for e in found.model.effects if e is not effect))
         share = (_squares(without) - _squares(found.model)) / _squares(found.first.model) if total > 0 else 0.0
         parameters = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
-        listed.append(LeftOut(effect.name, effect.title, swaps[effect.name].get(effect.name, 0.0), parameters, share))
+        probability = found.combinations.of(index[effect.name]) if found.combinations else 0.0
+        listed.append(LeftOut(effect.name, effect.title, probability, parameters, share))
     return tuple(sorted(listed, key=lambda item: -item.probability))
 
 
@@ -174,14 +167,15 @@ def _squares(model: MeasurementModel) -> float:
     return float(np.sum(model.estimate().least_squares.residuals ** 2))
 
 
-def _indistinguishable(swaps: Mapping[str, Mapping[str, float]]) -> tuple[tuple[str, ...], ...]:
-    groups = []
-    for name, probabilities in swaps.items():
-        if probabilities.get(name, 0.0) >= _TOLD_APART:
-            continue
-        rivals = [e for e, p in probabilities.items() if p > _RIVAL and e != name and e in CATALOGUE]
-        if rivals:
-            groups.append((name, *sorted(rivals, key=lambda e: -probabilities[e])))
+def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
+    if found.combinations is None:
+        return ()
+    names, groups = [e.name for e in found.first.explanations], []
+    for i in sorted(found.chosen):
+        odds = found.combinations.instead(found.chosen, i)
+        rivals = sorted((r for r in odds if odds[r] > NOT_TOLD_APART), key=lambda r: -odds[r])
+        if rivals and found.combinations.of(i) < _TOLD_APART:
+            groups.append((names[i], *(names[r] for r in rivals)))
     return tuple(groups)
 
 
@@ -280,8 +274,8 @@ def _heavy(race: Race) -> bool:
     return bool((log_t - len(z) * np.log(scales)).max() - (-0.5 * len(z) * (np.log(2 * np.pi) + 1)) > 4.0)
 
 
-def _contradicts(stated: float, left: Floats, factor: Floats) -> bool:
+def _contradicts(stated: float, left: Floats, factor: Floats | None) -> bool:
     """Two-sided χ² test of the stated noise at 1 %."""
-    white = np.linalg.solve(factor, left) / stated
+    white = (left if factor is None else np.linalg.solve(factor, left)) / stated
     p = float(special.chdtrc(len(left), white @ white))
     return min(p, 1 - p) < 0.005

@@ -1,13 +1,16 @@
-"""Marginal likelihoods of rival explanations, in closed form.
+"""Marginal likelihoods of rival explanations, alone and together, in closed form.
 
-Everything enters linearly with a normal prior whose standard deviation is a multiple of the noise, so that the evidence of an
-explanation depends on the data through one quadratic form; its integral over the noise is tabulated once, and the multiples
-are summed over a grid. What the baseline (the job's model and what has been found already) could absorb is projected out.
+Everything enters linearly with a normal prior whose standard deviation is a multiple of the noise, so that the evidence of
+explanations depends on the data through one quadratic form; its integral over the noise is tabulated once, and the multiples
+are summed over a grid. What the job's model could absorb is projected out.
+
+Explanations that are *granted* join the covariance of the noise, at a given size. So the evidence of one more explanation
+beside them needs nothing but the inner products of all columns, which are computed once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,7 +21,7 @@ from cmm_uq.mismatch.explanations import Explanation
 from cmm_uq.mismatch.noise import Kind
 from cmm_uq.points import Floats, Ints
 
-_AMPLITUDES = 7
+AMPLITUDES = 7
 _SMALLEST = 0.4
 """Smallest rms of an explanation that is considered, over the noise."""
 
@@ -28,20 +31,69 @@ _ABSORBED = 1e-5
 _BLOCK = 1_500_000
 
 
-@dataclass(frozen=True, eq=False)
-class _Members:
-    """Members with the same number of columns, r, in whitened coordinates.
+@dataclass(frozen=True)
+class Version:
+    """One version of an explanation at one size.
 
-    ``owner`` (M,) is the explanation of each and ``weight`` (M,) its log probability within it; ``directions`` (M, r, m')
-    are orthonormal, ``strengths`` (M, r) their variances for coefficients of one, ``amplitudes`` (M, a) the standard
-    deviations of the coefficients to try, in units of the noise.
+    Parameters
+    ----------
+    explanation, member : which.
+    amplitude : standard deviation of its coefficients, in units of the noise.
     """
 
-    owner: Ints
+    explanation: int
+    member: int
+    amplitude: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Members with the same number of columns, r.
+
+    ``explanation``, ``member`` (M,) say which; ``weight`` (M,) is the log probability of each within its explanation;
+    ``start`` (M,) the first of its columns in the stack; ``amplitudes`` (M, a) the sizes to try.
+    """
+
+    explanation: Ints
+    member: Ints
     weight: Floats
-    directions: Floats
-    strengths: Floats
+    start: Ints
     amplitudes: Floats
+    r: int
+
+    def columns(self, stack: Floats) -> Floats:
+        """Their columns (m', M·r)."""
+        first, last = int(self.start[0]), int(self.start[-1]) + self.r
+        if last - first == len(self.start) * self.r:
+            return stack[:, first:last]
+        return stack[:, (self.start[:, None] + np.arange(self.r)).ravel()]
+
+    def only(self, explanations: Sequence[int] | None) -> _Group:
+        if explanations is None:
+            return self
+        chosen = np.isin(self.explanation, explanations)
+        return _Group(
+            self.explanation[chosen], self.member[chosen], self.weight[chosen], self.start[chosen],
+            self.amplitudes[chosen], self.r,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Whitened:
+    """Under one kind of noise.
+
+    ``factor`` (``None`` for one), ``stack`` (m', K), ``blocks`` (M, r, r) the inner products of each group's members, and
+    ``log``, the logarithm of its probability less that of its determinant.
+    """
+
+    factor: Floats | None
+    stack: Floats
+    blocks: tuple[Floats, ...]
+    log: float
+
+    def of(self, data: Floats) -> Floats:
+        """Data (m', b) in units of this noise."""
+        return _white(self.factor, data)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,53 +135,70 @@ class Comparison:
         return self.rest.T @ self.observed
 
     @cached_property
-    def factors(self) -> list[Floats]:
-        """Lower triangular factor (m', m') of each kind's covariance."""
+    def _stack(self) -> tuple[Floats, tuple[_Group, ...]]:
+        """Columns (m', K) that the baseline leaves of all members, those with equally many together."""
+        found: dict[int, list[tuple[int, int, float, Floats]]] = {}
+        whole = [
+            (owner, j, -np.log(len(explanation.members)), member.columns / self.noise_scale[:, None])
+            for owner, explanation in enumerate(self.explanations)
+            for j, member in enumerate(explanation.members)
+        ]
+        lefts = np.split(
+            self.rest.T @ np.hstack([columns for *_, columns in whole]),
+            np.cumsum([columns.shape[1] for *_, columns in whole])[:-1], axis=1,
+        ) if whole else []  # fmt: skip
+        for (owner, j, log, columns), left in zip(whole, lefts, strict=True):
+            if linalg.norm(left) > _ABSORBED * linalg.norm(columns):
+                found.setdefault(columns.shape[1], []).append((owner, j, log, left))
+        groups, stack, start = [], [np.zeros((self.rest.shape[1], 0))], 0
+        for r in sorted(found):
+            chosen = found[r]
+            rms = np.array([linalg.norm(left) for *_, left in chosen]) / np.sqrt(max(self.rest.shape[1], 1))
+            largest = 1 / self.least_noise
+            smallest = np.minimum(_SMALLEST / rms, largest)
+            amplitudes = largest * (smallest / largest)[:, None] ** np.linspace(0, 1, AMPLITUDES)
+            explanation, member = (np.array([item[k] for item in chosen], dtype=np.int64) for k in (0, 1))
+            weight = np.array([item[2] for item in chosen])
+            starts = start + r * np.arange(len(chosen))
+            groups.append(_Group(explanation, member, weight, starts, amplitudes, r))
+            stack += [left for *_, left in chosen]
+            start += r * len(chosen)
+        return np.hstack(stack), tuple(groups)
+
+    @cached_property
+    def _where(self) -> dict[tuple[int, int], slice]:
+        """Columns of the stack of each explanation's members."""
+        return {
+            (int(i), int(j)): slice(int(start), int(start) + group.r)
+            for group in self._stack[1]
+            for i, j, start in zip(group.explanation, group.member, group.start, strict=True)
+        }
+
+    @cached_property
+    def factors(self) -> list[Floats | None]:
+        """Lower triangular factor (m', m') of each kind's covariance; ``None`` where that is one."""
         return [
-            np.eye(self.rest.shape[1])
-            if kind.name == "white"
+            None
+            if np.array_equal(kind.correlation, np.eye(len(kind.correlation)))
             else np.asarray(linalg.cholesky(self.rest.T @ kind.correlation @ self.rest, lower=True))
             for kind in self.kinds
         ]
 
     @cached_property
-    def columns(self) -> list[tuple[int, float, Floats]]:
-        """What the baseline leaves: explanation, log probability of the member within it, columns (m', r)."""
+    def _whitened(self) -> list[_Whitened]:
+        stack, groups = self._stack
         found = []
-        for owner, explanation in enumerate(self.explanations):
-            weight = -np.log(len(explanation.members))
-            for member in explanation.members:
-                whole = member.columns / self.noise_scale[:, None]
-                left = self.rest.T @ whole
-                if linalg.norm(left) > _ABSORBED * linalg.norm(whole):
-                    found.append((owner, weight, left))
+        for kind, factor in zip(self.kinds, self.factors, strict=True):
+            white = _white(factor, stack)
+            blocks = []
+            for group in groups:
+                each = group.columns(white).reshape(len(white), -1, group.r).transpose(1, 2, 0)
+                blocks.append(each @ each.transpose(0, 2, 1))
+            log = float(np.log(kind.probability))
+            if factor is not None:
+                log -= float(np.log(np.diag(factor)).sum())
+            found.append(_Whitened(factor, white, tuple(blocks), log))
         return found
-
-    @cached_property
-    def members(self) -> list[list[_Members]]:
-        """All members by kind of noise, those with equally many columns together."""
-        sizes = sorted({columns.shape[1] for _, _, columns in self.columns})
-        return [[self._together(factor, r) for r in sizes] for factor in self.factors]
-
-    def _together(self, factor: Floats, r: int) -> _Members:
-        chosen = [item for item in self.columns if item[2].shape[1] == r]
-        stacked = np.concatenate([columns for _, _, columns in chosen], axis=1)
-        white = (
-            linalg.solve_triangular(factor, stacked, lower=True).reshape(len(factor), len(chosen), r).transpose(1, 0, 2)
-        )
-        strengths, turn = np.linalg.eigh(white.transpose(0, 2, 1) @ white)
-        strengths = np.maximum(strengths, strengths[:, -1:] * 1e-12)
-        directions = np.ascontiguousarray(((white @ turn) / np.sqrt(strengths)[:, None, :]).transpose(0, 2, 1))
-        rms = np.sqrt(strengths.sum(axis=1) / len(factor))
-        largest = 1 / self.least_noise
-        smallest = np.minimum(_SMALLEST / rms, largest)
-        amplitudes = largest * (smallest / largest)[:, None] ** np.linspace(0, 1, _AMPLITUDES)
-        owner, weight = np.array([item[0] for item in chosen]), np.array([item[1] for item in chosen])
-        return _Members(owner, weight, directions, strengths, amplitudes)
-
-    def squares(self, left: Floats) -> list[Floats]:
-        """Sum of squares (b,) of data (m', b), whitened for each kind of noise."""
-        return [np.sum(linalg.solve_triangular(factor, left, lower=True) ** 2, axis=0) for factor in self.factors]
 
     def over_sigma(self, squares: Floats) -> Floats:
         """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape, from a table over ln(squares)."""
@@ -142,49 +211,145 @@ class Comparison:
         exponent = self.log_sigma - len(self.left) * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
         return nodes, np.asarray(special.logsumexp(exponent, axis=1), dtype=np.float64)
 
-    @cached_property
-    def _log_kinds(self) -> list[float]:
-        """Log probability of each kind, and the logarithm of its determinant taken off."""
-        return [
-            float(np.log(kind.probability) - np.log(np.diag(factor)).sum())
-            for kind, factor in zip(self.kinds, self.factors, strict=True)
-        ]
-
-    def null(self, left: Floats) -> Floats:
-        """Log evidence (kinds, b) of no explanation for data (m', b), noise priors included."""
-        return np.stack([
-            self.over_sigma(squares) + log for squares, log in zip(self.squares(left), self._log_kinds, strict=True)
-        ])  # fmt: skip
-
     def noise_posterior(self) -> Floats:
         """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline."""
         log = np.stack([
-            log + self.log_sigma - len(self.left) * np.log(self.sigma) - 0.5 * float(squares[0]) / self.sigma**2
-            for squares, log in zip(self.squares(self.left[:, None]), self._log_kinds, strict=True)
+            some.log + self.log_sigma - len(self.left) * np.log(self.sigma)
+            - 0.5 * float(np.sum(some.of(self.left[:, None]) ** 2)) / self.sigma**2
+            for some in self._whitened
         ])  # fmt: skip
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
-    def log_evidence(self, left: Floats | None = None) -> tuple[Floats, Floats]:
-        """Log evidence of nothing (b,) and of each explanation (c, b), for data (m', b), by default the recording's."""
+    def log_evidence(
+        self,
+        left: Floats | None = None,
+        granted: Sequence[Version] = (),
+        explanations: Sequence[int] | None = None,
+    ) -> tuple[Floats, Floats]:
+        """Log evidence (b,) of what is granted, and (c, b) of each explanation beside it.
+
+        Parameters
+        ----------
+        left : (m', b) data, by default the recording's.
+        granted : explanations taken for granted.
+        explanations : to consider, by default all; minus infinity for the others.
+        """
         data = self.left[:, None] if left is None else left
         total = np.full((len(self.explanations), data.shape[1]), -np.inf)
-        for factor, members, log in zip(self.factors, self.members, self._log_kinds, strict=True):
-            white = linalg.solve_triangular(factor, data, lower=True)
-            for some in members:
-                self._add(total, some, white, log)
-        return np.asarray(special.logsumexp(self.null(data), axis=0), dtype=np.float64), total
+        for group, each in self.each(data, granted, explanations):
+            gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight[:, None]
+            for explanation, gain in zip(group.explanation, gains, strict=True):
+                total[explanation] = np.logaddexp(total[explanation], gain)
+        return self.log_evidence_of(granted, data), total
 
-    def _add(self, total: Floats, members: _Members, white: Floats, log: float) -> None:
-        """Add the evidence of members under one kind of noise to that of their explanations, in blocks."""
-        squares = np.sum(white**2, axis=0)
-        block = max(1, _BLOCK // (_AMPLITUDES * white.shape[1] * members.directions.shape[1]))
-        for start in range(0, len(members.owner), block):
-            part = slice(start, start + block)
-            some = members.directions[part]
-            projected = (some.reshape(-1, len(white)) @ white).reshape(*some.shape[:2], -1) ** 2
-            ratio = members.amplitudes[part, :, None] ** 2 * members.strengths[part, None, :]  # (k, a, r)
-            unexplained = squares - (ratio / (1 + ratio)) @ projected  # (k, a, b)
-            log_each = self.over_sigma(unexplained) - 0.5 * np.log1p(ratio).sum(axis=2)[..., None] + log
-            gains = special.logsumexp(log_each, axis=1) - np.log(_AMPLITUDES) + members.weight[part, None]
-            for owner, gain in zip(members.owner[part], gains, strict=True):
-                total[owner] = np.logaddexp(total[owner], gain)
+    def beside(
+        self, granted: Sequence[Version] = (), explanations: Sequence[int] | None = None
+    ) -> dict[int, tuple[float, Version]]:
+        """Log evidence of each explanation beside what is granted, and its best version."""
+        found: dict[int, tuple[float, Version]] = {}
+        best: dict[int, float] = {}
+        for group, cube in self.each(self.left[:, None], granted, explanations):
+            each = cube[:, :, 0]
+            gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight
+            at = each.argmax(axis=1)
+            for m, (i, j) in enumerate(zip(group.explanation.tolist(), group.member.tolist(), strict=True)):
+                total = float(gains[m])
+                if i in found:
+                    total = float(np.logaddexp(found[i][0], total))
+                if each[m, at[m]] >= best.get(i, -np.inf):
+                    best[i] = float(each[m, at[m]])
+                    found[i] = total, Version(i, j, float(group.amplitudes[m, at[m]]))
+                else:
+                    found[i] = total, found[i][1]
+        return found
+
+    def best(self, left: Floats, explanations: Sequence[int]) -> list[Version]:
+        """Version with most evidence among some explanations, for each column of data (m', b)."""
+        found = [Version(0, 0, 0.0)] * left.shape[1]
+        most = np.full(left.shape[1], -np.inf)
+        for group, each in self.each(left, (), explanations):
+            flat = each.reshape(-1, left.shape[1])
+            at = flat.argmax(axis=0)
+            for column in np.flatnonzero(flat.max(axis=0) > most):
+                m, a = divmod(int(at[column]), AMPLITUDES)
+                found[column] = Version(int(group.explanation[m]), int(group.member[m]), float(group.amplitudes[m, a]))
+                most[column] = flat[at[column], column]
+        return found
+
+    def log_evidence_of(self, granted: Sequence[Version], left: Floats | None = None) -> Floats:
+        """Log evidence (b,) of what is granted, at the size granted, for data (m', b)."""
+        data = self.left[:, None] if left is None else left
+        every = [
+            self.over_sigma(known.squares) + known.log
+            for known in (self._beside(some, data, granted) for some in self._whitened)
+        ]
+        return np.asarray(special.logsumexp(np.stack(every), axis=0), dtype=np.float64)
+
+    def each(
+        self, data: Floats, granted: Sequence[Version], explanations: Sequence[int] | None = None
+    ) -> Iterator[tuple[_Group, Floats]]:
+        """Log evidence (M, a, b) of every member at every size beside what is granted, by groups of members."""
+        _, groups = self._stack
+        known = [self._beside(some, data, granted) for some in self._whitened]
+        for index, group in enumerate(groups):
+            chosen = group.only(explanations)
+            if not len(chosen.start):
+                continue
+            position = (chosen.start - group.start[0]) // group.r
+            total = np.full((len(position), AMPLITUDES, data.shape[1]), -np.inf)
+            for white, beside in zip(self._whitened, known, strict=True):
+                np.logaddexp(total, self._under(white, beside, chosen, white.blocks[index][position]), out=total)
+            yield chosen, total
+
+    def _under(self, white: _Whitened, beside: _Beside, group: _Group, blocks: Floats) -> Floats:
+        """Log evidence (M, a, b) of a group's members under one kind of noise."""
+        columns = group.columns(white.stack)
+        shape = len(group.start), group.r
+        shown = (columns.T @ beside.data).reshape(*shape, -1)  # (M, r, b)
+        if beside.rows.shape[0]:
+            hidden = (beside.rows @ columns).reshape(-1, *shape).transpose(1, 2, 0)
+            blocks = blocks - hidden @ hidden.transpose(0, 2, 1)
+        strengths, turn = (blocks[:, 0], None) if group.r == 1 else np.linalg.eigh(blocks)
+        strengths = np.maximum(strengths, 1e-300)
+        if turn is not None:
+            shown = turn.transpose(0, 2, 1) @ shown
+        ratio = group.amplitudes[:, :, None] ** 2 * strengths[:, None, :]  # (M, a, r)
+        taken = group.amplitudes[:, :, None] ** 2 / (1 + ratio)
+        found = np.empty((len(group.start), AMPLITUDES, shown.shape[2]))
+        block = max(1, _BLOCK // (AMPLITUDES * shown.shape[2]))
+        for begin in range(0, len(found), block):
+            part = slice(begin, begin + block)
+            squares = beside.squares - taken[part] @ shown[part] ** 2
+            found[part] = self.over_sigma(squares)
+        found += beside.log - 0.5 * np.log1p(ratio).sum(axis=2)[..., None]
+        return found
+
+    def _beside(self, white: _Whitened, data: Floats, granted: Sequence[Version]) -> _Beside:
+        """Data whitened by one kind of noise and what is granted."""
+        residual = white.of(data)
+        squares = np.sum(residual**2, axis=0)
+        if not granted:
+            return _Beside(residual, np.zeros((0, len(residual))), squares, white.log)
+        columns = np.hstack([v.amplitude * white.stack[:, self._where[v.explanation, v.member]] for v in granted])
+        factor = np.linalg.cholesky(np.eye(columns.shape[1]) + columns.T @ columns)
+        rows = np.linalg.solve(factor, columns.T)
+        seen = rows @ residual
+        log = white.log - float(np.log(np.diag(factor)).sum())
+        return _Beside(residual - rows.T @ seen, rows, squares - np.sum(seen**2, axis=0), log)
+
+
+def _white(factor: Floats | None, data: Floats) -> Floats:
+    return data if factor is None else np.asarray(linalg.solve_triangular(factor, data, lower=True), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """Data beside what is granted: what is left (m', b), the rows (g, m') that take it, its squares (b,), log determinant.
+
+    With Σ = 1 + C·Cᵀ and rows = chol(1 + CᵀC)⁻¹·Cᵀ, Σ⁻¹ = 1 − rowsᵀ·rows.
+    """
+
+    data: Floats
+    rows: Floats
+    squares: Floats
+    log: float

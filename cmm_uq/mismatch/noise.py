@@ -17,7 +17,7 @@ PLACING_RATIOS = (0.5, 1.0, 2.0)
 CORRELATIONS = (0.5, 0.85)
 """Correlation of neighbours in time."""
 
-WHITE = 0.7
+WHITE = 0.8
 """Probability, beforehand, that noise is white; the rest is shared by the other kinds."""
 
 _STATED_IS_RIGHT = 0.9

@@ -1,0 +1,197 @@
+"""Which explanations hold together: the posterior over combinations of them, found best first.
+
+Each combination has its marginal likelihood, the sizes of its members integrated one at a time about their joint best; each
+known effect has its posterior probability by summing over the combinations that contain it.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import lgamma
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.mismatch.evidence import Comparison, Version
+from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation
+
+EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
+"""Probability, beforehand, of none, one, two, three and four known effects that the job does not name."""
+
+UNKNOWNS = (0.85, 0.12, 0.03)
+"""Of none, one and two smooth functions that nobody knows."""
+
+WINDOW = 7.0
+"""Combinations less probable than the best by more than this, in logarithm, are not followed."""
+
+_MOST = 90
+Key = frozenset[int]
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Explanations that hold together, the size of each at its best, and the log posterior up to a constant."""
+
+    versions: tuple[Version, ...]
+    log_posterior: float
+
+
+@dataclass(frozen=True, eq=False)
+class Combinations:
+    """All combinations worth following.
+
+    Parameters
+    ----------
+    explanations : of which they are made.
+    found : by the indices of their explanations.
+    """
+
+    explanations: Sequence[Explanation]
+    found: Mapping[Key, Combination]
+
+    @cached_property
+    def probability(self) -> dict[Key, float]:
+        """Of each combination."""
+        log = np.array([c.log_posterior for c in self.found.values()])
+        return dict(zip(self.found, np.exp(log - special.logsumexp(log)).tolist(), strict=True))
+
+    def effects_of(self, key: Key) -> Key:
+        """The known effects of a combination."""
+        return frozenset(i for i in key if self.explanations[i].kind == EFFECT)
+
+    @cached_property
+    def of_effects(self) -> dict[Key, float]:
+        """Probability of each set of known effects, whatever is unknown besides."""
+        total: dict[Key, float] = {}
+        for key, p in self.probability.items():
+            known = self.effects_of(key)
+            total[known] = total.get(known, 0.0) + p
+        return total
+
+    def unknown_beside(self, effects: Key) -> float:
+        """Probability that something unknown acts besides, given these known effects."""
+        beside = sum(p for key, p in self.probability.items() if self.effects_of(key) == effects and key != effects)
+        return beside / self.of_effects[effects]
+
+    def of(self, index: int) -> float:
+        """Probability that an explanation is part of the truth."""
+        return float(sum(p for key, p in self.probability.items() if index in key))
+
+    def instead(self, effects: Key, index: int) -> dict[int, float]:
+        """Odds of each other known effect in the place of one, the rest kept."""
+        rest, whole = effects - {index}, self.of_effects[effects]
+        return {
+            next(iter(other - rest)): p / whole
+            for other, p in self.of_effects.items()
+            if len(other) == len(effects) and rest < other and other != effects
+        }
+
+
+def explore(comparison: Comparison) -> Combinations:
+    """Follow the most probable combinations, then every exchange of one effect of the best."""
+    search = _Search(comparison)
+    search.run()
+    while True:
+        best = max(search.settled, key=lambda key: search.settled[key].log_posterior)
+        fewer = [tuple(v for v in search.settled[best].versions if v.explanation != i) for i in best]
+        if all(keyed(versions) in search.expanded for versions in fewer):
+            return Combinations(comparison.explanations, search.settled)
+        for versions in fewer:
+            search.settle(versions)
+            search.expand(keyed(versions))
+        search.run()
+
+
+def keyed(versions: Iterable[Version]) -> Key:
+    """Which explanations these are versions of."""
+    return frozenset(v.explanation for v in versions)
+
+
+def log_prior(explanations: Sequence[Explanation], key: Iterable[int]) -> float:
+    """Log probability, beforehand, of a combination; minus infinity for one that is not considered."""
+    chosen = [explanations[i].kind for i in key]
+    total = 0.0
+    for kind, counts in ((EFFECT, EFFECTS), (UNKNOWN, UNKNOWNS)):
+        among, k = sum(e.kind == kind for e in explanations), chosen.count(kind)
+        if k >= len(counts):
+            return -np.inf
+        total += np.log(counts[k]) - (lgamma(among + 1) - lgamma(k + 1) - lgamma(among - k + 1))
+    return total
+
+
+class _Search:
+    """Best first: a combination is settled when it is first taken up, and expanded when it is taken up again."""
+
+    def __init__(self, comparison: Comparison) -> None:
+        self.comparison = comparison
+        self.candidates = [i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)]
+        self.settled: dict[Key, Combination] = {}
+        self.expanded: set[Key] = set()
+        self._waiting: list[tuple[float, int, tuple[Version, ...]]] = []
+        self._order = itertools.count()
+        self.settle(())
+        self.expand(frozenset())
+
+    def run(self) -> None:
+        """Follow whatever is within the window of the best."""
+        while self._waiting and len(self.settled) < _MOST:
+            best = max(c.log_posterior for c in self.settled.values())
+            negative, _, versions = heapq.heappop(self._waiting)
+            if -negative < best - WINDOW:
+                return
+            key = keyed(versions)
+            if key in self.settled:
+                self.expand(key)
+            else:
+                self.settle(versions)
+
+    def expand(self, key: Key) -> None:
+        """Put every combination with one more explanation on the list."""
+        if key in self.expanded:
+            return
+        self.expanded.add(key)
+        known = self.settled[key]
+        fixed = float(self.comparison.log_evidence_of(known.versions)[0])
+        others = [i for i in self.candidates if i not in key]
+        base = known.log_posterior - log_prior(self.comparison.explanations, key)
+        for i, (total, version) in self.comparison.beside(known.versions, others).items():
+            larger = key | {i}
+            prior = log_prior(self.comparison.explanations, larger)
+            if larger not in self.settled and prior > -np.inf:
+                self._push(base + total - fixed + prior, (*known.versions, version))
+
+    def _push(self, log_posterior: float, versions: tuple[Version, ...]) -> None:
+        heapq.heappush(self._waiting, (-log_posterior, next(self._order), versions))
+
+    def settle(self, versions: tuple[Version, ...]) -> None:
+        """Find the best sizes of a combination, and its evidence."""
+        key = keyed(versions)
+        if key in self.settled:
+            return
+        evidence, settled = log_evidence_together(self.comparison, versions)
+        log_posterior = evidence + log_prior(self.comparison.explanations, key)
+        self.settled[key] = Combination(settled, log_posterior)
+        if key:
+            self._push(log_posterior, settled)
+
+
+def log_evidence_together(comparison: Comparison, versions: Sequence[Version]) -> tuple[float, tuple[Version, ...]]:
+    """Log evidence of explanations that hold together, and the best version of each.
+
+    Exact for one; for several, the sizes and versions of each are summed with those of the others held at their best.
+    """
+    best = list(versions)
+    totals = [0.0] * len(best)
+    for _ in range(4):
+        before = tuple(best)
+        for i, version in enumerate(best):
+            others = best[:i] + best[i + 1 :]
+            totals[i], best[i] = comparison.beside(others, [version.explanation])[version.explanation]
+        if tuple(best) == before or len(best) == 1:
+            break
+    fixed = float(comparison.log_evidence_of(best)[0])
+    return fixed + sum(total - fixed for total in totals), tuple(best)
