@@ -20,7 +20,7 @@ from cmm_uq.points import AXES, Floats, Points
 
 EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
 
-LENGTH_SCALES = (0.6, 0.25)
+LENGTH_SCALES = (0.6, 0.25, 0.1)
 """Of unknown smooth functions, in parts of the covariate's range."""
 
 _UNKNOWN_SD = 0.05
