@@ -8,13 +8,16 @@ projected out exactly. Everything else in this room works on the reduced form th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import linalg
 
 from cmm_uq.points import Floats
+
+Whiten = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True)
@@ -62,14 +65,42 @@ class LinearModel:
     @cached_property
     def reduced(self) -> Reduced:
         """Whitened by the noise scale, the placing projected out by QR: (observed, design, degrees of freedom)."""
-        y, A = self.observed / self.noise_scale, self.design / self.noise_scale[:, None]
-        if self.placing.shape[1]:
-            Q, R, _ = linalg.qr(self.placing / self.noise_scale[:, None], mode="economic", pivoting=True)
-            diagonal = np.abs(np.diag(R))
-            Q = Q[:, diagonal > 1e-10 * diagonal[0]]
-            y, A = y - Q @ (Q.T @ y), A - Q @ (Q.T @ A)
-            return Reduced(y, A, len(y) - Q.shape[1])
-        return Reduced(y, A, len(y))
+        y = self.reduce(self.observed[:, None])[:, 0]
+        return Reduced(y, self.reduce(self.design), len(y) - self._reached.shape[1])
+
+    def reduce(self, columns: Floats) -> Floats:
+        """Columns (m, r), mm, in units of the noise scale, the placing projected out."""
+        white, Q = columns / self.noise_scale[:, None], self._reached
+        return white - Q @ (Q.T @ white) if Q.shape[1] else white
+
+    @cached_property
+    def _reached(self) -> Floats:
+        """Orthonormal basis of what the placing reaches, in units of the noise scale."""
+        if not self.placing.shape[1]:
+            return np.zeros((len(self.observed), 0))
+        Q, R, _ = linalg.qr(self.placing / self.noise_scale[:, None], mode="economic", pivoting=True)
+        diagonal = np.abs(np.diag(R))
+        return np.asarray(Q[:, diagonal > 1e-10 * diagonal[0]], dtype=np.float64)
+
+    def uncorrelated(self, correlation: Floats) -> tuple[LinearModel, Whiten]:
+        """The same model in observations without correlation, and what turns columns (m, r) of the old into the new.
+
+        Parameters
+        ----------
+        correlation : (m, m) of the noise, in units of the noise scale.
+        """
+        factor = linalg.cholesky(correlation, lower=True)
+
+        def white(columns: Floats) -> Floats:
+            scaled = columns / self.noise_scale[:, None]
+            return np.asarray(linalg.solve_triangular(factor, scaled, lower=True), dtype=np.float64)
+
+        observed = white(self.observed[:, None])[:, 0]
+        model = replace(
+            self, observed=observed, design=white(self.design), placing=white(self.placing),
+            noise_scale=np.ones(len(observed)),
+        )  # fmt: skip
+        return model, white
 
     @property
     def prior_mean(self) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +31,7 @@ class Posterior:
     sampler : program and version.
     ess_min, rhat_max : worst over all parameters and the noise.
     steps, autocorrelation_time : length of each chain, and the longest time.
+    shapes : (N, q) of what shapes columns, if anything does.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -42,6 +43,7 @@ class Posterior:
     rhat_max: float
     steps: int
     autocorrelation_time: float
+    shapes: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def converged(self) -> bool:

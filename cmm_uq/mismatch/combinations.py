@@ -72,6 +72,11 @@ class Combinations:
             total[known] = total.get(known, 0.0) + p
         return total
 
+    def versions(self, effects: Key) -> tuple[Version, ...]:
+        """Of the most probable combination with these known effects, or more."""
+        keys = [key for key in self.found if self.effects_of(key) >= effects]
+        return self.found[max(keys, key=lambda key: self.found[key].log_posterior)].versions
+
     def unknown_beside(self, effects: Key) -> float:
         """Probability that something unknown acts besides, given these known effects."""
         beside = sum(p for key, p in self.probability.items() if self.effects_of(key) == effects and key != effects)

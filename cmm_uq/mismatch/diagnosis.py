@@ -9,10 +9,11 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.conformity.quantity import Quantity
-from cmm_uq.inference.posterior import Posterior, Progress, sample
+from cmm_uq.inference.posterior import Posterior, Progress
 from cmm_uq.measurement import MeasurementModel
 from cmm_uq.mismatch.explanations import UNKNOWN, Explanation
 from cmm_uq.mismatch.held_out import Improvement, improvement
+from cmm_uq.mismatch.joint import Joint, joint_posterior
 from cmm_uq.mismatch.noise import Kind
 from cmm_uq.mismatch.search import NOT_TOLD_APART, Found, Race, search, tail_probability
 from cmm_uq.points import Floats
@@ -129,11 +130,12 @@ def diagnose(
         found = replace(found, last=found.first, model=model, chosen=frozenset(), unexplained=1.0)
         gain = improvement(model, model)
     noise = _noise(found.last, stated)
-    sampled = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
-    posterior = sample(sampled.estimate().linear, seed, progress)
+    known = None if stated is None else noise.coordinate.value * MICROMETRE
+    joint = joint_posterior(found, known, seed, progress)
+    after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     return Diagnosis(
-        _verdict(found, alpha), found.first.p_value, alpha, _where(found.first, alpha), _left_out(found, posterior),
-        _indistinguishable(found), _rivals(found.first), noise, gain, model, sampled, posterior,
+        _verdict(found, alpha), found.first.p_value, alpha, _where(found.first, alpha), _left_out(found, joint),
+        _indistinguishable(found), _rivals(found.first), noise, gain, model, after, joint.posterior,
     )  # fmt: skip
 
 
@@ -145,22 +147,31 @@ def _verdict(found: Found, alpha: float) -> str:
     return "partial" if found.unexplained > _UNKNOWN else "explained"
 
 
-def _left_out(found: Found, posterior: Posterior) -> tuple[LeftOut, ...]:
+def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
     index = {found.first.explanations[i].name: i for i in found.chosen}
+    posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
     total = _squares(found.first.model) - _squares(found.model)
     listed = []
     for effect in (e for e in found.model.effects if e.name in found.effects):
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
-        shape = np.tile(np.array(found.model.shapes.get(effect.name, ()), dtype=np.float64), (len(draws), 1))
-        reported = effect.to_reported(draws, shape)
+        reported = effect.to_reported(draws, joint.shapes.get(effect.name, np.zeros((len(draws), 0))))
         units = {parameter.name: parameter.unit for parameter in effect.reported}
         without = replace(found.model, effects=tuple(e for e in found.model.effects if e is not effect))
         share = (_squares(without) - _squares(found.model)) / _squares(found.first.model) if total > 0 else 0.0
-        parameters = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
+        parameters = {
+            name: Quantity.of_draws(_unwrapped(values) if name == "phase_rad" else values, units[name])
+            for name, values in reported.items()
+        }
         probability = found.combinations.of(index[effect.name]) if found.combinations else 0.0
         listed.append(LeftOut(effect.name, effect.title, probability, parameters, share))
     return tuple(sorted(listed, key=lambda item: -item.probability))
+
+
+def _unwrapped(phase: Floats) -> Floats:
+    """Phases within half a turn of their circular mean, so that they have a mean and an interval."""
+    middle = float(np.angle(np.mean(np.exp(1j * phase))))
+    return np.asarray(middle + np.angle(np.exp(1j * (phase - middle))), dtype=np.float64)
 
 
 def _squares(model: MeasurementModel) -> float:

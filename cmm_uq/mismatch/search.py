@@ -77,6 +77,7 @@ class Found:
     first, last : races before anything is found, and after everything is.
     combinations : of explanations, with their probabilities; ``None`` while the gate is closed.
     chosen : indices, in the first race, of the known effects that are found.
+    versions : of them, and of what is unknown besides, in the most probable combination.
     model : the job's model with what was left out.
     unexplained : probability that something unknown acts besides.
     """
@@ -85,6 +86,7 @@ class Found:
     last: Race
     combinations: Combinations | None
     chosen: Key
+    versions: tuple[Version, ...]
     model: MeasurementModel
     unexplained: float
 
@@ -106,12 +108,13 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     """
     first = race_of(model, stated, seed)
     if first.p_value >= alpha:
-        return Found(first, first, None, frozenset(), model, 0.0)
+        return Found(first, first, None, frozenset(), (), model, 0.0)
     combinations = explore(first.comparison)
     chosen = _asserted(combinations)
-    found = model if not chosen else _with(first, combinations, chosen)
+    versions = combinations.versions(chosen)
+    found = model if not chosen else _with(first, versions, chosen)
     last = first if not chosen else race_of(found, stated, None)
-    return Found(first, last, combinations, chosen, found, combinations.unknown_beside(chosen))
+    return Found(first, last, combinations, chosen, versions, found, combinations.unknown_beside(chosen))
 
 
 def _asserted(combinations: Combinations) -> Key:
@@ -155,12 +158,10 @@ def race_of(model: MeasurementModel, stated: float | None, seed: int | None) -> 
     return Race(model, values, comparison, log_odds, np.exp(log_prior + log_odds - log_total), p_value, maxima)
 
 
-def _with(race: Race, combinations: Combinations, chosen: Key) -> MeasurementModel:
+def _with(race: Race, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
     """The race's model with known effects more, of the shapes that are most probable together."""
-    keys = [key for key in combinations.found if combinations.effects_of(key) >= chosen]
-    best = combinations.found[max(keys, key=lambda key: combinations.found[key].log_posterior)]
     shapes, added = dict(race.model.shapes), []
-    for version in sorted(best.versions, key=lambda v: v.explanation):
+    for version in sorted(versions, key=lambda v: v.explanation):
         if version.explanation in chosen:
             explanation = race.explanations[version.explanation]
             added.append(CATALOGUE[explanation.name])
@@ -169,12 +170,16 @@ def _with(race: Race, combinations: Combinations, chosen: Key) -> MeasurementMod
     return replace(race.model, effects=(*race.model.effects, *added), shapes=shapes)
 
 
-def noise_kinds(model: MeasurementModel, sigma: float) -> list[Kind]:
-    """Kinds of noise of the used observations; a certified size adds what its certificate leaves open, at this noise."""
-    artefact = model.artefact
+def plain_kinds(model: MeasurementModel) -> list[Kind]:
+    """Kinds of noise of the used observations."""
     time = model.artefact.points.columns.get("time_s")
     order = order_of(None if time is None else mean_of(model, time), int(model.used.sum()))
-    found = kinds(artefact.measurement[model.used], order)
+    return kinds(model.artefact.measurement[model.used], order)
+
+
+def noise_kinds(model: MeasurementModel, sigma: float) -> list[Kind]:
+    """Kinds of noise; a certified size adds what its certificate leaves open, at this noise."""
+    artefact, found = model.artefact, plain_kinds(model)
     certified = np.array([size.certified for size in artefact.sizes], dtype=bool)
     sds = np.array([size.sd for size in artefact.sizes])[certified]
     change = artefact.size_change()[model.used][:, certified] * sds / artefact.noise_scale[model.used, None]
