@@ -27,6 +27,9 @@ from cmm_uq.points import Floats
 ARTEFACT = "artefact"
 """First part of the key of a size of the artefact."""
 
+_NO_MACHINE = 1000.0
+"""mm."""
+
 _SIZE_SCALE = 0.1
 """mm, a typical deviation of an artefact from its nominal size; only scales columns."""
 
@@ -105,13 +108,24 @@ class MeasurementModel:
         return np.asarray(self._basis(xyz) @ coefficients, dtype=np.float64)
 
     def indicated(self, true_xyz: Floats, coefficients: Floats) -> Floats:
-        """What the machine indicates at true points (n, 3): solves indicated + e(indicated) = true to below 0.01 nm."""
+        """What the machine indicates at true points (n, 3): solves indicated + e(indicated) = true to below 0.01 nm.
+
+        Raises
+        ------
+        CmmUqError : the errors are so large that no indication belongs to a true point.
+        """
         indicated = true_xyz.copy()
         for _ in range(12):
             change = true_xyz - self.errors(indicated, coefficients) - indicated
             indicated += change
-            if np.abs(change).max(initial=0.0) < 1e-8:
+            largest = np.abs(change).max(initial=0.0)
+            if largest < 1e-8:
                 break
+            if not largest < _NO_MACHINE:
+                raise CmmUqError(
+                    f"errors that would explain this recording exceed {_NO_MACHINE:g} mm: they are no machine's",
+                    where="the recording", fix="Look for a wrong unit, exchanged columns or points of different places",
+                )  # fmt: skip
         return indicated
 
     def predicted(self, values: Floats) -> Floats:
