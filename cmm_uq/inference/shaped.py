@@ -74,13 +74,15 @@ class _Density:
         self.model = model
         self.shaped = shaped
         reduced = model.reduced
+        # deviations from the prior means: lengths of half a metre would leave no digits for nanometres
+        observed = reduced.observed - reduced.design @ model.prior_mean
         flat = [model.reduce(np.hstack(list(some.table))) for some in shaped]
         # the walkers need no more rows than the columns have dimensions
         every = np.hstack([reduced.design, *flat])
         U, s, _ = linalg.svd(every / np.maximum(np.linalg.norm(every, axis=0), 1e-300), full_matrices=False)
         Q = U[:, s > _NEGLIGIBLE * s[0]]
-        self.design, self.observed, self.count = Q.T @ reduced.design, Q.T @ reduced.observed, reduced.count
-        self.squares = float(reduced.observed @ reduced.observed)
+        self.design, self.observed, self.count = Q.T @ reduced.design, Q.T @ observed, reduced.count
+        self.squares = float(observed @ observed)
         self.tables = [
             (Q.T @ columns).reshape(Q.shape[1], len(some.nodes), -1).transpose(1, 0, 2)
             for some, columns in zip(shaped, flat, strict=True)
@@ -102,10 +104,9 @@ class _Density:
         return design
 
     def _gaussian(self, shapes: Floats, sigma: Floats) -> tuple[Floats, Floats, Floats]:
-        """Means (w, k), lower factors of the scaled precisions with their scales, and ln p(observations | shapes, σ)."""
+        """Means (w, k) less the prior ones, lower factors of the precisions, and ln p(observations | shapes, σ)."""
         design = self.designs(shapes)
         right = (design.transpose(0, 2, 1) @ self.observed) / sigma[:, None] ** 2
-        right += self._weight * self.model.prior_mean
         precision = design.transpose(0, 2, 1) @ design / sigma[:, None, None] ** 2 + np.diag(self._weight)
         scale = 1 / np.sqrt(np.einsum("wii->wi", precision))
         factor = np.linalg.cholesky(precision * scale[:, :, None] * scale[:, None, :])
@@ -125,7 +126,7 @@ class _Density:
         """One exact draw (w, k) of the linear parameters for each."""
         mean, factor, _ = self._gaussian(shapes, sigma)
         z = random.standard_normal(mean.shape)
-        return mean + np.linalg.solve(factor.transpose(0, 2, 1), z[:, :, None])[:, :, 0]
+        return self.model.prior_mean + mean + np.linalg.solve(factor.transpose(0, 2, 1), z[:, :, None])[:, :, 0]
 
     @cached_property
     def _best(self) -> tuple[Floats, float]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,19 @@ def test_the_marginal_of_a_period_is_that_of_direct_integration() -> None:
     assert posterior.converged
     assert draws.mean() == pytest.approx(mean, abs=4 * error)
     assert draws.std() == pytest.approx(sd, rel=4 / np.sqrt(posterior.ess_min) + 0.02)
+
+
+def test_a_size_of_half_a_metre_known_to_a_nanometre_does_not_blur_the_period() -> None:
+    random = np.random.default_rng(7)
+    x = np.sort(random.uniform(0, 100, M))
+    plain = model(x, 1e-3, None, (0.0, 0.01, 23.0), 8)
+    length = Unknown(("artefact", "length"), "mm", 500.0, 1e-6, 0.1)
+    long = replace(plain, observed=plain.observed + 500.0, unknowns=(length, *plain.unknowns[1:]))
+    columns = shaped(x, 1 / np.linspace(1 / 40, 1 / 12, 300)[::-1])
+    mine, theirs = sample_shaped(long, [columns], 9), sample_shaped(replace(plain, unknowns=(
+        Unknown(("artefact", "length"), "mm", 0.0, 1e-6, 0.1), *plain.unknowns[1:])), [columns], 9)  # fmt: skip
+    assert mine.shapes.mean() == pytest.approx(theirs.shapes.mean(), abs=1e-3)
+    assert mine.sigma.mean() == pytest.approx(theirs.sigma.mean(), rel=1e-3)
 
 
 def test_two_modes_keep_their_probabilities() -> None:
