@@ -6,8 +6,6 @@ known effect has its posterior probability by summing over the combinations that
 
 from __future__ import annotations
 
-import heapq
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,9 +24,11 @@ UNKNOWNS = (0.85, 0.12, 0.03)
 """Of none, one and two smooth functions that nobody knows."""
 
 WINDOW = 7.0
-"""Combinations less probable than the best by more than this, in logarithm, are not followed."""
+"""A combination less probable than one of its parts by more than this, in logarithm, is not followed."""
 
-_MOST = 90
+SETTLED, FOLLOWED = 24, 8
+"""How many combinations of each size have their evidence computed, and are followed to the next size."""
+
 Key = frozenset[int]
 
 
@@ -97,18 +97,24 @@ class Combinations:
 
 
 def explore(comparison: Comparison) -> Combinations:
-    """Follow the most probable combinations, then every exchange of one effect of the best."""
+    """Follow the most probable combinations, level by level, then every exchange of one explanation of the best."""
     search = _Search(comparison)
-    search.run()
-    while True:
-        best = max(search.settled, key=lambda key: search.settled[key].log_posterior)
-        fewer = [tuple(v for v in search.settled[best].versions if v.explanation != i) for i in best]
-        if all(keyed(versions) in search.expanded for versions in fewer):
-            return Combinations(comparison.explanations, search.settled)
-        for versions in fewer:
-            search.settle(versions)
-            search.expand(keyed(versions))
-        search.run()
+    level: list[Key] = [frozenset()]
+    while level:
+        for key in level:
+            search.expand(key)
+        size = len(level[0]) + 1
+        level = [key for key in search.settle_best(size, SETTLED) if search.worth(key)]
+        level = search.best_of(level, FOLLOWED)
+    exchanged: set[Key] = set()
+    while (best := search.best()) not in exchanged:
+        exchanged.add(best)
+        for i in best:
+            fewer = tuple(v for v in search.settled[best].versions if v.explanation != i)
+            search.settle(fewer)
+            search.expand(keyed(fewer))
+        search.settle_best(len(best), SETTLED)
+    return Combinations(comparison.explanations, search.settled)
 
 
 def keyed(versions: Iterable[Version]) -> Key:
@@ -129,59 +135,67 @@ def log_prior(explanations: Sequence[Explanation], key: Iterable[int]) -> float:
 
 
 class _Search:
-    """Best first: a combination is settled when it is first taken up, and expanded when it is taken up again."""
+    """Combinations settled so far, and those that wait for it with an estimate of their posterior."""
 
     def __init__(self, comparison: Comparison) -> None:
         self.comparison = comparison
         self.candidates = [i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)]
         self.settled: dict[Key, Combination] = {}
-        self.expanded: set[Key] = set()
-        self._waiting: list[tuple[float, int, tuple[Version, ...]]] = []
-        self._order = itertools.count()
+        self._expanded: set[Key] = set()
+        self._waiting: dict[Key, tuple[float, tuple[Version, ...]]] = {}
         self.settle(())
-        self.expand(frozenset())
 
-    def run(self) -> None:
-        """Follow whatever is within the window of the best."""
-        while self._waiting and len(self.settled) < _MOST:
-            best = max(c.log_posterior for c in self.settled.values())
-            negative, _, versions = heapq.heappop(self._waiting)
-            if -negative < best - WINDOW:
-                return
-            key = keyed(versions)
-            if key in self.settled:
-                self.expand(key)
-            else:
-                self.settle(versions)
+    def best(self) -> Key:
+        """The most probable combination."""
+        return max(self.settled, key=lambda key: self.settled[key].log_posterior)
+
+    def worth(self, key: Key) -> bool:
+        """Whether a combination is at least as probable as one of its parts, but for the window."""
+        posterior = self.settled[key].log_posterior
+        parts = [self.settled[key - {i}].log_posterior for i in key if key - {i} in self.settled]
+        return posterior > max(parts, default=-np.inf) - WINDOW
+
+    def best_of(self, keys: Sequence[Key], count: int) -> list[Key]:
+        """The most probable, half of the places kept for known effects alone."""
+        order = sorted(keys, key=lambda key: -self.settled[key].log_posterior)
+        known = [key for key in order if not self._unknown(key)][: count // 2]
+        return known + [key for key in order if key not in known][: count - len(known)]
 
     def expand(self, key: Key) -> None:
         """Put every combination with one more explanation on the list."""
-        if key in self.expanded:
+        if key in self._expanded:
             return
-        self.expanded.add(key)
+        self._expanded.add(key)
         known = self.settled[key]
         fixed = float(self.comparison.log_evidence_of(known.versions)[0])
         others = [i for i in self.candidates if i not in key]
-        base = known.log_posterior - log_prior(self.comparison.explanations, key)
+        base = known.log_posterior - log_prior(self.comparison.explanations, key) - fixed
         for i, (total, version) in self.comparison.beside(known.versions, others).items():
             larger = key | {i}
-            prior = log_prior(self.comparison.explanations, larger)
-            if larger not in self.settled and prior > -np.inf:
-                self._push(base + total - fixed + prior, (*known.versions, version))
+            estimate = base + total + log_prior(self.comparison.explanations, larger)
+            if larger in self.settled or estimate <= self._waiting.get(larger, (-np.inf, ()))[0]:
+                continue
+            self._waiting[larger] = estimate, (*known.versions, version)
 
-    def _push(self, log_posterior: float, versions: tuple[Version, ...]) -> None:
-        heapq.heappush(self._waiting, (-log_posterior, next(self._order), versions))
+    def settle_best(self, size: int, count: int) -> list[Key]:
+        """Settle the most probable of this size that wait, half of the places kept for known effects alone."""
+        order = sorted((key for key in self._waiting if len(key) == size), key=lambda key: -self._waiting[key][0])
+        known = [key for key in order if not self._unknown(key)][: count // 2]
+        chosen = known + [key for key in order if key not in known][: count - len(known)]
+        for key in chosen:
+            self.settle(self._waiting.pop(key)[1])
+        return chosen
 
     def settle(self, versions: tuple[Version, ...]) -> None:
         """Find the best sizes of a combination, and its evidence."""
         key = keyed(versions)
-        if key in self.settled:
-            return
-        evidence, settled = log_evidence_together(self.comparison, versions)
-        log_posterior = evidence + log_prior(self.comparison.explanations, key)
-        self.settled[key] = Combination(settled, log_posterior)
-        if key:
-            self._push(log_posterior, settled)
+        if key not in self.settled:
+            evidence, settled = log_evidence_together(self.comparison, versions)
+            log_posterior = evidence + log_prior(self.comparison.explanations, key)
+            self.settled[key] = Combination(settled, log_posterior)
+
+    def _unknown(self, key: Key) -> bool:
+        return any(self.comparison.explanations[i].kind == UNKNOWN for i in key)
 
 
 def log_evidence_together(comparison: Comparison, versions: Sequence[Version]) -> tuple[float, tuple[Version, ...]]:

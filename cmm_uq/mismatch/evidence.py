@@ -139,8 +139,9 @@ class Comparison:
         """Columns (m', K) that the baseline leaves of all members, those with equally many together."""
         found: dict[int, list[tuple[int, int, float, Floats]]] = {}
         whole = [
-            (owner, j, -np.log(len(explanation.members)), member.columns / self.noise_scale[:, None])
+            (owner, j, np.log(member.weight / total), member.columns / self.noise_scale[:, None])
             for owner, explanation in enumerate(self.explanations)
+            for total in [sum(member.weight for member in explanation.members)]
             for j, member in enumerate(explanation.members)
         ]
         lefts = np.split(

@@ -6,8 +6,8 @@ for the unknown, plausibility) allows; how much smaller they may be is left to t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
@@ -30,16 +30,18 @@ _SHORTEST_PERIOD = 6.0
 """mm."""
 
 _MOST_PERIODS = 240
+_DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 _KEPT = 1e-3
 _GRID = 60
 
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """One version of an explanation: columns (m, r) in mm, with the shape parameter that they belong to."""
+    """One version of an explanation: columns (m, r) in mm, the shape parameter that they belong to, and its weight."""
 
     columns: Floats
     shape: tuple[float, ...] = ()
+    weight: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,7 @@ class Explanation:
     ----------
     name : the effect's name; for an unknown function what it depends on.
     kind : ``effect``, ``several`` (known effects at once) or ``unknown``.
-    members : equally probable versions.
+    members : versions, as probable as their weights say.
     covariate : (p,) where an unknown function is evaluated: the points' readings, or the observations' covariate.
     values : (p, r) the function there, mm, for one unit of each coefficient of the first member.
     covariate_name : its name in the recording.
@@ -87,6 +89,22 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
         if any(np.any(member.columns) for member in members):
             found.append(Explanation(effect.name, EFFECT, members))
     return found
+
+
+def finer(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
+    """An explanation with some of its periods divided: each gives way to five about it that share its weight."""
+    effect = CATALOGUE[explanation.name]
+    points = model.artefact.points.at(model.placed(values))
+    frequency = np.array([1 / member.shape[0] for member in explanation.members])
+    step = float(np.median(np.diff(np.sort(frequency))))
+    kept = list(explanation.members)
+    for i in members:
+        kept[i] = replace(kept[i], weight=kept[i].weight / len(_DIVIDED))
+        for part in _DIVIDED:
+            if part:
+                shape = (float(1 / (frequency[i] + part * step)),)
+                kept.append(Member(_seen(model, effect, points, shape, values), shape, kept[i].weight))
+    return replace(explanation, members=tuple(kept))
 
 
 def several(singles: Sequence[Explanation]) -> list[Explanation]:

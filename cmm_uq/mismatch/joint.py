@@ -75,7 +75,7 @@ def _nodes(found: Found, effect: Effect) -> Floats:
     ((group, cube),) = comparison.each(comparison.left[:, None], granted, [index])
     frequency = np.array([1 / found.first.explanations[index].members[m].shape[0] for m in group.member])
     evidence = special.logsumexp(cube[:, :, 0], axis=1)
-    step = float(np.min(np.diff(np.sort(frequency)))) if len(frequency) > 1 else 0.1 * float(frequency[0])
+    step = float(np.median(np.diff(np.sort(frequency)))) if len(frequency) > 1 else 0.1 * float(frequency[0])
     likely = frequency[evidence > evidence.max() - _IMPROBABLE]
     offsets = np.arange(-_FINER, _FINER + 1) / _FINER
     fine = np.unique(np.round((likely[:, None] + step * offsets).ravel() / step * _FINER)) * step / _FINER

@@ -48,7 +48,7 @@ def kinds(placing: Ints, order: Floats) -> list[Kind]:
 
     Parameters
     ----------
-    placing : (m,) which placing each observation belongs to.
+    placing : (m,) observations with the same number share an offset: repeats of one quantity in one placing.
     order : (m,) time, or place in the recording, of each observation.
     """
     m = len(placing)

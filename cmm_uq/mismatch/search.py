@@ -18,10 +18,20 @@ from scipy import special
 from cmm_uq.measurement import MeasurementModel
 from cmm_uq.mismatch.combinations import EFFECTS, Combinations, Key, explore
 from cmm_uq.mismatch.evidence import Comparison, Version
-from cmm_uq.mismatch.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, known, mean_of, several, unknown
+from cmm_uq.mismatch.explanations import (
+    EFFECT,
+    SEVERAL,
+    UNKNOWN,
+    Explanation,
+    finer,
+    known,
+    mean_of,
+    several,
+    unknown,
+)
 from cmm_uq.mismatch.noise import Kind, kinds, order_of, sigma_grid
 from cmm_uq.physics.catalogue import CATALOGUE
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 
 SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}
 """Probability, beforehand, of one effect of the catalogue, of several, and of the unknown; the rest is for nothing missing."""
@@ -35,6 +45,9 @@ _MISFIT = 20.0
 
 ASSERTED = 0.5
 """Probability from which an effect, or one of those that cannot be told from it, is asserted."""
+
+_PROBABLE = 0.003
+"""Probability from which the period in a combination is refined."""
 
 NOT_TOLD_APART = 0.02
 """Odds from which another effect in the place of one counts as not told apart from it."""
@@ -110,11 +123,28 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     if first.p_value >= alpha:
         return Found(first, first, None, frozenset(), (), model, 0.0)
     combinations = explore(first.comparison)
+    if periods := _periods(combinations):
+        explanations = [
+            finer(first.model, first.values, e, periods[i]) if i in periods else e
+            for i, e in enumerate(first.explanations)
+        ]
+        first = replace(first, comparison=replace(first.comparison, explanations=explanations))
+        combinations = explore(first.comparison)
     chosen = _asserted(combinations)
     versions = combinations.versions(chosen)
     found = model if not chosen else _with(first, versions, chosen)
     last = first if not chosen else race_of(found, stated, None)
     return Found(first, last, combinations, chosen, versions, found, combinations.unknown_beside(chosen))
+
+
+def _periods(combinations: Combinations) -> dict[int, set[int]]:
+    """Members of the periodic effects, by explanation, that probable combinations contain."""
+    found: dict[int, set[int]] = {}
+    for key, probability in combinations.probability.items():
+        for version in combinations.found[key].versions if probability > _PROBABLE else ():
+            if combinations.explanations[version.explanation].members[version.member].shape:
+                found.setdefault(version.explanation, set()).add(version.member)
+    return found
 
 
 def _asserted(combinations: Combinations) -> Key:
@@ -174,7 +204,24 @@ def plain_kinds(model: MeasurementModel) -> list[Kind]:
     """Kinds of noise of the used observations."""
     time = model.artefact.points.columns.get("time_s")
     order = order_of(None if time is None else mean_of(model, time), int(model.used.sum()))
-    return kinds(model.artefact.measurement[model.used], order)
+    return kinds(repeated_quantity(model), order)
+
+
+def repeated_quantity(model: MeasurementModel) -> Ints:
+    """Numbers (m,) that used observations share when they repeat one quantity: one point, or pair, of one placing."""
+    artefact = model.artefact
+    points = np.sort(artefact.points.point[artefact.rows], axis=1)
+    # the coordinates of one point are observations of their own: first, second and third of the same reading
+    _, reading = np.unique(
+        np.column_stack([artefact.measurement, artefact.repeat, points]), axis=0, return_inverse=True
+    )
+    order = np.argsort(reading.ravel(), kind="stable")
+    first = np.concatenate([[True], np.diff(reading.ravel()[order]) > 0])
+    place = np.arange(len(order))
+    direction = np.empty_like(place)
+    direction[order] = place - np.maximum.accumulate(np.where(first, place, 0))
+    _, number = np.unique(np.column_stack([artefact.measurement, points, direction]), axis=0, return_inverse=True)
+    return np.asarray(number.ravel()[model.used], dtype=np.int64)
 
 
 def noise_kinds(model: MeasurementModel, sigma: float) -> list[Kind]:
