@@ -52,7 +52,7 @@ class Rigid(Artefact):
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
         """See :meth:`Artefact.project`: every coordinate, along the artefact's own axes."""
         own = np.einsum("nij,nik->njk", self.attitudes(xyz), displacement)
-        return np.asarray(own.reshape(-1, displacement.shape[2]), dtype=np.float64)
+        return np.asarray(own.reshape(3 * len(xyz), displacement.shape[2]), dtype=np.float64)
 
     def placing(self, xyz: Floats) -> Floats:
         """See :meth:`Artefact.placing`: three translations and three rotations of each placing."""
