@@ -1,76 +1,134 @@
-"""Diagnose concealed ballbar cases and count: python benchmarks/concealed/study.py [cases of each kind]."""
+"""Diagnose concealed cases and count: ``python benchmarks/concealed/study.py FOLDER [--cases 13] [--summary DOCS]``.
+
+The cases are made first and their truth is sealed by a hash. Every diagnosis is appended to ``FOLDER/found*.jsonl``, so that a
+run can be interrupted and resumed, or shared among processes (``--part``); ``--summary`` counts what is there.
+"""
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
-import tempfile
 import time
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from generator import case, seal
+from generator import DESIGNS, NOTHING, SIGNALS, case, seal
+from physics import UNIT, kind_of
+from rich.progress import track
 
-from cmm_uq.analysis.diagnosing import Diagnosed, diagnose_job
-
-KINDS = ("one", "two", "none", "noise stated wrongly", "set-up", "correlated", "tails", "outside")
-
-
-def right(truth: dict, found: Diagnosed) -> bool:
-    """Whether a verdict and its effects are what was hidden; an effect named in a group that holds it counts."""
-    d, hidden = found.diagnosis, set(truth["hidden"])
-    named = {item.effect for item in d.effects}
-    if truth["kind"] in ("one", "two"):
-        groups = [set(group) for group in d.indistinguishable]
-        covered = all(name in named or any(name in g and g & named for g in groups) for name in hidden)
-        surplus = [n for n in named - hidden if not any(n in g and g & hidden for g in groups)]
-        return covered and not surplus
-    return d.verdict == ("unexplained" if truth["kind"] == "outside" else "consistent")
+from cmm_uq.analysis.diagnosing import diagnose_job
 
 
-def main(count: int) -> None:
-    folder = Path(tempfile.mkdtemp(prefix="concealed-"))
-    truths, jobs = [], []
-    for k, kind in enumerate(KINDS):
-        for i in range(count):
-            job = folder / f"{k}-{i}"
-            placings, repeats = ((20, 2), (40, 2), (40, 3))[i % 3] if kind not in ("set-up",) else (40, 3)
-            truths.append(case(10_000 * k + i, kind, job, placings, repeats))
-            jobs.append(job)
-    print("truth sealed:", seal(truths), flush=True)
-    good, verdicts, covered, seconds = Counter(), Counter(), [], []
-    calibration = []
-    for truth, job in zip(truths, jobs, strict=True):
-        start = time.perf_counter()
-        found = diagnose_job(job)
-        seconds.append(time.perf_counter() - start)
-        d, correct = found.diagnosis, right(truth, found)
-        label = f"{truth['kind']}, {truth['placings']}" if truth["kind"] in ("one", "two") else truth["kind"]
-        good[label, correct] += 1
-        verdicts[truth["kind"], d.verdict] += 1
-        for item in d.effects:
-            calibration.append((item.probability, item.effect in truth["hidden"]))
-            if item.effect in truth["hidden"] and len(item.parameters) == 1:
-                (quantity,) = item.parameters.values()
-                low, high = quantity.interval95
-                wanted = truth["hidden"][item.effect] * (1e-6 if item.effect.startswith("thermal") else 1)
-                covered.append(low <= wanted <= high)
-        if not correct:
-            print("  wrong:", truth["kind"], truth["placings"], json.dumps(truth["root_lambda"]), "->", d.verdict,
-                  [(i.effect, round(i.probability, 3)) for i in d.effects], d.indistinguishable,
-                  [p.what for p in d.where[:1]], f"p={d.p_value:.2g}", flush=True)  # fmt: skip
-    for label in sorted({key for key, _ in good}):
-        total = good[label, True] + good[label, False]
-        print(f"{label:28s} right {good[label, True]:4d} of {total}")
-    print("verdicts", dict(verdicts))
-    print(f"coverage of 95 % intervals: {np.mean(covered):.3f} of {len(covered)}")
-    p, y = np.array(calibration).T if calibration else (np.zeros(0), np.zeros(0))
-    bins = np.digitize(p, [0.5, 0.8, 0.95, 0.99])
-    for b in np.unique(bins):
-        print(f"said {p[bins == b].mean():.3f}: right {y[bins == b].mean():.3f} of {np.sum(bins == b)}")
-    print(f"seconds a case: median {np.median(seconds):.2f}, longest {np.max(seconds):.2f}")
+def make(folder: Path, cases: int) -> list[dict]:
+    """All cases, by the folder's name; made once."""
+    sealed = folder / "truth.json"
+    if not sealed.exists():
+        truths = []
+        for d, what in enumerate(DESIGNS):
+            for k, kind in enumerate(SIGNALS + NOTHING):
+                for i in range(cases):
+                    name = f"{d}-{k}-{i}"
+                    try:
+                        truths.append({"name": name, **case(d * 10**6 + k * 10**4 + i, what, kind, folder / name)})
+                    except RuntimeError:
+                        break  # this artefact has nothing of the kind to hide
+        sealed.write_text(json.dumps(truths), encoding="utf-8")
+    truths = json.loads(sealed.read_text(encoding="utf-8"))
+    print(f"{len(truths)} cases, truth sealed: {seal(truths)}", flush=True)
+    return truths
+
+
+def diagnosed(job: Path) -> dict:
+    start = time.perf_counter()
+    d = diagnose_job(job).diagnosis
+    return {
+        "verdict": d.verdict, "p": d.p_value, "seconds": time.perf_counter() - start,
+        "effects": {
+            item.effect: {
+                "probability": item.probability,
+                "parameters": {k: [q.value, q.u, *q.interval95] for k, q in item.parameters.items()},
+            }
+            for item in d.effects
+        },
+        "groups": [list(group) for group in d.indistinguishable],
+        "rivals": [[name, p] for name, p in d.rivals[:4]],
+        "heldout": [d.improvement.heldout_rms_before_um, d.improvement.heldout_rms_after_um, d.improvement.elpd_gain],
+    }  # fmt: skip
+
+
+def right(truth: dict, found: dict) -> tuple[bool, bool]:
+    """Whether the verdict and the effects are what was hidden: strictly, and with groups that the oracle cannot part."""
+    hidden, named = set(truth["hidden"]), set(found["effects"])
+    if truth["kind"] in NOTHING:
+        good = found["verdict"] == "consistent"
+        return good, good
+    if truth["kind"] == "outside":
+        good = found["verdict"] in ("unexplained", "partial") and not named
+        return good, good
+    verdicts = ("explained", "partial") if truth["kind"] == "roughly" else ("explained",)
+    good = found["verdict"] in verdicts
+    groups = [set(group) for group in found["groups"]]
+    together = all(h in named or any(h in g and g & named for g in groups) for h in hidden)
+    innocent = [n for n in named - hidden if not any(n in g and g & hidden for g in groups)]
+    return good and named == hidden, good and together and not innocent
+
+
+def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:
+    """For every parameter of every hidden effect that was named, whether its interval holds the truth."""
+    listed = []
+    if truth["kind"] in ("roughly", "outside"):
+        return listed
+    for name, size in truth["hidden"].items():
+        for parameter, (_, _, low, high) in found["effects"].get(name, {"parameters": {}})["parameters"].items():
+            value = size * UNIT.get(kind_of(name), 1.0)
+            if parameter == "amplitude_um":
+                value = abs(size)
+            elif parameter == "period_mm":
+                value = truth["period"]
+            elif parameter == "phase_rad":
+                value = truth["phase"] + (np.pi if size < 0 else 0.0)
+                value = low + (value - low) % (2 * np.pi)
+            listed.append((parameter, bool(low <= value <= high)))
+    return listed
+
+
+def run(folder: Path, truths: list[dict], part: tuple[int, int], only: str | None) -> None:
+    done = {json.loads(line)["name"] for file in folder.glob("found*.jsonl") for line in file.read_text().splitlines()}
+    mine = [t for t in truths[part[0] - 1 :: part[1]] if t["name"] not in done and (only is None or only in t["kind"])]
+    with (folder / f"found{part[0]}.jsonl").open("a", encoding="utf-8") as out:
+        for truth in track(mine, "Diagnosing"):
+            found = diagnosed(folder / truth["name"])
+            out.write(json.dumps({"name": truth["name"], **found}) + "\n")
+            out.flush()
+
+
+def summary(folder: Path, truths: list[dict], docs: Path | None) -> None:
+    from report import write
+
+    by_name = {t["name"]: t for t in truths}
+    pairs = []
+    for file in sorted(folder.glob("found*.jsonl")):
+        for line in file.read_text(encoding="utf-8").splitlines():
+            found = json.loads(line)
+            pairs.append((by_name[found["name"]], found))
+    write(pairs, right, covered, seal(truths), docs)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--cases", type=int, default=13, help="of each kind and artefact")
+    parser.add_argument("--part", default="1/1", help="which part of how many, to share the work among processes")
+    parser.add_argument("--only", help="kinds that contain this word")
+    parser.add_argument("--summary", nargs="?", const="", help="count, and write page and plots into this folder")
+    chosen = parser.parse_args()
+    chosen.folder.mkdir(parents=True, exist_ok=True)
+    truths = make(chosen.folder, chosen.cases)
+    if chosen.summary is None:
+        part, of = map(int, chosen.part.split("/"))
+        run(chosen.folder, truths, (part, of), chosen.only)
+    summary(chosen.folder, truths, Path(chosen.summary) if chosen.summary else None)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 12)
+    main()
