@@ -176,6 +176,11 @@ class Comparison:
         }
 
     @cached_property
+    def visible(self) -> frozenset[int]:
+        """Explanations of which the baseline leaves anything."""
+        return frozenset(i for i, _ in self._where)
+
+    @cached_property
     def factors(self) -> list[Floats | None]:
         """Lower triangular factor (m', m') of each kind's covariance; ``None`` where that is one."""
         return [
@@ -265,7 +270,7 @@ class Comparison:
         return found
 
     def best(self, left: Floats, explanations: Sequence[int]) -> list[Version]:
-        """Version with most evidence among some explanations, for each column of data (m', b)."""
+        """Version with most evidence among some visible explanations, for each column of data (m', b)."""
         found = [Version(0, 0, 0.0)] * left.shape[1]
         most = np.full(left.shape[1], -np.inf)
         for group, each in self.each(left, (), explanations):

@@ -56,7 +56,7 @@ def _held_out(model: MeasurementModel) -> tuple[float, Floats]:
     linear = estimate.linear
     sigma = max(estimate.least_squares.sigma_of_residuals, 1e-7)
     errors, densities = [], []
-    for out in _folds(model.artefact.measurement[model.used]):
+    for out in _folds(_groups(model)):
         train = replace(
             linear, observed=linear.observed[~out], design=linear.design[~out], placing=linear.placing[~out],
             noise_scale=linear.noise_scale[~out], sigma=sigma,
@@ -78,11 +78,19 @@ def _held_out(model: MeasurementModel) -> tuple[float, Floats]:
     return _rms(np.concatenate(errors)), np.array(densities)
 
 
-def _folds(measurement: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
-    placings = np.unique(measurement)
-    count = min(len(placings), max(FOLDS, 2)) if len(placings) > 40 else len(placings)
+def _groups(model: MeasurementModel) -> NDArray[np.int64]:
+    """What is left out together: placings; of a single placing its points, each with its repeats."""
+    artefact, used = model.artefact, model.used
+    if len(np.unique(artefact.measurement[used])) > 1:
+        return artefact.measurement[used]
+    return artefact.points.point[artefact.rows[:, 0]][used]
+
+
+def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
+    groups = np.unique(group)
+    count = FOLDS if len(groups) > 40 else len(groups)
     for k in range(count):
-        yield np.isin(measurement, placings[k::count])
+        yield np.isin(group, groups[k::count])
 
 
 def _complement(columns: Floats) -> Floats:

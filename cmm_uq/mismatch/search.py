@@ -267,8 +267,14 @@ def _statistic(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
     nothing, something = comparison.log_evidence(data)
     odds = something - nothing
     log_odds = special.logsumexp(_log_prior(comparison.explanations)[:, None] + odds, axis=0)
-    single = [i for i, e in enumerate(comparison.explanations) if e.kind == EFFECT and len(e.members) == 1]
-    pair = np.log(EFFECTS[2] / EFFECTS[0]) - np.log(max(comb(len(single), 2), 1)) + np.log(NOTHING)
+    single = [
+        i
+        for i, e in enumerate(comparison.explanations)
+        if e.kind == EFFECT and len(e.members) == 1 and i in comparison.visible
+    ]
+    if len(single) < 2:
+        return log_odds, odds
+    pair = np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(len(single), 2)) + np.log(NOTHING)
     together: dict[Version, list[int]] = {}
     for column, version in enumerate(comparison.best(data, single)):
         together.setdefault(version, []).append(column)
