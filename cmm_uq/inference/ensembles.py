@@ -27,6 +27,8 @@ EFFECTIVE_SAMPLES = 4000
 LEAST_EFFECTIVE_SAMPLES = 1000
 LARGEST_RHAT = 1.01
 _T_DOF = 6.0
+_WIDER = 2.0
+"""Times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail."""
 
 Progress = Callable[[float], None]
 LogDensity = Callable[[Floats], Floats]
@@ -71,6 +73,7 @@ def run_ensembles(
     progress: Progress | None = None,
     *,
     effective_samples: int = EFFECTIVE_SAMPLES,
+    steps_at_once: int = STEPS_AT_ONCE,
 ) -> Chains:
     """Sample a density with emcee.
 
@@ -81,6 +84,7 @@ def run_ensembles(
     seed : the same seed gives the same draws.
     progress : told the part done, from 0 to 1.
     effective_samples : to reach in every parameter.
+    steps_at_once : between two looks at how many there are.
     """
     import emcee
 
@@ -94,15 +98,17 @@ def run_ensembles(
         )  # fmt: skip
         random = np.random.RandomState(np.random.MT19937(child))
         sampler.random_state = random.get_state()
-        states.append(sampler.run_mcmc(_t_draws(walkers, d, random), BURN_IN, store=False))
+        states.append(
+            sampler.run_mcmc(_start(lambda z: density(centre + z @ factor.T), walkers, d, random), BURN_IN, store=False)
+        )
         samplers.append(sampler)
     steps = 0
     while True:
         states = [
-            sampler.run_mcmc(state, STEPS_AT_ONCE, skip_initial_state_check=True)
+            sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
             for sampler, state in zip(samplers, states, strict=True)
         ]
-        steps += STEPS_AT_ONCE
+        steps += steps_at_once
         chains = np.stack([sampler.get_chain() for sampler in samplers])
         time, effective = _effective_samples(chains)
         if progress:
@@ -122,6 +128,7 @@ def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> t
     centre (d,) and factor (d, d), as :func:`run_ensembles` wants them.
     """
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
+    factor = _WIDER * factor
     for _ in range(3):
         z = _t_draws(500 * len(centre), len(centre), random)
         theta = centre + z @ factor.T
@@ -132,10 +139,21 @@ def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> t
         about = theta - mean
         covariance = (about * weight[:, None]).T @ about
         # too few draws that count would make it degenerate: the approximation is then better than its correction
-        if 1 / np.sum(weight**2) < 20 * len(centre):
+        if 1 / np.sum(weight**2) < 5 * len(centre):
             break
         centre, factor = mean, np.linalg.cholesky(covariance)
     return centre, factor
+
+
+def _start(density: LogDensity, walkers: int, d: int, random: Any) -> Floats:
+    """Where the walkers begin: draws that the density does not forbid."""
+    z = _t_draws(walkers, d, random)
+    for _ in range(100):
+        forbidden = ~np.isfinite(density(z))
+        if not forbidden.any():
+            break
+        z[forbidden] = _t_draws(int(forbidden.sum()), d, random)
+    return z
 
 
 def _independence(coordinates: Floats, random: Any) -> tuple[Floats, Floats]:
@@ -160,6 +178,8 @@ def _effective_samples(chains: Floats) -> tuple[float, float]:
 
     ensembles, steps, walkers, d = chains.shape
     merged = chains.transpose(1, 0, 2, 3).reshape(steps, ensembles * walkers, d)
+    if (np.ptp(merged, axis=0) == 0).any():  # a walker that never moved has no autocorrelation time yet
+        return float(steps), float(ensembles * walkers)
     time = float(np.max(np.maximum(integrated_time(merged, quiet=True, tol=0), 1.0)))
     return time, steps * ensembles * walkers / time
 

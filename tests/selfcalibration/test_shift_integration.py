@@ -123,7 +123,7 @@ def test_without_a_known_length_the_uncertainty_grows_to_the_end() -> None:
 
 
 def test_a_known_length_pins_both_of_its_ends_and_leaves_the_middle_worst() -> None:
-    """By hand: of n steps the readings' bridge is 2·i·(n − i)/n, and 2·i/n comes from the two that the length is compared with."""
+    """By hand: the bridge of n steps is 2·i·(n − i)/n; 2·i/n comes from the two readings that the length meets."""
     a = 20.0 * np.arange(23)
     law = integrated(a, a + 20, np.full((2, 23), 1e-3), known=KnownSpan(0, 22, 440.0, 0.0))
     i = np.arange(23)

@@ -1,0 +1,209 @@
+"""Readings of one artefact in several placings along an axis, checked, repeats averaged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.points import AXES, Floats, Ints, Points
+from cmm_uq.selfcalibration.smooth_model import Scatter
+
+NOISE_RATIO = "noise_ratio"
+"""Optional column: standard uncertainty of this reading over that of an ordinary one."""
+_ALIKE = 1e-3
+"""Shifts nearer to each other than this are the same, mm."""
+_MISPLACED = 0.1
+"""Part of the artefact's length by which a placing may differ from its nominal shift, at most and at least 1 mm."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftedSeries:
+    """Means over repeats, one row a reading.
+
+    Parameters
+    ----------
+    axis : that was read.
+    reading : (n,) scale readings, mm.
+    series, point : (n,) index of the placing, and of the artefact's point.
+    noise_scale : (n,) standard uncertainty of each mean over that of one ordinary reading.
+    time : (n,) s; ``None`` where it was not recorded.
+    shifts, u_shift : (s,) nominal shift of each placing and the standard uncertainty of each against the first, mm.
+    cosine : (s,) of the angle between artefact and axis in each placing, from the other two coordinates.
+    numbers : (p,) of the artefact's points, as recorded.
+    scatter : of repeats about their means; ``None`` without repeats.
+    """
+
+    axis: str
+    reading: Floats
+    series: Ints
+    point: Ints
+    noise_scale: Floats
+    time: Floats | None
+    shifts: Floats
+    u_shift: float
+    cosine: Floats
+    numbers: Ints
+    scatter: Scatter | None
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Lowest and highest reading, mm."""
+        return float(self.reading.min()), float(self.reading.max())
+
+    @cached_property
+    def positions(self) -> Floats:
+        """Where the axis was read, mm: readings nearer to each other than a tenth of the usual pitch are one place."""
+        ordered = np.sort(self.reading)
+        pitch = self.pitch
+        starts = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > 0.1 * pitch)
+        return np.asarray(np.add.reduceat(ordered, starts) / np.diff([*starts, len(ordered)]))
+
+    @cached_property
+    def pitch(self) -> float:
+        """Median distance of neighbouring points, mm."""
+        return float(np.median(np.abs(np.diff(self.reading[self.series == 0]))))
+
+    @cached_property
+    def pair(self) -> tuple[Floats, Floats] | None:
+        """Readings a and b (n,) of two complete series, for the integrations; ``None`` where there are more, or gaps."""
+        a, b = self.series == 0, self.series == 1
+        if len(self.shifts) != 2 or a.sum() != len(self.numbers) or b.sum() != len(self.numbers):
+            return None
+        return self.reading[a], self.reading[b]
+
+
+def shifted_series(points: Points, axis: str, shifts: Floats, u_shift: float, where: str = "") -> ShiftedSeries:
+    """Series from a recording: ``measurement`` numbers the placings, ``point`` the artefact's points.
+
+    Raises
+    ------
+    CmmUqError : what cannot be evaluated, and which placing would mend it.
+    """
+    placings = np.unique(points.measurement)
+    _check_shifts(shifts, placings)
+    keys, first, inverse, counts = np.unique(
+        np.column_stack([points.measurement, points.point]),
+        axis=0, return_index=True, return_inverse=True, return_counts=True,
+    )  # fmt: skip
+    inverse = inverse.ravel()
+    ratio = points.columns.get(NOISE_RATIO, np.ones(len(points)))
+    if (ratio <= 0).any():
+        raise CmmUqError(
+            "noise_ratio must be positive", where=where, fix="1 is an ordinary reading, 2 one twice as noisy"
+        )
+    weight = 1 / ratio**2
+    total = np.bincount(inverse, weight)
+    means = np.column_stack([np.bincount(inverse, weight * x) / total for x in points.readings.T])
+    along = AXES.index(axis)
+    reading = means[:, along]
+    numbers, point = np.unique(keys[:, 1], return_inverse=True)
+    series = np.searchsorted(placings, keys[:, 0])
+    lines = points.lines[first] if len(points.lines) else np.zeros(len(keys), dtype=np.int64)
+    _check_order(reading, series, placings, numbers[point], lines, where)
+    _check_common(series, point, numbers, placings, where)
+    _check_places(reading, series, point, shifts, placings, where)
+    left = (points.readings[:, along] - reading[inverse]) / ratio
+    repeats = len(points) - len(keys)
+    time = points.columns.get("time_s")
+    return ShiftedSeries(
+        axis, reading, series.astype(np.int64), point.astype(np.int64), 1 / np.sqrt(total),
+        None if time is None else np.bincount(inverse, time) / counts, shifts, u_shift, _cosines(means, series, along),
+        numbers, Scatter(float(left @ left), repeats) if repeats else None,
+    )  # fmt: skip
+
+
+def _check_shifts(shifts: Floats, placings: Ints) -> None:
+    where = "job.toml [artefact] shifts_mm"
+    if len(placings) < 2:
+        raise CmmUqError("the artefact was read in one placing only", where=where,
+                         fix="Shift it by about the pitch of its points and read it again")  # fmt: skip
+    if len(shifts) != len(placings):
+        raise CmmUqError(f"{len(shifts)} shifts for {len(placings)} series", where=where,
+                         fix="Give one shift a series, 0.0 for the first")  # fmt: skip
+    order = np.argsort(shifts)
+    for one, other in pairwise(order.tolist()):
+        if shifts[other] - shifts[one] < _ALIKE:
+            i, j = sorted((int(one), int(other)))
+            raise CmmUqError(
+                f"series {placings[i]} and {placings[j]} have the same shift, {shifts[i]:g} mm: a shift of zero against "
+                "each other shows nothing of the machine", where=where,
+                fix=f"Shift series {placings[j]} by about the pitch of the points; the same place read again is a repeat",
+            )  # fmt: skip
+
+
+def _check_order(reading: Floats, series: Ints, placings: Ints, number: Ints, lines: Ints, where: str) -> None:
+    """Every series must run the same way along the axis as the first."""
+    way = 0.0
+    for s, placing in enumerate(placings):
+        rows = np.flatnonzero(series == s)
+        steps = np.diff(reading[rows])
+        way = way or float(np.sign(reading[rows[-1]] - reading[rows[0]]))
+        bad = np.flatnonzero(np.sign(steps) != way)
+        if bad.size:
+            row = rows[bad[0] + 1]
+            raise CmmUqError(
+                f"series {placing}, point {number[row]} reads {reading[row]:g} mm, out of order after "
+                f"{reading[row - 1]:g} mm", where=f"{where} line {lines[row]}" if lines[row] else where or None,
+                fix="Number the points along the artefact, in every series the same way, or read this placing again",
+            )  # fmt: skip
+
+
+def _check_common(series: Ints, point: Ints, numbers: Ints, placings: Ints, where: str) -> None:
+    """A point that was read in one placing only says nothing; with two series both must have the same length."""
+    alone = np.flatnonzero(np.bincount(point, minlength=len(numbers)) < 2)
+    if alone.size:
+        there = placings[series[point == alone[0]][0]]
+        lengths = ", ".join(str(int((series == s).sum())) for s in range(len(placings)))
+        raise CmmUqError(
+            f"point {numbers[alone[0]]} is read in series {there} only (the series have {lengths} points)",
+            where=where or None,
+            fix=f"Read point {numbers[alone[0]]} in another series as well, or leave it out of series {there}",
+        )
+    for s, placing in enumerate(placings):
+        if (series == s).sum() < 2:
+            raise CmmUqError(f"series {placing} has fewer than two points", where=where or None,
+                             fix="Read more points in this placing, or leave it out")  # fmt: skip
+
+
+def _check_places(reading: Floats, series: Ints, point: Ints, shifts: Floats, placings: Ints, where: str) -> None:
+    """Each placing must stand where its shift says, and read part of a range that another reads too."""
+    base = np.zeros(point.max() + 1)
+    base[point] = reading - shifts[series]
+    lowest = np.array([reading[series == s].min() for s in range(len(placings))])
+    highest = np.array([reading[series == s].max() for s in range(len(placings))])
+    length = float(np.ptp(reading - shifts[series]))
+    for s, placing in enumerate(placings):
+        others = np.arange(len(placings)) != s
+        if not np.any((lowest[others] < highest[s]) & (highest[others] > lowest[s])):
+            raise CmmUqError(
+                f"series {placing}, shifted by {shifts[s]:g} mm, reads no range that another series reads: nothing is "
+                "read twice", where=where or None,
+                fix=f"Shift it by less than the {highest[s] - lowest[s]:g} mm it covers, best by the pitch of its points",
+            )  # fmt: skip
+    first = {int(p): float(r) for p, r in zip(point[series == 0], reading[series == 0], strict=True)}
+    for s, placing in enumerate(placings[1:], 1):
+        moved = [
+            r - first[int(p)] for p, r in zip(point[series == s], reading[series == s], strict=True) if int(p) in first
+        ]
+        nominal = shifts[s] - shifts[0]
+        if moved and abs(np.mean(moved) - nominal) > max(1.0, min(_MISPLACED * length, 0.5 * abs(nominal))):
+            raise CmmUqError(
+                f"series {placing} is shifted by {np.mean(moved):.4g} mm against the first, not by {nominal:g} mm",
+                where="job.toml [artefact] shifts_mm", fix=f"Write {shifts[0] + np.mean(moved):.4g}, or mend the recording",
+            )  # fmt: skip
+
+
+def _cosines(means: Floats, series: Ints, along: int) -> Floats:
+    """Cosine of the angle between artefact and axis in every placing, from straight lines through the other coordinates."""
+    found = np.ones(series.max() + 1)
+    across = [i for i in range(3) if i != along]
+    for s in range(len(found)):
+        rows = series == s
+        x = means[rows, along] - means[rows, along].mean()
+        slopes = x @ means[rows][:, across] / (x @ x)
+        found[s] = 1 / np.sqrt(1 + slopes @ slopes)
+    return found
