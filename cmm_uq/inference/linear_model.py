@@ -8,7 +8,7 @@ projected out exactly. Everything else in this room works on the reduced form th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -81,6 +81,11 @@ class LinearModel:
         Q, R, _ = linalg.qr(self.placing / self.noise_scale[:, None], mode="economic", pivoting=True)
         diagonal = np.abs(np.diag(R))
         return np.asarray(Q[:, diagonal > 1e-10 * diagonal[0]], dtype=np.float64)
+
+    def only(self, parameters: Sequence[int]) -> LinearModel:
+        """The model with some of its parameters, the others zero."""
+        chosen = list(parameters)
+        return replace(self, design=self.design[:, chosen], unknowns=tuple(self.unknowns[i] for i in chosen))
 
     def uncorrelated(self, correlation: Floats) -> tuple[LinearModel, Whiten]:
         """The same model in observations without correlation, and what turns columns (m, r) of the old into the new.

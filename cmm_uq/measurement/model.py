@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,6 +140,10 @@ class MeasurementModel:
         ------
         CmmUqError : the recording has too few observations.
         """
+        return self._estimate
+
+    @cached_property
+    def _estimate(self) -> Estimate:
         values = np.array([u.prior_mean for u in self.unknowns])
         for _ in range(10):
             linear = self.linearised(values)

@@ -9,8 +9,11 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.inference.least_squares import solve
+from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.posterior import Posterior, Progress
 from cmm_uq.measurement import MeasurementModel
+from cmm_uq.mismatch.evidence import Comparison
 from cmm_uq.mismatch.explanations import UNKNOWN, Explanation
 from cmm_uq.mismatch.held_out import Improvement, improvement
 from cmm_uq.mismatch.joint import Joint, joint_posterior
@@ -127,7 +130,7 @@ def diagnose(
     found = search(model, stated, alpha=alpha, seed=seed)
     gain = improvement(model, found.model)
     if found.effects and gain.elpd_gain <= 0:
-        found = replace(found, last=found.first, model=model, chosen=frozenset(), unexplained=1.0)
+        found = replace(found, last=found.first.comparison, model=model, chosen=frozenset(), unexplained=1.0)
         gain = improvement(model, model)
     noise = _noise(found.last, stated)
     known = None if stated is None else noise.coordinate.value * MICROMETRE
@@ -151,20 +154,20 @@ def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
     index = {found.first.explanations[i].name: i for i in found.chosen}
     posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
-    total = _squares(found.first.model) - _squares(found.model)
+    linear, first = found.model.estimate().linear, _squares(found.first.model.estimate().linear, ())
+    total = first - _squares(linear, ())
     listed = []
     for effect in (e for e in found.model.effects if e.name in found.effects):
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         reported = effect.to_reported(draws, joint.shapes.get(effect.name, np.zeros((len(draws), 0))))
         units = {parameter.name: parameter.unit for parameter in effect.reported}
-        without = replace(found.model, effects=tuple(e for e in found.model.effects if e is not effect))
-        share = (_squares(without) - _squares(found.model)) / _squares(found.first.model) if total > 0 else 0.0
+        share = (_squares(linear, [column[effect.name, c.name] for c in effect.coefficients]) - first + total) / first
         parameters = {
             name: Quantity.of_draws(_unwrapped(values) if name == "phase_rad" else values, units[name])
             for name, values in reported.items()
         }
         probability = found.combinations.of(index[effect.name]) if found.combinations else 0.0
-        listed.append(LeftOut(effect.name, effect.title, probability, parameters, share))
+        listed.append(LeftOut(effect.name, effect.title, probability, parameters, share if total > 0 else 0.0))
     return tuple(sorted(listed, key=lambda item: -item.probability))
 
 
@@ -174,8 +177,10 @@ def _unwrapped(phase: Floats) -> Floats:
     return np.asarray(middle + np.angle(np.exp(1j * (phase - middle))), dtype=np.float64)
 
 
-def _squares(model: MeasurementModel) -> float:
-    return float(np.sum(model.estimate().least_squares.residuals ** 2))
+def _squares(linear: LinearModel, without: Sequence[int]) -> float:
+    """Sum of squared residuals, in units of the noise scale, when some parameters are left out."""
+    kept = [i for i in range(len(linear.unknowns)) if i not in without]
+    return float(np.sum(solve(linear.only(kept)).residuals ** 2))
 
 
 def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
@@ -235,9 +240,8 @@ def _region(covariate: Floats, curve: Floats) -> tuple[float, float]:
     return float(covariate[first]), float(covariate[last])
 
 
-def _noise(race: Race, stated: float | None) -> NoiseFound:
+def _noise(comparison: Comparison, stated: float | None) -> NoiseFound:
     """Posterior of the noise, given what is modelled; a kind is named when it has nine parts of ten."""
-    comparison = race.comparison
     weight = comparison.noise_posterior()
     sigma = comparison.sigma / MICROMETRE
     sizes = np.array([kind.size if kind.name == "placing" else 0.0 for kind in comparison.kinds])
@@ -248,7 +252,7 @@ def _noise(race: Race, stated: float | None) -> NoiseFound:
         coordinate,
         _summary(placing, weight),
         probability.get("correlated", 0.0) > _NOISE_KIND,
-        _heavy(race),
+        probability.get("tails", 0.0) > _NOISE_KIND or _heavy(comparison),
         stated is not None
         and _contradicts(stated, comparison.left, comparison.factors[int(weight.sum(axis=1).argmax())]),
     )
@@ -272,9 +276,9 @@ def _summary(values: Floats, weight: Floats) -> Quantity:
     )
 
 
-def _heavy(race: Race) -> bool:
+def _heavy(comparison: Comparison) -> bool:
     """Whether Student's t with four degrees of freedom describes the residuals e⁴ times better than a normal."""
-    z: Floats = np.asarray(race.comparison.rest @ race.comparison.left, dtype=np.float64)
+    z: Floats = np.asarray(comparison.rest @ comparison.left, dtype=np.float64)
     deviation = float(z.std())
     if len(z) < 15 or deviation == 0:
         return False

@@ -200,11 +200,13 @@ class Comparison:
             for group in groups:
                 each = group.columns(white).reshape(len(white), -1, group.r).transpose(1, 2, 0)
                 blocks.append(each @ each.transpose(0, 2, 1))
-            log = float(np.log(kind.probability))
-            if factor is not None:
-                log -= float(np.log(np.diag(factor)).sum())
-            found.append(_Whitened(factor, white, tuple(blocks), log))
+            found.append(_Whitened(factor, white, tuple(blocks), self._log_kind(kind, factor)))
         return found
+
+    def _log_kind(self, kind: Kind, factor: Floats | None) -> float:
+        """Log probability of a kind of noise, less the logarithm of its determinant."""
+        determinant = 0.0 if factor is None else float(np.log(np.diag(factor)).sum())
+        return float(np.log(kind.probability)) + kind.log_factor - determinant
 
     def over_sigma(self, squares: Floats) -> Floats:
         """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape, from a table over ln(squares)."""
@@ -220,9 +222,9 @@ class Comparison:
     def noise_posterior(self) -> Floats:
         """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline."""
         log = np.stack([
-            some.log + self.log_sigma - len(self.left) * np.log(self.sigma)
-            - 0.5 * float(np.sum(some.of(self.left[:, None]) ** 2)) / self.sigma**2
-            for some in self._whitened
+            self._log_kind(kind, factor) + self.log_sigma - len(self.left) * np.log(self.sigma)
+            - 0.5 * float(np.sum(_white(factor, self.left[:, None]) ** 2)) / self.sigma**2
+            for kind, factor in zip(self.kinds, self.factors, strict=True)
         ])  # fmt: skip
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 

@@ -157,11 +157,29 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
             factors = [_UNKNOWN_SD * factor for factor in _smooth(readings)]
             members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
             found.append(Explanation(name, UNKNOWN, members, readings, factors[0], f"{axis}_mm"))
+    found += list(_changing(model, points, values))
     for name, covariate in covariates(model).items():
         factors = [_UNKNOWN_SD * factor for factor in _smooth(covariate)]
         members = tuple(Member(factor) for factor in factors)
         found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, factors[0], name))
     return found
+
+
+def _changing(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """Scales that change with time."""
+    time = points.columns.get("time_s")
+    if time is None or len(np.unique(time)) < 3:
+        return
+    for i, axis in enumerate(AXES):
+        readings = points.readings[:, i]
+        half = 0.5 * float(np.ptp(readings))
+        if half < 1.0:
+            continue
+        lever = ((readings - readings.mean()) / half)[:, None]
+        factors = [_UNKNOWN_SD * factor for factor in _smooth(time)]
+        members = tuple(Member(model.seen(_along(i, lever * factor), values)) for factor in factors)
+        name = f"scale of {axis.upper()} as a function of time"
+        yield Explanation(name, UNKNOWN, members, time, factors[0], "time_s")
 
 
 def _along(axis: int, factor: Floats) -> Floats:

@@ -55,7 +55,7 @@ def joint_posterior(found: Found, sigma: float | None, seed: int, progress: Prog
 def _correlation(found: Found) -> Floats:
     """Of the noise that is most probable once everything found is modelled."""
     kinds = plain_kinds(found.model)
-    weight = found.last.comparison.noise_posterior().sum(axis=1)
+    weight = found.last.noise_posterior().sum(axis=1)
     return kinds[int(np.argmax(weight))].correlation
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import special
 
 from cmm_uq.points import Floats, Ints
 
@@ -20,6 +21,13 @@ CORRELATIONS = (0.5, 0.85)
 WHITE = 0.8
 """Probability, beforehand, that noise is white; the rest is shared by the other kinds."""
 
+TAILS = 0.05
+"""Probability of heavy tails, taken from that of white noise."""
+
+_TAILS_DOF = 4.0
+_SHRINK = (_TAILS_DOF - 2) / _TAILS_DOF
+"""Square of the t distribution's scale over its standard deviation."""
+
 _STATED_IS_RIGHT = 0.9
 _STATED_SPREAD = 0.08
 _POINTS = 400
@@ -31,16 +39,33 @@ class Kind:
 
     Parameters
     ----------
-    name : ``white``, ``placing`` or ``correlated``.
+    name : ``white``, ``placing``, ``correlated`` or ``tails``.
     size : ratio of the placing's standard deviation to the reading's, or correlation of neighbours; 0 for white.
     correlation : (m, m) covariance over the variance of a reading.
     probability : beforehand.
+    log_factor : logarithm by which its density exceeds that of a normal distribution with this covariance.
     """
 
     name: str
     size: float
     correlation: Floats
     probability: float
+    log_factor: float = 0.0
+
+
+def tails(residual: Floats) -> Kind:
+    """Student's t with four degrees of freedom, by its tangent at residuals (m,) over the noise scale.
+
+    ln t is convex in the square of its argument, so that the tangent is a normal density below it, wherever it touches: the
+    evidence of this kind is never overstated. (σ stays the standard deviation of a reading.)
+    """
+    scale = 1.4826 * float(np.median(np.abs(residual)))
+    squares = (residual / max(scale, 1e-300)) ** 2 / _SHRINK
+    weight = (_TAILS_DOF + 1) / (_TAILS_DOF + squares)
+    log_t = special.gammaln((_TAILS_DOF + 1) / 2) - special.gammaln(_TAILS_DOF / 2) - 0.5 * np.log(np.pi * _TAILS_DOF)
+    log_t = log_t - 0.5 * (_TAILS_DOF + 1) * np.log1p(squares / _TAILS_DOF) - 0.5 * np.log(_SHRINK)
+    normal = -0.5 * np.log(2 * np.pi * _SHRINK / weight) - 0.5 * weight * squares
+    return Kind("tails", _TAILS_DOF, np.diag(_SHRINK / weight), TAILS, float(np.sum(log_t - normal)))
 
 
 def kinds(placing: Ints, order: Floats) -> list[Kind]:
@@ -53,7 +78,7 @@ def kinds(placing: Ints, order: Floats) -> list[Kind]:
     """
     m = len(placing)
     same = (placing[:, None] == placing[None, :]).astype(np.float64)
-    found = [Kind("white", 0.0, np.eye(m), WHITE)]
+    found = [Kind("white", 0.0, np.eye(m), WHITE - TAILS)]
     shared = same.sum() > m
     share = (1 - WHITE) / (len(CORRELATIONS) + shared * len(PLACING_RATIOS))
     if shared:

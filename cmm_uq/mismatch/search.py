@@ -29,7 +29,7 @@ from cmm_uq.mismatch.explanations import (
     several,
     unknown,
 )
-from cmm_uq.mismatch.noise import Kind, kinds, order_of, sigma_grid
+from cmm_uq.mismatch.noise import Kind, kinds, order_of, sigma_grid, tails
 from cmm_uq.physics.catalogue import CATALOGUE
 from cmm_uq.points import Floats, Ints
 
@@ -87,7 +87,8 @@ class Found:
 
     Parameters
     ----------
-    first, last : races before anything is found, and after everything is.
+    first : race before anything is found.
+    last : what is left after everything is, without rivals.
     combinations : of explanations, with their probabilities; ``None`` while the gate is closed.
     chosen : indices, in the first race, of the known effects that are found.
     versions : of them, and of what is unknown besides, in the most probable combination.
@@ -96,7 +97,7 @@ class Found:
     """
 
     first: Race
-    last: Race
+    last: Comparison
     combinations: Combinations | None
     chosen: Key
     versions: tuple[Version, ...]
@@ -121,7 +122,7 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     """
     first = race_of(model, stated, seed)
     if first.p_value >= alpha:
-        return Found(first, first, None, frozenset(), (), model, 0.0)
+        return Found(first, first.comparison, None, frozenset(), (), model, 0.0)
     combinations = explore(first.comparison)
     if periods := _periods(combinations):
         explanations = [
@@ -133,7 +134,7 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     chosen = _asserted(combinations)
     versions = combinations.versions(chosen)
     found = model if not chosen else _with(first, versions, chosen)
-    last = first if not chosen else race_of(found, stated, None)
+    last = comparison_of(found, stated, ())
     return Found(first, last, combinations, chosen, versions, found, combinations.unknown_beside(chosen))
 
 
@@ -160,32 +161,33 @@ def _with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
     return combinations.of(index) + sum(combinations.of(i) for i, odds in rivals.items() if odds > NOT_TOLD_APART)
 
 
-def race_of(model: MeasurementModel, stated: float | None, seed: int | None) -> Race:
-    """Let all rivals compete for what a model leaves.
-
-    Parameters
-    ----------
-    seed : of the null distribution; without one the p-value is not computed (1).
-    """
-    estimate = model.estimate()
-    values, linear = estimate.least_squares.value, estimate.linear
+def race_of(model: MeasurementModel, stated: float | None, seed: int) -> Race:
+    """Let all rivals compete for what a model leaves; ``seed`` is that of the null distribution."""
+    values = model.estimate().least_squares.value
     singles = known(model, values, tuple(effect.name for effect in model.effects))
     rivals = singles + several(singles) + unknown(model, values)
-    sigma_left = max(estimate.least_squares.sigma_of_residuals, 1e-6)
-    sigma, log_sigma = sigma_grid(stated, sigma_left)
-    held = _held(model)
-    rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
-    comparison = Comparison(
-        rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.placing]) / linear.noise_scale[:, None],
-        noise_kinds(model, sigma_left), sigma, log_sigma, rivals, linear.noise_scale,
-        stated or sigma_left / _MISFIT,
-    )  # fmt: skip
+    comparison = comparison_of(model, stated, rivals)
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]
     log_prior = _log_prior(rivals)
     log_total = special.logsumexp(np.append(log_prior + log_odds, np.log(NOTHING)))
-    p_value, maxima = (1.0, np.zeros(0)) if seed is None else _gate(comparison, seed)
+    p_value, maxima = _gate(comparison, seed)
     return Race(model, values, comparison, log_odds, np.exp(log_prior + log_odds - log_total), p_value, maxima)
+
+
+def comparison_of(model: MeasurementModel, stated: float | None, rivals: Sequence[Explanation]) -> Comparison:
+    """Rivals, possibly none, against what a model leaves."""
+    estimate = model.estimate()
+    linear = estimate.linear
+    sigma_left = max(estimate.least_squares.sigma_of_residuals, 1e-6)
+    sigma, log_sigma = sigma_grid(stated, sigma_left)
+    held = _held(model)
+    rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
+    return Comparison(
+        rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.placing]) / linear.noise_scale[:, None],
+        noise_kinds(model, sigma_left), sigma, log_sigma, rivals, linear.noise_scale,
+        stated or sigma_left / _MISFIT,
+    )  # fmt: skip
 
 
 def _with(race: Race, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
@@ -204,7 +206,8 @@ def plain_kinds(model: MeasurementModel) -> list[Kind]:
     """Kinds of noise of the used observations."""
     time = model.artefact.points.columns.get("time_s")
     order = order_of(None if time is None else mean_of(model, time), int(model.used.sum()))
-    return kinds(repeated_quantity(model), order)
+    least_squares, linear = model.estimate().least_squares, model.estimate().linear
+    return [*kinds(repeated_quantity(model), order), tails(least_squares.residuals / linear.noise_scale)]
 
 
 def repeated_quantity(model: MeasurementModel) -> Ints:

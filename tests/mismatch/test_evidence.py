@@ -8,7 +8,7 @@ from scipy import special, stats
 
 from cmm_uq.mismatch.evidence import Comparison
 from cmm_uq.mismatch.explanations import EFFECT, Explanation, Member
-from cmm_uq.mismatch.noise import kinds, sigma_grid
+from cmm_uq.mismatch.noise import kinds, sigma_grid, tails
 from cmm_uq.mismatch.search import tail_probability
 from cmm_uq.points import Floats
 
@@ -100,6 +100,19 @@ def test_a_stated_noise_is_mostly_believed() -> None:
     assert p[~near].sum() > 0.01
 
 
+def test_the_evidence_of_heavy_tails_is_below_that_of_student_s_t_and_meets_it_at_the_tangent() -> None:
+    random = np.random.default_rng(9)
+    residual = 3e-3 * random.standard_t(4, 40)
+    kind = tails(residual)
+    scale = np.sqrt(np.diag(kind.correlation))
+    sigma = 1.4826 * np.median(np.abs(residual))
+    for data, tangent in ((residual, True), (3e-3 * random.standard_t(4, 40), False)):
+        bound = stats.norm.logpdf(data, scale=sigma * scale).sum() + kind.log_factor
+        exact = stats.t.logpdf(data, 4, scale=sigma * np.sqrt(0.5)).sum()
+        assert bound <= exact + 1e-9
+        assert (bound == pytest.approx(exact, abs=1e-9)) == tangent
+
+
 def test_placings_are_a_kind_of_noise_only_where_they_are_repeated() -> None:
     alone = {kind.name for kind in kinds(np.arange(6), np.arange(6.0))}
     assert alone == {"white", "correlated"}
@@ -107,4 +120,5 @@ def test_placings_are_a_kind_of_noise_only_where_they_are_repeated() -> None:
     (half,) = [kind for kind in repeated if kind.name == "placing" and kind.size == 0.5]
     assert half.correlation[0, 1] == 0.25
     assert half.correlation[0, 3] == 0.0
-    assert sum(kind.probability for kind in repeated) == pytest.approx(1.0)
+    heavy = tails(np.arange(1.0, 7.0))
+    assert sum(kind.probability for kind in [*repeated, heavy]) == pytest.approx(1.0)
