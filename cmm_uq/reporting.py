@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.analysis import Result, analyse
+from cmm_uq.analysis import Result, ShiftResult, analyse
 from cmm_uq.analysis.diagnosing import diagnose_job
 from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
@@ -28,13 +28,15 @@ class Report:
     files : what was written, by name.
     """
 
-    result: Result
+    result: Result | ShiftResult
     results: bytes
     files: dict[str, Path]
 
 
 def write_report(job: Path, out: Path | None = None, *, seed: int = 0, stage: Stage | None = None) -> Report:
     """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
+
+    A shift job adds its correction table, an error map.
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ def write_diagnosis(
     return WrittenDiagnosis(found, data, files)
 
 
-def _contents(result: Result, tell: Stage) -> dict[str, bytes]:
+def _contents(result: Result | ShiftResult, tell: Stage) -> dict[str, bytes]:
     from cmm_uq.certificate.compose import certificate
     from cmm_uq.certificate.html import render_html
     from cmm_uq.certificate.pdf import render_pdf
@@ -114,7 +116,16 @@ def _contents(result: Result, tell: Stage) -> dict[str, bytes]:
 
     tell("Composing the certificate", 0.5)
     document = certificate(result)
-    data = as_json(results(result))
+    more: dict[str, bytes] = {}
+    if isinstance(result, ShiftResult):
+        from cmm_uq.certificate.shift_results import shift_results
+        from cmm_uq.certificate.shift_section import TABLE_FILE
+        from cmm_uq.selfcalibration.correction_table import table_text
+
+        data = as_json(shift_results(result))
+        more[TABLE_FILE] = table_text(result.table)
+    else:
+        data = as_json(results(result))
     tell("Rendering", 0.8)
     pdf = render_pdf(document, {**result.job.inputs, "results.json": data})
-    return {"certificate.html": render_html(document).encode(), "certificate.pdf": pdf, "results.json": data}
+    return {"certificate.html": render_html(document).encode(), "certificate.pdf": pdf, "results.json": data, **more}

@@ -10,14 +10,16 @@ from pathlib import Path
 from cmm_uq.analysis.diagnosing import diagnosed, screened_model
 from cmm_uq.analysis.estimation import accuracy, influences, noise, parameters, sizes, with_noise
 from cmm_uq.analysis.result import Result
+from cmm_uq.analysis.shifting import KIND, ShiftResult, analyse_shift
 from cmm_uq.conformity.standards import statement
 from cmm_uq.inference.posterior import Progress, sample
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import read_job
 
-__all__ = ["Result", "analyse"]
+__all__ = ["Result", "ShiftResult", "analyse", "analyse_observations"]
 
 
-def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) -> Result:
+def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) -> Result | ShiftResult:
     """Analyse a job.
 
     Parameters
@@ -31,6 +33,18 @@ def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) ->
     CmmUqError : the job cannot be analysed as it stands.
     """
     job = read_job(folder)
+    if job.facts.artefact.kind == KIND:
+        return analyse_shift(job, seed=seed, progress=progress)
+    return analyse_observations(job, seed=seed, progress=progress)
+
+
+def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Result:
+    """Analyse a job whose observations are explained by named effects: every kind but shift.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be analysed as it stands.
+    """
     screened, findings = screened_model(job)
     model, estimate, p_value = with_noise(screened)
     posterior = sample(estimate.linear, seed, progress)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cmm_uq.analysis.estimation import model_of, without_outliers
 from cmm_uq.analysis.result import Diagnosed
+from cmm_uq.analysis.shifting import refuse_shift
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
@@ -35,6 +36,7 @@ def diagnose_job(
     if not 1e-6 <= alpha <= 0.5:
         raise CmmUqError(f"a false-alarm rate of {alpha:g}", fix="Give one between 0.000001 and 0.5; 0.01 is usual")
     job = read_job(folder)
+    refuse_shift(job, "diagnosed")
     model, findings = screened_model(job)
     return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
 

@@ -6,12 +6,14 @@ from collections.abc import Callable, Mapping
 
 from cmm_uq import __version__
 from cmm_uq.analysis.result import Result
+from cmm_uq.analysis.shifting import ShiftResult
 from cmm_uq.certificate import (
     ballbar_section,
     bryan_section,
     gauge_section,
     plane_section,
     plate_section,
+    shift_section,
     sphere_section,
     tolerance_section,
     triangle_section,
@@ -23,7 +25,7 @@ from cmm_uq.certificate.warning import warnings
 from cmm_uq.certificate.wording import expanded, listed, probability, title_of, units_of
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.standards import Statement
-from cmm_uq.jobs.job import JobFile
+from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.uncertainty.rounding import rounded, significant
 from cmm_uq.units import MICROMETRE
 
@@ -52,29 +54,37 @@ ARTEFACT_SECTIONS: Mapping[str, Callable[[Result], list[Section]]] = {
 """What each kind of artefact adds to a certificate."""
 
 
-def certificate(result: Result) -> Document:
+def certificate(result: Result | ShiftResult) -> Document:
     """The certificate of a result, complete but for its looks."""
-    facts = result.job.facts
+    if isinstance(result, ShiftResult):
+        sampler, seed = result.estimate.chains.sampler, result.estimate.seed
+        return _document(result.job, shift_section.sections(result), shift_section.warnings(result), sampler, seed)
     sections = [_performance(result), _conformity(result), _errors(result), _traceability(result)]
     sections += tolerance_section.sections(result)
     sections += ARTEFACT_SECTIONS[result.artefact.kind](result)
-    if facts.job.diagnosis_on_certificate:
+    if result.job.facts.job.diagnosis_on_certificate:
         sections += diagnosis_sections(result.diagnosed)
     sections += [_posterior(result), _method(result)]
+    return _document(result.job, sections, warnings(result), result.posterior.sampler, result.posterior.seed)
+
+
+def _document(job: Job, sections: list[Section], told: tuple[str, ...], sampler: str, seed: int) -> Document:
+    """Sections and warnings between what every certificate has."""
+    facts = job.facts
     return Document(
         title="Calibration certificate",
         number=facts.job.number or facts.job.id,
         subject=f"{facts.machine.name}, measured on {facts.job.date.isoformat()}",
         issuer=tuple(line for line in (facts.laboratory.name, *facts.laboratory.address.splitlines()) if line),
         particulars=_particulars(facts),
-        warnings=warnings(result),
+        warnings=told,
         sections=tuple(section for section in sections if section.blocks),
         statements=STATEMENTS,
         signatures=(Signature(facts.laboratory.signatory, facts.laboratory.signatory_role),)
         if facts.laboratory.signatory
         else (),
-        attachments=(*result.job.inputs, "results.json"),
-        produced_by=f"cmm-uq {__version__}, {result.posterior.sampler}, seed {result.posterior.seed}",
+        attachments=(*job.inputs, "results.json"),
+        produced_by=f"cmm-uq {__version__}, {sampler}, seed {seed}",
         date=facts.job.issued or facts.job.date,
     )
 

@@ -58,7 +58,8 @@ def undetermined(series: ShiftedSeries, *, scale_known: bool) -> Undetermined:
     known, _ = np.linalg.qr(np.column_stack(trivial))
     free = free - known @ (known.T @ free)
     basis, sizes, _ = np.linalg.svd(free, full_matrices=False)
-    return Undetermined(common_period(series.shifts), basis[:, sizes > 1e-6])
+    # pitches and shifts a little off their nominals leave of the slope itself no more than their own relative error
+    return Undetermined(common_period(series.shifts), basis[:, sizes > _ALIKE])
 
 
 def common_period(shifts: Floats) -> float:

@@ -1,0 +1,122 @@
+"""The joint estimate of an axis: what it finds of a known error, and what it must agree with."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.selfcalibration.curve import CurveEstimate, estimate_curve
+from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan, integrated
+from cmm_uq.selfcalibration.series import shifted_series
+
+_SPEC = importlib.util.spec_from_file_location("shifted", Path(__file__).with_name("shifted.py"))
+assert _SPEC is not None
+assert _SPEC.loader is not None
+shifted = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(shifted)
+PITCH_20, bent, read = shifted.PITCH_20, shifted.bent, shifted.read
+
+NOISE = 1.1e-3
+KNOWN = KnownSpan(0, 22, 440.0, 0.0)
+
+
+def off(estimate: CurveEstimate, error=bent):
+    """True minus estimated error, and the standard uncertainty, at the positions read."""
+    curve, start = estimate.curve, estimate.series.reading[0]
+    return error(curve.position) - error(np.array([start])) - curve.error, curve.u
+
+
+@pytest.fixture(scope="module")
+def paper() -> CurveEstimate:
+    """The paper's data: 23 points, 20 mm, ten readings of 1.1 µm, one shift by the pitch."""
+    points = read(bent, PITCH_20, (0.0, 20.0), NOISE, 10)
+    return estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0]), 0.5), KNOWN)
+
+
+def test_the_chains_converge(paper: CurveEstimate) -> None:
+    assert paper.chains.converged
+
+
+def test_the_true_curve_lies_in_the_simultaneous_band_widened_to_a_chance_of_one_in_ten_thousand(
+    paper: CurveEstimate,
+) -> None:
+    away, u = off(paper)
+    assert np.all(np.abs(away[u > 1e-7]) < 5.0 * u[u > 1e-7])
+
+
+def test_repeats_give_the_repeatability(paper: CurveEstimate) -> None:
+    """460 readings: to 1/√(2·414) = 3.5 %, three times that."""
+    assert paper.sigma.mean() == pytest.approx(NOISE, rel=0.105)
+
+
+def test_the_posterior_agrees_with_the_law_of_propagation_where_smoothness_adds_little(paper: CurveEstimate) -> None:
+    """A shift by the pitch joins all points: the integration is unbiased, and the joint fit at most as uncertain."""
+    a, b = paper.series.pair
+    law = integrated(a, b, np.full((2, 23), paper.sigma.mean() / np.sqrt(10)), known=KNOWN)
+    joint = paper.at(a)
+    assert np.all(joint.u[1:] <= 1.1 * law.u[1:])  # 2000 draws know u to 1.6 %; growth and σ add to the posterior's
+    assert np.all(joint.u[5:18] > 0.8 * law.u[5:18])
+    assert np.all(np.abs(joint.error - law.error) < 3 * law.u + 1e-12)
+
+
+def test_the_known_length_is_met_exactly(paper: CurveEstimate) -> None:
+    np.testing.assert_allclose(paper.artefact[:, 22], 440.0, atol=1e-9)
+
+
+def test_without_noise_three_placings_give_the_curve_and_the_artefact() -> None:
+    places = PITCH_20 + np.random.default_rng(3).normal(0, 0.01, 23)
+    points = read(bent, places, (0.0, 20.0, 47.0))
+    known = KnownSpan(0, 22, places[22] - places[0], 0.0)
+    estimate = estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0, 47.0]), 0.5), known, sigma=1e-5)
+    away, _ = off(estimate)
+    assert np.abs(away).max() < 0.2e-3
+    np.testing.assert_allclose(estimate.artefact.mean(axis=0), places - places[0], atol=0.2e-3)
+
+
+def test_points_missing_in_a_placing_cost_little() -> None:
+    points = read(bent, PITCH_20, (0.0, 20.0, 47.0), 0.2e-3, 3)
+    gone = ((points.measurement == 2) & (points.point == 7)) | ((points.measurement == 3) & (points.point > 18))
+    series = shifted_series(points.select(~gone), "x", np.array([0.0, 20.0, 47.0]), 0.5)
+    estimate = estimate_curve(series, KNOWN)
+    away, u = off(estimate)
+    assert np.all(np.abs(away[u > 1e-7]) < 5 * u[u > 1e-7])
+
+
+def test_an_artefact_turned_a_little_sideways_reads_shorter_by_its_cosine() -> None:
+    """2 mrad: 440 mm shorten by 0.88 µm in that placing alone; the other coordinates tell."""
+    points = read(lambda x: 0 * x, PITCH_20, (0.0, 20.0))
+    turned = points.measurement == 2
+    x = points.xyz[:, 0].copy()
+    xyz = np.column_stack([
+        np.where(turned, 20 + (x - 20) * np.cos(2e-3), x), np.where(turned, (x - 20) * np.sin(2e-3), 0), 0 * x
+    ])  # fmt: skip
+    series = shifted_series(replace(points, xyz=xyz), "x", np.array([0.0, 20.0]), 0.5)
+    assert series.cosine == pytest.approx([1.0, np.cos(2e-3)], abs=1e-12)
+    estimate = estimate_curve(series, KNOWN, sigma=1e-5)
+    assert np.abs(estimate.curve.error).max() < 0.05e-3
+
+
+def test_without_a_known_length_and_shift_the_curve_is_zero_at_both_ends() -> None:
+    points = read(bent, PITCH_20, (0.0, 20.0), NOISE, 3)
+    estimate = estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0]), 0.5))
+    ends = estimate.at(estimate.series.reading[[0, 22]])
+    assert not estimate.scale_known
+    np.testing.assert_allclose(ends.draws, 0.0, atol=1e-12)
+
+
+def test_a_shift_known_exactly_gives_the_scale() -> None:
+    """50 ppm: a shift of 20 mm, read without noise, shows 1 nm a µm of scale."""
+    points = read(lambda x: 50e-6 * x, PITCH_20, (0.0, 20.0))
+    estimate = estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0]), 0.0), sigma=1e-5)
+    assert estimate.scale.mean() == pytest.approx(50e-6, abs=0.5e-6)
+
+
+def test_the_same_seed_gives_the_same_draws() -> None:
+    points = read(bent, PITCH_20, (0.0, 20.0), NOISE, 2)
+    series = shifted_series(points, "x", np.array([0.0, 20.0]), 0.5)
+    one, other = (estimate_curve(series, KNOWN, seed=5).curve.draws for _ in range(2))
+    np.testing.assert_array_equal(one, other)
