@@ -11,6 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cmm_uq.errors import suggestion
+from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.points import Points
 
 ArtefactKind = Literal[
@@ -274,6 +275,7 @@ class JobFile(_Table):
     recording: RecordingFacts
     model: ModelFacts
     conformity: list[ConformityFacts] = []
+    plan: PlanFacts = PlanFacts()
 
 
 @dataclass(frozen=True, eq=False)

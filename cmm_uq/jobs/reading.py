@@ -13,15 +13,16 @@ from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.job import Job, JobFile, MachineFacts
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.toml_file import checked
-from cmm_uq.points import AXES, Machine
+from cmm_uq.points import AXES, Machine, Points
 
 
-def read_job(folder: Path) -> Job:
+def read_job(folder: Path, *, recorded: bool = True) -> Job:
     """Read and check a job.
 
     Parameters
     ----------
     folder : the job folder, or its job.toml.
+    recorded : whether the recording must be there; otherwise a job still to be measured has no points.
 
     Raises
     ------
@@ -36,13 +37,17 @@ def read_job(folder: Path) -> Job:
     if earlier is not None and facts.artefact.kind != "plate":
         raise CmmUqError(f"earlier compares two recordings of a plate, not of a {facts.artefact.kind}",
                          where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
+    machine = _machine(facts.machine)
+    if not recorded and not _inside(folder, facts.recording.file, path).exists():
+        none = np.zeros(0, dtype=np.int64)
+        return Job(folder, facts, Points(np.zeros((0, 3)), none, none, none, machine), inputs)
     for name in (
         facts.recording.file,
         *filter(None, [earlier]),
         *(error_map.file for error_map in facts.machine.error_map),
     ):
         inputs[name] = content_of(_inside(folder, name, path), f"Put it beside job.toml, or mend its name in {path}")
-    machine, where = _machine(facts.machine), str(folder / facts.recording.file)
+    where = str(folder / facts.recording.file)
     points = read_recording(inputs[facts.recording.file], where, machine)
     if earlier is not None:
         then = read_recording(inputs[earlier], str(folder / earlier), machine)
