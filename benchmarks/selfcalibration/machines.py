@@ -50,8 +50,8 @@ def _wandering(random: np.random.Generator) -> Error:
 FAMILIES = (_polynomial, _waves, _ballscrew, _wandering)
 
 
-def machine(random: np.random.Generator) -> Error:
-    """e of one axis, zero at 0 and 440 mm, 27 µm from peak to valley at the 20 mm positions between."""
+def machine(random: np.random.Generator) -> tuple[Error, frozenset[int]]:
+    """e of one axis, zero at 0 and 440 mm, 27 µm from peak to valley at the 20 mm positions between; and its families."""
     chosen = random.permutation(4)[: random.integers(1, 3)]
     parts = [(FAMILIES[i](random), random.uniform(0.3, 1.0)) for i in chosen]
     scaled = [(part, weight / np.ptp(part(FULL))) for part, weight in parts]
@@ -65,7 +65,7 @@ def machine(random: np.random.Generator) -> Error:
         return raw(x) - ends[0] - (ends[1] - ends[0]) * x / LENGTH
 
     size = PEAK_TO_VALLEY / np.ptp(level(FULL))
-    return lambda x: size * level(x)
+    return lambda x: size * level(x), frozenset(chosen.tolist())
 
 
 @dataclass(frozen=True)

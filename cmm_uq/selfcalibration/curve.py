@@ -7,7 +7,7 @@ The artefact's dimensions X and the slope are free; D is known, or known within 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.ensembles import Chains, Progress, refined, run_ensembles
 from cmm_uq.points import Floats
 from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
-from cmm_uq.selfcalibration.series import ShiftedSeries
+from cmm_uq.selfcalibration.series import RepeatedDrift, ShiftedSeries
 from cmm_uq.selfcalibration.smooth_function import FINEST, SmoothFunction
 from cmm_uq.selfcalibration.smooth_model import Coefficients, SmoothModel
 from cmm_uq.units import HOUR, MICROMETRE
@@ -26,7 +26,7 @@ DRAWS = 2000
 EFFECTIVE_SAMPLES = 2000
 _TYPICAL = 5 * MICROMETRE
 _DRIFT = 10 * MICROMETRE
-"""Standard deviation of the drift while a series is read, mm per hour."""
+"""Standard deviation of the drift, mm per hour."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,8 @@ class CurveEstimate:
         found = model.functions[0]
         explained = c.flat.mean(axis=0) @ model.flat.T + c.columns.mean(axis=0) @ model.columns.T
         explained += found.factor * c.function(0, found.position).mean(axis=0)
-        return np.asarray(before), np.asarray(model.observed - explained)
+        count = len(self.series.reading)
+        return np.asarray(before[:count]), np.asarray((model.observed - explained)[:count])
 
 
 def estimate_curve(
@@ -207,8 +208,7 @@ def _model(series: ShiftedSeries, known: KnownSpan | None, sigma: float | None) 
         columns += [(series.series == s).astype(np.float64) for s in range(1, len(series.shifts))]
         sd += [series.u_shift] * (len(series.shifts) - 1)
     if series.time is not None:
-        middle = np.bincount(series.series, series.time) / np.bincount(series.series)
-        columns.append((series.time - middle[series.series]) / HOUR)
+        columns.append((series.time - series.time[series.series == 0].mean()) / HOUR)
         sd.append(_DRIFT)
     if known is not None:
         ends = cosine * (series.point == known.last)
@@ -220,7 +220,23 @@ def _model(series: ShiftedSeries, known: KnownSpan | None, sigma: float | None) 
     smooth = SmoothFunction(
         f"linearity_{series.axis}", low, high, shortest, series.reading, -np.ones(len(series.reading)), _TYPICAL
     )
-    return SmoothModel(
+    model = SmoothModel(
         observed, series.noise_scale, flat, np.column_stack(columns) if columns else np.zeros((len(observed), 0)),
         np.array(sd, dtype=np.float64), (smooth,), None if sigma is not None else series.scatter, sigma,
+    )  # fmt: skip
+    return (
+        model if series.drift is None else _with_drift_seen(model, series.drift, series.u_shift > 0, len(series.shifts))
+    )
+
+
+def _with_drift_seen(model: SmoothModel, seen: RepeatedDrift, shifts_free: bool, count: int) -> SmoothModel:
+    """One observation more: the drift that repeats show, of the column that stands after those of the shifts."""
+    row = np.zeros((1, model.columns.shape[1]))
+    row[0, count - 1 if shifts_free else 0] = 1.0
+    smooth = model.functions[0]
+    nowhere = replace(smooth, position=np.r_[smooth.position, smooth.low], factor=np.r_[smooth.factor, 0.0])
+    return replace(
+        model, observed=np.r_[model.observed, seen.rate], noise_scale=np.r_[model.noise_scale, seen.noise_scale],
+        flat=np.vstack([model.flat, np.zeros((1, model.flat.shape[1]))]), columns=np.vstack([model.columns, row]),
+        functions=(nowhere,),
     )  # fmt: skip

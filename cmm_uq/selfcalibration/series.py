@@ -11,13 +11,30 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.selfcalibration.smooth_model import Scatter
+from cmm_uq.units import HOUR
 
 NOISE_RATIO = "noise_ratio"
 """Optional column: standard uncertainty of this reading over that of an ordinary one."""
 _ALIKE = 1e-3
 """Shifts nearer to each other than this are the same, mm."""
+_LATER = 0.01
+"""Root of the sum of squares of the times between repeats, h, from which on they show a drift."""
 _MISPLACED = 0.1
 """Part of the artefact's length by which a placing may differ from its nominal shift, at most and at least 1 mm."""
+
+
+@dataclass(frozen=True)
+class RepeatedDrift:
+    """Drift as repeats of the same reading at different times show it.
+
+    Parameters
+    ----------
+    rate : mm per hour.
+    noise_scale : its standard uncertainty over that of one ordinary reading, per hour.
+    """
+
+    rate: float
+    noise_scale: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +51,8 @@ class ShiftedSeries:
     shifts, u_shift : (s,) nominal shift of each placing and the standard uncertainty of each against the first, mm.
     cosine : (s,) of the angle between artefact and axis in each placing, from the other two coordinates.
     numbers : (p,) of the artefact's points, as recorded.
-    scatter : of repeats about their means; ``None`` without repeats.
+    scatter : of repeats about their means and their drift; ``None`` without repeats.
+    drift : from repeats at different times; ``None`` where there are none.
     """
 
     axis: str
@@ -48,6 +66,7 @@ class ShiftedSeries:
     cosine: Floats
     numbers: Ints
     scatter: Scatter | None
+    drift: RepeatedDrift | None = None
 
     @property
     def span(self) -> tuple[float, float]:
@@ -85,9 +104,9 @@ def shifted_series(points: Points, axis: str, shifts: Floats, u_shift: float, wh
     """
     placings = np.unique(points.measurement)
     _check_shifts(shifts, placings)
-    keys, first, inverse, counts = np.unique(
+    keys, first, inverse = np.unique(
         np.column_stack([points.measurement, points.point]),
-        axis=0, return_index=True, return_inverse=True, return_counts=True,
+        axis=0, return_index=True, return_inverse=True,
     )  # fmt: skip
     inverse = inverse.ravel()
     ratio = points.columns.get(NOISE_RATIO, np.ones(len(points)))
@@ -107,13 +126,29 @@ def shifted_series(points: Points, axis: str, shifts: Floats, u_shift: float, wh
     _check_common(series, point, numbers, placings, where)
     _check_places(reading, series, point, shifts, placings, where)
     left = (points.readings[:, along] - reading[inverse]) / ratio
-    repeats = len(points) - len(keys)
-    time = points.columns.get("time_s")
+    time = _mean_times(points, inverse, weight)
+    drift = None if time is None else _drift(left, (points.columns["time_s"] - time[inverse]) / ratio)
+    dof = len(points) - len(keys) - (drift is not None)
+    if drift is not None and time is not None:
+        left -= drift.rate * (points.columns["time_s"] - time[inverse]) / ratio / HOUR
     return ShiftedSeries(
         axis, reading, series.astype(np.int64), point.astype(np.int64), 1 / np.sqrt(total),
-        None if time is None else np.bincount(inverse, time) / counts, shifts, u_shift, _cosines(means, series, along),
-        numbers, Scatter(float(left @ left), repeats) if repeats else None,
+        time, shifts, u_shift, _cosines(means, series, along), numbers,
+        Scatter(float(left @ left), dof) if dof else None, drift,
     )  # fmt: skip
+
+
+def _mean_times(points: Points, inverse: Ints, weight: Floats) -> Floats | None:
+    time = points.columns.get("time_s")
+    return None if time is None else np.asarray(np.bincount(inverse, weight * time) / np.bincount(inverse, weight))
+
+
+def _drift(left: Floats, later: Floats) -> RepeatedDrift | None:
+    """From deviations of repeats, and how much later each was read, s, both over the noise of the reading."""
+    hours = later / HOUR
+    squares = float(hours @ hours)
+    # repeats one right after the other say nothing of a drift
+    return RepeatedDrift(float(hours @ left) / squares, squares**-0.5) if squares > _LATER**2 else None
 
 
 def _check_shifts(shifts: Floats, placings: Ints) -> None:

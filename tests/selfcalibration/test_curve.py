@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmm_uq.points import Points
 from cmm_uq.selfcalibration.curve import CurveEstimate, estimate_curve
 from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan, integrated
 from cmm_uq.selfcalibration.series import shifted_series
@@ -98,6 +99,41 @@ def test_an_artefact_turned_a_little_sideways_reads_shorter_by_its_cosine() -> N
     assert series.cosine == pytest.approx([1.0, np.cos(2e-3)], abs=1e-12)
     estimate = estimate_curve(series, KNOWN, sigma=1e-5)
     assert np.abs(estimate.curve.error).max() < 0.05e-3
+
+
+def forth_and_back(rate: float, noise: float) -> tuple[Points, Points]:
+    """Two series, the second read forth and halfway back, while the machine drifts, mm/h; half an hour forth and back.
+
+    With and without the time of each reading.
+    """
+    points = read(bent, PITCH_20, (0.0, 20.0), noise, 2)
+    points = points.select((points.repeat == 1) | ((points.measurement == 2) & (points.point > 8)))
+    way = np.where(points.repeat == 1, points.point - 1, 46 - points.point) / 45
+    time = 1800.0 * (way + points.measurement - 1)
+    drifting = replace(points, xyz=points.xyz + np.column_stack([rate * time / 3600, 0 * time, 0 * time]))
+    return replace(drifting, columns={"time_s": time}), drifting
+
+
+def test_drift_is_told_from_the_curve_where_series_are_read_forth_and_back() -> None:
+    """6 µm/h; read one way only, a drift makes b − a change linearly along the axis, as a parabola of errors would."""
+    timed, blind = forth_and_back(6e-3, 0.0)
+    shifts = np.array([0.0, 20.0])
+    series = shifted_series(timed, "x", shifts, 0.5)
+    assert series.drift is not None
+    assert series.drift.rate == pytest.approx(6e-3, rel=1e-4)
+    away, _ = off(estimate_curve(series, KNOWN, sigma=1e-5))
+    worse, _ = off(estimate_curve(shifted_series(blind, "x", shifts, 0.5), KNOWN, sigma=1e-5))
+    assert np.ptp(away) < 0.2e-3 < 1e-3 < np.ptp(worse)
+
+
+def test_repeats_tell_the_repeatability_apart_from_the_drift() -> None:
+    """15 differences of two readings, one spent on the drift: known to 1/√28 = 19 %; three times that."""
+    timed, blind = forth_and_back(20e-3, NOISE)
+    scatters = [shifted_series(p, "x", np.array([0.0, 20.0]), 0.5).scatter for p in (timed, blind)]
+    assert scatters[0] is not None
+    assert scatters[1] is not None
+    assert scatters[0].sigma == pytest.approx(NOISE, rel=0.57)
+    assert scatters[1].sigma > 2 * NOISE
 
 
 def test_without_a_known_length_and_shift_the_curve_is_zero_at_both_ends() -> None:
