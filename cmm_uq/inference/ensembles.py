@@ -8,12 +8,12 @@ the ensembles are compared with each other.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import special
 
 from cmm_uq.points import Floats
 
@@ -115,9 +115,8 @@ def run_ensembles(
             progress(min(1.0, effective / effective_samples))
         if (effective >= effective_samples and steps > 50 * time) or steps >= MOST_STEPS:
             break
-    rhat = _rhat(chains.reshape(ENSEMBLES, -1, d))
     draws = centre + chains.reshape(-1, d) @ factor.T
-    return Chains(draws, f"emcee {emcee.__version__}", effective, rhat, steps, time)
+    return Chains(draws, f"emcee {emcee.__version__}", effective, rhat(chains.reshape(ENSEMBLES, -1, d)), steps, time)
 
 
 def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> tuple[Floats, Floats]:
@@ -184,10 +183,35 @@ def _effective_samples(chains: Floats) -> tuple[float, float]:
     return time, steps * ensembles * walkers / time
 
 
-def _rhat(chains: Floats) -> float:
-    """Largest rank-normalised split R-hat, each ensemble one chain: walkers of one ensemble are not independent."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)
-        import arviz
-    result = arviz.rhat(arviz.convert_to_dataset({"z": chains}), method="rank")
-    return float(result["z"].max())
+def rhat(chains: Floats) -> float:
+    """Largest rank-normalised split R-hat of the parameters, bulk or tail (Vehtari et al. 2021, section 4).
+
+    Parameters
+    ----------
+    chains : (c, n, d) independent chains.
+    """
+    half = chains.shape[1] // 2
+    split = np.concatenate([chains[:, :half], chains[:, -half:]])
+    folded = np.abs(split - np.median(split, axis=(0, 1)))
+    return max(float(_split_rhat(_normal_scores(values)).max()) for values in (split, folded))
+
+
+def _normal_scores(values: Floats) -> Floats:
+    """Normal quantiles of the ranks of (c, n, d) values, for each parameter over all chains; ties share their rank."""
+    flat = values.reshape(-1, values.shape[2])
+    ranks = np.empty_like(flat)
+    for rank, column in zip(ranks.T, flat.T, strict=True):
+        _, place, count = np.unique(column, return_inverse=True, return_counts=True)
+        rank[:] = (np.cumsum(count) - 0.5 * (count - 1))[place]
+    return np.asarray(special.ndtri((ranks - 0.375) / (len(flat) + 0.25)), dtype=np.float64).reshape(values.shape)
+
+
+def _split_rhat(values: Floats) -> Floats:
+    """√((n − 1)/n + B/(n·W)) with the variances between and within chains, (d,)."""
+    n = values.shape[1]
+    within = values.var(axis=1, ddof=1).mean(axis=0)
+    between = values.mean(axis=1).var(axis=0, ddof=1)
+    with np.errstate(
+        divide="ignore", invalid="ignore"
+    ):  # chains that never moved: infinite or not a number, not converged
+        return np.asarray(np.sqrt((n - 1) / n + between / within), dtype=np.float64)

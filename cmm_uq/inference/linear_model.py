@@ -87,18 +87,16 @@ class LinearModel:
         chosen = list(parameters)
         return replace(self, design=self.design[:, chosen], unknowns=tuple(self.unknowns[i] for i in chosen))
 
-    def uncorrelated(self, correlation: Floats) -> tuple[LinearModel, Whiten]:
+    def uncorrelated(self, whiten: Whiten) -> tuple[LinearModel, Whiten]:
         """The same model in observations without correlation, and what turns columns (m, r) of the old into the new.
 
         Parameters
         ----------
-        correlation : (m, m) of the noise, in units of the noise scale.
+        whiten : what turns noise (m, r), in units of the noise scale, into white noise.
         """
-        factor = linalg.cholesky(correlation, lower=True)
 
         def white(columns: Floats) -> Floats:
-            scaled = columns / self.noise_scale[:, None]
-            return np.asarray(linalg.solve_triangular(factor, scaled, lower=True), dtype=np.float64)
+            return whiten(columns / self.noise_scale[:, None])
 
         observed = white(self.observed[:, None])[:, 0]
         model = replace(

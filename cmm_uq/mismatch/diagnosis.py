@@ -221,9 +221,11 @@ def _where(race: Race, alpha: float) -> tuple[Place, ...]:
 def _smoothed(race: Race, explanation: Explanation, values: Floats) -> tuple[Floats, Floats]:
     """Best linear estimate (p,) of an unknown function and its standard uncertainty, mm, at the noise of the residuals."""
     comparison = race.comparison
-    left = comparison.rest.T @ (explanation.members[0].columns / comparison.noise_scale[:, None])
+    left = comparison.rest(explanation.members[0].columns / comparison.noise_scale[:, None])
     least = comparison.left - left @ np.linalg.lstsq(left, comparison.left, rcond=None)[0]
-    variance = max(float(least @ least) / max(len(least) - left.shape[1], 1), comparison.least_noise**2)
+    variance = max(
+        float(least @ least) / max(comparison.degrees_of_freedom - left.shape[1], 1), comparison.least_noise**2
+    )
     covariance = np.linalg.inv(left.T @ left / variance + np.eye(left.shape[1]))
     estimate = values @ (covariance @ left.T @ comparison.left) / variance
     return estimate, np.sqrt(np.einsum("pi,ij,pj->p", values, covariance, values))
@@ -254,7 +256,7 @@ def _noise(comparison: Comparison, stated: float | None) -> NoiseFound:
         probability.get("correlated", 0.0) > _NOISE_KIND,
         probability.get("tails", 0.0) > _NOISE_KIND or _heavy(comparison),
         stated is not None
-        and _contradicts(stated, comparison.left, comparison.factors[int(weight.sum(axis=1).argmax())]),
+        and _contradicts(stated, comparison.squares[int(weight.sum(axis=1).argmax())], comparison.degrees_of_freedom),
     )
 
 
@@ -278,7 +280,7 @@ def _summary(values: Floats, weight: Floats) -> Quantity:
 
 def _heavy(comparison: Comparison) -> bool:
     """Whether Student's t with four degrees of freedom describes the residuals e⁴ times better than a normal."""
-    z: Floats = np.asarray(comparison.rest @ comparison.left, dtype=np.float64)
+    z = comparison.left
     deviation = float(z.std())
     if len(z) < 15 or deviation == 0:
         return False
@@ -289,8 +291,7 @@ def _heavy(comparison: Comparison) -> bool:
     return bool((log_t - len(z) * np.log(scales)).max() - (-0.5 * len(z) * (np.log(2 * np.pi) + 1)) > 4.0)
 
 
-def _contradicts(stated: float, left: Floats, factor: Floats | None) -> bool:
+def _contradicts(stated: float, squares: float, count: int) -> bool:
     """Two-sided χ² test of the stated noise at 1 %."""
-    white = (left if factor is None else np.linalg.solve(factor, left)) / stated
-    p = float(special.chdtrc(len(left), white @ white))
+    p = float(special.chdtrc(count, squares / stated**2))
     return min(p, 1 - p) < 0.005

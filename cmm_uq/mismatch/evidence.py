@@ -11,11 +11,13 @@ beside them needs nothing but the inner products of all columns, which are compu
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from scipy import linalg, special
+from numpy.typing import NDArray
+from scipy import linalg, sparse, special
 
 from cmm_uq.mismatch.explanations import Explanation
 from cmm_uq.mismatch.noise import Kind
@@ -28,7 +30,7 @@ _SMALLEST = 0.4
 _ABSORBED = 1e-5
 """Part of its length below which a column is the baseline's own."""
 
-_BLOCK = 1_500_000
+_BLOCK, _COLUMNS = 1_500_000, 500
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class _Group:
     r: int
 
     def columns(self, stack: Floats) -> Floats:
-        """Their columns (m', M·r)."""
+        """Their columns (m, M·r)."""
         first, last = int(self.start[0]), int(self.start[-1]) + self.r
         if last - first == len(self.start) * self.r:
             return stack[:, first:last]
@@ -79,21 +81,21 @@ class _Group:
 
 
 @dataclass(frozen=True, eq=False)
-class _Whitened:
-    """Under one kind of noise.
+class _Noise:
+    """One kind of noise, what the baseline reaches projected out.
 
-    ``factor`` (``None`` for one), ``stack`` (m', K), ``blocks`` (M, r, r) the inner products of each group's members, and
-    ``log``, the logarithm of its probability less that of its determinant.
+    The precision of what is left is WᵀW − rowsᵀ·rows, with the whitening W (m, m); ``log``, the log probability less that of
+    the determinant.
     """
 
-    factor: Floats | None
-    stack: Floats
-    blocks: tuple[Floats, ...]
+    whitening: sparse.csr_array
+    rows: Floats
     log: float
 
-    def of(self, data: Floats) -> Floats:
-        """Data (m', b) in units of this noise."""
-        return _white(self.factor, data)
+    def __call__(self, columns: Floats) -> Floats:
+        """Precision times columns (m, b)."""
+        whole = self.whitening.T @ (self.whitening @ columns)
+        return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +111,7 @@ class Comparison:
     explanations : rivals; columns in mm.
     noise_scale : (m,).
     least_noise : mm, the least that the noise may be; with it the largest coefficients are as large as physics allows.
+    certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
     """
 
     observed: Floats
@@ -119,24 +122,34 @@ class Comparison:
     explanations: Sequence[Explanation]
     noise_scale: Floats
     least_noise: float
+    certified: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     @cached_property
-    def rest(self) -> Floats:
-        """(m, m') orthonormal basis of what the baseline leaves."""
+    def _reached(self) -> Floats:
+        """(m, m − m') orthonormal basis of what the baseline reaches."""
         if not self.baseline.shape[1]:
-            return np.eye(len(self.observed))
+            return np.zeros((len(self.observed), 0))
         length = np.linalg.norm(self.baseline, axis=0)
-        U, s, _ = linalg.svd(self.baseline / np.where(length > 0, length, 1.0), full_matrices=True)
-        return np.asarray(U[:, int(np.sum(s > 1e-9 * s[0])) :], dtype=np.float64)
+        U, s, _ = linalg.svd(self.baseline / np.where(length > 0, length, 1.0), full_matrices=False)
+        return np.asarray(U[:, s > 1e-9 * s[0]], dtype=np.float64)
+
+    def rest(self, columns: Floats) -> Floats:
+        """What the baseline leaves of columns (m, b)."""
+        return columns - self._reached @ (self._reached.T @ columns)
 
     @cached_property
     def left(self) -> Floats:
-        """(m',) what the baseline leaves of the observations."""
-        return self.rest.T @ self.observed
+        """(m,) what the baseline leaves of the observations."""
+        return self.rest(self.observed[:, None])[:, 0]
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """m', how many observations that is worth."""
+        return int(len(self.observed) - self._reached.shape[1])
 
     @cached_property
     def _stack(self) -> tuple[Floats, tuple[_Group, ...]]:
-        """Columns (m', K) that the baseline leaves of all members, those with equally many together."""
+        """Columns (m, K) that the baseline leaves of all members, those with equally many together."""
         found: dict[int, list[tuple[int, int, float, Floats]]] = {}
         whole = [
             (owner, j, np.log(member.weight / total), member.columns / self.noise_scale[:, None])
@@ -145,16 +158,16 @@ class Comparison:
             for j, member in enumerate(explanation.members)
         ]
         lefts = np.split(
-            self.rest.T @ np.hstack([columns for *_, columns in whole]),
+            self.rest(np.hstack([columns for *_, columns in whole])),
             np.cumsum([columns.shape[1] for *_, columns in whole])[:-1], axis=1,
         ) if whole else []  # fmt: skip
         for (owner, j, log, columns), left in zip(whole, lefts, strict=True):
             if linalg.norm(left) > _ABSORBED * linalg.norm(columns):
                 found.setdefault(columns.shape[1], []).append((owner, j, log, left))
-        groups, stack, start = [], [np.zeros((self.rest.shape[1], 0))], 0
+        groups, stack, start = [], [np.zeros((len(self.observed), 0))], 0
         for r in sorted(found):
             chosen = found[r]
-            rms = np.array([linalg.norm(left) for *_, left in chosen]) / np.sqrt(max(self.rest.shape[1], 1))
+            rms = np.array([linalg.norm(left) for *_, left in chosen]) / np.sqrt(max(self.degrees_of_freedom, 1))
             largest = 1 / self.least_noise
             smallest = np.minimum(_SMALLEST / rms, largest)
             amplitudes = largest * (smallest / largest)[:, None] ** np.linspace(0, 1, AMPLITUDES)
@@ -180,33 +193,59 @@ class Comparison:
         """Explanations of which the baseline leaves anything."""
         return frozenset(i for i, _ in self._where)
 
-    @cached_property
-    def factors(self) -> list[Floats | None]:
-        """Lower triangular factor (m', m') of each kind's covariance; ``None`` where that is one."""
-        return [
-            None
-            if np.array_equal(kind.correlation, np.eye(len(kind.correlation)))
-            else np.asarray(linalg.cholesky(self.rest.T @ kind.correlation @ self.rest, lower=True))
-            for kind in self.kinds
-        ]
+    def noise(self, kind: Kind, random: np.random.Generator, draws: int) -> Floats:
+        """What the baseline leaves (m, draws) of noise of one kind, a reading's standard deviation being one."""
+        found = kind.noise(random.standard_normal((len(self.observed), draws)))
+        if self.certified.size:
+            found += self.certified @ random.standard_normal((self.certified.shape[1], draws))
+        return self.rest(found)
 
     @cached_property
-    def _whitened(self) -> list[_Whitened]:
-        stack, groups = self._stack
+    def _noises(self) -> list[_Noise]:
         found = []
-        for kind, factor in zip(self.kinds, self.factors, strict=True):
-            white = _white(factor, stack)
-            blocks = []
-            for group in groups:
-                each = group.columns(white).reshape(len(white), -1, group.r).transpose(1, 2, 0)
-                blocks.append(each @ each.transpose(0, 2, 1))
-            found.append(_Whitened(factor, white, tuple(blocks), self._log_kind(kind, factor)))
+        for kind in self.kinds:
+            Q, R = np.linalg.qr(kind.white(self._reached))
+            log = float(np.log(kind.probability)) + kind.log_factor + kind.log_whitening - _log_diagonal(R)
+            rows = kind.whitening.T @ Q
+            if self.certified.size:
+                white = kind.white(self.certified)
+                white -= Q @ (Q.T @ white)
+                factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white)
+                log -= _log_diagonal(factor)
+                certified = np.linalg.solve(factor, white.T)
+                rows = np.hstack([rows, kind.whitening.T @ certified.T])
+            found.append(_Noise(kind.whitening, np.asarray(rows.T, dtype=np.float64), log))
         return found
 
-    def _log_kind(self, kind: Kind, factor: Floats | None) -> float:
-        """Log probability of a kind of noise, less the logarithm of its determinant."""
-        determinant = 0.0 if factor is None else float(np.log(np.diag(factor)).sum())
-        return float(np.log(kind.probability)) + kind.log_factor - determinant
+    @cached_property
+    def _blocks(self) -> list[list[Floats]]:
+        """Inner products (M, r, r) of each member's columns, by kind of noise and group."""
+        stack, groups = self._stack
+        found = []
+        for noise in self._noises:
+            blocks = []
+            for group in groups:
+                parts = np.array_split(group.columns(stack), max(1, len(group.start) * group.r // _COLUMNS), axis=1)
+                other = np.hstack([noise(part) for part in parts]).T.reshape(-1, group.r, len(stack))
+                each = group.columns(stack).T.reshape(-1, group.r, len(stack))
+                blocks.append(each @ other.transpose(0, 2, 1))
+            found.append(blocks)
+        return found
+
+    @cached_property
+    def _left_weighed(self) -> list[Floats]:
+        """Precision times what the baseline leaves (m, 1), by kind of noise."""
+        return [noise(self.left[:, None]) for noise in self._noises]
+
+    @cached_property
+    def squares(self) -> Floats:
+        """Sum of squares of what the baseline leaves, mm², whitened by each kind of noise."""
+        return np.array([float(self.left @ weighed[:, 0]) for weighed in self._left_weighed])
+
+    @cached_property
+    def _weighed(self) -> dict[tuple[int, int], list[Floats]]:
+        """Precision times the columns of members that were ever granted, by kind of noise."""
+        return {}
 
     def over_sigma(self, squares: Floats) -> Floats:
         """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape, from a table over ln(squares)."""
@@ -216,15 +255,17 @@ class Comparison:
     @cached_property
     def _table(self) -> tuple[Floats, Floats]:
         nodes = np.linspace(-16.0, 8.0, 1500) + np.log(float(self.left @ self.left))
-        exponent = self.log_sigma - len(self.left) * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
+        exponent = (
+            self.log_sigma - self.degrees_of_freedom * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
+        )
         return nodes, np.asarray(special.logsumexp(exponent, axis=1), dtype=np.float64)
 
     def noise_posterior(self) -> Floats:
         """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline."""
         log = np.stack([
-            self._log_kind(kind, factor) + self.log_sigma - len(self.left) * np.log(self.sigma)
-            - 0.5 * float(np.sum(_white(factor, self.left[:, None]) ** 2)) / self.sigma**2
-            for kind, factor in zip(self.kinds, self.factors, strict=True)
+            noise.log + self.log_sigma - self.degrees_of_freedom * np.log(self.sigma)
+            - 0.5 * squares / self.sigma**2
+            for noise, squares in zip(self._noises, self.squares, strict=True)
         ])  # fmt: skip
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
@@ -238,17 +279,16 @@ class Comparison:
 
         Parameters
         ----------
-        left : (m', b) data, by default the recording's.
+        left : (m, b) data, by default the recording's.
         granted : explanations taken for granted.
         explanations : to consider, by default all; minus infinity for the others.
         """
-        data = self.left[:, None] if left is None else left
-        total = np.full((len(self.explanations), data.shape[1]), -np.inf)
-        for group, each in self.each(data, granted, explanations):
+        total = np.full((len(self.explanations), 1 if left is None else left.shape[1]), -np.inf)
+        for group, each in self.each(left, granted, explanations):
             gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight[:, None]
             for explanation, gain in zip(group.explanation, gains, strict=True):
                 total[explanation] = np.logaddexp(total[explanation], gain)
-        return self.log_evidence_of(granted, data), total
+        return self.log_evidence_of(granted, left), total
 
     def beside(
         self, granted: Sequence[Version] = (), explanations: Sequence[int] | None = None
@@ -256,7 +296,7 @@ class Comparison:
         """Log evidence of each explanation beside what is granted, and its best version."""
         found: dict[int, tuple[float, Version]] = {}
         best: dict[int, float] = {}
-        for group, cube in self.each(self.left[:, None], granted, explanations):
+        for group, cube in self.each(None, granted, explanations):
             each = cube[:, :, 0]
             gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight
             at = each.argmax(axis=1)
@@ -272,7 +312,7 @@ class Comparison:
         return found
 
     def best(self, left: Floats, explanations: Sequence[int]) -> list[Version]:
-        """Version with most evidence among some visible explanations, for each column of data (m', b)."""
+        """Version with most evidence among some visible explanations, for each column of data (m, b)."""
         found = [Version(0, 0, 0.0)] * left.shape[1]
         most = np.full(left.shape[1], -np.inf)
         for group, each in self.each(left, (), explanations):
@@ -285,37 +325,41 @@ class Comparison:
         return found
 
     def log_evidence_of(self, granted: Sequence[Version], left: Floats | None = None) -> Floats:
-        """Log evidence (b,) of what is granted, at the size granted, for data (m', b)."""
-        data = self.left[:, None] if left is None else left
-        every = [
-            self.over_sigma(known.squares) + known.log
-            for known in (self._beside(some, data, granted) for some in self._whitened)
-        ]
+        """Log evidence (b,) of what is granted, at the size granted, for data (m, b)."""
+        every = [self.over_sigma(known.squares) + known.log for known in self._beside(left, granted)]
         return np.asarray(special.logsumexp(np.stack(every), axis=0), dtype=np.float64)
 
     def each(
-        self, data: Floats, granted: Sequence[Version], explanations: Sequence[int] | None = None
+        self, data: Floats | None, granted: Sequence[Version], explanations: Sequence[int] | None = None
     ) -> Iterator[tuple[_Group, Floats]]:
         """Log evidence (M, a, b) of every member at every size beside what is granted, by groups of members."""
-        _, groups = self._stack
-        known = [self._beside(some, data, granted) for some in self._whitened]
+        stack, groups = self._stack
+        known = self._beside(data, granted)
+        ends = np.cumsum([each.seen_by.shape[1] for each in known])[:-1]
+        seen_by = np.hstack([each.seen_by for each in known])
         for index, group in enumerate(groups):
             chosen = group.only(explanations)
             if not len(chosen.start):
                 continue
             position = (chosen.start - group.start[0]) // group.r
-            total = np.full((len(position), AMPLITUDES, data.shape[1]), -np.inf)
-            for white, beside in zip(self._whitened, known, strict=True):
-                np.logaddexp(total, self._under(white, beside, chosen, white.blocks[index][position]), out=total)
+            seen = (chosen.columns(stack).T @ seen_by).reshape(len(position), group.r, -1)
+            total = np.full((len(position), AMPLITUDES, len(known[0].squares)), -np.inf)
+            for beside, blocks, part in zip(known, self._blocks, np.split(seen, ends, axis=2), strict=True):
+                one = self._under(beside, chosen, blocks[index][position], part)
+                np.logaddexp(total, one, out=total)
             yield chosen, total
 
-    def _under(self, white: _Whitened, beside: _Beside, group: _Group, blocks: Floats) -> Floats:
-        """Log evidence (M, a, b) of a group's members under one kind of noise."""
-        columns = group.columns(white.stack)
-        shape = len(group.start), group.r
-        shown = (columns.T @ beside.data).reshape(*shape, -1)  # (M, r, b)
-        if beside.rows.shape[0]:
-            hidden = (beside.rows @ columns).reshape(-1, *shape).transpose(1, 2, 0)
+    def _under(self, beside: _Beside, group: _Group, blocks: Floats, seen: Floats) -> Floats:
+        """Log evidence (M, a, b) of a group's members under one kind of noise.
+
+        Parameters
+        ----------
+        blocks : (M, r, r) their inner products.
+        seen : (M, r, b + g) theirs with the data and with what is granted.
+        """
+        shown = seen[:, :, : len(beside.squares)]
+        if seen.shape[2] > len(beside.squares):
+            hidden = seen[:, :, len(beside.squares) :]
             blocks = blocks - hidden @ hidden.transpose(0, 2, 1)
         strengths, turn = (blocks[:, 0], None) if group.r == 1 else np.linalg.eigh(blocks)
         strengths = np.maximum(strengths, 1e-300)
@@ -332,32 +376,50 @@ class Comparison:
         found += beside.log - 0.5 * np.log1p(ratio).sum(axis=2)[..., None]
         return found
 
-    def _beside(self, white: _Whitened, data: Floats, granted: Sequence[Version]) -> _Beside:
-        """Data whitened by one kind of noise and what is granted."""
-        residual = white.of(data)
-        squares = np.sum(residual**2, axis=0)
-        if not granted:
-            return _Beside(residual, np.zeros((0, len(residual))), squares, white.log)
-        columns = np.hstack([v.amplitude * white.stack[:, self._where[v.explanation, v.member]] for v in granted])
-        factor = np.linalg.cholesky(np.eye(columns.shape[1]) + columns.T @ columns)
-        rows = np.linalg.solve(factor, columns.T)
-        seen = rows @ residual
-        log = white.log - float(np.log(np.diag(factor)).sum())
-        return _Beside(residual - rows.T @ seen, rows, squares - np.sum(seen**2, axis=0), log)
+    def _beside(self, data: Floats | None, granted: Sequence[Version]) -> list[_Beside]:
+        """Data (m, b), the recording's by default, weighed by each kind of noise and what is granted."""
+        plain = self.left[:, None] if data is None else data
+        columns = [version.amplitude * self._columns(version) for version in granted]
+        taken = np.hstack(columns) if granted else None
+        found = []
+        for index, noise in enumerate(self._noises):
+            weighed = self._left_weighed[index] if data is None else noise(data)
+            squares = np.einsum("mb,mb->b", plain, weighed)
+            if taken is None:
+                found.append(_Beside(weighed, squares, noise.log))
+                continue
+            other = np.hstack([v.amplitude * self._weighed_columns(v)[index] for v in granted])
+            factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ other)
+            rows = np.linalg.solve(factor, other.T)
+            seen = rows @ plain
+            log = noise.log - _log_diagonal(factor)
+            found.append(_Beside(np.hstack([weighed - rows.T @ seen, rows.T]), squares - np.sum(seen**2, axis=0), log))
+        return found
+
+    def _columns(self, version: Version) -> Floats:
+        return self._stack[0][:, self._where[version.explanation, version.member]]
+
+    def _weighed_columns(self, version: Version) -> list[Floats]:
+        key = version.explanation, version.member
+        if key not in self._weighed:
+            self._weighed[key] = [noise(self._columns(version)) for noise in self._noises]
+        return self._weighed[key]
 
 
-def _white(factor: Floats | None, data: Floats) -> Floats:
-    return data if factor is None else np.asarray(linalg.solve_triangular(factor, data, lower=True), dtype=np.float64)
+def _log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
+    return float(np.log(np.abs(np.diag(triangular))).sum())
 
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """Data beside what is granted: what is left (m', b), the rows (g, m') that take it, its squares (b,), log determinant.
+    """Data beside what is granted, under one kind of noise.
 
-    With Σ = 1 + C·Cᵀ and rows = chol(1 + CᵀC)⁻¹·Cᵀ, Σ⁻¹ = 1 − rowsᵀ·rows.
+    ``seen_by`` (m, b + g): Σ⁻¹·data and the rows of what is granted, side by side; ``squares`` (b,) dataᵀ·Σ⁻¹·data; ``log``
+    probability of this noise less that of its determinant.
+
+    With Σ = N + C·Cᵀ and rows = chol(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
     """
 
-    data: Floats
-    rows: Floats
+    seen_by: Floats
     squares: Floats
     log: float

@@ -10,7 +10,8 @@ from scipy import special
 from cmm_uq.inference.posterior import Posterior, Progress, sample
 from cmm_uq.inference.shaped import Shaped, sample_shaped
 from cmm_uq.measurement import MeasurementModel
-from cmm_uq.mismatch.search import Found, plain_kinds
+from cmm_uq.mismatch.noise import Kind
+from cmm_uq.mismatch.search import Found
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 
@@ -41,7 +42,7 @@ def joint_posterior(found: Found, sigma: float | None, seed: int, progress: Prog
     """
     model = replace(found.model, sigma=sigma)
     estimate = model.estimate()
-    linear, white = estimate.linear.uncorrelated(_correlation(found))
+    linear, white = estimate.linear.uncorrelated(_noise(found).white)
     new = [e for e in model.effects if e.shape and e.name in found.effects]
     if not new:
         return Joint(sample(linear, seed, progress), {})
@@ -52,11 +53,10 @@ def joint_posterior(found: Found, sigma: float | None, seed: int, progress: Prog
     return Joint(posterior, {e.name: posterior.shapes[:, j : j + 1] for j, e in enumerate(new)})
 
 
-def _correlation(found: Found) -> Floats:
-    """Of the noise that is most probable once everything found is modelled."""
-    kinds = plain_kinds(found.model)
+def _noise(found: Found) -> Kind:
+    """That is most probable once everything found is modelled."""
     weight = found.last.noise_posterior().sum(axis=1)
-    return kinds[int(np.argmax(weight))].correlation
+    return found.last.kinds[int(np.argmax(weight))]
 
 
 def _shaped(found: Found, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:

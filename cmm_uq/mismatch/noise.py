@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
+from scipy import sparse, special
 
 from cmm_uq.points import Floats, Ints
 
@@ -41,16 +41,26 @@ class Kind:
     ----------
     name : ``white``, ``placing``, ``correlated`` or ``tails``.
     size : ratio of the placing's standard deviation to the reading's, or correlation of neighbours; 0 for white.
-    correlation : (m, m) covariance over the variance of a reading.
+    whitening : (m, m) sparse W; W times such noise, over the standard deviation of a reading, is white.
+    log_whitening : logarithm of its determinant.
     probability : beforehand.
     log_factor : logarithm by which its density exceeds that of a normal distribution with this covariance.
     """
 
     name: str
     size: float
-    correlation: Floats
+    whitening: sparse.csr_array
+    log_whitening: float
     probability: float
     log_factor: float = 0.0
+
+    def white(self, columns: Floats) -> Floats:
+        """Columns (m, b) that become white noise if they are noise of this kind."""
+        return np.asarray(self.whitening @ columns, dtype=np.float64)
+
+    def noise(self, normal: Floats) -> Floats:
+        """Noise (m, b) of this kind from standard normal numbers."""
+        return np.asarray(sparse.linalg.splu(self.whitening.tocsc()).solve(normal), dtype=np.float64)
 
 
 def tails(residual: Floats) -> Kind:
@@ -65,7 +75,9 @@ def tails(residual: Floats) -> Kind:
     log_t = special.gammaln((_TAILS_DOF + 1) / 2) - special.gammaln(_TAILS_DOF / 2) - 0.5 * np.log(np.pi * _TAILS_DOF)
     log_t = log_t - 0.5 * (_TAILS_DOF + 1) * np.log1p(squares / _TAILS_DOF) - 0.5 * np.log(_SHRINK)
     normal = -0.5 * np.log(2 * np.pi * _SHRINK / weight) - 0.5 * weight * squares
-    return Kind("tails", _TAILS_DOF, np.diag(_SHRINK / weight), TAILS, float(np.sum(log_t - normal)))
+    log_whitening = 0.5 * float(np.log(weight / _SHRINK).sum())
+    whitening = sparse.diags_array(np.sqrt(weight / _SHRINK)).tocsr()
+    return Kind("tails", _TAILS_DOF, whitening, log_whitening, TAILS, float(np.sum(log_t - normal)))
 
 
 def kinds(placing: Ints, order: Floats) -> list[Kind]:
@@ -77,16 +89,32 @@ def kinds(placing: Ints, order: Floats) -> list[Kind]:
     order : (m,) time, or place in the recording, of each observation.
     """
     m = len(placing)
-    same = (placing[:, None] == placing[None, :]).astype(np.float64)
-    found = [Kind("white", 0.0, np.eye(m), WHITE - TAILS)]
-    shared = same.sum() > m
+    _, place, repeats = np.unique(placing, return_inverse=True, return_counts=True)
+    shared = len(repeats) < m
     share = (1 - WHITE) / (len(CORRELATIONS) + shared * len(PLACING_RATIOS))
+    found = [Kind("white", 0.0, sparse.eye_array(m, format="csr"), 0.0, WHITE - TAILS)]
     if shared:
-        found += [Kind("placing", ratio, np.eye(m) + ratio**2 * same, share) for ratio in PLACING_RATIOS]
-    rank = np.argsort(np.argsort(order, kind="stable"), kind="stable")
-    apart = np.abs(rank[:, None] - rank[None, :])
-    found += [Kind("correlated", phi, phi**apart, share) for phi in CORRELATIONS]
-    return found
+        found += [_shared(ratio, place, repeats, share) for ratio in PLACING_RATIOS]
+    return found + [_correlated(phi, np.argsort(order, kind="stable"), share) for phi in CORRELATIONS]
+
+
+def _shared(ratio: float, place: Ints, repeats: Ints, probability: float) -> Kind:
+    """An offset of each place, ``ratio`` times a reading's standard deviation: covariance 1 + ratio² within a place."""
+    m, grown = len(place), np.sqrt(1 + repeats * ratio**2)
+    member = sparse.csr_array((np.ones(m), (np.arange(m), place)), shape=(m, len(repeats)))
+    less = sparse.diags_array((1 - 1 / grown) / repeats)
+    whitening = (sparse.eye_array(m) - member @ less @ member.T).tocsr()
+    return Kind("placing", ratio, whitening, -float(np.log(grown).sum()), probability)
+
+
+def _correlated(phi: float, sequence: Ints, probability: float) -> Kind:
+    """First-order autoregression along a sequence."""
+    m, innovation = len(sequence), np.sqrt(1 - phi**2)
+    diagonal = np.concatenate([[1.0], np.full(m - 1, 1 / innovation)])
+    below = np.full(m - 1, -phi / innovation)
+    rows, columns = np.append(sequence, sequence[1:]), np.append(sequence, sequence[:-1])
+    whitening = sparse.csr_array((np.append(diagonal, below), (rows, columns)), shape=(m, m))
+    return Kind("correlated", phi, whitening, -(m - 1) * float(np.log(innovation)), probability)
 
 
 def sigma_grid(stated: float | None, residual: float) -> tuple[Floats, Floats]:

@@ -185,8 +185,8 @@ def comparison_of(model: MeasurementModel, stated: float | None, rivals: Sequenc
     rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
     return Comparison(
         rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.placing]) / linear.noise_scale[:, None],
-        noise_kinds(model, sigma_left), sigma, log_sigma, rivals, linear.noise_scale,
-        stated or sigma_left / _MISFIT,
+        noise_kinds(model), sigma, log_sigma, rivals, linear.noise_scale,
+        stated or sigma_left / _MISFIT, _certified(model, sigma_left),
     )  # fmt: skip
 
 
@@ -202,7 +202,7 @@ def _with(race: Race, versions: Sequence[Version], chosen: Key) -> MeasurementMo
     return replace(race.model, effects=(*race.model.effects, *added), shapes=shapes)
 
 
-def plain_kinds(model: MeasurementModel) -> list[Kind]:
+def noise_kinds(model: MeasurementModel) -> list[Kind]:
     """Kinds of noise of the used observations."""
     time = model.artefact.points.columns.get("time_s")
     order = order_of(None if time is None else mean_of(model, time), int(model.used.sum()))
@@ -227,14 +227,13 @@ def repeated_quantity(model: MeasurementModel) -> Ints:
     return np.asarray(number.ravel()[model.used], dtype=np.int64)
 
 
-def noise_kinds(model: MeasurementModel, sigma: float) -> list[Kind]:
-    """Kinds of noise; a certified size adds what its certificate leaves open, at this noise."""
-    artefact, found = model.artefact, plain_kinds(model)
+def _certified(model: MeasurementModel, sigma: float) -> Floats:
+    """What the certificates of sizes leave open (m, c), for one standard deviation, in units of this noise."""
+    artefact = model.artefact
     certified = np.array([size.certified for size in artefact.sizes], dtype=bool)
     sds = np.array([size.sd for size in artefact.sizes])[certified]
-    change = artefact.size_change()[model.used][:, certified] * sds / artefact.noise_scale[model.used, None]
-    open_ = change @ change.T / sigma**2
-    return [replace(kind, correlation=kind.correlation + open_) for kind in found]
+    change = artefact.size_change()[model.used][:, certified] * sds
+    return np.asarray(change / artefact.noise_scale[model.used, None] / sigma, dtype=np.float64)
 
 
 def _held(model: MeasurementModel) -> NDArray[np.bool_]:
@@ -250,12 +249,13 @@ def _log_prior(rivals: Sequence[Explanation]) -> Floats:
 def _gate(comparison: Comparison, seed: int) -> tuple[float, Floats]:
     """Probability, under nothing, of as much evidence for something; and the unknown functions' largest under nothing."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
-    draws = random.standard_normal((len(comparison.left), DRAWS))
+    draws = np.empty((len(comparison.left), DRAWS))
     sizes = comparison.sigma[comparison.noise_posterior().argmax(axis=1)]
     probability = np.array([kind.probability for kind in comparison.kinds])
-    for i, g in enumerate(random.choice(len(sizes), DRAWS, p=probability / probability.sum())):
-        factor = comparison.factors[g]
-        draws[:, i] = sizes[g] * (draws[:, i] if factor is None else factor @ draws[:, i])
+    chosen = random.choice(len(sizes), DRAWS, p=probability / probability.sum())
+    for g in np.unique(chosen):
+        columns = np.flatnonzero(chosen == g)
+        draws[:, columns] = sizes[g] * comparison.noise(comparison.kinds[g], random, len(columns))
     statistic, odds = _statistic(comparison, np.column_stack([comparison.left, draws]))
     unknowns = [i for i, e in enumerate(comparison.explanations) if e.kind == UNKNOWN]
     maxima = odds[unknowns, 1:].max(axis=0) if unknowns else np.zeros(0)

@@ -11,6 +11,7 @@ from cmm_uq.mismatch.explanations import EFFECT, Explanation, Member
 from cmm_uq.mismatch.noise import kinds, sigma_grid, tails
 from cmm_uq.mismatch.search import tail_probability
 from cmm_uq.points import Floats
+from tests.mismatch.dense_noise import covariance, rest
 
 
 def comparison(seed: int = 1) -> Comparison:
@@ -28,23 +29,23 @@ def comparison(seed: int = 1) -> Comparison:
 
 def direct(c: Comparison, members: tuple[Member, ...] | None) -> float:
     """Sum over noise, amplitude and version of the density of what the baseline leaves."""
-    total = []
+    total, Q = [], rest(c)
     for kind in c.kinds:
-        white = c.rest.T @ kind.correlation @ c.rest
+        white = Q.T @ covariance(kind) @ Q
         for signal, weight in _signals(c, members):
             for sigma, log_p in zip(c.sigma, c.log_sigma, strict=True):
                 density = stats.multivariate_normal(np.zeros(len(white)), sigma**2 * (white + signal))
-                total.append(density.logpdf(c.left) + log_p + np.log(kind.probability * weight))
-    return float(special.logsumexp(total)) + 0.5 * len(c.left) * np.log(2 * np.pi)
+                total.append(density.logpdf(Q.T @ c.observed) + log_p + np.log(kind.probability * weight))
+    return float(special.logsumexp(total)) + 0.5 * Q.shape[1] * np.log(2 * np.pi)
 
 
 def _signals(c: Comparison, members: tuple[Member, ...] | None) -> list[tuple[Floats, float]]:
     """Covariances of the signal over the variance of the noise, with their probabilities."""
+    Q, signals = rest(c), []
     if members is None:
-        return [(np.zeros((len(c.left), len(c.left))), 1.0)]
-    signals = []
+        return [(np.zeros((Q.shape[1], Q.shape[1])), 1.0)]
     for member in members:
-        F = c.rest.T @ (member.columns / c.noise_scale[:, None])
+        F = Q.T @ (member.columns / c.noise_scale[:, None])
         largest = 1 / c.least_noise
         smallest = min(0.4 / np.sqrt(np.sum(F**2) / len(F)), largest)
         amplitudes = np.geomspace(largest, smallest, 7)
@@ -77,9 +78,9 @@ def test_strong_evidence_for_nothing_is_as_rare_as_it_says() -> None:
     weight = np.concatenate([kind.probability * np.exp(c.log_sigma) for kind in c.kinds])
     chosen = random.choice(len(weight), count, p=weight / weight.sum())
     g, s = np.divmod(chosen, len(c.sigma))
-    z = random.standard_normal((len(c.left), count))
-    factors = [np.eye(len(c.left)) if factor is None else factor for factor in c.factors]
-    data = np.stack([c.sigma[s[i]] * factors[g[i]] @ z[:, i] for i in range(count)], axis=1)
+    data = np.empty((len(c.left), count))
+    for i in range(count):
+        data[:, i] = c.sigma[s[i]] * c.noise(c.kinds[g[i]], random, 1)[:, 0]
     nothing, something = c.log_evidence(data)
     for k in (3, 10, 30):
         rate = np.mean(something - nothing >= np.log(k), axis=1)
@@ -104,7 +105,7 @@ def test_the_evidence_of_heavy_tails_is_below_that_of_student_s_t_and_meets_it_a
     random = np.random.default_rng(9)
     residual = 3e-3 * random.standard_t(4, 40)
     kind = tails(residual)
-    scale = np.sqrt(np.diag(kind.correlation))
+    scale = np.sqrt(np.diag(covariance(kind)))
     sigma = 1.4826 * np.median(np.abs(residual))
     for data, tangent in ((residual, True), (3e-3 * random.standard_t(4, 40), False)):
         bound = stats.norm.logpdf(data, scale=sigma * scale).sum() + kind.log_factor
@@ -118,7 +119,11 @@ def test_placings_are_a_kind_of_noise_only_where_they_are_repeated() -> None:
     assert alone == {"white", "correlated"}
     repeated = kinds(np.repeat([1, 2], 3), np.arange(6.0))
     (half,) = [kind for kind in repeated if kind.name == "placing" and kind.size == 0.5]
-    assert half.correlation[0, 1] == 0.25
-    assert half.correlation[0, 3] == 0.0
+    assert covariance(half) == pytest.approx(np.eye(6) + 0.25 * np.kron(np.eye(2), np.ones((3, 3))), abs=1e-12)
+    (near, _) = [kind for kind in repeated if kind.name == "correlated"]
+    apart = np.abs(np.subtract.outer(np.arange(6), np.arange(6)))
+    assert covariance(near) == pytest.approx(0.5**apart, abs=1e-12)
+    for kind in repeated:
+        assert kind.log_whitening == pytest.approx(-0.5 * np.linalg.slogdet(covariance(kind))[1], abs=1e-12)
     heavy = tails(np.arange(1.0, 7.0))
     assert sum(kind.probability for kind in [*repeated, heavy]) == pytest.approx(1.0)
