@@ -1,13 +1,14 @@
-"""Screening of a recording: impossible values, figures that repeat another measurement's, gross outliers.
+"""Screening of a recording: damaged coordinates, wrong units, slipped or stuck columns, copies, gross outliers.
 
-What is found is reported, never silently dropped. Whether it is used for the estimates is said with each finding.
+What is found is reported as what it is, never silently dropped or mended. Damage of a whole column, and of a column that the
+model uses, is refused; single damaged rows and columns that nothing needs are left out; the rest is used as it stands. Each
+finding says which.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,59 +16,70 @@ from scipy import linalg, special
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.linear_model import LinearModel
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.mismatch.screening_artefact import shape_of
+from cmm_uq.mismatch.screening_columns import SENSORS, about_whole_column, column_findings
+from cmm_uq.mismatch.screening_coordinates import coordinate_findings, outside_travel
+from cmm_uq.mismatch.screening_finding import Finding, finding, span
 from cmm_uq.points import AXES, Floats, Points
+
+__all__ = ["Finding", "Screened", "gross_outliers", "impossible_values", "repeated_figures", "screen", "screened"]
 
 GROSS = 1e-3
 """Probability, over all observations together, that noise alone makes one look like an outlier."""
 
-_TRAVEL_TOLERANCE = 1.0
-"""mm that a scale may read beyond its stated travel."""
+_UNIT_LENGTH = 0.02
+_REFUSED_WHOLE = ("unit", "sign", "shifted column")
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Something odd in a recording.
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A recording that may be fitted, and what screening found in it.
 
     Parameters
     ----------
-    kind : ``impossible``, ``duplicate`` or ``outlier``.
-    measurements : that it concerns.
-    lines : of the file.
-    why : in words.
-    column : that it concerns, if one.
-    set_aside : whether the estimates leave these measurements out.
+    points : without the rows and columns that are left out.
+    findings : all of them.
     """
 
-    kind: str
-    measurements: tuple[int, ...]
-    lines: tuple[int, ...]
-    why: str
-    column: str | None = None
-    set_aside: bool = False
+    points: Points
+    findings: tuple[Finding, ...]
 
 
-def _temperature(values: Floats) -> NDArray[np.bool_]:
-    return (values < -30) | (values > 80)
+def screened(
+    points: Points, facts: ArtefactFacts, *, needed: Collection[str], set_aside: Collection[int], where: str
+) -> Screened:
+    """A recording without what cannot be used, and all that is odd in it; before an artefact is made of it.
+
+    Parameters
+    ----------
+    points : the recording as read.
+    facts : what the job says of the artefact.
+    needed : columns that the model uses.
+    set_aside : measurements that the job leaves out of the estimates.
+    where : the recording's name, for messages.
+
+    Raises
+    ------
+    CmmUqError : a damage of the whole recording, of a whole column, or of one that the model uses.
+    """
+    shape = shape_of(facts, points)
+    damaged = coordinate_findings(points, facts, shape, where) if shape else []
+    odd = screen(points, needed=needed, set_aside=set_aside, where=where, kind=facts.kind)
+    if shape and shape.together:
+        damaged = [_reversal(found, points, needed) for found in damaged]
+    findings = (*damaged, *(_left_out(f) for f in odd if not _told(f, damaged)))
+    lost = sorted({row for found in findings for row in found.rows})
+    kept = points.select(np.delete(np.arange(len(points)), lost)) if lost else points
+    gone = {found.column for found in findings if found.set_aside and not found.rows}
+    kept = replace(kept, columns={name: values for name, values in kept.columns.items() if name not in gone})
+    return Screened(kept, findings)
 
 
-IMPOSSIBLE: Mapping[str, tuple[Callable[[Floats], NDArray[np.bool_]], str]] = MappingProxyType(
-    {
-        "radius_mm": (lambda v: v <= 0, "a radius is positive"),
-        "fit_rms_um": (lambda v: v < 0, "an rms is not negative"),
-        "n_points": (lambda v: v < 1, "a fit needs points"),
-        "humidity_pct": (lambda v: (v < 0) | (v > 100), "relative humidity lies between 0 and 100 %"),
-        "pressure_hpa": (lambda v: (v < 500) | (v > 1100), "air pressure lies between 500 and 1100 hPa; is it in hPa?"),
-        "speed_mm_s": (lambda v: v < 0, "a speed is not negative"),
-        **{
-            f"temp_{place}_c": (_temperature, "no measuring room is so cold or hot; is it in °C?")
-            for place in (*AXES, "artefact", "table_top", "table_bottom", "air")
-        },
-    }
-)
-
-
-def screen(points: Points, *, needed: Collection[str], set_aside: Collection[int], where: str) -> tuple[Finding, ...]:
-    """All that is odd in a recording before anything is fitted.
+def screen(
+    points: Points, *, needed: Collection[str], set_aside: Collection[int], where: str, kind: str = ""
+) -> tuple[Finding, ...]:
+    """All that is odd in a recording without regard to its artefact's shape.
 
     Parameters
     ----------
@@ -75,63 +87,54 @@ def screen(points: Points, *, needed: Collection[str], set_aside: Collection[int
     needed : columns that the model uses.
     set_aside : measurements that the job leaves out of the estimates.
     where : the recording's name, for messages.
+    kind : of artefact.
 
     Raises
     ------
-    CmmUqError : a value that the model uses cannot be.
+    CmmUqError : a whole column in another unit or place, or a value that the model uses cannot be.
     """
-    impossible = impossible_values(points)
-    for finding in impossible:
-        if finding.column in needed:
-            raise CmmUqError(finding.why, where=f"{where} line {finding.lines[0]}, column {finding.column}",
+    impossible = impossible_values(points, kind)
+    for found in impossible:
+        if found.column in needed:
+            raise CmmUqError(found.why, where=_place(where, found),
                              fix="The model uses this column: mend it, or leave out the effect that needs it")  # fmt: skip
-    found = (*impossible, *repeated_figures(points))
-    return tuple(replace(f, set_aside=bool(set(f.measurements[-1:]) & set(set_aside))) for f in found)
+        if found.kind in _REFUSED_WHOLE and about_whole_column(found, points):
+            raise CmmUqError(found.why, where=_place(where, found), fix="Mend the column, or remove it")
+    odd = (*impossible, *repeated_figures(points))
+    return tuple(replace(f, set_aside=f.measurements[-1] in set_aside) for f in odd)
 
 
-def impossible_values(points: Points) -> list[Finding]:
+def impossible_values(points: Points, kind: str = "") -> list[Finding]:
     """Values that cannot be: one finding a column, and one an axis whose readings leave the machine's travel."""
-    found = []
-    for column, (wrong, why) in IMPOSSIBLE.items():
-        if column in points.columns and np.any(rows := wrong(points.columns[column])):
-            found.append(
-                _finding("impossible", points, rows, f"{column} = {_span(points.columns[column][rows])}: {why}", column)
-            )
+    found = column_findings(points, kind)
     if all(f"n{a}" in points.columns for a in AXES):
         norm = np.linalg.norm([points.columns[f"n{a}"] for a in AXES], axis=0)
-        if np.any(rows := np.abs(norm - 1) > 0.02):
-            found.append(_finding("impossible", points, rows, "the normal nx, ny, nz has no unit length", "nx"))
+        if np.any(rows := np.abs(norm - 1) > _UNIT_LENGTH):
+            found.append(finding("impossible", points, rows, "the normal nx, ny, nz has no unit length", "nx"))
+    outside = outside_travel(points)
     for i, axis in enumerate(AXES):
-        low, high = points.machine.travel_mm[i]
-        readings = points.readings[:, i]
-        if np.any(rows := (readings < low - _TRAVEL_TOLERANCE) | (readings > high + _TRAVEL_TOLERANCE)):
+        if np.any(rows := outside[:, i]):
+            low, high = points.machine.travel_mm[i]
             why = (
-                f"scale readings of {axis.upper()} ({axis}_mm + origin) of {_span(readings[rows])} mm lie outside the "
-                f"travel {low:g} to {high:g} mm"
+                f"scale readings of {axis.upper()} ({axis}_mm + origin) of {span(points.readings[rows, i])} mm lie outside "
+                f"the travel {low:g} to {high:g} mm{_hint(points, i)}"
             )
-            found.append(_finding("impossible", points, rows, why, f"{axis}_mm"))
+            found.append(finding("impossible", points, rows, why, f"{axis}_mm"))
     return found
 
 
 def repeated_figures(points: Points) -> list[Finding]:
-    """Measurements whose coordinates repeat, digit for digit, those of another measurement."""
+    """Measurements whose coordinates repeat, digit for digit, those of another measurement; runs of them as one block."""
     first: dict[bytes, int] = {}
-    found = []
+    copies: list[tuple[int, int]] = []
     for group in range(int(points.group.max()) + 1):
-        rows = np.flatnonzero(points.group == group)
-        figures = points.xyz[rows]
+        figures = points.xyz[points.group == group]
         key = figures[np.lexsort(figures.T)].tobytes()
         if key not in first:
             first[key] = group
-            continue
-        original = np.flatnonzero(points.group == first[key])
-        if points.measurement[original[0]] == points.measurement[rows[0]]:
-            continue
-        a, b = int(points.measurement[original[0]]), int(points.measurement[rows[0]])
-        why = f"measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement"
-        both = np.isin(np.arange(len(points)), np.concatenate([original, rows]))
-        found.append(_finding("duplicate", points, both, why))
-    return found
+        elif _measurement(points, first[key]) != _measurement(points, group):
+            copies.append((first[key], group))
+    return [_copied(points, run) for run in _runs(copies)]
 
 
 def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64]) -> list[tuple[int, float]]:
@@ -165,11 +168,86 @@ def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64]) -> list[
     return found
 
 
-def _finding(kind: str, points: Points, rows: NDArray[np.bool_], why: str, column: str | None = None) -> Finding:
-    lines = tuple(points.lines[rows].tolist()) if len(points.lines) else ()
-    return Finding(kind, tuple(dict.fromkeys(points.measurement[rows].tolist())), lines, why, column)
+def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
+    originals, later = zip(*run, strict=True)
+    both = np.isin(points.group, (*originals, *later))
+    if len(run) == 1:
+        a, b = _measurement(points, originals[0]), _measurement(points, later[0])
+        why = f"measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement"
+        return finding("duplicate", points, both, why)
+    ends = [_measurement(points, group) for group in (later[0], later[-1], originals[0], originals[-1])]
+    why = (
+        "measurements {} to {} repeat the coordinates of measurements {} to {} to the last digit: a block ".format(
+            *ends
+        )
+        + "pasted twice, whose copies say nothing: remove them, or record what was measured"
+    )
+    rows = tuple(np.flatnonzero(np.isin(points.group, later)).tolist())
+    return replace(finding("repeated block", points, both, why), rows=rows)
 
 
-def _span(values: Floats) -> str:
-    low, high = float(values.min()), float(values.max())
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+def _runs(copies: Sequence[tuple[int, int]]) -> list[list[tuple[int, int]]]:
+    """Copies in runs whose originals and copies both follow each other."""
+    runs: list[list[tuple[int, int]]] = []
+    for a, b in copies:
+        if runs and runs[-1][-1] == (a - 1, b - 1):
+            runs[-1].append((a, b))
+        else:
+            runs.append([(a, b)])
+    return runs
+
+
+def _measurement(points: Points, group: int) -> int:
+    return int(points.measurement[np.argmax(points.group == group)])
+
+
+def _reversal(found: Finding, points: Points, needed: Collection[str]) -> Finding:
+    """A bar numbered the other way round is left out where the model uses what was recorded beside each ball."""
+    if found.kind != "swapped" or found.rows:
+        return found
+    rows = np.flatnonzero(np.isin(points.lines, found.lines)) if len(points.lines) else np.zeros(0, dtype=np.int64)
+    differing = [
+        name
+        for name in needed
+        for group in np.unique(points.group[rows])
+        if np.ptp(points.column(name)[points.group == group]) > 0
+    ]
+    if not differing:
+        return found
+    why = f"{found.why}; the model uses {differing[0]}: number the balls as in the other repeats"
+    return replace(found, set_aside=True, rows=tuple(rows.tolist()), why=why)
+
+
+def _left_out(found: Finding) -> Finding:
+    """Copies of a block are left out, and columns of sensors that cannot be trusted."""
+    return replace(found, set_aside=found.set_aside or bool(found.rows) or found.column in SENSORS)
+
+
+def _told(found: Finding, damaged: Sequence[Finding]) -> bool:
+    """Whether a reading outside the travel is told already as what it is."""
+    lines = {line for other in damaged for line in other.lines}
+    return found.kind == "impossible" and found.column in ("x_mm", "y_mm", "z_mm") and set(found.lines) <= lines
+
+
+def _hint(points: Points, axis: int) -> str:
+    """What would bring most readings of an axis inside: the origin, a sign, another axis."""
+    if outside_travel(points)[:, axis].mean() < 0.5:
+        return ""
+    low, high = points.machine.travel_mm[axis]
+
+    def inside(readings: Floats) -> bool:
+        return bool(np.mean((readings >= low) & (readings <= high)) > 0.95)
+
+    origin = points.machine.origin_mm
+    hints = [f"{AXES[axis]}_mm with the wrong sign"] if inside(origin[axis] - points.xyz[:, axis]) else []
+    hints += [
+        f"{AXES[axis]}_mm exchanged with {AXES[j]}_mm"
+        for j in range(3)
+        if j != axis and inside(origin[axis] + points.xyz[:, j])
+    ]
+    return f": look for {', or '.join(['a missing origin_mm', *hints])}"
+
+
+def _place(where: str, found: Finding) -> str:
+    line = f" line {found.lines[0]}" if found.lines else ""
+    return f"{where}{line}, column {found.column}"

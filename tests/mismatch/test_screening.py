@@ -40,22 +40,25 @@ def test_a_repeat_of_the_same_measurement_is_no_copy(ballbar_points: Points) -> 
 
 
 @pytest.mark.parametrize(
-    ("column", "value", "why"),
+    ("column", "value", "kind", "why"),
     [
-        ("radius_mm", -38.1, "a radius is positive"),
-        ("humidity_pct", 140.0, "between 0 and 100"),
-        ("pressure_hpa", 101325.0, "is it in hPa"),
-        ("temp_x_c", 293.15, "is it in °C"),
-        ("n_points", 0.0, "needs points"),
+        ("radius_mm", -38.1, "impossible", "a radius is positive"),
+        ("humidity_pct", 140.0, "impossible", "between 0 and 100"),
+        ("pressure_hpa", 101325.0, "unit", "It looks like Pa"),
+        ("pressure_hpa", 101.325, "unit", "It looks like kPa"),
+        ("temp_x_c", 293.15, "unit", "It looks like kelvin"),
+        ("temp_artefact_c", 68.0, "unit", "It looks like °F"),
+        ("temp_air_c", 2e6, "impossible", "is it in °C"),
+        ("n_points", 0.0, "impossible", "needs points"),
     ],
 )
 def test_impossible_values_are_named_with_their_lines(
-    ballbar_points: Points, column: str, value: float, why: str
+    ballbar_points: Points, column: str, value: float, kind: str, why: str
 ) -> None:
     values = np.full(len(ballbar_points), {"pressure_hpa": 1000.0}.get(column, 20.0))
     values[6] = value
     (found,) = impossible_values(with_columns(ballbar_points, **{column: values}))
-    assert found.kind == "impossible"
+    assert found.kind == kind
     assert found.lines == (8,)
     assert found.measurements == (4,)
     assert why in found.why
