@@ -127,5 +127,5 @@ def _contents(result: Result | ShiftResult, tell: Stage) -> dict[str, bytes]:
     else:
         data = as_json(results(result))
     tell("Rendering", 0.8)
-    pdf = render_pdf(document, {**result.job.inputs, "results.json": data})
+    pdf = render_pdf(document, {**result.job.inputs, "results.json": data, **more})
     return {"certificate.html": render_html(document).encode(), "certificate.pdf": pdf, "results.json": data, **more}

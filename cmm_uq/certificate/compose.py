@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from cmm_uq import __version__
 from cmm_uq.analysis.result import Result
@@ -58,7 +59,8 @@ def certificate(result: Result | ShiftResult) -> Document:
     """The certificate of a result, complete but for its looks."""
     if isinstance(result, ShiftResult):
         sampler, seed = result.estimate.chains.sampler, result.estimate.seed
-        return _document(result.job, shift_section.sections(result), shift_section.warnings(result), sampler, seed)
+        document = _document(result.job, shift_section.sections(result), shift_section.warnings(result), sampler, seed)
+        return replace(document, attachments=(*document.attachments, shift_section.TABLE_FILE))
     sections = [_performance(result), _conformity(result), _errors(result), _traceability(result)]
     sections += tolerance_section.sections(result)
     sections += ARTEFACT_SECTIONS[result.artefact.kind](result)

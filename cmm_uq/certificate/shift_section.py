@@ -124,15 +124,18 @@ def _open(result: ShiftResult) -> Section:
         f"length, such as {0.618 * free.period:.3g} mm, would show it."
     )]  # fmt: skip
     if count:
-        worst = free.patterns[:, 0]
-        rows = tuple((f"{x:.3f}", f"{v:.3f}") for x, v in _sparse(result.estimate.series.positions, worst))
+        at, worst = result.estimate.series.positions, free.patterns[:, 0]
         blocks += [
             Paragraph(
                 f"Beyond a constant and a slope, {count} combination{'s' if count > 1 else ''} of the errors at the positions "
                 "read change no reading. The curve shows the smoothest error that agrees with the readings. A placing "
                 "that joins the positions, or a finer pitch, would determine them."
             ),
-            Table("One such combination", (Column("Reading", "mm"), Column("Weight")), rows),
+            curve_with_band(
+                at, worst, 0 * at, x_label=f"Scale reading {result.axis} / mm", y_label="Weight", points=(at, worst),
+                caption="One such combination: this pattern, of any size, changes no reading.",
+                alternative=f"Weights of the errors at {len(at)} positions that together change no reading.",
+            ),
         ]  # fmt: skip
     else:
         blocks.append(

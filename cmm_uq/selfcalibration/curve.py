@@ -138,9 +138,13 @@ class CurveEstimate:
         """(n,) what does not fit, mm: with no error of the machine but its scale, and with the curve."""
         model = self.coefficients.model
         design = np.hstack([model.flat, model.columns])
-        weighted = design / model.noise_scale[:, None]
-        plain = np.linalg.lstsq(weighted, model.observed / model.noise_scale, rcond=None)[0]
-        before = model.observed - design @ plain
+        # shifts keep to what is known of them: free ones would explain any reading by a scale of nothing
+        held = np.hstack(
+            [np.zeros((len(model.column_sd), model.flat.shape[1])), np.diag(self.sigma.mean() / model.column_sd)]
+        )
+        weighted = np.vstack([design / model.noise_scale[:, None], held])
+        wanted = np.r_[model.observed / model.noise_scale, np.zeros(len(held))]
+        before = model.observed - design @ np.linalg.lstsq(weighted, wanted, rcond=None)[0]
         c = self.coefficients
         found = model.functions[0]
         explained = c.flat.mean(axis=0) @ model.flat.T + c.columns.mean(axis=0) @ model.columns.T

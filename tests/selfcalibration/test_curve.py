@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,13 +11,7 @@ from cmm_uq.points import Points
 from cmm_uq.selfcalibration.curve import CurveEstimate, estimate_curve
 from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan, integrated
 from cmm_uq.selfcalibration.series import shifted_series
-
-_SPEC = importlib.util.spec_from_file_location("shifted", Path(__file__).with_name("shifted.py"))
-assert _SPEC is not None
-assert _SPEC.loader is not None
-shifted = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(shifted)
-PITCH_20, bent, read = shifted.PITCH_20, shifted.bent, shifted.read
+from tests.selfcalibration.shifted import PITCH_20, bent, read
 
 NOISE = 1.1e-3
 KNOWN = KnownSpan(0, 22, 440.0, 0.0)

@@ -1,0 +1,81 @@
+"""Every command on a shift job: an answer, or one line that says why not."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pikepdf
+import pytest
+
+from cmm_uq.analysis import ShiftResult, analyse
+from tests.conftest import ROOT
+
+COMMAND = [sys.executable, "-m", "cmm_uq"]
+EXAMPLE = ROOT / "examples" / "shift-simulated"
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False,
+                          encoding="utf-8")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("shift") / "report"
+    process = run("report", EXAMPLE, "--out", out)
+    assert process.returncode == 0, process.stderr
+    return out
+
+
+def test_a_report_has_its_correction_table_also_inside_the_pdf(report: Path) -> None:
+    names = ["certificate.html", "certificate.pdf", "correction_table.csv", "results.json"]
+    assert sorted(path.name for path in report.iterdir()) == names
+    with pikepdf.open(report / "certificate.pdf") as pdf:
+        assert set(pdf.attachments) == {"job.toml", "recording.csv", "results.json", "correction_table.csv"}
+
+
+def test_compensating_by_the_table_brings_the_error_down(report: Path, tmp_path: Path) -> None:
+    """What is left of about 27 µm is within the uncertainty of the curve: the job calibrates itself a second time."""
+    job = tmp_path / "job"
+    shutil.copytree(EXAMPLE, job)
+    shutil.copy(report / "correction_table.csv", job)
+    text = (job / "job.toml").read_text(encoding="utf-8")
+    named = 'error_map = [ { file = "correction_table.csv", temperature_c = 20.0 } ]\n'
+    (job / "job.toml").write_text(re.sub(r"(?m)^(chain = .*\n)", rf"\1{named}", text), encoding="utf-8")
+    process = run("compensate", job, "--out", tmp_path / "out")
+    assert process.returncode == 0, process.stderr
+    before, after = analyse(EXAMPLE), analyse(tmp_path / "out")
+    assert isinstance(before, ShiftResult)
+    assert isinstance(after, ShiftResult)
+    assert np.ptp(before.fine.error) > 0.024
+    assert np.ptp(after.fine.error) < 2 * before.fine.simultaneous_factor * before.fine.u.max()
+    assert np.ptp(after.fine.error) < 0.1 * np.ptp(before.fine.error)
+    truth = [np.loadtxt(path / "recording.csv", delimiter=",", skiprows=s)[:, :4] for path, s in
+             ((EXAMPLE, 1), (tmp_path / "out", 2))]  # fmt: skip
+    x = truth[0][:, 3]
+    true = x + 0.012 * np.sin(x / 90) + 0.010 * np.exp((x - 590) / 60) + 8e-6 * x
+    left = [np.ptp(rows[:, 3] - true) for rows in truth]
+    assert left[1] < left[0] / 5
+
+
+@pytest.mark.parametrize("command", ["diagnose", "simulate", "compensate", "budget"])
+def test_what_a_shift_job_cannot_have_is_one_line_and_exit_code_2(command: str, tmp_path: Path) -> None:
+    truth = tmp_path / "truth.toml"
+    truth.write_text("[effects.scale_x]\nppm = 10.0\n", encoding="utf-8")
+    more = ["--truth", truth] if command == "simulate" else []
+    process = run(command, EXAMPLE, *more, "--out", tmp_path / "out")
+    assert process.returncode == 2
+    assert "Traceback" not in process.stderr
+    said = {
+        "diagnose": "a shift job cannot be diagnosed",
+        "simulate": "a shift job cannot be simulated",
+        "compensate": "the job has no error map",
+        "budget": "Is a directory",
+    }
+    assert said[command] in process.stderr
+    assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())
