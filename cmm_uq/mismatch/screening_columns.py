@@ -174,17 +174,19 @@ def _slipped(points: Points) -> Iterator[Finding]:
     for column, values in _measured(points):
         if _constant_in_groups(points.group, values):
             continue
-        for by, way in ((-1, "down"), (1, "up")):
-            back = np.roll(values, by)
-            constant = [np.ptp(back[a : a + k]) == 0 for a, k in zip(firsts, sizes, strict=True)]
-            changing = np.diff(back[firsts]) != 0
-            if np.sum(constant) >= len(firsts) - 1 and changing.mean() >= _MOVING:
-                why = (
-                    f"{column} changes inside every placing and would be the same for all points of each if it were moved "
-                    f"back: it is shifted {way} by one row against the other columns: move it back"
-                )
-                yield finding("shifted column", points, np.ones(len(points), dtype=bool), why, column)
-                break
+        ways = [way for by, way in ((-1, "down"), (1, "up")) if _of_placings(np.roll(values, by), firsts, sizes)]
+        if ways:
+            why = (
+                f"{column} changes inside every placing and would be the same for all points of each if it were moved back: "
+                f"it is shifted {' or '.join(ways)} by one row against the other columns: move it back"
+            )
+            yield finding("shifted column", points, np.ones(len(points), dtype=bool), why, column)
+
+
+def _of_placings(values: Floats, firsts: Ints, sizes: Ints) -> bool:
+    """Whether a column is the same for all points of each placing, but for one at the edge, and changes between them."""
+    constant = [np.ptp(values[a : a + k]) == 0 for a, k in zip(firsts, sizes, strict=True)]
+    return bool(np.sum(constant) >= len(firsts) - 1 and np.mean(np.diff(values[firsts]) != 0) >= _MOVING)
 
 
 def _approach(points: Points) -> Iterator[Finding]:

@@ -157,7 +157,9 @@ class _Search:
             xyz[chosen] = xyz[chosen[::-1]]
             if self._fit(chosen, xyz, self.shape.reference):
                 names = [f"point {self.points.point[i]} of measurement {self.points.measurement[i]}" for i in chosen]
-                yield "swapped", chosen, f"{names[0]} and {names[1]} are exchanged: exchange their coordinates", None
+                other = ", or the other ends of these bars," if self.shape.is_bar else ""
+                why = f"{names[0]} and {names[1]}{other} are exchanged: exchange their coordinates"
+                yield "swapped", chosen, why, None
 
     def _blocks(self, open_: NDArray[np.bool_]) -> Iterator[tuple[str, Ints, str, str | None]]:
         """Measurements, runs of rows and repeats most of whose rows are damaged in the same way."""
@@ -284,17 +286,18 @@ def _refuse_whole(search: _Search, where: str) -> None:
     if best is not None:
         raise CmmUqError(f"{told}; they fit once it is undone, so this looks like {best.what}",
                          where=f"{where}, column {best.columns[0]}", fix=best.fix)  # fmt: skip
+    for axis, column in zip(AXES, points.xyz.T, strict=True):
+        if np.ptp(column) == 0 and bad > MOST * len(points):
+            raise CmmUqError(f"{told}: {axis}_mm is stuck at {column[0]:g} in every row", where=f"{where}, column {axis}_mm",
+                             fix="Export the recording again")  # fmt: skip
 
 
 def _refuse_another(search: _Search, facts: ArtefactFacts, where: str) -> None:
     """Refuse a recording of another artefact, or of none: in the words of the artefact's own checks where these see it."""
-    points, told = search.points, _missed(search)
-    for axis, column in zip(AXES, points.xyz.T, strict=True):
-        if np.ptp(column) == 0:
-            raise CmmUqError(f"{told}: {axis}_mm is stuck at {column[0]:g} in every row", where=f"{where}, column {axis}_mm",
-                             fix="Export the recording again")  # fmt: skip
-    artefact_of(facts, points, where=where)
-    raise CmmUqError(told, where=where, fix="Check [artefact] in job.toml, and the order of rows and columns")
+    artefact_of(facts, search.points, where=where)
+    raise CmmUqError(
+        _missed(search), where=where, fix="Check [artefact] in job.toml, and the order of rows and columns"
+    )
 
 
 def _missed(search: _Search) -> str:
