@@ -8,7 +8,7 @@ from types import FrameType
 
 import typer
 
-from cmm_uq.cli import budget, compensate, diagnose, report, selftest, simulate
+from cmm_uq.cli import budget, compensate, diagnose, plan, report, selftest, simulate
 from cmm_uq.errors import CmmUqError
 
 BAD_INPUT = 2
@@ -24,6 +24,7 @@ app = typer.Typer(
 )
 app.command("report")(report.command)
 app.command("diagnose")(diagnose.command)
+app.command("plan")(plan.command)
 app.command("simulate")(simulate.command)
 app.command("compensate")(compensate.command)
 app.command("budget")(budget.command)

@@ -1,0 +1,88 @@
+"""A plan in words: what its placings determine, what they leave open, how the operator sets the artefact up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cmm_uq.analysis.planning import RECORDED, Plan
+from cmm_uq.certificate.wording import listed
+from cmm_uq.measurement.model import ARTEFACT
+from cmm_uq.physics.catalogue import CATALOGUE
+from cmm_uq.planning.identifiability import Determined, Identifiability
+from cmm_uq.planning.placing import Placing
+
+STATUS = {"determined": "determined", "weak": "weakly: hardly better than physics allows", "free": "not determined"}
+
+CRITERIA = {
+    "separation": "effects told apart best",
+    "D": "smallest volume of uncertainty (D)",
+    "A": "smallest mean variance (A)",
+    "worst": "smallest of the largest uncertainties (worst case)",
+}
+
+
+def title_of(name: str) -> str:
+    """An effect in words."""
+    return CATALOGUE[name].title if name in CATALOGUE else name
+
+
+def combination(parts: Mapping[tuple[str, str], float]) -> str:
+    """A free combination in words: ``scale error of X, Y and Z together, with the artefact's own length``."""
+    effects = list(dict.fromkeys(owner for owner, _ in parts if owner != ARTEFACT))
+    sizes = [name for owner, name in parts if owner == ARTEFACT]
+    families: dict[str, list[str]] = {}
+    for effect in effects:
+        head, _, tail = title_of(effect).rpartition(" ")
+        families.setdefault(head, []).append(tail)
+    words = listed([f"{head} {listed(tails)}" for head, tails in families.items()]) if families else ""
+    own = "the artefact's own length" if len(sizes) == 1 else "the artefact's own dimensions"
+    if not effects:
+        return own[0].upper() + own[1:]
+    if sizes:
+        return f"{words}{' together' if len(effects) > 1 else ''}, with {own}"
+    return f"{words} together" if len(effects) > 1 else f"{words}: nothing shows of it"
+
+
+def expected(parameter: Determined) -> str:
+    """Expected standard uncertainty."""
+    return "–" if parameter.u is None else f"{parameter.u:.2g}"
+
+
+def named(parameter: Determined) -> str:
+    """A parameter in words."""
+    owner, name = parameter.unknown.key
+    if owner == ARTEFACT:
+        return f"Artefact, {name}"
+    effect = CATALOGUE[owner]
+    return effect.title if len(effect.coefficients) == 1 else f"{effect.title}, {name}"
+
+
+def pairs(found: Identifiability) -> list[str]:
+    """Effects that could not be told apart, grouped where they all resemble each other."""
+    groups: list[set[str]] = []
+    for first, second, _ in found.alike:
+        joined = [group for group in groups if first in group or second in group]
+        merged = {first, second}.union(*joined)
+        groups = [group for group in groups if group not in joined] + [merged]
+    return [listed([title_of(name) for name in CATALOGUE if name in group]) for group in groups]
+
+
+def base_name(plan: Plan) -> str:
+    """Of the placings to start from."""
+    count = len(plan.start.placings)
+    return f"the recording ({count} placings)" if plan.name == RECORDED else f"{plan.name} ({count} placings)"
+
+
+def ends(placing: Placing) -> str:
+    """Where the artefact stands, in scale readings, mm."""
+    readings = placing.points.readings
+    far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
+    first, last = (", ".join(f"{value:.0f}" for value in readings[row]) for row in (0, far))
+    return f"({first})" if far == 0 else f"({first}) → ({last})"
+
+
+def smallest(amplitude: float | None) -> str:
+    """Smallest size of an effect that is found."""
+    return "–" if amplitude is None else f"{amplitude:.2g}"

@@ -1,0 +1,61 @@
+"""How well effects are told apart, from the information on them and on all that must be fitted besides.
+
+Two effects whose columns are parallel after everything else has been projected out cannot be told apart by any method; the
+sine of the angle between them is the part of one that the other cannot imitate. (Baarda 1968; Teunissen 2018, *Distributional
+theory for the DIA method*: minimal detectable and identifiable bias.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.points import Floats
+
+SEEN = 1e-6
+"""Part of an effect's information, of what it would be if nothing else were fitted, below which it is not seen."""
+
+_RIDGE = 1e-13
+
+
+def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> Floats:
+    """Information (..., r, r) on rivals once the base (rows) is fitted: the Schur complement.
+
+    Parameters
+    ----------
+    information : (..., k, k).
+    """
+    rival, fitted = list(rivals), list(base)
+    own = information[..., rival, :][..., :, rival]
+    if not fitted:
+        return np.asarray(own)
+    cross = information[..., fitted, :][..., :, rival]
+    within = information[..., fitted, :][..., :, fitted]
+    scale = np.sqrt(np.maximum(np.einsum("...ii->...i", within), 1e-300))
+    scaled = within / scale[..., :, None] / scale[..., None, :]
+    scaled = scaled + _RIDGE * np.eye(len(fitted))
+    solved = np.linalg.solve(scaled, cross / scale[..., :, None]) / scale[..., :, None]
+    return np.asarray(own - np.swapaxes(cross, -1, -2) @ solved)
+
+
+def cosines(left: Floats, alone: Floats) -> Floats:
+    """Absolute cosines (..., r, r) between effects; 1 on the diagonal, and with an effect that is not seen.
+
+    Parameters
+    ----------
+    left : (..., r, r) information on them, see :func:`left_of`.
+    alone : (..., r) information on each if nothing else were fitted.
+    """
+    size = np.einsum("...ii->...i", left)
+    seen = size > SEEN * alone
+    root = np.sqrt(np.where(seen, size, 1.0))
+    cosine = np.abs(left) / root[..., :, None] / root[..., None, :]
+    cosine = np.where(seen[..., :, None] & seen[..., None, :], np.minimum(cosine, 1.0), 1.0)
+    return np.asarray(np.where(np.eye(left.shape[-1], dtype=bool), 1.0, cosine))
+
+
+def visible(left: Floats, alone: Floats) -> NDArray[np.bool_]:
+    """(..., r) whether anything of each effect is left."""
+    return np.asarray(np.einsum("...ii->...i", left) > SEEN * alone)

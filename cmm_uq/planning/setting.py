@@ -1,0 +1,96 @@
+"""What planning needs to know of a job, together: the artefact, the wishes, the room."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import ArtefactFacts, Job
+from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.measurement import MeasurementModel
+from cmm_uq.physics.catalogue import CATALOGUE, effects
+from cmm_uq.physics.effect import Effect
+from cmm_uq.planning.volume import Volume
+from cmm_uq.points import Machine, Points
+from cmm_uq.units import MICROMETRE
+
+ASSUMED_NOISE_UM = 1.0
+"""Standard uncertainty of a coordinate where the job states none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """An artefact, a plan's wishes, and the room for it.
+
+    Parameters
+    ----------
+    artefact : as the job describes it.
+    plan : ``[plan]``.
+    volume : room.
+    named : effects that the job's model names.
+    sigma : standard uncertainty of one coordinate, mm.
+    stated : the same as the job states it; ``None`` where it does not.
+    """
+
+    artefact: ArtefactFacts
+    plan: PlanFacts
+    volume: Volume
+    named: tuple[Effect, ...]
+    sigma: float
+    stated: float | None = None
+
+    @classmethod
+    def of(cls, job: Job) -> Setting:
+        """What a job says.
+
+        Raises
+        ------
+        CmmUqError : no effect is named, or one is unknown; the volume is not known.
+        """
+        facts, plan = job.facts, job.facts.plan
+        if not facts.model.effects and facts.artefact.kind != "shift":
+            raise CmmUqError("no effect is named, so there is nothing to determine", where="job.toml [model] effects",
+                             fix="Name the error factors that the measurement shall determine")  # fmt: skip
+        recorded = job.points.readings if len(job.points) else None
+        stated = facts.recording.u_coordinate_um
+        return cls(
+            facts.artefact, plan, Volume.of(job.points.machine, plan, recorded),
+            effects(facts.model.effects, where="job.toml [model] effects"),
+            (stated or ASSUMED_NOISE_UM) * MICROMETRE, None if stated is None else stated * MICROMETRE,
+        )  # fmt: skip
+
+    @property
+    def machine(self) -> Machine:
+        """That is measured."""
+        return self.volume.machine
+
+    def model(self, points: Points, also: tuple[Effect, ...] = ()) -> MeasurementModel:
+        """The model that the job names, with further effects, of the artefact at these points."""
+        return MeasurementModel(artefact_of(self.artefact, points), (*self.named, *also), self.sigma)
+
+    def rivals(self, points: Points) -> tuple[Effect, ...]:
+        """Effects that the job does not name: those that the plan lists, else all of the catalogue that could act here.
+
+        Effects with a nonlinear parameter are left out: how well one is seen depends on its value.
+
+        Raises
+        ------
+        CmmUqError : the plan lists an unknown effect, or one whose columns will not be recorded.
+        """
+        named = {effect.name for effect in self.named}
+        if self.plan.rivals is not None:
+            where = "job.toml [plan] rivals"
+            chosen = effects(self.plan.rivals, where=where)
+            for effect in chosen:
+                if missing := [column for column in effect.columns if column not in points.columns]:
+                    raise CmmUqError(f"{effect.name} needs the column {missing[0]}, which this plan does not record",
+                                     where=where, fix="Leave it out, or give its value in [plan] columns")  # fmt: skip
+            return tuple(effect for effect in chosen if effect.name not in named and not effect.shape)
+        return tuple(
+            effect
+            for effect in CATALOGUE.values()
+            if effect.name not in named
+            and not effect.shape
+            and all(column in points.columns for column in effect.columns)
+        )
