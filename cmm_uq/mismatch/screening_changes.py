@@ -29,7 +29,7 @@ class Change:
     Parameters
     ----------
     kind : of finding.
-    what : the mistake, in words that follow "looks like".
+    what : the mistake, as a sentence without its full stop.
     fix : what to do.
     columns : that it concerns.
     apply : coordinates (k, 3) and references (k, j) as they would be without it.
@@ -66,7 +66,7 @@ def changes_of_blocks(shape: Shape) -> tuple[Change, ...]:
             found += [_shift((i,), (name,), by, way, of_references=True) for i, name in enumerate(shape.names)]
     if shape.names == ("reference_mm",):
         found.append(
-            Change("swapped", "its faces counted from the other end", "Turn the order of reference_mm round", shape.names,
+            Change("swapped", "its faces seem counted from the other end", "Turn the order of reference_mm round", shape.names,
                    lambda xyz, r: (xyz, r.max(axis=0) + r.min(axis=0) - r))
         )  # fmt: skip
     return tuple(found)
@@ -80,7 +80,7 @@ def _units(
             concerned = tuple(names[i] for i in chosen)
             scale = np.where(np.isin(np.arange(len(names)), chosen), factor, 1.0)
             yield Change(
-                "unit", f"{', '.join(concerned)} in {unit}, not mm", f"Convert to mm (times {factor:g})", concerned,
+                "unit", f"{_verb(concerned, 'look')} like {unit}, not mm", f"Convert to mm (times {factor:g})", concerned,
                 _on(of_references, _times(scale)),
             )  # fmt: skip
 
@@ -90,7 +90,7 @@ def _signs(names: tuple[str, ...], *, of_references: bool) -> Iterator[Change]:
     for chosen in (*((i,) for i in range(3)), *several):
         concerned = tuple(names[i] for i in chosen)
         sign = np.where(np.isin(np.arange(3), chosen), -1.0, 1.0)
-        yield Change("sign", f"{', '.join(concerned)} with the wrong sign", "Turn the sign round", concerned,
+        yield Change("sign", f"{_verb(concerned, 'seem')} to have the wrong sign", "Turn the sign round", concerned,
                      _on(of_references, _times(sign)))  # fmt: skip
 
 
@@ -98,7 +98,7 @@ def _exchanges(names: tuple[str, ...], *, of_references: bool) -> Iterator[Chang
     for i, j in combinations(range(3), 2):
         order = np.arange(3)
         order[[i, j]] = j, i
-        yield Change("exchanged coordinates", f"{names[i]} and {names[j]} exchanged", "Exchange them",
+        yield Change("exchanged coordinates", f"{names[i]} and {names[j]} seem exchanged", "Exchange them",
                      (names[i], names[j]), _on(of_references, _reordered(order)))  # fmt: skip
 
 
@@ -109,9 +109,13 @@ def _shift(chosen: tuple[int, ...], names: tuple[str, ...], by: int, way: str, *
         return values
 
     return Change(
-        "shifted column", f"{', '.join(names)} shifted {way} by one row against the other columns",
+        "shifted column", f"{_verb(names, 'seem')} shifted {way} by one row against the other columns",
         "Move the column back beside the others", names, _on(of_references, shifted), 1,
     )  # fmt: skip
+
+
+def _verb(columns: tuple[str, ...], verb: str) -> str:
+    return f"{', '.join(columns)} {verb}{'s' if len(columns) == 1 else ''}"
 
 
 def _times(factors: Floats) -> Callable[[Floats], Floats]:

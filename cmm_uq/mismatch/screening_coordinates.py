@@ -107,7 +107,7 @@ class _Search:
                 found.append(self._finding(kind, rows, why, column))
         groups = self.points.group if self.shape.together else np.arange(len(self.points))
         unknown = [np.flatnonzero(open_ & (groups == group)) for group in np.unique(groups[open_])]
-        why = "No mistake that is known here explains it: measure again"
+        why = "no known mistake explains it: measure again"
         return found + [self._finding("outlier", rows, why, None) for rows in unknown]
 
     def _finding(self, kind: str, rows: Ints, why: str, column: str | None) -> Finding:
@@ -116,7 +116,7 @@ class _Search:
         by = f"by {amount:.3g} mm, " if np.isfinite(amount) else ""
         missed = f"the artefact is missed {by}far more than any machine's error"
         what = missed if amount > self.shape.tolerance else "the readings lie far outside the travel"
-        told = f"{at_lines(self.points, rows)}: {what}. {why}"
+        told = f"{at_lines(self.points, rows)}: {what}; {why}"
         return replace(
             finding(kind, self.points, rows, told, column), set_aside=True, rows=tuple(int(row) for row in lost)
         )
@@ -137,7 +137,7 @@ class _Search:
             copied = (
                 f"the coordinates of {at_lines(self.points, original[block])} to the last digit: copied, not measured"
             )
-            kind, has = ("duplicate", "It has") if len(block) == 1 else ("repeated block", "They have")
+            kind, has = ("duplicate", "it has") if len(block) == 1 else ("repeated block", "they have")
             yield kind, block, f"{has} {copied}", None
 
     def _other_place(self, rows: Ints, others: Ints) -> NDArray[np.bool_]:
@@ -169,9 +169,13 @@ class _Search:
                 continue
             told = self._first(both, rows)
             if told is None and self._numbered_otherwise(rows):
-                told = "swapped", "its points are numbered in another order: number them as the references are", None
+                told = (
+                    "swapped",
+                    "its points seem numbered in another order than the references: number them alike",
+                    None,
+                )
             if told is not None:
-                yield told[0], rows, f"It looks like {told[1]}" if told[0] != "swapped" else told[1], told[2]
+                yield told[0], rows, told[1], told[2]
 
     def _candidates(self, open_: NDArray[np.bool_]) -> Iterator[Ints]:
         several = 1 if self.shape.together else 3
@@ -196,7 +200,7 @@ class _Search:
             chosen = np.array([row])
             told = self._stuck(row) or self._first(every, chosen)
             if told is not None:
-                yield told[0], chosen, f"It looks like {told[1]}", told[2]
+                yield told[0], chosen, told[1], told[2]
 
     def _stuck(self, row: int) -> tuple[str, str, str | None] | None:
         """One coordinate repeated from the row before, digit for digit, while the others moved on."""
@@ -206,7 +210,7 @@ class _Search:
         if same.sum() != 1:
             return None
         axis = AXES[int(np.argmax(same))]
-        return "stuck", f"{axis}_mm stuck at the value of the row before. Measure again", f"{axis}_mm"
+        return "stuck", f"{axis}_mm seems stuck at the value of the row before. Measure again", f"{axis}_mm"
 
     def _first(self, every: Iterable[Change], rows: Ints) -> tuple[str, str, str | None] | None:
         for change in every:
@@ -284,7 +288,7 @@ def _refuse_whole(search: _Search, where: str) -> None:
         if left <= fewest and outside_travel(points.at(xyz)).any(axis=1).mean() <= _EDGES:
             best, fewest = change, left - 1
     if best is not None:
-        raise CmmUqError(f"{told}; they fit once it is undone, so this looks like {best.what}",
+        raise CmmUqError(f"{told}, and fit once one mistake is undone: {best.what}",
                          where=f"{where}, column {best.columns[0]}", fix=best.fix)  # fmt: skip
     for axis, column in zip(AXES, points.xyz.T, strict=True):
         if np.ptp(column) == 0 and bad > MOST * len(points):
