@@ -1,4 +1,8 @@
-"""Every effect by its name."""
+"""Every effect by its name.
+
+``CATALOGUE`` holds the effects that every job file may count on. ``FURTHER`` holds rarer ones: a job may name them, simulate
+them and have them estimated like the others; whether they are thought of unasked is for the diagnosis to decide.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,24 @@ from collections.abc import Sequence
 from types import MappingProxyType
 
 from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.physics import drives, probing, rigid_body, thermal
+from cmm_uq.physics import drives, probing, reversal, rigid_body, scales, scanning, stylus, thermal, warming
 from cmm_uq.physics.effect import Effect
 
 CATALOGUE = MappingProxyType(
     {effect.name: effect for effect in (*rigid_body.EFFECTS, *drives.EFFECTS, *thermal.EFFECTS, *probing.EFFECTS)}
 )
 """Effects by name."""
+
+FURTHER = MappingProxyType(
+    {
+        effect.name: effect
+        for effect in (*reversal.EFFECTS, *scales.EFFECTS, *warming.EFFECTS, *stylus.EFFECTS, *scanning.EFFECTS)
+    }
+)
+"""Further effects by name."""
+
+EVERY = MappingProxyType({**CATALOGUE, **FURTHER})
+"""All of them by name."""
 
 
 def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, ...]:
@@ -23,8 +38,8 @@ def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, 
     CmmUqError : a name is unknown or stands twice.
     """
     for i, name in enumerate(names):
-        if name not in CATALOGUE:
-            raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, CATALOGUE))
+        if name not in EVERY:
+            raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, EVERY))
         if name in names[:i]:
             raise CmmUqError(f"the effect {name!r} is named twice", where=where, fix="Name it once")
-    return tuple(CATALOGUE[name] for name in names)
+    return tuple(EVERY[name] for name in names)

@@ -25,8 +25,11 @@ from cmm_uq.physics.map_interpolation import LookedUp
 from cmm_uq.points import Floats
 
 
-def euler_313(alpha: float, beta: float, gamma: float) -> Floats:
-    """Attitude (3, 3) from angles about Z, X′ and Z″, rad (Harris 2004 eq. 7): columns are u, v, w in machine axes."""
+def euler_313(alpha: float | Floats, beta: float | Floats, gamma: float | Floats) -> Floats:
+    """Attitude (3, 3) from angles about Z, X′ and Z″, rad (Harris 2004 eq. 7): columns are u, v, w in machine axes.
+
+    Angles (n,) give attitudes (3, 3, n).
+    """
     ca, sa, cb, sb, cg, sg = (f(a) for a in (alpha, beta, gamma) for f in (np.cos, np.sin))
     return np.array(
         [

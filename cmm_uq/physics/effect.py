@@ -8,14 +8,20 @@ exact linear algebra. What is truly nonlinear (a period) is a *shape* of the bas
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import ClassVar
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.points import Floats, Points
+
+CONTRACT, FURTHER = "contract", "further"
+"""Tiers: effects that every job file may count on, and rarer ones that only some machines and recordings show."""
+
+TRIALS = 7
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,7 @@ class Effect(ABC):
     coefficients : what enters e linearly, k of them.
     shape : what shapes the basis, if anything.
     columns : columns that the recording must have.
+    tier : ``contract`` or ``further``: how readily it is to be thought of.
     """
 
     name: str
@@ -61,6 +68,7 @@ class Effect(ABC):
     coefficients: tuple[Parameter, ...]
     shape: tuple[Shape, ...] = ()
     columns: tuple[str, ...] = ()
+    tier: str = CONTRACT
 
     @abstractmethod
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -70,6 +78,11 @@ class Effect(ABC):
         ------
         CmmUqError : a column or a machine's figure is missing.
         """
+
+    def trials(self) -> Iterator[tuple[float, ...]]:
+        """Values of the shape worth trying, evenly spread in their logarithm; one empty tuple without a shape."""
+        grids = [np.geomspace(s.low, s.high, TRIALS).tolist() for s in self.shape]
+        yield from product(*grids)
 
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:

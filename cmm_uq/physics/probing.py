@@ -11,7 +11,8 @@ from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE
 
 
-def _normals(points: Points) -> Floats:
+def normals_of(points: Points) -> Floats:
+    """Outward unit normals (n, 3), as recorded."""
     return np.column_stack([points.column(f"n{a}") for a in AXES])
 
 
@@ -25,7 +26,7 @@ class ProbeRadius(Effect):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return MICROMETRE * _normals(points)[:, :, None]
+        return MICROMETRE * normals_of(points)[:, :, None]
 
 
 class ProbeLobing(Harmonic):
@@ -39,7 +40,7 @@ class ProbeLobing(Harmonic):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
-        normals = _normals(points)
+        normals = normals_of(points)
         angle = 3 * np.arctan2(normals[:, 1], normals[:, 0])
         lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
         return np.asarray(MICROMETRE * normals[:, :, None] * lobes[:, None, :], dtype=np.float64)

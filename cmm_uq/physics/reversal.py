@@ -1,0 +1,118 @@
+"""What changes when an axis turns round: lateral play, yaw, wind-up of its drive, and what speed adds to it.
+
+They share a sign: half of it each way. Hysteresis of the axis itself is in :mod:`cmm_uq.physics.drives`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmm_uq.physics.effect import FURTHER, Effect, Parameter, along
+from cmm_uq.physics.rigid_body import turned
+from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.units import ARCSECOND, METRE, MICROMETRE
+
+_MILLISECOND = 1e-3
+"""1 ms in s."""
+
+
+class Play(Effect):
+    """Lateral play: carriage a steps sideways along b when it turns round: e_b = ½·gap·approach_a.
+
+    Worn or badly set bearings of the guideway. Along its own direction the same is hysteresis.
+    """
+
+    coefficients = (Parameter("gap_um", "µm", 10.0),)
+    tier = FURTHER
+
+    def __init__(self, axis: str, direction: str) -> None:
+        self.axis, self.direction = axis, direction
+        self.name = f"play_{axis}_{direction}"
+        self.title = f"Lateral play of {axis.upper()} along {direction.upper()}"
+        self.columns = (f"approach_{axis}",)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        return along(self.direction, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}"))
+
+
+class YawPlay(Effect):
+    """Carriage a yaws when it turns round: ε_z = ½·angle·approach_a, which moves the ram by ε × what carriage a carries.
+
+    A bridge that is driven at one leg, or a drive that is not in line with friction and mass.
+    """
+
+    coefficients = (Parameter("angle_arcsec", "″", 2.0),)
+    tier = FURTHER
+
+    def __init__(self, axis: str) -> None:
+        self.axis = axis
+        self.name = f"yaw_play_{axis}"
+        self.title = f"Yaw of carriage {axis.upper()} at reversal"
+        self.columns = (f"approach_{axis}",)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        return turned(points, self.axis, "z", 0.5 * ARCSECOND * points.column(f"approach_{self.axis}"))
+
+
+class WindUp(Effect):
+    """Hysteresis that grows along the travel: e_a = ½·w·approach_a·(a − middle of the travel).
+
+    A leadscrew or belt that winds up between motor and carriage, or is worn at one end ("unequal backlash").
+    """
+
+    coefficients = (Parameter("um_per_m", "µm/m", 20.0),)
+    tier = FURTHER
+
+    def __init__(self, axis: str) -> None:
+        self.axis = axis
+        self.name = f"windup_{axis}"
+        self.title = f"Wind-up of the drive of {axis.upper()}"
+        self.columns = (f"approach_{axis}",)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        low, high = points.machine.travel(self.axis)
+        place = (points.readings[:, AXES.index(self.axis)] - 0.5 * (low + high)) / METRE
+        return along(self.axis, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}") * place)
+
+
+class SpeedLag(Effect):
+    """Scale and trigger read at different moments: e_a = lag·speed along a, in the sense of travel.
+
+    A positive lag: the scale was read before the probe was where it triggered. Speed along a is the recorded speed times
+    the direction of travel.
+    """
+
+    coefficients = (Parameter("lag_ms", "ms", 1.0),)
+
+    tier = FURTHER
+
+    def __init__(self, axis: str) -> None:
+        self.axis = axis
+        self.name = f"speed_lag_{axis}"
+        self.title = f"Lag of {axis.upper()} in proportion to speed"
+        self.columns = ("speed_mm_s", *(f"approach_{a}" for a in AXES))
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        part = travel(points)[:, AXES.index(self.axis)]
+        return along(self.axis, _MILLISECOND * points.column("speed_mm_s") * part)
+
+
+def travel(points: Points) -> Floats:
+    """Unit vectors (n, 3) of travel into each point; zero where none was recorded."""
+    signs = np.column_stack([points.column(f"approach_{a}") for a in AXES])
+    length = np.linalg.norm(signs, axis=1, keepdims=True)
+    return np.asarray(signs / np.where(length > 0, length, 1.0), dtype=np.float64)
+
+
+EFFECTS: tuple[Effect, ...] = (
+    *(Play(a, b) for a in AXES for b in AXES if a != b),
+    *(YawPlay(a) for a in "xy"),
+    *(WindUp(a) for a in AXES),
+    *(SpeedLag(a) for a in AXES),
+)

@@ -1,0 +1,102 @@
+"""Errors of scales beyond a constant factor: curvature, and a laser's wavelength in air that nobody corrected.
+
+A scale that is not parallel to its axis, or a gauge not parallel to a line (cosine error), is a constant factor −½θ² at any
+place, and cannot be told from the scale error of that axis; so it is no effect of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmm_uq.physics.effect import FURTHER, Effect, Parameter, along
+from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.uncertainty.air.edlen import harris_2004
+from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
+
+AIR = ("temp_air_c", "pressure_hpa", "humidity_pct")
+
+_PASCAL_PER_HPA = 100.0
+_CO2_PPM, _HENE_NM = 450.0, 632.991
+_STANDARD = (REFERENCE_TEMPERATURE, 101325.0, 50.0)
+
+
+class ScaleCurvature(Effect):
+    """Position error of second order: e_a = bow·(1 − (2(a − a0)/T − 1)²), T the travel from a0.
+
+    A scale clamped at both ends, a tape that is stretched unevenly, a rack of two pieces.
+    """
+
+    coefficients = (Parameter("bow_um", "µm", 10.0),)
+    tier = FURTHER
+
+    def __init__(self, axis: str) -> None:
+        self.axis = axis
+        self.name = f"scale_curvature_{axis}"
+        self.title = f"Curvature of the scale of {axis.upper()}"
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        low, high = points.machine.travel(self.axis)
+        place = 2 * (points.readings[:, AXES.index(self.axis)] - low) / (high - low) - 1
+        return along(self.axis, MICROMETRE * (1 - place**2))
+
+
+class AirScale(Effect):
+    """A laser scale whose wavelength is not corrected for air: e_a = −part·(n − n₀)·a, n₀ at 20 °C, 1013.25 hPa, 50 %.
+
+    Part 1 is no correction at all. About −1 ppm/K, +0.27 ppm/hPa, −0.01 ppm/% in n (Harris 2004 section 3.3).
+    """
+
+    coefficients = (Parameter("part", "1", 1.0),)
+    columns = AIR
+    tier = FURTHER
+
+    def __init__(self, axis: str) -> None:
+        self.axis = axis
+        self.name = f"air_scale_{axis}"
+        self.title = f"Refractive index of air on the laser scale of {axis.upper()}"
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        return along(self.axis, -index_change(points) * points.readings[:, AXES.index(self.axis)])
+
+
+class DeadPath(Effect):
+    """Dead path of a laser scale: e_a = −d·(n − n at the first point), d the path that the zero of the scale leaves out.
+
+    The air between interferometer and zero changes its optical length while nothing moves.
+    """
+
+    coefficients = (Parameter("path_mm", "mm", 300.0),)
+    columns = AIR
+    tier = FURTHER
+
+    def __init__(self, axis: str) -> None:
+        self.axis = axis
+        self.name = f"dead_path_{axis}"
+        self.title = f"Dead path of the laser scale of {axis.upper()}"
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        change = index_change(points)
+        return along(self.axis, change[0] - change)
+
+
+def index_change(points: Points) -> Floats:
+    """Refractive index of the recorded air less that of standard air, (n,)."""
+
+    def refractivity(temperature: Floats, pascal: Floats, humidity: Floats) -> Floats:
+        return np.asarray(harris_2004(temperature, pascal, humidity, _CO2_PPM, _HENE_NM), dtype=np.float64)
+
+    temperature, hectopascal, humidity = (points.column(name) for name in AIR)
+    standard = refractivity(*(np.array(value) for value in _STANDARD))
+    return refractivity(temperature, _PASCAL_PER_HPA * hectopascal, humidity) - standard
+
+
+EFFECTS: tuple[Effect, ...] = (
+    *(ScaleCurvature(a) for a in AXES),
+    *(AirScale(a) for a in AXES),
+    *(DeadPath(a) for a in AXES),
+)

@@ -1,0 +1,79 @@
+"""Errors of a laser digitizer in its own frame: its alignment, its depth scale, the angle at which its light meets a surface.
+
+Its frame turns with ``gamma_deg``, and with ``alpha_deg`` and ``beta_deg`` where they are recorded; without these w lies along
+the machine's X axis (α = β = 90°, Harris 2004 section 6.2). Depth is measured along v.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmm_uq.physics.digitizer import euler_313
+from cmm_uq.physics.effect import FURTHER, Effect, Parameter
+from cmm_uq.physics.probing import normals_of
+from cmm_uq.points import Floats, Points
+from cmm_uq.units import MICROMETRE
+
+
+class DigitizerOffset(Effect):
+    """Digitizer misaligned in its scan plane: e = du·u + dv·v, which turns with the pose.
+
+    An alignment on the reference sphere that was off by [du dv], or a mount that has moved since (Harris 2004 eq. 14–25).
+    """
+
+    name = "digitizer_offset"
+    title = "Alignment of the digitizer"
+    coefficients = (Parameter("u_um", "µm", 20.0), Parameter("v_um", "µm", 20.0))
+    columns = ("gamma_deg",)
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        return MICROMETRE * attitudes(points)[:, :, :2]
+
+
+class DigitizerDepth(Effect):
+    """Error in proportion to scan depth: e = k·depth·v, the depth from the column ``depth_mm`` (Feng 2001, Xi 2001)."""
+
+    name = "digitizer_depth"
+    title = "Depth bias of the digitizer"
+    coefficients = (Parameter("um_per_mm", "µm/mm", 1.0),)
+    columns = ("gamma_deg", "depth_mm")
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        return MICROMETRE * points.column("depth_mm")[:, None, None] * attitudes(points)[:, :, 1:2]
+
+
+class DigitizerIncidence(Effect):
+    """Error in proportion to the angles between beam and normal: e = (kᵢ·incident + kₚ·projected)·v (Feng 2001, Xi 2001).
+
+    The incident angle lies in the scan plane, the projected one across it.
+    """
+
+    name = "digitizer_incidence"
+    title = "Incidence of the digitizer's light"
+    coefficients = (Parameter("incident_um_per_deg", "µm/°", 1.0), Parameter("projected_um_per_deg", "µm/°", 1.0))
+    columns = ("gamma_deg", "nx", "ny", "nz")
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        frame = attitudes(points)
+        own = np.einsum("ni,nij->nj", normals_of(points), frame)
+        angles = np.degrees(np.arctan2(own[:, [0, 2]], np.abs(own[:, 1:2])))
+        return np.asarray(MICROMETRE * frame[:, :, 1:2] * angles[:, None, :], dtype=np.float64)
+
+
+def attitudes(points: Points) -> Floats:
+    """Axes u, v, w of the digitizer as columns (n, 3, 3) in machine axes: Euler angles 3-1-3 (Harris 2004 eq. 7)."""
+    right = np.full(len(points), 90.0)
+    alpha, beta = (np.radians(points.columns.get(name, right)) for name in ("alpha_deg", "beta_deg"))
+    gamma = np.radians(points.column("gamma_deg"))
+    return np.moveaxis(euler_313(alpha, beta, gamma), 2, 0)
+
+
+EFFECTS: tuple[Effect, ...] = (DigitizerOffset(), DigitizerDepth(), DigitizerIncidence())

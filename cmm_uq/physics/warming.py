@@ -1,0 +1,174 @@
+"""Machines and artefacts that warm up: drift that settles, scales that grow with time, squareness that depends on temperature.
+
+A temperature sensor that reads wrong by a constant makes a constant scale error of α·ΔT and cannot be told from one; so it is
+no effect of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmm_uq.physics.effect import FURTHER, Effect, Parameter, Shape, along
+from cmm_uq.physics.rigid_body import turned
+from cmm_uq.physics.thermal import EXPANSION
+from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.units import ARCSECOND, HOUR, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE
+
+SETTLING = Shape("settling_h", "h", 0.2, 20.0)
+"""Time constant of warming: an electric cabinet takes minutes, a granite table a day."""
+
+LAG = Shape("lag_h", "h", 0.05, 5.0)
+"""Time constant of an artefact behind its thermometer: a thin bar minutes, a solid one an hour or more."""
+
+
+class ScaleDrift(Effect):
+    """A scale that grows with time: e_a = r·time·a. A room or a machine that warms steadily."""
+
+    coefficients = (Parameter("ppm_per_h", "ppm/h", 5.0),)
+    columns = ("time_s",)
+    tier = FURTHER
+
+    def __init__(self, axis: str) -> None:
+        self.axis = axis
+        self.name = f"scale_drift_{axis}"
+        self.title = f"Scale of {axis.upper()} growing with time"
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        hours = points.column("time_s") / HOUR
+        return along(self.axis, PPM * hours * points.readings[:, AXES.index(self.axis)])
+
+
+class Settling(Effect):
+    """Drift that settles: e_a = A·(1 − exp(−time/τ)). What follows switching on, or a door left open."""
+
+    coefficients = (Parameter("um", "µm", 20.0),)
+    shape = (SETTLING,)
+    columns = ("time_s",)
+    tier = FURTHER
+
+    def __init__(self, axis: str) -> None:
+        self.axis = axis
+        self.name = f"settling_{axis}"
+        self.title = f"Settling of {axis.upper()}"
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        return along(self.axis, MICROMETRE * _settled(points, shape))
+
+
+class ScaleSettling(Effect):
+    """A scale that settles: e_a = s·(1 − exp(−time/τ))·a. An axis warmed by its motor, an air supply that was switched on."""
+
+    coefficients = (Parameter("ppm", "ppm", 20.0),)
+    shape = (SETTLING,)
+    columns = ("time_s",)
+    tier = FURTHER
+
+    def __init__(self, axis: str) -> None:
+        self.axis = axis
+        self.name = f"scale_settling_{axis}"
+        self.title = f"Scale of {axis.upper()} settling"
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        return along(self.axis, PPM * _settled(points, shape) * points.readings[:, AXES.index(self.axis)])
+
+
+class ThermalSquareness(Effect):
+    """Squareness that changes with temperature: S = k·(mean of temp_x, temp_y, temp_z − 20 °C), signs as for squareness.
+
+    A frame of two materials. Harris 2004 table 7 looked for it, and found XY free of it and YZ, ZX by up to 4″/K.
+    """
+
+    coefficients = (Parameter("arcsec_per_k", "″/K", 4.0),)
+    columns = tuple(f"temp_{a}_c" for a in AXES)
+    tier = FURTHER
+
+    def __init__(self, plane: str, moved: str, lever: str) -> None:
+        self.moved, self.lever = moved, lever
+        self.name = f"thermal_squareness_{plane}"
+        self.title = f"Squareness {plane[0].upper()}–{plane[1].upper()} with temperature"
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        excess = np.mean([points.column(name) for name in self.columns], axis=0) - REFERENCE_TEMPERATURE
+        return along(self.moved, -ARCSECOND * excess * points.readings[:, AXES.index(self.lever)])
+
+
+class CarriageGradient(Effect):
+    """A carriage bent by a gradient across it: carriage a turns about b by ε = k·(difference)·(a − a0).
+
+    As the table under ``thermal_gradient``: the bridge between its upper and lower side, the ram between front and back.
+    """
+
+    coefficients = (Parameter("arcsec_per_m_k", "″/(m·K)", 20.0),)
+    tier = FURTHER
+
+    def __init__(self, what: str, axis: str, about: str, columns: tuple[str, str]) -> None:
+        self.axis, self.about = axis, about
+        self.name = f"thermal_gradient_{what}"
+        self.title = f"Bending by the temperature gradient in the {what}"
+        self.columns = columns
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        low, _ = points.machine.travel(self.axis)
+        gradient = points.column(self.columns[0]) - points.column(self.columns[1])
+        angle = ARCSECOND * gradient * (points.readings[:, AXES.index(self.axis)] - low) / METRE
+        return turned(points, self.axis, self.about, angle)
+
+
+class ArtefactLag(Effect):
+    """Artefact behind its thermometer: longer by α·(T′ − temp_artefact)·length, with τ·dT′/dt = temp_artefact − T′.
+
+    It stands beside the artefact's expansion (stated, or ``thermal_artefact``), which follows the thermometer. T′ begins at
+    the first recorded temperature, and temperatures between two records lie on a line.
+    """
+
+    name = "artefact_lag"
+    title = "Artefact lagging behind its thermometer"
+    coefficients = (EXPANSION,)
+    shape = (LAG,)
+    columns = ("temp_artefact_c", "time_s")
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        (lag,) = shape
+        temperature = points.column("temp_artefact_c")
+        behind = lagging(points.column("time_s") / HOUR, temperature, lag) - temperature
+        return (-behind[:, None] * (points.xyz - points.group_means(points.xyz)))[:, :, None]
+
+
+def lagging(hours: Floats, temperature: Floats, lag: float) -> Floats:
+    """Temperature (n,) of a body that follows another with a time constant, exact for lines between the records, °C."""
+    moments, index = np.unique(hours, return_inverse=True)
+    index = index.ravel()
+    driving = np.bincount(index, temperature) / np.bincount(index)
+    body = np.empty_like(driving)
+    body[0] = driving[0]
+    for k, step in enumerate(np.diff(moments)):
+        behind = lag * (driving[k + 1] - driving[k]) / step
+        body[k + 1] = driving[k + 1] - behind + (body[k] - driving[k] + behind) * np.exp(-step / lag)
+    return np.asarray(body[index], dtype=np.float64)
+
+
+def _settled(points: Points, shape: Sequence[float]) -> Floats:
+    (settling,) = shape
+    return np.asarray(-np.expm1(-points.column("time_s") / HOUR / settling), dtype=np.float64)
+
+
+EFFECTS: tuple[Effect, ...] = (
+    *(ScaleDrift(a) for a in AXES),
+    *(Settling(a) for a in AXES),
+    *(ScaleSettling(a) for a in AXES),
+    ThermalSquareness("xy", "x", "y"),
+    ThermalSquareness("yz", "y", "z"),
+    ThermalSquareness("zx", "x", "z"),
+    CarriageGradient("bridge", "y", "x", ("temp_bridge_top_c", "temp_bridge_bottom_c")),
+    CarriageGradient("ram", "z", "y", ("temp_ram_front_c", "temp_ram_back_c")),
+    ArtefactLag(),
+)
