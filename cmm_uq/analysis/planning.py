@@ -19,7 +19,7 @@ from cmm_uq.planning.candidates import candidates
 from cmm_uq.planning.exchange import choose, score_of
 from cmm_uq.planning.identifiability import Identifiability, identifiability
 from cmm_uq.planning.information import told, whole
-from cmm_uq.planning.placing import Placing, joined, split
+from cmm_uq.planning.placing import Placing, appended, joined, split
 from cmm_uq.planning.ready import ready_plan
 from cmm_uq.planning.setting import Setting
 from cmm_uq.points import Floats, Points
@@ -123,6 +123,7 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     if setting.artefact.kind == KIND:
         return _shift_plan(job, setting)
     name, placings, points = _start(job, setting)
+    setting = setting.sized(points)
     if name == RECORDED and job.facts.recording.u_coordinate_um is None:
         estimate = setting.model(points).estimate().least_squares
         setting = replace(setting, sigma=max(estimate.sigma_of_residuals, 1e-3 * MICROMETRE))
@@ -132,11 +133,7 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     chosen, kept, scores = _searched(setting, start, rivals, name)
     better = None
     if chosen is not None:
-        if name == RECORDED:
-            added = _recorded_like(setting, chosen[kept:], points)
-            points = _together(points, added)
-        else:
-            points = _joined(setting, chosen)
+        points = _after(setting, points, chosen[kept:]) if name == RECORDED else _joined(setting, chosen)
         better = _outlook(setting, chosen, points, rivals, power, seed, _part(tell, 0.6, 0.95))
     met = conditions(name, [placing.points for placing in placings], job.points.machine) + _in_time(
         setting, name, placings
@@ -155,30 +152,22 @@ def _start(job: Job, setting: Setting) -> tuple[str, tuple[Placing, ...], Points
     return name, placings, _joined(setting, placings)
 
 
-def _joined(setting: Setting, placings: Sequence[Placing], first: int = 1) -> Points:
+def _joined(setting: Setting, placings: Sequence[Placing]) -> Points:
     plan = setting.plan
     return joined(
         placings, seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing,
-        columns=plan.columns, first=first,
+        columns=plan.columns,
     )  # fmt: skip
 
 
-def _recorded_like(setting: Setting, added: Sequence[Placing], recorded: Points) -> Points:
-    """Further placings with the columns of the recording, at its mean where the plan does not say."""
-    points = _joined(setting, added, first=int(recorded.measurement.max()) + 1)
-    columns = {
+def _after(setting: Setting, recorded: Points, added: Sequence[Placing]) -> Points:
+    """A recording and further placings, what else was recorded being at its mean there."""
+    points = _joined(setting, added)
+    places = split(replace(points, columns={
         name: points.columns.get(name, np.full(len(points), float(values.mean())))
         for name, values in recorded.columns.items()
-    }
-    return replace(points, columns=columns)
-
-
-def _together(recorded: Points, added: Points) -> Points:
-    return Points(
-        np.vstack([recorded.xyz, added.xyz]), np.concatenate([recorded.measurement, added.measurement]),
-        np.concatenate([recorded.point, added.point]), np.concatenate([recorded.repeat, added.repeat]), recorded.machine,
-        {name: np.concatenate([values, added.columns[name]]) for name, values in recorded.columns.items()},
-    )  # fmt: skip
+    }))  # fmt: skip
+    return appended(recorded, places)
 
 
 def _outlook(

@@ -131,14 +131,14 @@ def _warnings(plan: Plan) -> list[str]:
 def _sections(plan: Plan) -> tuple[Section, ...]:
     return (
         Section("Placings", _placings(plan)),
+        Section("Pictures of the placings", tuple(
+            placing_pictures(plan.to_measure, plan.setting.volume.box, plan.measured + 1) if plan.to_measure else ()
+        )),
         Section("What these placings determine", _determined(plan)),
         Section("What a better plan gains", _gain(plan)),
         Section("Smallest effects that the diagnosis would find", _smallest(plan)),
         Section("Conditions of the standard", tuple(
             Paragraph(f"{'✓' if condition.met else '✗'} {condition.what}") for condition in plan.conditions
-        )),
-        Section("Pictures of the placings", tuple(
-            placing_pictures(plan.to_measure, plan.setting.volume.box, plan.measured + 1) if plan.to_measure else ()
         )),
     )  # fmt: skip
 
@@ -227,7 +227,6 @@ def _smallest(plan: Plan) -> tuple[Block, ...]:
     )
     note = (
         f"Size found in {100 * POWER:.0f} of 100 recordings, at {100 * FALSE_ALARMS:g} % of false alarms. Named rightly: the "
-        "effect alone is more probable than any other and than none; – where that is never so. An effect that grows with "
-        "its readings is stated per unit of its parameter."
+        "effect alone is more probable than any other and than none; – where only a size beyond what physics allows would be."
     )
     return (Table("Smallest effects", heads, rows, (note,)),)

@@ -53,7 +53,7 @@ def placing_pictures(placings: Sequence[Placing], box: Floats, first: int) -> li
 def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
     corners = _seen(np.array(list(product(*box))))
     low, high = corners.min(axis=0), corners.max(axis=0)
-    span = 1.16 * (high - low)
+    span = 1.22 * (high - low)
     width = WIDTH_MM / A_ROW
     height = min(width * float(span[1] / span[0]), 75.0) + _TEXT_MM
     with house_style():

@@ -79,7 +79,7 @@ def ends(placing: Placing) -> str:
     """Where the artefact stands, in scale readings, mm."""
     readings = placing.points.readings
     far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
-    first, last = (", ".join(f"{value:.0f}" for value in readings[row]) for row in (0, far))
+    first, last = (", ".join(f"{value:.0f}".replace("-", "−") for value in readings[row]) for row in (0, far))
     return f"({first})" if far == 0 else f"({first}) → ({last})"
 
 

@@ -36,7 +36,8 @@ _LARGER = np.array([0.9, 1.0, 1.1, 1.25, 1.5, 2.0])
 """Noise as it looks, over what it is, at which the gate's threshold is found."""
 
 _TAIL = 0.2
-_UNSEEN = 1e-6
+_ALLOWED = 3.0
+"""Prior standard deviations up to which an effect is reckoned with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,7 @@ class Power:
     ----------
     effect : its name.
     parameter, unit : its (first) parameter.
+    allowed : largest amplitude that physics allows, in its unit.
     per_unit : size, as in :data:`SIZES`, of an effect of one unit; 0 where nothing of it shows.
     detected_at, named_at : (d,) size from which on each drawn recording is alarmed, and named rightly; may be infinite.
     """
@@ -54,6 +56,7 @@ class Power:
     effect: str
     parameter: str
     unit: str
+    allowed: float
     per_unit: float
     detected_at: Floats
     named_at: Floats
@@ -68,7 +71,7 @@ class Power:
 
     @property
     def detectable(self) -> float | None:
-        """Amplitude detected with a probability of 80 %; ``None`` where none of :data:`SIZES` is."""
+        """Amplitude detected with a probability of 80 %; ``None`` where none that physics allows is."""
         return self._amplitude(self.detected_at)
 
     @property
@@ -78,7 +81,7 @@ class Power:
 
     def _amplitude(self, at: Floats) -> float | None:
         size = float(np.quantile(at, POWER, method="higher"))
-        return size / self.per_unit if self.per_unit > 0 and np.isfinite(size) else None
+        return size / self.per_unit if size <= self.allowed * self.per_unit else None
 
 
 def without_fault(facts: ArtefactFacts, model: MeasurementModel, sigma: float, seed: int) -> MeasurementModel:
@@ -125,15 +128,18 @@ def _power(rule: _Rule, model: MeasurementModel, values: Floats, effect: Effect,
     shown = rule.comparison.rest(column)
     length = float(np.linalg.norm(shown))
     name, unit = effect.reported[0].name, effect.coefficients[0].unit
+    allowed = _ALLOWED * effect.coefficients[0].prior_sd
     index = rule.index(effect.name)
-    if length <= _UNSEEN * float(np.linalg.norm(column)) or index is None:
+    if length * allowed < SIZES[0] * rule.sigma or index is None:
         never = np.full(draws, np.inf)
-        return Power(effect.name, name, unit, 0.0, never, never)
+        return Power(effect.name, name, unit, allowed, 0.0, never, never)
     noise = rule.noise(shown / length, seed, draws)
     alarm, margin = np.empty((len(SIZES), draws)), np.empty((len(SIZES), draws))
     for i, size in enumerate(SIZES):
         alarm[i], margin[i] = rule(rule.sigma * (noise + size * shown / length), index)
-    return Power(effect.name, name, unit, length / rule.sigma, _reached(alarm), _reached(np.minimum(alarm, margin)))
+    return Power(
+        effect.name, name, unit, allowed, length / rule.sigma, _reached(alarm), _reached(np.minimum(alarm, margin))
+    )
 
 
 def _reached(margin: Floats) -> Floats:

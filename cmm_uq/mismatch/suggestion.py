@@ -1,112 +1,197 @@
-"""Which further placing would part effects that a recording cannot tell apart."""
+"""Which further placing would part effects that a recording cannot tell apart, how often to measure it, and what follows.
+
+The artefact is set up as it was recorded, elsewhere and in other attitudes. What each such placing would add to the recording
+is known before it is measured; the odds that are to be expected follow from the size at which each effect of a pair explains
+the recording, with everything else fitted anew.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
-from cmm_uq.artefacts.ballbar import Ballbar
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.artefacts.artefact import Artefact
+from cmm_uq.artefacts.bryan import Bryan
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import WITH_REFERENCES, ArtefactFacts
+from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.measurement import MeasurementModel
+from cmm_uq.measurement.model import ARTEFACT
 from cmm_uq.mismatch.diagnosis import Diagnosis
 from cmm_uq.mismatch.explanations import shapes
 from cmm_uq.physics.catalogue import CATALOGUE
-from cmm_uq.points import Floats, Points
-from cmm_uq.units import MICROMETRE
+from cmm_uq.planning.candidates import like
+from cmm_uq.planning.information import certified, gram, scales, shared
+from cmm_uq.planning.placing import Pattern, Placing, appended
+from cmm_uq.planning.separation import left_of
+from cmm_uq.planning.swept import swept
+from cmm_uq.planning.volume import Volume
+from cmm_uq.points import Floats
 
 ODDS = 20.0
 """Odds that the suggested repetitions are expected to reach."""
 
 _MOST = 30
+_CANDIDATES = 120
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A placing, how often to repeat it, and what it is expected to decide."""
+    """A placing, how often to repeat it, and what it is expected to decide.
+
+    Parameters
+    ----------
+    separates : names of the two effects.
+    what : in words.
+    repetitions : how often to measure it.
+    odds : of the true one of the two over the other that are then to be expected.
+    """
 
     separates: tuple[str, str]
     what: str
     repetitions: int
+    odds: float
 
 
-def suggestions(diagnosis: Diagnosis, facts: ArtefactFacts) -> tuple[Suggestion, ...]:
-    """One placing for each pair that cannot be told apart; for a ballbar only, within the machine's travel."""
-    bar = diagnosis.before.artefact
-    if not isinstance(bar, Ballbar):
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """Information of the recording (k, k), of each candidate (c, k, k) and of certificates (k, k).
+
+    ``names`` (k,) says whose rows they are, ``fitted`` which of them the diagnosis fits beside any pair.
+    """
+
+    names: tuple[str, ...]
+    fitted: frozenset[str]
+    recorded: Floats
+    each: Floats
+    prior: Floats
+
+
+def suggestions(diagnosis: Diagnosis, facts: ArtefactFacts, plan: PlanFacts | None = None) -> tuple[Suggestion, ...]:
+    """One placing for each pair that cannot be told apart, within the machine's travel or the recorded volume.
+
+    Parameters
+    ----------
+    diagnosis : with groups of effects that look alike.
+    facts : of the artefact.
+    plan : what the volume and the fixtures allow.
+    """
+    pairs = [pair for group in diagnosis.indistinguishable for pair in combinations(group[:3], 2)]
+    if not pairs:
         return ()
-    found = []
-    for group in diagnosis.indistinguishable:
-        for first, second in combinations(group[:3], 2):
-            suggestion = _best(diagnosis, facts, bar, (first, second))
-            if suggestion is not None:
-                found.append(suggestion)
-    return tuple(found)
+    model = _with_all(diagnosis.after, sorted({name for pair in pairs for name in pair}))
+    artefact = diagnosis.after.artefact
+    if facts.kind in WITH_REFERENCES:  # one placing alone does not show how long the artefact is
+        facts = facts.model_copy(update={"length_mm": artefact.sizes[0].nominal})
+    try:
+        places = _candidates(artefact, plan or PlanFacts(margin_mm=0.0))
+        told = _told(diagnosis.after, model, facts, places)
+    except CmmUqError:  # nowhere else to put it
+        return ()
+    found = [_best(diagnosis.after, told, places, artefact.title.lower(), pair) for pair in pairs]
+    return tuple(suggestion for suggestion in found if suggestion is not None)
 
 
-def _best(diagnosis: Diagnosis, facts: ArtefactFacts, bar: Ballbar, pair: tuple[str, str]) -> Suggestion | None:
-    places = _candidates(bar)
-    if places is None:
-        return None
-    differing = np.abs(np.subtract(*(_predicted(diagnosis, facts, places, name, pair) for name in pair)))
-    best = int(np.argmax(differing))
-    sigma = diagnosis.noise.coordinate.value * MICROMETRE * float(bar.noise_scale[0])
-    repetitions = int(np.ceil(2 * np.log(ODDS) * (sigma / max(differing[best], 1e-9)) ** 2))
-    if repetitions > _MOST:
-        return None
-    ends = places.xyz[2 * best : 2 * best + 2] + places.machine.origin_mm
-    start, stop = (", ".join(f"{value:.0f}" for value in end) for end in ends)
-    what = (
-        f"Place the bar from ({start}) to ({stop}) mm in scale readings and measure it {repetitions} times: the two predict "
-        f"lengths {differing[best] / MICROMETRE:.1f} µm apart there, odds of {ODDS:.0f} : 1 are to be expected."
-    )
-    return Suggestion(pair, what, repetitions)
+def _with_all(after: MeasurementModel, names: Sequence[str]) -> MeasurementModel:
+    """The model with every effect of every pair, periods as found or the longest."""
+    shape = dict(after.shapes)
+    for name in names:
+        if CATALOGUE[name].shape and name not in shape:
+            shape[name] = next(iter(shapes(CATALOGUE[name], after.artefact.points)))
+    others = tuple(effect for effect in after.effects if effect.name not in names)
+    return replace(after, effects=(*others, *(CATALOGUE[name] for name in names)), shapes=shape)
 
 
-def _predicted(diagnosis: Diagnosis, facts: ArtefactFacts, places: Points, name: str, pair: tuple[str, str]) -> Floats:
-    """What the model with one of the pair, fitted to the recording, predicts for new placings, (m,) mm."""
-    after = diagnosis.after
+def _candidates(artefact: Artefact, plan: PlanFacts) -> tuple[Placing, ...]:
+    """The first recorded placing, once, in many places and attitudes."""
+    points = artefact.points
+    volume = Volume.of(points.machine, plan, points.readings)
+    if isinstance(artefact, Bryan):
+        length = artefact.sizes[0].nominal
+        centre = artefact.centres(points.readings, length)[0]
+        places = swept(volume, length, _CANDIDATES, 1, centre)
+        means = {name: np.full(1, float(values.mean())) for name, values in points.columns.items()}
+        return tuple(replace(place, points=replace(place.points, columns=means)) for place in places)
+    first = points.select(points.measurement == artefact.measurement[0])
+    once = first.select(first.repeat == first.repeat.min())
+    pattern, attitude, _ = Pattern.of_recording(once)
+    return like(pattern, artefact.kind, volume, attitude, _CANDIDATES)
+
+
+def _told(after: MeasurementModel, model: MeasurementModel, facts: ArtefactFacts, places: Sequence[Placing]) -> _Told:
+    values = np.array([unknown.prior_mean for unknown in model.unknowns])
+    names = tuple(unknown.key[0] for unknown in model.unknowns)
+    fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
+    if isinstance(model.artefact, Bryan):
+        every = appended(model.artefact.points, places)
+        whole = shared(MeasurementModel(artefact_of(facts, every), model.effects, model.sigma, shapes=model.shapes))
+        count = len(whole.each) - len(places)
+        more = len(whole.prior) - len(names)
+        return _Told(
+            (*names, *[ARTEFACT] * more), fitted, whole.each[:count].sum(axis=0), whole.each[count:], whole.prior
+        )
+    each = [
+        gram(
+            MeasurementModel(artefact_of(facts, place.points), model.effects, model.sigma, shapes=model.shapes), values
+        )
+        for place in places
+    ]
+    return _Told(names, fitted, gram(model, values), np.stack(each), certified(model.unknowns))
+
+
+def _best(
+    after: MeasurementModel, told: _Told, places: Sequence[Placing], title: str, pair: tuple[str, str]
+) -> Suggestion | None:
+    sizes = {name: _size(after, name, pair) for name in pair}
+    before = float(_expected(told, told.recorded[None], pair, sizes)[0])
+    for repetitions in range(1, _MOST + 1):
+        log_odds = _expected(told, told.recorded + repetitions * told.each, pair, sizes)
+        best = int(np.argmax(log_odds))
+        if log_odds[best] >= np.log(ODDS):
+            odds = float(np.exp(min(log_odds[best], 50.0)))
+            times = "once" if repetitions == 1 else f"{repetitions} times"
+            what = (
+                f"Place the {title} {_where(places[best])} mm in scale readings and measure it {times}: odds of about "
+                f"{_round(odds)} : 1 for the true one are to be expected, {_round(float(np.exp(min(before, 50.0))))} : 1 "
+                "without it."
+            )
+            return Suggestion(pair, what, repetitions, odds)
+    return None
+
+
+def _size(after: MeasurementModel, name: str, pair: tuple[str, str]) -> Floats:
+    """Size at which one effect of a pair, without the other, explains the recording, over its prior standard deviation."""
+    others = tuple(effect for effect in after.effects if effect.name not in pair)
     effect = CATALOGUE[name]
-    others = tuple(e for e in after.effects if e.name not in pair)
     shape = dict(after.shapes)
     if effect.shape and name not in shape:
         shape[name] = next(iter(shapes(effect, after.artefact.points)))
     model = replace(after, effects=(*others, effect), shapes=shape)
-    values = model.estimate().least_squares.value
-    there = MeasurementModel(Ballbar(facts, places), model.effects, shapes=shape)
-    return np.asarray(there.linearised(values).design @ values, dtype=np.float64)
+    value = model.estimate().least_squares.value / scales(model.unknowns)
+    return np.asarray([v for v, u in zip(value, model.unknowns, strict=True) if u.key[0] == name], dtype=np.float64)
 
 
-def _candidates(bar: Ballbar) -> Points | None:
-    """The bar in many places and directions inside the machine's travel (or the recorded volume), columns as on average."""
-    points = bar.points
-    travel = points.machine.travel_mm - points.machine.origin_mm[:, None]
-    recorded = np.column_stack([points.xyz.min(axis=0), points.xyz.max(axis=0)])
-    box = np.where(np.isfinite(travel), travel, recorded)
-    half = 0.5 * bar.sizes[0].nominal
-    middles, halves = [], []
-    for direction in _directions():
-        room = box[:, 1] - box[:, 0] - 2 * half * np.abs(direction)
-        if np.any(room < 0):
-            continue
-        for corner in np.array(np.meshgrid(*[[0.0, 0.5, 1.0]] * 3)).reshape(3, -1).T:
-            middles.append(box[:, 0] + half * np.abs(direction) + corner * room)
-            halves.append(half * direction)
-    if not middles:
-        return None
-    m, h = np.array(middles), np.array(halves)
-    xyz = np.stack([m - h, m + h], axis=1).reshape(-1, 3)
-    number = np.repeat(np.arange(1, len(m) + 1), 2)
-    columns = {name: np.full(len(xyz), float(np.mean(values))) for name, values in points.columns.items()}
-    return Points(xyz, number, np.tile([1, 2], len(m)), np.ones_like(number), points.machine, columns)
+def _expected(told: _Told, information: Floats, pair: tuple[str, str], sizes: Mapping[str, Floats]) -> Floats:
+    """Expected log odds (c,) of the true one of a pair over the other, the less of the two, everything else fitted."""
+    both = {name: [i for i, owner in enumerate(told.names) if owner == name] for name in pair}
+    rest = [i for i, owner in enumerate(told.names) if owner in told.fitted and owner not in pair]
+    found = []
+    for true, other in (pair, pair[::-1]):
+        left = left_of(information + told.prior, both[true], [*rest, *both[other]])
+        found.append(0.5 * np.einsum("i,cij,j->c", sizes[true], left, sizes[true]))
+    return np.asarray(np.minimum(found[0], found[1]), dtype=np.float64)
 
 
-def _directions() -> Iterator[Floats]:
-    """Thirteen directions of a cube: along edges, face diagonals and body diagonals."""
-    for x in (0, 1):
-        for y in (-1, 0, 1):
-            for z in (-1, 0, 1):
-                if (x, y, z) > (0, 0, 0):
-                    yield np.array([x, y, z]) / np.sqrt(x * x + y * y + z * z)
+def _where(place: Placing) -> str:
+    readings = place.points.readings
+    far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
+    ends = [", ".join(f"{value:.0f}" for value in readings[row]) for row in (0, far)]
+    return f"from ({ends[0]}) to ({ends[1]})" if far else f"at ({ends[0]})"
+
+
+def _round(odds: float) -> str:
+    return f"{odds:.0f}" if odds < 1000 else "1000 and more"

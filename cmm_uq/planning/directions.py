@@ -11,13 +11,14 @@ _NEGLIGIBLE = 0.02
 
 
 def words(direction: Floats) -> str:
-    """A direction as an operator says it, either way along it: ``along X``, ``along +X −Z``."""
+    """A direction as an operator says it, either way along it: ``along X``, ``along +X −Z, inclined 45°``."""
     u = direction / np.linalg.norm(direction)
     taken = [i for i in range(3) if abs(u[i]) > _NEGLIGIBLE]
     if len(taken) == 1:
         return f"along {AXES[taken[0]].upper()}"
     turned = u * np.sign(u[taken[0]])
-    return "along " + " ".join(f"{'+' if turned[i] > 0 else '−'}{AXES[i].upper()}" for i in taken)
+    named = "along " + " ".join(f"{'+' if turned[i] > 0 else '−'}{AXES[i].upper()}" for i in taken)
+    return f"{named}, inclined {np.degrees(np.arcsin(abs(u[2]))):.0f}°" if 2 in taken else named
 
 
 def cube() -> list[Floats]:

@@ -50,9 +50,9 @@ def score_of(criterion: str, told: Told, targets: Sequence[int]) -> Score:
 
     Parameters
     ----------
-    criterion : ``D`` (volume of the uncertainty ellipsoid), ``A`` (sum of variances) and ``worst`` (largest variance) of the
-        targets, in units of their prior standard deviations; ``separation``: Σ ln sin² over pairs of targets, each pair with
-        everything that is not a target fitted.
+    criterion : ``D`` (volume of the uncertainty ellipsoid), ``A`` (mean of variances) and ``worst`` (largest variance) of the
+        targets, in units of their prior standard deviations, as logarithms of a variance; ``separation``: mean of −ln sin²
+        over pairs of targets, each pair with everything that is not a target fitted.
     told : for what must be fitted besides.
     targets : rows of the effects that count.
 
@@ -89,7 +89,7 @@ def score_of(criterion: str, told: Told, targets: Sequence[int]) -> Score:
         if criterion == "D":
             return np.asarray(np.linalg.slogdet(covariance)[1] / len(targets))
         variances = np.einsum("...ii->...i", covariance)
-        return np.asarray(variances.mean(axis=-1) if criterion == "A" else variances.max(axis=-1))
+        return np.asarray(np.log(variances.mean(axis=-1) if criterion == "A" else variances.max(axis=-1)))
 
     return uncertain
 

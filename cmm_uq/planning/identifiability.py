@@ -24,6 +24,8 @@ from cmm_uq.points import Floats
 NOT_TOLD_APART = 0.98
 """Cosine from which on two effects could hardly be told apart: a fifth of one is all that the other cannot imitate."""
 
+_ROUNDING = 1e-9
+
 WEAK = 0.1
 """Part of the prior variance from which on a parameter counts as weakly determined."""
 

@@ -64,7 +64,7 @@ def told(setting: Setting, placings: Sequence[Placing], also: tuple[Effect, ...]
         columns=plan.columns,
     )  # fmt: skip
     if setting.artefact.kind == "bryan":
-        return _sharing(setting.model(points, also))
+        return shared(setting.model(points, also))
     numbers = np.unique(points.measurement)
     models = [setting.model(points.select(points.measurement == number), also) for number in numbers]
     matrices = [gram(model, np.array([u.prior_mean for u in model.unknowns])) for model in models]
@@ -75,7 +75,7 @@ def whole(setting: Setting, points: Points, also: tuple[Effect, ...] = ()) -> Fl
     """Information (k, k) of a whole recording, in the rows of :func:`told`, without that of certificates."""
     model = setting.model(points, also)
     if setting.artefact.kind == "bryan":
-        return np.asarray(_sharing(model).each.sum(axis=0), dtype=np.float64)
+        return np.asarray(shared(model).each.sum(axis=0), dtype=np.float64)
     return gram(model, np.array([u.prior_mean for u in model.unknowns]))
 
 
@@ -100,8 +100,8 @@ def certified(unknowns: Sequence[Unknown], more: int = 0) -> Floats:
     return np.diag(values)
 
 
-def _sharing(model: MeasurementModel) -> Told:
-    """Placings, one a measurement, whose freedoms are shared by all of them."""
+def shared(model: MeasurementModel) -> Told:
+    """Information of each measurement of a recording whose placing's freedoms are common to all of them: a swept bar."""
     values = np.array([u.prior_mean for u in model.unknowns])
     linear = model.linearised(values)
     rows = np.hstack([linear.design * scales(linear.unknowns), linear.placing])

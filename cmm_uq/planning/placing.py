@@ -116,7 +116,7 @@ def along(direction: Floats) -> Floats:
     u = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
     across = np.cross([0.0, 0.0, 1.0], u)
     if np.linalg.norm(across) < _LEVEL:
-        across = np.array([0.0, 1.0, 0.0])
+        across = np.cross(u, [1.0, 0.0, 0.0])
     v = across / np.linalg.norm(across)
     return np.column_stack([u, v, np.cross(u, v)])
 
@@ -141,6 +141,21 @@ def joined(
         clock += seconds_per_point * n
         more = {"time_s": time} | {name: np.full(n, value) for name, value in (columns or {}).items()}
         parts.append(replace(points, measurement=np.full(n, number), columns={**points.columns, **more}))
+    return _concatenated(parts)
+
+
+def appended(recorded: Points, placings: Sequence[Placing]) -> Points:
+    """A recording and further placings after it, columns as recorded; the placings must have them."""
+    numbers = range(int(recorded.measurement.max()) + 1, int(recorded.measurement.max()) + 1 + len(placings))
+    later = [
+        replace(placing.points, measurement=np.full(len(placing.points), number))
+        for number, placing in zip(numbers, placings, strict=True)
+    ]
+    return _concatenated([recorded, *later])
+
+
+def _concatenated(parts: Sequence[Points]) -> Points:
+    """All parts with the columns that every one of them has."""
     names = [name for name in parts[0].columns if all(name in part.columns for part in parts)]
     return Points(
         np.vstack([p.xyz for p in parts]), np.concatenate([p.measurement for p in parts]),

@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 from cmm_uq.points import Floats
 
 SEEN = 1e-6
-"""Part of an effect's information, of what it would be if nothing else were fitted, below which it is not seen."""
+"""Part of an effect's information, of what it would be if nothing else were fitted, below which rounding hides it."""
+
+FAINT = 1.0
+"""Information, for an effect of its prior standard deviation, below which it does not stand out of the noise."""
 
 _RIDGE = 1e-13
 
@@ -49,7 +52,7 @@ def cosines(left: Floats, alone: Floats) -> Floats:
     alone : (..., r) information on each if nothing else were fitted.
     """
     size = np.einsum("...ii->...i", left)
-    seen = size > SEEN * alone
+    seen = visible(left, alone)
     root = np.sqrt(np.where(seen, size, 1.0))
     cosine = np.abs(left) / root[..., :, None] / root[..., None, :]
     cosine = np.where(seen[..., :, None] & seen[..., None, :], np.minimum(cosine, 1.0), 1.0)
@@ -58,4 +61,4 @@ def cosines(left: Floats, alone: Floats) -> Floats:
 
 def visible(left: Floats, alone: Floats) -> NDArray[np.bool_]:
     """(..., r) whether anything of each effect is left."""
-    return np.asarray(np.einsum("...ii->...i", left) > SEEN * alone)
+    return np.asarray(np.einsum("...ii->...i", left) > np.maximum(SEEN * alone, FAINT))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts, Job
+from cmm_uq.jobs.job import WITH_REFERENCES, ArtefactFacts, Job
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.measurement import MeasurementModel
 from cmm_uq.physics.catalogue import CATALOGUE, effects
@@ -64,6 +64,16 @@ class Setting:
     def machine(self) -> Machine:
         """That is measured."""
         return self.volume.machine
+
+    def sized(self, points: Points) -> Setting:
+        """The same with the artefact's length as these points show it, where its certified figures stand in the recording.
+
+        Without it each placing would take the longest distance of its own for the one that the certificate speaks of.
+        """
+        if self.artefact.kind not in WITH_REFERENCES or self.artefact.length_mm is not None:
+            return self
+        longest = artefact_of(self.artefact, points).sizes[0].nominal
+        return replace(self, artefact=self.artefact.model_copy(update={"length_mm": longest}))
 
     def model(self, points: Points, also: tuple[Effect, ...] = ()) -> MeasurementModel:
         """The model that the job names, with further effects, of the artefact at these points."""

@@ -1,0 +1,115 @@
+"""Which artefact determines which factor: ``python benchmarks/planning/artefact_table.py [DOCS.md]``.
+
+For the ready plan of every artefact the whole catalogue is taken to act at once, and the table follows from the design. With a
+file, the table between its two marks is replaced.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.measurement.model import ARTEFACT
+from cmm_uq.physics.catalogue import CATALOGUE, effects
+from cmm_uq.planning.identifiability import NOT_TOLD_APART, identifiability
+from cmm_uq.planning.information import certified, gram
+from cmm_uq.planning.placing import joined
+from cmm_uq.planning.ready import ready_plan
+from cmm_uq.planning.separation import cosines, left_of, visible
+from cmm_uq.planning.setting import Setting
+from cmm_uq.planning.volume import Volume
+from cmm_uq.points import Machine
+
+BEGIN, END = "<!-- generated: artefact × factor -->", "<!-- end of generated -->"
+MACHINE = Machine("bridge machine", "XYZ", np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]]))
+SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
+ARTEFACTS: dict[str, tuple[dict[str, object], dict[str, object]]] = {
+    "ballbar": ({"length_mm": 500.0, "u_um": 0.5}, {}),
+    "bryan": ({"length_mm": 280.0, "u_um": 0.5}, {}),
+    "step_gauge": ({"u_um": 0.4}, {"length_mm": 1000.0, "both_ways": True}),
+    "gauge_blocks": ({"u_um": 0.2}, {"lengths_mm": [30.0, 150.0, 300.0, 450.0, 560.0]}),
+    "plate": ({"u_um": 0.5}, {"pitch_mm": 100.0}),
+    "triangle": ({"blocks_mm": [480.0, 280.0, 380.0], "u_blocks_um": 0.1, "cylinders_mm": [20.0, 20.0, 20.0],
+                  "u_cylinders_um": 0.1}, {}),
+    "sphere": ({"length_mm": 25.0, "u_um": 0.1}, {}),
+    "plane": ({}, {}),
+}  # fmt: skip
+SHORT = {"artefact_sag": "sag", "probe_radius": "probe radius", "probe_lobing": "probe lobing"}
+
+
+def short(name: str) -> str:
+    """A name that fits a table."""
+    return SHORT.get(name, name.replace("_", " "))
+
+
+def column(kind: str) -> dict[str, str]:
+    """What the ready plan of one artefact says of every factor, told of the six classical ones.
+
+    A factor that the job names is determined or not; one that it does not name would be seen apart from all others, be
+    mistaken for some, or not be seen.
+    """
+    facts, wishes = ARTEFACTS[kind]
+    plan = PlanFacts.model_validate(wishes)
+    setting = Setting(
+        ArtefactFacts.model_validate({"kind": kind, **facts}), plan, Volume.of(MACHINE, plan), effects(SIX), 1e-3, 1e-3
+    )
+    points = joined(ready_plan(setting)[1])
+    found = identifiability(setting.model(points))
+    cells = {}
+    for parameter in found.parameters:
+        owner = parameter.unknown.key[0]
+        if owner == ARTEFACT:
+            continue
+        partners = sorted({key[0] for parts in found.free if parameter.unknown.key in parts for key in parts} - {owner})
+        cells[owner] = "not seen" if parameter.u is None and not partners else (
+            f"with {', '.join(map(short, partners))}" if parameter.u is None
+            else f"**{parameter.u:.2g} {parameter.unknown.unit}**"
+        )  # fmt: skip
+    return cells | others(setting, points)
+
+
+def others(setting: Setting, points: object) -> dict[str, str]:
+    """The factors that a job of the six does not name."""
+    rivals = setting.rivals(points)
+    model = setting.model(points, rivals)
+    names = [unknown.key[0] for unknown in model.unknowns]
+    information = gram(model, np.array([u.prior_mean for u in model.unknowns])) + certified(model.unknowns)
+    base = [i for i, name in enumerate(names) if name in (*SIX, ARTEFACT)]
+    rows = [i for i in range(len(names)) if i not in base]
+    left, alone = left_of(information, rows, base), np.diag(information)[rows]
+    cosine, seen = cosines(left, alone), visible(left, alone)
+    cells = dict.fromkeys(CATALOGUE, "–")
+    for a, i in enumerate(rows):
+        alike = [names[rows[b]] for b in range(len(rows)) if b != a and seen[b] and cosine[a, b] > NOT_TOLD_APART]
+        alike = sorted({name for name in alike if name != names[i]})
+        said = "not seen" if not seen[a] else f"like {', '.join(map(short, alike))}" if alike else u_of(i)
+        cells[names[i]] = said
+    return {name: cell for name, cell in cells.items() if name not in SIX}
+
+
+def table() -> str:
+    """The table as Markdown."""
+    columns = {kind: column(kind) for kind in ARTEFACTS}
+    listed = [name for name in CATALOGUE if any(cells[name] != "–" for cells in columns.values())]
+    lines = [f"| factor | {' | '.join(short(kind) for kind in columns)} |", "| --- |" + " --- |" * len(columns)]
+    lines += [f"| {short(name)} | {' | '.join(cells[name] for cells in columns.values())} |" for name in listed]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    text = table()
+    if len(sys.argv) < 2:
+        print(text)
+        return
+    path = Path(sys.argv[1])
+    page = path.read_text(encoding="utf-8")
+    before, rest = page.split(BEGIN)
+    path.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""Jobs still to be measured, for the studies of this folder."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning.setting import Setting
+from cmm_uq.planning.volume import Volume
+from cmm_uq.points import Machine
+
+SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
+MACHINE = Machine("bridge machine", "XYZ", np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]]))
+
+
+def setting(facts: ArtefactFacts, named: tuple[str, ...] = SIX, sigma: float = 1e-3, **plan: object) -> Setting:
+    wishes = PlanFacts.model_validate(plan)
+    return Setting(facts, wishes, Volume.of(MACHINE, wishes), effects(named), sigma, sigma)
+
+
+def ballbar() -> Setting:
+    return setting(ArtefactFacts(kind="ballbar", length_mm=500.0, u_um=0.5))
+
+
+def step_gauge() -> Setting:
+    return setting(ArtefactFacts(kind="step_gauge", u_um=0.4), pitch_mm=20.0, length_mm=1000.0)
+
+
+def plate() -> Setting:
+    return setting(ArtefactFacts(kind="plate", u_um=0.5), repeats=2, pitch_mm=100.0)
+
+
+def triangle() -> Setting:
+    return setting(ArtefactFacts(kind="triangle", blocks_mm=[480.0, 280.0, 380.0], u_blocks_um=0.1,
+                                 cylinders_mm=[20.0, 20.0, 20.0], u_cylinders_um=0.1))  # fmt: skip
+
+
+def bryan() -> Setting:
+    bar = ArtefactFacts(kind="bryan", length_mm=280.0, u_um=0.5)
+    return setting(bar)
+
+
+SETTINGS = {
+    "ballbar, twenty positions": ballbar,
+    "step gauge, seven lines": step_gauge,
+    "plate, six placings": plate,
+    "triangle, seven placings": triangle,
+    "bryan, twenty-five positions": bryan,
+}

@@ -1,0 +1,126 @@
+"""What placings determine, against figures worked out by hand and against least squares on drawn recordings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning import patterns
+from cmm_uq.planning.identifiability import Identifiability, identifiability
+from cmm_uq.planning.placing import Placing, along, joined
+from cmm_uq.planning.ready import ready_plan
+from cmm_uq.planning.setting import Setting
+from tests.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting
+
+UNCALIBRATED = BALLBAR.model_copy(update={"length_mm": None, "u_um": None})
+
+
+def found(chosen: Setting, placings: tuple[Placing, ...], *rivals: str) -> Identifiability:
+    return identifiability(chosen.model(joined(placings)), effects(rivals))
+
+
+def bars(chosen: Setting, *directions: tuple[float, float, float]) -> tuple[Placing, ...]:
+    pattern = patterns.ballbar(chosen.artefact, chosen.plan)
+    return tuple(
+        chosen.volume.set_up(pattern, along(np.array(d)), (0.5, 0.5, 0.5), f"{i}") for i, d in enumerate(directions)
+    )
+
+
+def test_the_scale_of_one_bar_measured_n_times_by_hand() -> None:
+    """u(scale) = √(2σ²/n + u_L²)/L: 1 µm, four times, bar of 400 mm ± 0.5 µm."""
+    chosen = setting(BALLBAR, named=("scale_x",), repeats=4)
+    (parameter,) = found(chosen, bars(chosen, (1, 0, 0))).parameters
+    assert parameter.u == pytest.approx(np.sqrt(2 / 4 + 0.5**2) / 0.4, rel=1e-5)
+    assert parameter.status == "determined"
+
+
+def test_an_uncalibrated_bar_leaves_the_three_scales_free_together_with_its_length() -> None:
+    chosen = setting(UNCALIBRATED, length_mm=400.0)
+    plan = found(chosen, ready_plan(chosen)[1])
+    (combination,) = plan.free
+    assert {key: round(part / combination["scale_x", "ppm"], 9) for key, part in combination.items()} == pytest.approx(
+        {("scale_x", "ppm"): 1.0, ("scale_y", "ppm"): 1.0, ("scale_z", "ppm"): 1.0, ("artefact", "length_mm"): 400e-6},
+        rel=1e-4,
+    )
+    status = {p.unknown.key[0]: p.status for p in plan.parameters}
+    assert status == dict.fromkeys(SIX[:3], "free") | dict.fromkeys(SIX[3:], "determined") | {"artefact": "free"}
+    assert not plan.complete
+
+
+def test_bars_along_one_axis_determine_its_scale_and_nothing_else() -> None:
+    chosen = setting(BALLBAR)
+    plan = found(chosen, bars(chosen, (1, 0, 0), (1, 0, 0)))
+    assert [p.unknown.key[0] for p in plan.parameters if p.status == "determined"] == ["scale_x"]
+    assert len(plan.free) == 5
+
+
+def test_sag_is_one_with_the_scales_of_the_table_axes() -> None:
+    """1 µm of sag on 400 mm is −2.5 ppm of X and of Y at once, for level bars with the vertical one free of it."""
+    chosen = setting(BALLBAR, named=("scale_x", "scale_y", "scale_z", "artefact_sag"))
+    plan = found(chosen, bars(chosen, (1, 0, 0), (0, 1, 0), (0, 0, 1)))
+    (combination,) = plan.free
+    sag = combination["artefact_sag", "um"]
+    assert combination["scale_x", "ppm"] / sag == pytest.approx(-2.5, rel=1e-4)
+    assert combination["scale_y", "ppm"] / sag == pytest.approx(-2.5, rel=1e-4)
+    assert set(combination) == {("scale_x", "ppm"), ("scale_y", "ppm"), ("artefact_sag", "um")}
+
+
+def test_one_direction_of_travel_leaves_backlash_free_and_both_determine_it() -> None:
+    named = (*SIX, "hysteresis_x", "hysteresis_y", "hysteresis_z")
+    one, both = (setting(GAUGE, named, length_mm=820.0, both_ways=way) for way in (False, True))
+    assert [p.status for p in found(one, ready_plan(one)[1]).parameters][6:] == ["free"] * 3
+    assert [p.status for p in found(both, ready_plan(both)[1]).parameters][6:] == ["determined"] * 3
+
+
+def test_seven_lines_of_a_gauge_cannot_tell_the_pitch_of_x_from_that_of_y() -> None:
+    """On lines through one middle both bend the space diagonals alike: z·x and z·y are the same parabola there."""
+    chosen = setting(GAUGE, length_mm=820.0)
+    plan = found(chosen, ready_plan(chosen)[1], "rotation_x_y", "rotation_y_x", "straightness_z_x")
+    assert ("rotation_x_y", "rotation_y_x") in {pair[:2] for pair in plan.alike}
+
+
+def test_a_level_plate_shows_nothing_of_the_scale_of_z() -> None:
+    facts, wishes = EVERY_KIND["plate"]
+    chosen = setting(facts, named=("scale_x", "scale_y"), **wishes)
+    plan = found(chosen, ready_plan(chosen)[1][:2], "scale_z", "squareness_xy")
+    assert plan.unseen == ("scale_z",)
+
+
+def test_few_placings_are_a_finding_and_no_error() -> None:
+    chosen = setting(BALLBAR)
+    plan = found(chosen, bars(chosen, (1, 1, 1)))
+    assert all(p.status == "free" for p in plan.parameters)
+
+
+@pytest.mark.parametrize("kind", ["ballbar", "step_gauge", "plate", "triangle", "bryan"])
+def test_expected_uncertainties_are_those_of_drawn_recordings(kind: str) -> None:
+    """Forty least-squares estimates: the sum of squares over the expected variance is χ², here within its 99.99 % range."""
+    from scipy import stats
+
+    facts, wishes = EVERY_KIND[kind]
+    named = ("squareness_xy", "squareness_zx") if kind == "bryan" else ("scale_x", "squareness_xy", "squareness_zx")
+    chosen = setting(facts, named, repeats=1, **wishes)
+    points = joined(ready_plan(chosen)[1])
+    expected = np.array([p.u for p in found(chosen, ready_plan(chosen)[1]).parameters if p.unknown.key[0] in named])
+    acting = MeasurementModel(artefact_of(facts, points), effects(named))
+    random = np.random.default_rng(4)
+    squares = np.zeros(len(named))
+    for _ in range(40):
+        sizes = np.array([
+            s.nominal + (s.sd * random.standard_normal() if np.isfinite(s.sd) else 0.0) for s in acting.artefact.sizes
+        ])  # fmt: skip
+        xyz = acting.simulate(np.zeros(len(named)), sizes, Noise(chosen.sigma), random)
+        value = chosen.model(points.at(xyz)).estimate().least_squares.value
+        squares += (value[: len(named)] / expected) ** 2
+    low, high = stats.chi2.ppf([0.5e-4, 1 - 0.5e-4], 40)
+    assert np.all((low < squares) & (squares < high)), squares
+
+
+def test_a_level_surface_shows_none_of_the_classical_factors() -> None:
+    """They move the surface into itself, shift it or tilt it, and what is left is rounding."""
+    facts, _ = EVERY_KIND["plane"]
+    chosen = setting(facts)
+    assert {p.status for p in found(chosen, ready_plan(chosen)[1]).parameters} == {"free"}
