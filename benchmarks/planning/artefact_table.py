@@ -86,7 +86,13 @@ def others(setting: Setting, points: object) -> dict[str, str]:
     for a, i in enumerate(rows):
         alike = [names[rows[b]] for b in range(len(rows)) if b != a and seen[b] and cosine[a, b] > NOT_TOLD_APART]
         alike = sorted({name for name in alike if name != names[i]})
-        said = "not seen" if not seen[a] else f"like {', '.join(map(short, alike))}" if alike else u_of(i)
+        said = (
+            "not seen"
+            if not seen[a]
+            else f"like {', '.join(map(short, alike))}"
+            if alike
+            else (f"**{model.unknowns[i].prior_sd / np.sqrt(left[a, a]):.2g} {model.unknowns[i].unit}**")
+        )
         cells[names[i]] = said
     return {name: cell for name, cell in cells.items() if name not in SIX}
 
