@@ -23,6 +23,7 @@ TOLERANCE_MM, TOLERANCE_RATIO = 0.5, 5e-3
 """Misfit that no machine's errors explain: so many mm, and so much of the artefact's size."""
 
 _SAMPLES = 120
+_JUDGED = 1000
 _PAIRS = 60
 _ACROSS = 10.0
 """Where on a face the probe touched is nobody's business: misfit across a line counts by this less."""
@@ -135,7 +136,8 @@ def _spheres(facts: ArtefactFacts, points: Points) -> Shape | None:
 def _swept(facts: ArtefactFacts, points: Points) -> Shape | None:
     if len(points) < 8 or np.any(points.point != 1):
         return None
-    extent = facts.length_mm or 0.5 * _spread(points.xyz)
+    about = points.xyz - np.median(points.xyz, axis=0)
+    extent = facts.length_mm or float(np.median(np.linalg.norm(about, axis=1)))
     return Shape((np.arange(len(points)),), _ball, facts.length_mm or np.nan, extent, False, (), _nothing(points))
 
 
@@ -178,8 +180,10 @@ def _body(xyz: Floats, body: Floats, _: float) -> Floats:
     if len(xyz) < 3:
         return np.zeros(len(xyz))
     samples = _broad(body, np.array([np.arange(3)]) if len(xyz) == 3 else _samples(len(xyz), 3))
-    misfits = np.linalg.norm(xyz - _placed(body, body[samples], xyz[samples]), axis=2)
-    best = misfits[np.argmin(np.median(misfits, axis=1))]
+    some = _some(len(xyz))
+    misfits = np.linalg.norm(xyz[some] - _placed(body[some], body[samples], xyz[samples]), axis=2)
+    chosen = samples[[np.argmin(np.median(misfits, axis=1))]]
+    best = np.linalg.norm(xyz - _placed(body, body[chosen], xyz[chosen])[0], axis=1)
     agree = np.flatnonzero(best <= max(4 * float(np.median(best)), TOLERANCE_MM))
     if len(agree) < 3:
         return np.asarray(best, dtype=np.float64)
@@ -214,10 +218,10 @@ def _ball(xyz: Floats, _: Floats, radius: float) -> Floats:
         return np.zeros(len(xyz))
     squares = np.sum(four[sound] ** 2, axis=2)[:, :, None] / scale
     centres = np.linalg.solve(equations[sound], squares)[:, :3, 0]
-    distances = np.linalg.norm(about[None] - centres[:, None], axis=2)
-    radii = np.median(distances, axis=1, keepdims=True) if np.isnan(radius) else radius
-    misfits = np.abs(distances - radii)
-    return np.asarray(misfits[np.argmin(np.median(misfits, axis=1))], dtype=np.float64)
+    distances = np.linalg.norm(about[None, _some(len(xyz))] - centres[:, None], axis=2)
+    radii = np.median(distances, axis=1) if np.isnan(radius) else np.full(len(centres), radius)
+    best = np.argmin(np.median(np.abs(distances - radii[:, None]), axis=1))
+    return np.asarray(np.abs(np.linalg.norm(about - centres[best], axis=1) - radii[best]), dtype=np.float64)
 
 
 def _ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
@@ -247,8 +251,10 @@ def _flat(xyz: Floats, _: Floats, __: float) -> Floats:
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     if not np.all(lengths):
         return np.zeros(len(xyz))
-    misfits = np.abs(np.einsum("ski,si->sk", xyz[None] - samples[:, :1], normals / lengths))
-    return np.asarray(misfits[np.argmin(np.median(misfits, axis=1))], dtype=np.float64)
+    normals = normals / lengths
+    misfits = np.abs(np.einsum("ski,si->sk", xyz[None, _some(len(xyz))] - samples[:, :1], normals))
+    best = np.argmin(np.median(misfits, axis=1))
+    return np.asarray(np.abs((xyz - samples[best, 0]) @ normals[best]), dtype=np.float64)
 
 
 def _placings(numbers: Ints) -> tuple[Ints, ...]:
@@ -260,6 +266,11 @@ def _samples(count: int, size: int) -> Ints:
     """Rows of different points, the same for every recording of so many."""
     random = np.random.default_rng(count)
     return np.argsort(random.random((_SAMPLES, count)), axis=1)[:, :size]
+
+
+def _some(count: int) -> Ints:
+    """Rows by which samples are judged: all of them, or as many as decide as well."""
+    return np.unique(np.linspace(0, count - 1, min(count, _JUDGED)).astype(np.int64))
 
 
 def _common_length(xyz: Floats, rows: tuple[Ints, ...]) -> float:

@@ -67,7 +67,7 @@ def changes_of_blocks(shape: Shape) -> tuple[Change, ...]:
     if shape.names == ("reference_mm",):
         found.append(
             Change("swapped", "its faces seem counted from the other end", "Turn the order of reference_mm round", shape.names,
-                   lambda xyz, r: (xyz, r.max(axis=0) + r.min(axis=0) - r))
+                   _on(True, _from_the_other_end))
         )  # fmt: skip
     return tuple(found)
 
@@ -112,6 +112,12 @@ def _shift(chosen: tuple[int, ...], names: tuple[str, ...], by: int, way: str, *
         "shifted column", f"{_verb(names, 'seem')} shifted {way} by one row against the other columns",
         "Move the column back beside the others", names, _on(of_references, shifted), 1,
     )  # fmt: skip
+
+
+def _from_the_other_end(reference: Floats) -> Floats:
+    """The certified distance of the first face for the last, of the second for the last but one, …"""
+    faces, rank = np.unique(reference, return_inverse=True)
+    return np.asarray(faces[::-1][rank].reshape(reference.shape), dtype=np.float64)
 
 
 def _verb(columns: tuple[str, ...], verb: str) -> str:

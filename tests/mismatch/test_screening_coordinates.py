@@ -263,6 +263,54 @@ def test_a_bar_turned_round_is_left_out_where_the_approach_of_its_balls_matters(
     assert len(found.points) == len(points) - 2
 
 
+def lines_twice(points: Points) -> Points:
+    """Eight lines of a gauge of six faces, each measured twice."""
+    faces = np.array([0.0, 40, 100, 180, 260, 300])
+    starts = points.xyz[:8] * [0.3, 0.3, 0.3] + [30.0, 30.0, -30.0]
+    directions = np.abs(points.xyz[1::2][:8] - points.xyz[::2][:8]) / 400.0 * [1, 1, -1]
+    xyz = np.concatenate([s + np.outer(faces, d) for s, d in zip(starts, directions, strict=True) for _ in (1, 2)])
+    n = len(xyz)
+    number, repeat = np.repeat(np.arange(1, 9), 12), np.tile(np.repeat([1, 2], 6), 8)
+    return Points(xyz, number, np.tile(np.arange(1, 7), 16), repeat, points.machine,
+                  {"reference_mm": np.tile(faces, 16)}, np.arange(2, n + 2))  # fmt: skip
+
+
+@pytest.mark.parametrize("which", [1, 2])
+def test_of_two_repeats_the_one_in_inches_is_left_out_and_the_other_used(ballbar_points: Points, which: int) -> None:
+    """Neither half has a majority in its line; that one of them is in a known unit decides."""
+    points = lines_twice(ballbar_points)
+    spoilt = (points.measurement == 5) & (points.repeat == which)
+    xyz = points.xyz.copy()
+    xyz[spoilt] /= INCH
+    found = screened(points.at(xyz), ArtefactFacts(kind="step_gauge"), needed=set(), set_aside=[], where="g.csv")
+    (unit,) = found.findings
+    assert unit.kind == "unit"
+    assert set(unit.rows) == set(np.flatnonzero(spoilt))
+
+
+def test_a_gauge_counted_from_its_other_end_is_told(ballbar_points: Points) -> None:
+    points = lines_twice(ballbar_points)
+    xyz = points.xyz.copy()
+    for repeat in (1, 2):
+        rows = np.flatnonzero((points.measurement == 3) & (points.repeat == repeat))
+        xyz[rows] = xyz[rows[::-1]]
+    found = screened(points.at(xyz), ArtefactFacts(kind="step_gauge"), needed=set(), set_aside=[], where="g.csv")
+    (swap,) = found.findings
+    assert (swap.kind, swap.measurements) == ("swapped", (3,))
+    assert "counted from the other end" in swap.why
+
+
+def test_several_damages_at_once_are_each_named(ballbar_points: Points) -> None:
+    xyz = ballbar_points.xyz.copy()
+    xyz[3] /= INCH
+    xyz[[20, 41]] = xyz[[41, 20]]
+    xyz[60, 0] += 53.0
+    found = screened(ballbar_points.at(xyz), bar_facts(), needed=set(), set_aside=[], where="bar.csv")
+    assert {f.kind: f.measurements for f in found.findings} == {
+        "unit": (2,), "swapped": (11, 21), "outlier": (31,),
+    }  # fmt: skip
+
+
 def test_the_other_end_of_a_damaged_bar_goes_with_it() -> None:
     found = screen_of(REAL, times(ROW, 1 / INCH))
     assert 4 not in found.points.measurement
