@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.analysis import Result, ShiftResult, analyse
+from cmm_uq.analysis import PlaneShiftResult, Result, ShiftResult, analyse
 from cmm_uq.analysis.diagnosing import diagnose_job
 from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
@@ -28,7 +28,7 @@ class Report:
     files : what was written, by name.
     """
 
-    result: Result | ShiftResult
+    result: Result | ShiftResult | PlaneShiftResult
     results: bytes
     files: dict[str, Path]
 
@@ -108,7 +108,7 @@ def write_diagnosis(
     return WrittenDiagnosis(found, data, files)
 
 
-def _contents(result: Result | ShiftResult, tell: Stage) -> dict[str, bytes]:
+def _contents(result: Result | ShiftResult | PlaneShiftResult, tell: Stage) -> dict[str, bytes]:
     from cmm_uq.certificate.compose import certificate
     from cmm_uq.certificate.html import render_html
     from cmm_uq.certificate.pdf import render_pdf
@@ -117,15 +117,16 @@ def _contents(result: Result | ShiftResult, tell: Stage) -> dict[str, bytes]:
     tell("Composing the certificate", 0.5)
     document = certificate(result)
     more: dict[str, bytes] = {}
-    if isinstance(result, ShiftResult):
+    if isinstance(result, Result):
+        data = as_json(results(result))
+    else:
+        from cmm_uq.certificate.plane_shift_results import plane_shift_results
         from cmm_uq.certificate.shift_results import shift_results
         from cmm_uq.certificate.shift_section import TABLE_FILE
         from cmm_uq.selfcalibration.correction_table import table_text
 
-        data = as_json(shift_results(result))
+        data = as_json(shift_results(result) if isinstance(result, ShiftResult) else plane_shift_results(result))
         more[TABLE_FILE] = table_text(result.table)
-    else:
-        data = as_json(results(result))
     tell("Rendering", 0.8)
     pdf = render_pdf(document, {**result.job.inputs, "results.json": data, **more})
     return {"certificate.html": render_html(document).encode(), "certificate.pdf": pdf, "results.json": data, **more}

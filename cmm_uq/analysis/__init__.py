@@ -9,6 +9,7 @@ from pathlib import Path
 
 from cmm_uq.analysis.diagnosing import diagnosed, screened_model
 from cmm_uq.analysis.estimation import accuracy, influences, noise, parameters, sizes, with_noise
+from cmm_uq.analysis.plane_shifting import PlaneShiftResult, analyse_plane
 from cmm_uq.analysis.result import Result
 from cmm_uq.analysis.shifting import KIND, ShiftResult, analyse_shift
 from cmm_uq.conformity.standards import statement
@@ -16,10 +17,12 @@ from cmm_uq.inference.posterior import Progress, sample
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import read_job
 
-__all__ = ["Result", "ShiftResult", "analyse", "analyse_observations"]
+__all__ = ["PlaneShiftResult", "Result", "ShiftResult", "analyse", "analyse_observations"]
 
 
-def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) -> Result | ShiftResult:
+def analyse(
+    folder: Path, *, seed: int = 0, progress: Progress | None = None
+) -> Result | ShiftResult | PlaneShiftResult:  # fmt: skip
     """Analyse a job.
 
     Parameters
@@ -33,6 +36,8 @@ def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) ->
     CmmUqError : the job cannot be analysed as it stands.
     """
     job = read_job(folder)
+    if job.facts.artefact.plane is not None:
+        return analyse_plane(job, seed=seed, progress=progress)
     if job.facts.artefact.kind == KIND:
         return analyse_shift(job, seed=seed, progress=progress)
     return analyse_observations(job, seed=seed, progress=progress)

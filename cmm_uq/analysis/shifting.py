@@ -12,7 +12,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job, KnownLength
 from cmm_uq.physics.error_map import ErrorMap
-from cmm_uq.points import Floats, Points
+from cmm_uq.points import Floats
 from cmm_uq.selfcalibration.correction_table import correction_table
 from cmm_uq.selfcalibration.curve import Curve, CurveEstimate, estimate_curve
 from cmm_uq.selfcalibration.integration_uncertainty import IntegratedCurve, KnownSpan, integrated
@@ -94,12 +94,20 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
     ------
     CmmUqError : the job cannot be analysed as it stands.
     """
+    check_facts(job)
     facts, stated = job.facts.artefact, job.facts.recording.u_coordinate_um
-    _check_facts(job)
-    axis = facts.axis or "x"
-    points = _used(job)
+    if facts.axis is None:
+        raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
+                         fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip
+    if not facts.shifts_mm:
+        raise CmmUqError("is missing", where="job.toml [artefact] shifts_mm",
+                         fix="Give one shift a series, 0.0 for the first")  # fmt: skip
     series = shifted_series(
-        points, axis, np.array(facts.shifts_mm, dtype=np.float64), facts.u_shift_um * MICROMETRE, job.recording_path
+        job.points,
+        facts.axis,
+        np.array(facts.shifts_mm, dtype=np.float64),
+        facts.u_shift_um * MICROMETRE,
+        job.recording_path,
     )
     known = None if facts.known is None else _known(facts.known, series)
     estimate = estimate_curve(
@@ -122,30 +130,27 @@ def refuse_shift(job: Job, what: str) -> None:
                          where="job.toml [artefact] kind", fix="cmm-uq report JOB estimates it")  # fmt: skip
 
 
-def _check_facts(job: Job) -> None:
-    facts = job.facts
-    if facts.artefact.axis is None:
-        raise CmmUqError("is missing", where="job.toml [artefact] axis", fix='Name the axis shifted along: axis = "x"')
-    if not facts.artefact.shifts_mm:
-        raise CmmUqError("is missing", where="job.toml [artefact] shifts_mm",
-                         fix="Give one shift a series, 0.0 for the first")  # fmt: skip
+def check_facts(job: Job) -> None:
+    """Refuse what a shift job, along an axis or in a plane, cannot have.
+
+    Raises
+    ------
+    CmmUqError : with the key.
+    """
+    facts, aside = job.facts, job.facts.recording.set_aside
     if facts.model.effects:
-        raise CmmUqError("a shift job estimates the error of its axis as a free function, not by effects",
+        raise CmmUqError("a shift job estimates errors as free functions, not by effects",
                          where="job.toml [model] effects", fix="Write effects = []")  # fmt: skip
     if facts.conformity:
-        raise CmmUqError("no standard here decides on the curve of one axis", where="job.toml [[conformity]]",
-                         fix="Leave it out; the certificate states the linearity error with its uncertainty")  # fmt: skip
+        raise CmmUqError("no standard here decides on curves of errors", where="job.toml [[conformity]]",
+                         fix="Leave it out; the certificate states the errors with their uncertainty")  # fmt: skip
 
-
-def _used(job: Job) -> Points:
-    aside = job.facts.recording.set_aside
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
     if aside:
         raise CmmUqError("a series cannot be set aside", where="job.toml [recording] set_aside",
                          fix="Take the series out of the recording and its shift out of shifts_mm")  # fmt: skip
-    return job.points
 
 
 def _known(given: KnownLength, series: ShiftedSeries) -> KnownSpan:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from cmm_uq import __version__
+from cmm_uq.analysis.plane_shifting import PlaneShiftResult
 from cmm_uq.analysis.result import Result
 from cmm_uq.analysis.shifting import ShiftResult
 from cmm_uq.certificate import (
@@ -13,6 +14,7 @@ from cmm_uq.certificate import (
     bryan_section,
     gauge_section,
     plane_section,
+    plane_shift_section,
     plate_section,
     shift_section,
     sphere_section,
@@ -55,12 +57,12 @@ ARTEFACT_SECTIONS: Mapping[str, Callable[[Result], list[Section]]] = {
 """What each kind of artefact adds to a certificate."""
 
 
-def certificate(result: Result | ShiftResult) -> Document:
+def certificate(result: Result | ShiftResult | PlaneShiftResult) -> Document:
     """The certificate of a result, complete but for its looks."""
     if isinstance(result, ShiftResult):
-        sampler, seed = result.estimate.chains.sampler, result.estimate.seed
-        document = _document(result.job, shift_section.sections(result), shift_section.warnings(result), sampler, seed)
-        return replace(document, attachments=(*document.attachments, shift_section.TABLE_FILE))
+        return _shifted(result, shift_section.sections(result), shift_section.warnings(result))
+    if isinstance(result, PlaneShiftResult):
+        return _shifted(result, plane_shift_section.sections(result), plane_shift_section.warnings(result))
     sections = [_performance(result), _conformity(result), _errors(result), _traceability(result)]
     sections += tolerance_section.sections(result)
     sections += ARTEFACT_SECTIONS[result.artefact.kind](result)
@@ -68,6 +70,12 @@ def certificate(result: Result | ShiftResult) -> Document:
         sections += diagnosis_sections(result.diagnosed)
     sections += [_posterior(result), _method(result)]
     return _document(result.job, sections, warnings(result), result.posterior.sampler, result.posterior.seed)
+
+
+def _shifted(result: ShiftResult | PlaneShiftResult, sections: list[Section], told: tuple[str, ...]) -> Document:
+    """With the correction table among the attachments."""
+    document = _document(result.job, sections, told, result.estimate.chains.sampler, result.estimate.seed)
+    return replace(document, attachments=(*document.attachments, shift_section.TABLE_FILE))
 
 
 def _document(job: Job, sections: list[Section], told: tuple[str, ...], sampler: str, seed: int) -> Document:

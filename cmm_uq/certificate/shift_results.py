@@ -9,6 +9,7 @@ from cmm_uq import __version__
 from cmm_uq.analysis.shifting import ShiftResult
 from cmm_uq.certificate.results_file import SCHEMA
 from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.inference.ensembles import Chains
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.points import Floats
 from cmm_uq.selfcalibration.curve import Curve
@@ -18,10 +19,10 @@ from cmm_uq.units import MICROMETRE
 def shift_results(result: ShiftResult) -> dict[str, Any]:
     """A result as plain data, in the layout of the schema ``cmm-uq/results/1``; no diagnosis, no accuracy of lengths."""
     job, estimate = result.job, result.estimate
-    chains, axis = estimate.chains, result.axis
-    estimates = {f"linearity_{axis}": {"peak_to_valley_um": _quantity(result.linearity)}}
+    axis = result.axis
+    estimates = {f"linearity_{axis}": {"peak_to_valley_um": quantity_data(result.linearity)}}
     if result.scale is not None:
-        estimates[f"scale_{axis}"] = {"ppm": _quantity(result.scale)}
+        estimates[f"scale_{axis}"] = {"ppm": quantity_data(result.scale)}
     before, after = estimate.residuals
     return {
         "schema": SCHEMA,
@@ -30,53 +31,59 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
         "estimates": estimates,
         "noise": {
             "stated_coordinate_um": job.facts.recording.u_coordinate_um,
-            "coordinate_um": _quantity(result.repeatability),
+            "coordinate_um": quantity_data(result.repeatability),
         },
-        "sampling": {
-            "sampler": chains.sampler, "seed": estimate.seed, "draws": len(estimate.sigma), "ess_min": chains.ess_min,
-            "rhat_max": chains.rhat_max, "steps": chains.steps,
-            "autocorrelation_time": chains.autocorrelation_time, "converged": chains.converged,
-        },
-        "curves": {f"linearity_{axis}": _curve(estimate.curve)},
+        "sampling": sampling_data(estimate.chains, estimate.seed, len(estimate.sigma)),
+        "curves": {f"linearity_{axis}": curve_data(estimate.curve, MICROMETRE, "um")},
         "integrations": {
-            method: {"position_mm": _plain(curve.position), "error_um": _um(curve.error), "u_um": _um(curve.u)}
+            method: {"position_mm": curve.position.tolist(), "error_um": _um(curve.error), "u_um": _um(curve.u)}
             for method, curve in result.integrated.items()
         },
         "artefact": {"point": estimate.series.numbers.tolist(),
-                     "distance_mm": _plain(estimate.artefact.mean(axis=0)) if estimate.scale_known else None,
+                     "distance_mm": estimate.artefact.mean(axis=0).tolist() if estimate.scale_known else None,
                      "u_um": _um(estimate.artefact.std(axis=0, ddof=1)) if estimate.scale_known else None},
         "identifiability": {
             "scale_determined": estimate.scale_known,
             "period_not_seen_mm": result.undetermined.period,
             "patterns_not_seen": [
-                {"position_mm": _plain(estimate.series.positions), "weight": _plain(pattern)}
+                {"position_mm": estimate.series.positions.tolist(), "weight": pattern.tolist()}
                 for pattern in result.undetermined.patterns.T
             ],
         },
-        "improvement": {"rms_before_um": _rms(before), "rms_after_um": _rms(after)},
+        "improvement": {"rms_before_um": rms_um(before), "rms_after_um": rms_um(after)},
         "conformity": [],
     }  # fmt: skip
 
 
-def _quantity(quantity: Quantity) -> dict[str, Any]:
+def quantity_data(quantity: Quantity) -> dict[str, Any]:
+    """Value, u and interval of a quantity; its unit is in the key that it stands under."""
     return {key: value for key, value in asdict(quantity).items() if key != "unit"}
 
 
-def _curve(curve: Curve) -> dict[str, Any]:
-    low, high = curve.interval95
+def sampling_data(chains: Chains, seed: int, draws: int) -> dict[str, Any]:
+    """How the sampling went."""
     return {
-        "position_mm": _plain(curve.position), "error_um": _um(curve.error), "u_um": _um(curve.u),
-        "interval95_um": [_um(low), _um(high)], "simultaneous_factor95": curve.simultaneous_factor,
+        "sampler": chains.sampler, "seed": seed, "draws": draws, "ess_min": chains.ess_min, "rhat_max": chains.rhat_max,
+        "steps": chains.steps, "autocorrelation_time": chains.autocorrelation_time, "converged": chains.converged,
     }  # fmt: skip
 
 
-def _plain(values: Floats) -> list[float]:
-    return [float(v) for v in values]
+def curve_data(curve: Curve, unit: float, suffix: str) -> dict[str, Any]:
+    """A curve with its uncertainty, in a unit with that suffix."""
+    low, high = curve.interval95
+    return {
+        "position_mm": curve.position.tolist(), f"error_{suffix}": (curve.error / unit).tolist(),
+        f"u_{suffix}": (curve.u / unit).tolist(),
+        f"interval95_{suffix}": [(low / unit).tolist(), (high / unit).tolist()],
+        "simultaneous_factor95": curve.simultaneous_factor,
+    }  # fmt: skip
+
+
+def rms_um(values: Floats) -> float:
+    """Root mean square of mm, in µm."""
+    return float((values**2).mean() ** 0.5) / MICROMETRE
 
 
 def _um(values: Floats) -> list[float]:
-    return _plain(values / MICROMETRE)
-
-
-def _rms(values: Floats) -> float:
-    return float((values @ values / len(values)) ** 0.5) / MICROMETRE
+    found: list[float] = (values / MICROMETRE).tolist()
+    return found

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from cmm_uq.analysis.plane_shifting import PlaneShiftResult
 from cmm_uq.analysis.result import Result
 from cmm_uq.analysis.shifting import ShiftResult
-from cmm_uq.certificate import shift_section
+from cmm_uq.certificate import plane_shift_section, shift_section
 from cmm_uq.certificate.warning import warnings
 from cmm_uq.certificate.wording import expanded, probability, title_of
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.uncertainty.rounding import rounded
 
 
-def summary(result: Result | ShiftResult) -> list[tuple[str, str, str]]:
+def summary(result: Result | ShiftResult | PlaneShiftResult) -> list[tuple[str, str, str]]:
     """Rows of what, figure and remark: what was measured, the figures, the decisions, the warnings."""
     if isinstance(result, ShiftResult):
         return shift_section.summary(result)
+    if isinstance(result, PlaneShiftResult):
+        return plane_shift_section.summary(result)
     facts, free = result.job.facts, {key for combination in result.undetermined for key in combination}
     rows = [(
         "Measured", f"{facts.machine.name}, {result.artefact.title.lower()}, {len(result.residuals)} observations",

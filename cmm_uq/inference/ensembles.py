@@ -29,6 +29,7 @@ LARGEST_RHAT = 1.01
 _T_DOF = 6.0
 _WIDER = 2.0
 """Times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail."""
+_LOOKS = 3
 
 Progress = Callable[[float], None]
 LogDensity = Callable[[Floats], Floats]
@@ -127,20 +128,23 @@ def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> t
     centre (d,) and factor (d, d), as :func:`run_ensembles` wants them.
     """
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
-    factor = _WIDER * factor
-    for _ in range(3):
+    width, looks = _WIDER, 0
+    while looks < _LOOKS:
         z = _t_draws(500 * len(centre), len(centre), random)
-        theta = centre + z @ factor.T
+        theta = centre + width * z @ factor.T
         log_weight = density(theta) - _t_log_density(z)
         weight = np.exp(log_weight - log_weight.max())
         weight /= weight.sum()
-        mean = weight @ theta
-        about = theta - mean
-        covariance = (about * weight[:, None]).T @ about
         # too few draws that count would make it degenerate: the approximation is then better than its correction
         if 1 / np.sum(weight**2) < 5 * len(centre):
-            break
-        centre, factor = mean, np.linalg.cholesky(covariance)
+            if width == 1.0:
+                break
+            width = max(1.0, width / 2**0.25)  # in many dimensions most of what is so much wider lies where nothing is
+            continue
+        looks += 1
+        mean = weight @ theta
+        about = theta - mean
+        centre, factor, width = mean, np.linalg.cholesky((about * weight[:, None]).T @ about), 1.0
     return centre, factor
 
 

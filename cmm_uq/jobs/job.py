@@ -146,7 +146,7 @@ class ArtefactFacts(_Table):
     ``nominal`` says that those figures are nominal only: their common scale then stays free. ``form_um`` is the form
     deviation of a test sphere by its certificate. ``blocks_mm`` (1–2, 2–3, 3–1) and the diameters ``cylinders_mm`` (1, 2, 3)
     make a triangle, with the standard uncertainty of each. ``probe_offset_mm`` is the effective radius by which a probed
-    plane is moved to the surface.
+    plane is moved to the surface. A shifted artefact lies along an ``axis`` or, a plate, in a ``plane``.
     """
 
     kind: ArtefactKind
@@ -165,6 +165,7 @@ class ArtefactFacts(_Table):
     cte_per_k: float = 0.0
     certificate: Traceability | None = None
     axis: Literal["x", "y", "z"] | None = None
+    plane: Literal["xy", "yz", "zx"] | None = None
     shifts_mm: list[float] = []
     u_shift_um: NotNegative = 0.0
     known: KnownLength | None = None
@@ -183,6 +184,13 @@ class ArtefactFacts(_Table):
             raise ValueError(
                 "a triangle is made of blocks_mm = [1–2, 2–3, 3–1] and cylinders_mm = [1, 2, 3], and nothing else is: give "
                 'both for kind = "triangle", neither for another kind'
+            )
+        if self.plane is not None and (
+            self.kind != "shift" or self.axis is not None or self.shifts_mm or self.u_shift_um
+        ):
+            raise ValueError(
+                "plane belongs to a plate that is shifted and turned: its placings are found from the readings; leave out "
+                "axis, shifts_mm and u_shift_um, or leave out plane"
             )
         if self.probe_offset_mm is not None and self.kind != "plane":
             raise ValueError(f"probe_offset_mm moves a probed plane, not a {self.kind}: leave it out")

@@ -1,4 +1,4 @@
-"""The estimated curve as an error map, which compensates the machine's readings."""
+"""The estimated curves as an error map, which compensates the machine's readings."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.physics.error_map import AxisErrors, ErrorMap, write_error_map
+from cmm_uq.physics.kinematics import carried_offset
 from cmm_uq.points import AXES, Floats, Machine
 from cmm_uq.selfcalibration.curve import Curve
-from cmm_uq.units import MICROMETRE
+from cmm_uq.selfcalibration.plane import PlaneEstimate
+from cmm_uq.units import ARCSECOND, MICROMETRE
 
 _DECIMALS = 3
-"""Of the table's µm."""
+"""Of the table's µm and ″."""
 
 
 def correction_table(axis: str, curve: Curve, machine: Machine) -> ErrorMap:
@@ -27,9 +29,36 @@ def correction_table(axis: str, curve: Curve, machine: Machine) -> ErrorMap:
     curve : true = indicated + e at scale readings.
     machine : whose travel the table must cover.
     """
-    carriages = [_carriage(machine.travel_mm[i], curve if a == axis else None, i) for i, a in enumerate(AXES)]
-    x, y, z = carriages
-    return ErrorMap((x, y, z))
+    column = AXES.index(axis)
+    errors = np.zeros((len(curve.position), 6))
+    errors[:, column] = curve.error
+    return _error_map({column: (curve.position, errors)}, machine)
+
+
+def plane_correction_table(estimate: PlaneEstimate, machine: Machine) -> ErrorMap:
+    """Error map of the two carriages of a plane; the squareness stands in it as a slope of the second axis' straightness.
+
+    A map counts levers from the scales' zero, the estimate from the middle of what was read: the difference goes into the
+    displacements. Scales that the placings leave open are left as they are.
+    """
+    found: dict[int, tuple[Floats, Floats]] = {}
+    axes, normal = estimate.plate.axes, 3 - sum(estimate.plate.axes)
+    for which, axis in enumerate(axes):
+        x = estimate.positions[which]
+        errors = np.zeros((len(x), 6))
+        errors[:, axis] = estimate.linearity[which].error
+        errors[:, axes[1 - which]] = estimate.straightness[which].error
+        if axis in estimate.rotations:
+            turn = estimate.rotations[axis].error
+            arm = carried_offset(AXES[axis], estimate.plate.middle[None], chain=machine.chain)[0, list(axes)]
+            errors[:, axes[0]] += arm[1] * turn
+            errors[:, axes[1]] -= arm[0] * turn
+            errors[:, 3 + normal] = turn
+        found[axis] = x, errors
+    if f"squareness_{estimate.plate.plane}" not in estimate.free.names:
+        y, errors = found[axes[1]]
+        errors[:, axes[0]] -= estimate.squareness.mean() * (y - y[0])
+    return _error_map(found, machine)
 
 
 def table_text(table: ErrorMap) -> bytes:
@@ -40,16 +69,20 @@ def table_text(table: ErrorMap) -> bytes:
         return path.read_bytes()
 
 
-def _carriage(travel: Floats, curve: Curve | None, column: int) -> AxisErrors:
+def _error_map(found: dict[int, tuple[Floats, Floats]], machine: Machine) -> ErrorMap:
+    x, y, z = (_carriage(machine.travel_mm[a], found.get(a)) for a in range(3))
+    return ErrorMap((x, y, z))
+
+
+def _carriage(travel: Floats, found: tuple[Floats, Floats] | None) -> AxisErrors:
     low, high = (float(v) for v in travel)
-    if curve is None:
+    if found is None:
         ends = np.array([-1e4, 1e4]) if np.isnan(low) else np.array([low, high])
         return AxisErrors(ends, np.zeros((2, 6)))
-    position, error = curve.position, np.round(curve.error / MICROMETRE, _DECIMALS) * MICROMETRE
+    unit = np.repeat([MICROMETRE, ARCSECOND], 3)
+    position, errors = found[0], np.round(found[1] / unit, _DECIMALS) * unit
     if not np.isnan(low) and low < position[0]:
-        position, error = np.r_[low, position], np.r_[error[0], error]
+        position, errors = np.r_[low, position], np.vstack([errors[:1], errors])
     if not np.isnan(high) and high > position[-1]:
-        position, error = np.r_[position, high], np.r_[error, error[-1]]
-    errors = np.zeros((len(position), 6))
-    errors[:, column] = error
+        position, errors = np.r_[position, high], np.vstack([errors, errors[-1:]])
     return AxisErrors(position, errors)

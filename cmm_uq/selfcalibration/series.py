@@ -10,11 +10,10 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import AXES, Floats, Ints, Points
+from cmm_uq.selfcalibration.repeats import Means, means_over_repeats
 from cmm_uq.selfcalibration.smooth_model import Scatter
 from cmm_uq.units import HOUR
 
-NOISE_RATIO = "noise_ratio"
-"""Optional column: standard uncertainty of this reading over that of an ordinary one."""
 _ALIKE = 1e-3
 """Shifts nearer to each other than this are the same, mm."""
 _LATER = 0.01
@@ -104,43 +103,31 @@ def shifted_series(points: Points, axis: str, shifts: Floats, u_shift: float, wh
     """
     placings = np.unique(points.measurement)
     _check_shifts(shifts, placings)
-    keys, first, inverse = np.unique(
-        np.column_stack([points.measurement, points.point]),
-        axis=0, return_index=True, return_inverse=True,
-    )  # fmt: skip
-    inverse = inverse.ravel()
-    ratio = points.columns.get(NOISE_RATIO, np.ones(len(points)))
-    if (ratio <= 0).any():
-        raise CmmUqError(
-            "noise_ratio must be positive", where=where, fix="1 is an ordinary reading, 2 one twice as noisy"
-        )
-    weight = 1 / ratio**2
-    total = np.bincount(inverse, weight)
-    means = np.column_stack([np.bincount(inverse, weight * x) / total for x in points.readings.T])
+    means = means_over_repeats(points, where)
     along = AXES.index(axis)
-    reading = means[:, along]
-    numbers, point = np.unique(keys[:, 1], return_inverse=True)
-    series = np.searchsorted(placings, keys[:, 0])
-    lines = points.lines[first] if len(points.lines) else np.zeros(len(keys), dtype=np.int64)
-    _check_order(reading, series, placings, numbers[point], lines, where)
+    reading = means.readings[:, along]
+    numbers, point = np.unique(means.point, return_inverse=True)
+    series = np.searchsorted(placings, means.measurement)
+    _check_order(reading, series, placings, means.point, means.line, where)
     _check_common(series, point, numbers, placings, where)
     _check_places(reading, series, point, shifts, placings, where)
-    left = (points.readings[:, along] - reading[inverse]) / ratio
-    time = _mean_times(points, inverse, weight)
-    drift = None if time is None else _drift(left, (points.columns["time_s"] - time[inverse]) / ratio)
-    dof = len(points) - len(keys) - (drift is not None)
-    if drift is not None and time is not None:
-        left -= drift.rate * (points.columns["time_s"] - time[inverse]) / ratio / HOUR
+    scatter, drift = _repeats(points, means, along)
     return ShiftedSeries(
-        axis, reading, series.astype(np.int64), point.astype(np.int64), 1 / np.sqrt(total),
-        time, shifts, u_shift, _cosines(means, series, along), numbers,
-        Scatter(float(left @ left), dof) if dof else None, drift,
+        axis, reading, series.astype(np.int64), point.astype(np.int64), means.noise_scale, means.time, shifts, u_shift,
+        _cosines(means.readings, series, along), numbers, scatter, drift,
     )  # fmt: skip
 
 
-def _mean_times(points: Points, inverse: Ints, weight: Floats) -> Floats | None:
-    time = points.columns.get("time_s")
-    return None if time is None else np.asarray(np.bincount(inverse, weight * time) / np.bincount(inverse, weight))
+def _repeats(points: Points, means: Means, along: int) -> tuple[Scatter | None, RepeatedDrift | None]:
+    """What repeats tell of the repeatability, and of a drift between them."""
+    left = (points.readings[:, along] - means.readings[means.of, along]) / means.ratio
+    drift = None
+    if means.time is not None:
+        later = (points.columns["time_s"] - means.time[means.of]) / means.ratio
+        if drift := _drift(left, later):
+            left = left - drift.rate * later / HOUR
+    dof = len(points) - len(means.point) - (drift is not None)
+    return Scatter(float(left @ left), dof) if dof else None, drift
 
 
 def _drift(left: Floats, later: Floats) -> RepeatedDrift | None:

@@ -19,6 +19,7 @@ from scipy import linalg, optimize
 from cmm_uq.inference.posterior import SIGMA_BOUNDS
 from cmm_uq.points import Floats
 from cmm_uq.selfcalibration.smooth_function import LONGEST, SmoothFunction
+from cmm_uq.selfcalibration.smooth_marginal import BATCH, Marginal, marginal
 
 _AMPLITUDE_BOUNDS = (1e-4, 1e2)
 """Of each amplitude over its typical size."""
@@ -26,7 +27,6 @@ _LENGTH, _LENGTH_SPREAD = 0.2, 0.6
 """Median correlation length as a part of the range, and the standard deviation of its logarithm: five hills or so."""
 _GROWTH_SPREAD = 1.5
 """Standard deviation of the logarithm of the ends' size over the middle's: 1/7 to 7."""
-_BATCH = 250
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class SmoothModel:
         return len(self.functions) + 2 + (self.sigma is None)
 
     @cached_property
-    def _reduced(self) -> _Reduced:
+    def _reduced(self) -> Marginal:
         """Whitened, and projected on what the flat columns cannot explain."""
         Q, _ = linalg.qr(self.flat / self.noise_scale[:, None])
         rest = Q[:, self.flat.shape[1] :].T / self.noise_scale
@@ -90,7 +90,7 @@ class SmoothModel:
             observed, even, ends, columns = Q.T @ observed, Q.T @ even, Q.T @ ends, Q.T @ columns
         if self.scatter is not None:
             squares, dof = squares + self.scatter.squares, dof + self.scatter.dof
-        return _Reduced(observed, even, ends, columns, max(squares, 0.0), dof)
+        return marginal(observed, even, ends, columns, self.column_sd, max(squares, 0.0), dof)
 
     def _unpacked(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
         """Standard deviations of the coefficients (w, J), growths r (w,) and σ (w,) mm."""
@@ -119,38 +119,13 @@ class SmoothModel:
         low, high = self._bounds()
         return np.where(np.all((theta > low) & (theta < high), axis=1), value, -np.inf)
 
-    def _covariance(self, theta: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Design (w, p, J), coefficients' sd (w, J), σ (w,), and covariance of the reduced observations (w, p, p)."""
-        reduced = self._reduced
-        sd, growth, sigma = self._unpacked(theta)
-        design = reduced.even + (growth - 1)[:, None, None] * reduced.ends
-        scaled = design * sd[:, None, :]
-        covariance = scaled @ scaled.transpose(0, 2, 1)
-        known = reduced.columns * self.column_sd
-        rounding = 1e-15 * np.einsum("wii->w", covariance)
-        covariance += known @ known.T + (sigma**2 + rounding)[:, None, None] * np.eye(len(reduced.observed))
-        return design, sd, sigma, covariance
-
     def log_density(self, theta: Floats) -> Floats:
         """Log posterior density of θ, up to a constant: (w, dimension) → (w,)."""
         value = self._log_prior(theta)
         inside = np.flatnonzero(np.isfinite(value))
         if not inside.size:
             return value
-        reduced = self._reduced
-        _, _, sigma, covariance = self._covariance(theta[inside])
-        # the factor of the covariance bordered by the observations has L⁻¹·observed in its last row: one call, not two
-        size = len(reduced.observed)
-        bordered = np.empty((len(inside), size + 1, size + 1))
-        bordered[:, :size, :size], bordered[:, size, :size] = covariance, reduced.observed
-        bordered[:, size, size] = 1 + 2 * (reduced.observed @ reduced.observed) / sigma**2
-        factor = np.linalg.cholesky(bordered)
-        explained = factor[:, size, :size]
-        value[inside] += (
-            -0.5 * np.einsum("wi,wi->w", explained, explained)
-            - np.log(np.einsum("wii->wi", factor)[:, :size]).sum(axis=1)
-            - 0.5 * reduced.squares / sigma**2 - reduced.dof * np.log(sigma)
-        )  # fmt: skip
+        value[inside] += self._reduced.log_likelihood(*self._unpacked(theta[inside]))
         return value
 
     def laplace(self) -> tuple[Floats, Floats]:
@@ -207,21 +182,12 @@ class SmoothModel:
         return Coefficients(self, coefficients, growth, columns, flat, sigma)
 
     def _draws(self, theta: Floats, random: np.random.Generator) -> Iterator[tuple[Floats, Floats, Floats]]:
-        reduced = self._reduced
-        whitened = self.flat / self.noise_scale[:, None]
-        Q, R = linalg.qr(whitened, mode="economic")
-        for begin in range(0, len(theta), _BATCH):
-            some = theta[begin : begin + _BATCH]
-            design, sd, sigma, covariance = self._covariance(some)
-            w = sd * random.standard_normal(sd.shape)
-            x = self.column_sd * random.standard_normal((len(some), len(self.column_sd)))
-            noise = sigma[:, None] * random.standard_normal((len(some), len(reduced.observed)))
-            prior = np.einsum("wpj,wj->wp", design, w) + x @ reduced.columns.T + noise
-            weight = np.linalg.solve(covariance, (reduced.observed - prior)[:, :, None])[:, :, 0]
-            w += sd**2 * np.einsum("wpj,wp->wj", design, weight)
-            x += self.column_sd**2 * (weight @ reduced.columns)
-            left = (self.observed - self._explained(w, np.exp(some[:, len(self.functions) + 1]), x)) / self.noise_scale
-            spread = sigma[:, None] * random.standard_normal((len(some), Q.shape[1]))
+        Q, R = linalg.qr(self.flat / self.noise_scale[:, None], mode="economic")
+        for begin in range(0, len(theta), BATCH):
+            sd, growth, sigma = self._unpacked(theta[begin : begin + BATCH])
+            w, x = self._reduced.draw(sd, growth, sigma, random)
+            left = (self.observed - self._explained(w, growth, x)) / self.noise_scale
+            spread = sigma[:, None] * random.standard_normal((len(sd), Q.shape[1]))
             yield w, x, linalg.solve_triangular(R, (left @ Q + spread).T).T
 
     def _explained(self, w: Floats, growth: Floats, x: Floats) -> Floats:
@@ -234,16 +200,6 @@ class SmoothModel:
     def _split(self, w: Floats) -> list[Floats]:
         ends = np.cumsum([f.sines(np.zeros(1)).shape[1] for f in self.functions])
         return np.split(w, ends[:-1], axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class _Reduced:
-    observed: Floats
-    even: Floats
-    ends: Floats
-    columns: Floats
-    squares: float
-    dof: int
 
 
 @dataclass(frozen=True, eq=False)

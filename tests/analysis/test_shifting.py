@@ -100,7 +100,7 @@ def test_without_a_known_length_there_is_no_scale(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("pattern", "replacement", "where", "said"),
     [
-        (r"axis = .*\n", "", "axis", "is missing"),
+        (r"axis = .*\n", "", "[artefact]", "neither axis nor plane"),
         (r"shifts_mm = .*\n", "", "shifts_mm", "is missing"),
         (r"shifts_mm = .*", "shifts_mm = [0.0, 20.0]", "shifts_mm", "2 shifts for 3 series"),
         (r"shifts_mm = .*", "shifts_mm = [0.0, 20.0, 20.0]", "shifts_mm", "same shift"),

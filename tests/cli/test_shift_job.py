@@ -79,3 +79,59 @@ def test_what_a_shift_job_cannot_have_is_one_line_and_exit_code_2(command: str, 
     }
     assert said[command] in process.stderr
     assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())
+
+
+PLATE = ROOT / "examples" / "shift-plate-simulated"
+
+
+def test_a_plates_table_compensates_the_machine_too(tmp_path: Path) -> None:
+    """Residuals of the true places by the example's own formula, after the best rigid motion, of all 525 readings."""
+    assert run("report", PLATE, "--out", tmp_path / "report").returncode == 0
+    job = tmp_path / "job"
+    shutil.copytree(PLATE, job)
+    shutil.copy(tmp_path / "report" / "correction_table.csv", job)
+    text = (job / "job.toml").read_text(encoding="utf-8")
+    named = 'error_map = [ { file = "correction_table.csv", temperature_c = 20.0 } ]\n'
+    (job / "job.toml").write_text(re.sub(r"(?m)^(chain = .*\n)", rf"\1{named}", text), encoding="utf-8")
+    process = run("compensate", job, "--out", tmp_path / "out")
+    assert process.returncode == 0, process.stderr
+    before = np.loadtxt(PLATE / "recording.csv", delimiter=",", skiprows=1)
+    after = np.loadtxt(tmp_path / "out" / "recording.csv", delimiter=",", skiprows=2)
+    x, y = before[:, 3:5].T
+    yaw = 5e-6 * np.sin(x / 150) + 1e-5 * x / 600
+    true = np.column_stack([
+        x + 0.010 * np.sin(x / 90) + 20e-6 * x + 0.003 * np.sin(y / 100) - 60e-6 * y - y * yaw,
+        y - 0.008 * np.cos(y / 110) - 10e-6 * y + 0.004 * (x / 300 - 1) ** 2 + 0.002 * np.sin(x / 60),
+    ])  # fmt: skip
+    left = [rms_after_rigid_motion(rows[:, 3:5], true) for rows in (before, after)]
+    assert left[0] > 0.008
+    assert left[1] < 0.001
+
+
+def rms_after_rigid_motion(found: np.ndarray, true: np.ndarray) -> float:
+    z, w = (part @ [1, 1j] - (part @ [1, 1j]).mean() for part in (found, true))
+    turn = np.angle(np.vdot(z, w))
+    return float(np.sqrt(np.mean(np.abs(z * np.exp(1j * turn) - w) ** 2)))
+
+
+@pytest.mark.parametrize(
+    ("pattern", "replacement", "said"),
+    [
+        (r'plane = "xy"', 'plane = "xy"\naxis = "x"', "leave out axis"),
+        (r'plane = "xy"', 'plane = "xz"', "plane"),
+        (r'plane = "xy"', 'plane = "yz"', "does not lie in the plane yz"),
+        (r"to = 25", "to = 26", "no ball 26"),
+        (r"to = 25", "to = 5", "mm apart, not 565.688 mm"),
+        (r"effects = \[\]", 'effects = ["scale_x"]', "not by effects"),
+    ],
+)
+def test_what_a_plates_job_cannot_be_is_said(tmp_path: Path, pattern: str, replacement: str, said: str) -> None:
+    job = tmp_path / "job"
+    shutil.copytree(PLATE, job)
+    text, count = re.subn(pattern, replacement, (job / "job.toml").read_text(encoding="utf-8"))
+    assert count == 1
+    (job / "job.toml").write_text(text, encoding="utf-8")
+    process = run("report", job, "--out", tmp_path / "out")
+    assert process.returncode == 2
+    assert said in process.stderr
+    assert "Traceback" not in process.stderr

@@ -9,7 +9,8 @@ import pytest
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import Points
-from cmm_uq.selfcalibration.series import NOISE_RATIO, shifted_series
+from cmm_uq.selfcalibration.repeats import NOISE_RATIO
+from cmm_uq.selfcalibration.series import shifted_series
 from tests.selfcalibration.shifted import bent, read
 
 PLACES = 20.0 * np.arange(6)
