@@ -221,7 +221,8 @@ def _ball(xyz: Floats, _: Floats, radius: float) -> Floats:
     distances = np.linalg.norm(about[None, _some(len(xyz))] - centres[:, None], axis=2)
     radii = np.median(distances, axis=1) if np.isnan(radius) else np.full(len(centres), radius)
     best = np.argmin(np.median(np.abs(distances - radii[:, None]), axis=1))
-    return np.asarray(np.abs(np.linalg.norm(about - centres[best], axis=1) - radii[best]), dtype=np.float64)
+    away, nearest = _centred(about - centres[best], float(radii[best]), free=bool(np.isnan(radius)))
+    return np.asarray(np.abs(np.linalg.norm(away, axis=1) - nearest), dtype=np.float64)
 
 
 def _ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
@@ -234,14 +235,22 @@ def _ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
             return np.zeros(len(xyz))
         radius = float(np.median(np.sum((xyz[j] - xyz[i]) * steps, axis=1)[wide] / squares[wide]))
     away = xyz - np.median(xyz - radius * normals, axis=0)
-    for _ in range(5):  # the centre of the points themselves, by those near to it: nominal normals put it astray
+    away, radius = _centred(away, radius, free=False)  # nominal normals put it astray
+    misses = np.linalg.norm(away - radius * normals, axis=1) - _NORMAL * abs(radius)
+    return np.asarray(np.maximum(np.abs(np.linalg.norm(away, axis=1) - radius), misses), dtype=np.float64)
+
+
+def _centred(away: Floats, radius: float, *, free: bool) -> tuple[Floats, float]:
+    """Points (k, 3) about the centre of the sphere through those near to one, and its radius: Gauss–Newton, trimmed."""
+    for _ in range(5):
         distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
         off = distance - radius
         near = np.abs(off) <= max(3 * float(np.median(np.abs(off))), 1e-3)
-        step, *_rest = np.linalg.lstsq(away[near] / distance[near, None], off[near], rcond=None)
-        away = away - step
-    misses = np.linalg.norm(away - radius * normals, axis=1) - _NORMAL * abs(radius)
-    return np.asarray(np.maximum(np.abs(np.linalg.norm(away, axis=1) - radius), misses), dtype=np.float64)
+        design = np.column_stack([away / distance[:, None], np.ones(len(away))])[near, : 4 if free else 3]
+        step, *_rest = np.linalg.lstsq(design, off[near], rcond=1e-6)
+        away = away - step[:3]
+        radius += float(step[3]) if free else 0.0
+    return away, radius
 
 
 def _flat(xyz: Floats, _: Floats, __: float) -> Floats:

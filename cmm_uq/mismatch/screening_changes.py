@@ -115,7 +115,7 @@ def _shift(chosen: tuple[int, ...], names: tuple[str, ...], by: int, way: str, *
 
 
 def _from_the_other_end(reference: Floats) -> Floats:
-    """The certified distance of the first face for the last, of the second for the last but one, …"""
+    """The certified distance of the first face for the last, of the second for the last but one, and so on."""
     faces, rank = np.unique(reference, return_inverse=True)
     return np.asarray(faces[::-1][rank].reshape(reference.shape), dtype=np.float64)
 
