@@ -135,6 +135,7 @@ def _attempt(random: np.random.Generator, what: str, kind: str, folder: Path) ->
         return None
     if kind in ("one", "two", "three", "roughly"):
         rivals = _inseparable(oracle, design, named, hidden, sizes, signals)
+    stands_in = _stands_in(oracle, design, named, sizes, signals) if kind == "outside" else None
     base = {name: random.normal(0, LARGEST[kind_of(name)] / 6) for name in named}
 
     def e(p: np.ndarray) -> np.ndarray:
@@ -154,7 +155,7 @@ def _attempt(random: np.random.Generator, what: str, kind: str, folder: Path) ->
     _write(folder, p, design, named, design.length if certified else None, stated if says else None)
     return {
         "named": named, "hidden": sizes, "root_lambda": wanted, "sigma_um": sigma * 1e3, "stated": says,
-        "certified": certified, "rivals": rivals, **shape, "observations": len(oracle.column(KNOWN["scale_x"])),
+        "certified": certified, "rivals": rivals, "stands_in": stands_in, **shape, "observations": len(oracle.column(KNOWN["scale_x"])),
     }  # fmt: skip
 
 
@@ -218,6 +219,19 @@ def _inseparable(oracle: Oracle, design: Design, named: list[str], hidden: dict,
             < _UNSEEN
         ]  # fmt: skip
     return found
+
+
+def _stands_in(oracle: Oracle, design: Design, named: list[str], sizes: dict, signals: dict) -> tuple[str, float]:
+    """The known effect that comes nearest to what is hidden, and the √λ that it leaves."""
+    ((name, signal),) = signals.items()
+    return min(
+        (
+            (rival, min(oracle.left(sizes[name] * signal, [columns]) for columns in oracle.rivals_of(rival)))
+            for rival in visible(design)
+            if rival not in named
+        ),
+        key=lambda pair: pair[1],
+    )
 
 
 def _noise(random: np.random.Generator, kind: str, sigma: float, design: Design) -> np.ndarray:

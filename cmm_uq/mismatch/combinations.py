@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import lgamma
 
 import numpy as np
 from scipy import special
 
 from cmm_uq.mismatch.evidence import Comparison, Version
 from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.points import Floats
 
 EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
 """Probability, beforehand, of none, one, two, three and four known effects that the job does not name."""
@@ -122,16 +122,39 @@ def keyed(versions: Iterable[Version]) -> Key:
     return frozenset(v.explanation for v in versions)
 
 
-def log_prior(explanations: Sequence[Explanation], key: Iterable[int]) -> float:
-    """Log probability, beforehand, of a combination; minus infinity for one that is not considered."""
-    chosen = [explanations[i].kind for i in key]
-    total = 0.0
-    for kind, counts in ((EFFECT, EFFECTS), (UNKNOWN, UNKNOWNS)):
-        among, k = sum(e.kind == kind for e in explanations), chosen.count(kind)
-        if k >= len(counts):
-            return -np.inf
-        total += np.log(counts[k]) - (lgamma(among + 1) - lgamma(k + 1) - lgamma(among - k + 1))
-    return total
+class Prior:
+    """Probability, beforehand, of every combination: of how many, and among as many by the product of their weights."""
+
+    def __init__(self, explanations: Sequence[Explanation]) -> None:
+        self._weight = [(e.kind, float(np.log(e.weight))) for e in explanations]
+        self._counts = {
+            kind: np.log(counts) - np.log(_symmetric([e.weight for e in explanations if e.kind == kind], len(counts)))
+            for kind, counts in ((EFFECT, EFFECTS), (UNKNOWN, UNKNOWNS))
+        }
+
+    def log(self, key: Iterable[int]) -> float:
+        """Logarithm of the probability; minus infinity for a combination that is not considered."""
+        total, count = 0.0, dict.fromkeys(self._counts, 0)
+        for i in key:
+            kind, weight = self._weight[i]
+            if kind not in count:
+                return -np.inf
+            count[kind] += 1
+            total += weight
+        for kind, k in count.items():
+            if k >= len(self._counts[kind]):
+                return -np.inf
+            total += float(self._counts[kind][k])
+        return total
+
+
+def _symmetric(weights: Sequence[float], count: int) -> Floats:
+    """Sums over all sets of 0, 1, … members of the products of their weights (``count``,); one where there is no set."""
+    sums = np.zeros(count)
+    sums[0] = 1.0
+    for weight in weights:
+        sums[1:] += weight * sums[:-1]
+    return np.where(sums > 0, sums, 1.0)
 
 
 class _Search:
@@ -139,6 +162,7 @@ class _Search:
 
     def __init__(self, comparison: Comparison) -> None:
         self.comparison = comparison
+        self.prior = Prior(comparison.explanations)
         self.candidates = [i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)]
         self.settled: dict[Key, Combination] = {}
         self._expanded: set[Key] = set()
@@ -169,10 +193,10 @@ class _Search:
         known = self.settled[key]
         fixed = float(self.comparison.log_evidence_of(known.versions)[0])
         others = [i for i in self.candidates if i not in key]
-        base = known.log_posterior - log_prior(self.comparison.explanations, key) - fixed
+        base = known.log_posterior - self.prior.log(key) - fixed
         for i, (total, version) in self.comparison.beside(known.versions, others).items():
             larger = key | {i}
-            estimate = base + total + log_prior(self.comparison.explanations, larger)
+            estimate = base + total + self.prior.log(larger)
             if larger in self.settled or estimate <= self._waiting.get(larger, (-np.inf, ()))[0]:
                 continue
             self._waiting[larger] = estimate, (*known.versions, version)
@@ -191,7 +215,7 @@ class _Search:
         key = keyed(versions)
         if key not in self.settled:
             evidence, settled = log_evidence_together(self.comparison, versions)
-            log_posterior = evidence + log_prior(self.comparison.explanations, key)
+            log_posterior = evidence + self.prior.log(key)
             self.settled[key] = Combination(settled, log_posterior)
 
     def _unknown(self, key: Key) -> bool:

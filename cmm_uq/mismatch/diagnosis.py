@@ -14,11 +14,11 @@ from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.posterior import Posterior, Progress
 from cmm_uq.measurement import MeasurementModel
 from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.explanations import UNKNOWN, Explanation
 from cmm_uq.mismatch.held_out import Improvement, improvement
 from cmm_uq.mismatch.joint import Joint, joint_posterior
+from cmm_uq.mismatch.location import Place, located
 from cmm_uq.mismatch.noise import Kind
-from cmm_uq.mismatch.search import NOT_TOLD_APART, Found, Race, search, tail_probability
+from cmm_uq.mismatch.search import NOT_TOLD_APART, Found, Race, search
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 
@@ -28,28 +28,6 @@ FALSE_ALARMS = 0.01
 _TOLD_APART = 0.95
 _UNKNOWN = 0.5
 _NOISE_KIND = 0.9
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """Where a mismatch lives.
-
-    Parameters
-    ----------
-    covariate : column that it depends on.
-    region : of that covariate, where it is larger than half its maximum.
-    p_value : corrected for having looked at every covariate.
-    amplitude_um : largest value of the smooth function.
-    what : the unknown function, in words.
-    curve : covariate, function and its standard uncertainty in µm, each (p,).
-    """
-
-    covariate: str
-    region: tuple[float, float]
-    p_value: float
-    amplitude_um: float
-    what: str
-    curve: tuple[Floats, Floats, Floats]
 
 
 @dataclass(frozen=True)
@@ -137,7 +115,7 @@ def diagnose(
     joint = joint_posterior(found, known, seed, progress)
     after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     return Diagnosis(
-        _verdict(found, alpha), found.first.p_value, alpha, _where(found.first, alpha), _left_out(found, joint),
+        _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha), _left_out(found, joint),
         _indistinguishable(found), _rivals(found.first), noise, gain, model, after, joint.posterior,
     )  # fmt: skip
 
@@ -147,7 +125,7 @@ def _verdict(found: Found, alpha: float) -> str:
         return "consistent"
     if not found.effects:
         return "unexplained"
-    return "partial" if found.unexplained > _UNKNOWN else "explained"
+    return "partial" if found.rough or found.unexplained > _UNKNOWN else "explained"
 
 
 def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
@@ -198,48 +176,6 @@ def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
 def _rivals(race: Race) -> tuple[tuple[str, float], ...]:
     order = np.argsort(-race.probability)
     return tuple((race.explanations[i].name, float(race.probability[i])) for i in order[:12])
-
-
-def _where(race: Race, alpha: float) -> tuple[Place, ...]:
-    if race.p_value >= alpha:
-        return ()
-    found = []
-    for explanation, odds in zip(race.explanations, race.log_odds, strict=True):
-        name, covariate, values = explanation.covariate_name, explanation.covariate, explanation.values
-        if explanation.kind != UNKNOWN or covariate is None or values is None or name is None:
-            continue
-        p_value = tail_probability(race.null_maximum, float(odds))
-        if p_value < alpha:
-            order = np.unique(covariate, return_index=True)[1]
-            x, (y, u) = covariate[order], _smoothed(race, explanation, values[order])
-            amplitude = float(np.abs(y).max()) / MICROMETRE
-            curve = (x, y / MICROMETRE, u / MICROMETRE)
-            found.append(Place(name, _region(x, y), p_value, amplitude, explanation.name, curve))
-    return tuple(sorted(found, key=lambda place: place.p_value))
-
-
-def _smoothed(race: Race, explanation: Explanation, values: Floats) -> tuple[Floats, Floats]:
-    """Best linear estimate (p,) of an unknown function and its standard uncertainty, mm, at the noise of the residuals."""
-    comparison = race.comparison
-    left = comparison.rest(explanation.members[0].columns / comparison.noise_scale[:, None])
-    least = comparison.left - left @ np.linalg.lstsq(left, comparison.left, rcond=None)[0]
-    variance = max(
-        float(least @ least) / max(comparison.degrees_of_freedom - left.shape[1], 1), comparison.least_noise**2
-    )
-    covariance = np.linalg.inv(left.T @ left / variance + np.eye(left.shape[1]))
-    estimate = values @ (covariance @ left.T @ comparison.left) / variance
-    return estimate, np.sqrt(np.einsum("pi,ij,pj->p", values, covariance, values))
-
-
-def _region(covariate: Floats, curve: Floats) -> tuple[float, float]:
-    """Range of the sorted covariate about the curve's largest value where it exceeds half of it."""
-    high = np.abs(curve) >= 0.5 * np.abs(curve).max()
-    first = last = int(np.argmax(np.abs(curve)))
-    while first > 0 and high[first - 1]:
-        first -= 1
-    while last < len(high) - 1 and high[last + 1]:
-        last += 1
-    return float(covariate[first]), float(covariate[last])
 
 
 def _noise(comparison: Comparison, stated: float | None) -> NoiseFound:

@@ -300,12 +300,13 @@ class Comparison:
             each = cube[:, :, 0]
             gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight
             at = each.argmax(axis=1)
+            most = each.max(axis=1) + group.weight
             for m, (i, j) in enumerate(zip(group.explanation.tolist(), group.member.tolist(), strict=True)):
                 total = float(gains[m])
                 if i in found:
                     total = float(np.logaddexp(found[i][0], total))
-                if each[m, at[m]] >= best.get(i, -np.inf):
-                    best[i] = float(each[m, at[m]])
+                if most[m] >= best.get(i, -np.inf):
+                    best[i] = float(most[m])
                     found[i] = total, Version(i, j, float(group.amplitudes[m, at[m]]))
                 else:
                     found[i] = total, found[i][1]
@@ -316,7 +317,7 @@ class Comparison:
         found = [Version(0, 0, 0.0)] * left.shape[1]
         most = np.full(left.shape[1], -np.inf)
         for group, each in self.each(left, (), explanations):
-            flat = each.reshape(-1, left.shape[1])
+            flat = (each + group.weight[:, None, None]).reshape(-1, left.shape[1])
             at = flat.argmax(axis=0)
             for column in np.flatnonzero(flat.max(axis=0) > most):
                 m, a = divmod(int(at[column]), AMPLITUDES)

@@ -7,15 +7,15 @@ for the unknown, plausibility) allows; how much smaller they may be is left to t
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import linalg
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.measurement import MeasurementModel
-from cmm_uq.physics.catalogue import CATALOGUE
-from cmm_uq.physics.effect import Effect
+from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.effect import FURTHER, Effect
 from cmm_uq.points import AXES, Floats, Points
 
 EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
@@ -29,6 +29,19 @@ _UNKNOWN_SD = 0.05
 _SHORTEST_PERIOD = 6.0
 """mm."""
 
+_IDEALISED = ("straightness", "hysteresis", "rotation", "drift")
+"""Effects whose form along their axis, or in time, is the simplest of many that their mechanism can have."""
+
+_TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
+_ROUGH = 0.25
+"""Probability that such an effect has another form than the simplest."""
+
+_FURTHER = 0.1
+"""Weight of an effect that only some machines show, beside one that most do."""
+
+_SPACE_LENGTHS = (0.5, 0.25)
+_SPACE_PLACES, _SPACE_RANK = 120, 40
+_MOST_STEPS = 64
 _MOST_PERIODS = 240
 _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 _KEPT = 1e-3
@@ -37,11 +50,22 @@ _GRID = 60
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """One version of an explanation: columns (m, r) in mm, the shape parameter that they belong to, and its weight."""
+    """One version of an explanation.
+
+    Parameters
+    ----------
+    columns : (m, r) mm.
+    shape : nonlinear parameter that they belong to.
+    weight : how probable, among the versions.
+    values : (p, r) mm, an unknown function where its covariate is given, for one unit of each coefficient.
+    rough : whether an effect has another form here than its own, though the same mechanism.
+    """
 
     columns: Floats
     shape: tuple[float, ...] = ()
     weight: float = 1.0
+    values: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    rough: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,17 +77,24 @@ class Explanation:
     name : the effect's name; for an unknown function what it depends on.
     kind : ``effect``, ``several`` (known effects at once) or ``unknown``.
     members : versions, as probable as their weights say.
-    covariate : (p,) where an unknown function is evaluated: the points' readings, or the observations' covariate.
-    values : (p, r) the function there, mm, for one unit of each coefficient of the first member.
+    covariate : (p,) what an unknown function depends on, of the points or of the observations.
     covariate_name : its name in the recording.
+    mechanism : the effect that an unknown function would be, had it that effect's form.
+    weight : how readily it is thought of, beside others of its kind.
     """
 
     name: str
     kind: str
     members: tuple[Member, ...]
     covariate: Floats | None = None
-    values: Floats | None = None
     covariate_name: str | None = None
+    mechanism: str = ""
+    weight: float = 1.0
+
+    @property
+    def shaped(self) -> bool:
+        """Whether its versions differ in a nonlinear parameter."""
+        return bool(self.members[0].shape)
 
 
 def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
@@ -77,7 +108,7 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
     """
     points = model.artefact.points.at(model.placed(values))
     found = []
-    for effect in CATALOGUE.values():
+    for effect in EVERY.values():
         if effect.name in named or any(column not in points.columns for column in effect.columns):
             continue
         try:
@@ -87,24 +118,58 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
         except CmmUqError:  # the job does not give the travel that this effect needs
             continue
         if any(np.any(member.columns) for member in members):
-            found.append(Explanation(effect.name, EFFECT, members))
+            members = (*members, *_roughly(model, effect, points, values))
+            weight = _FURTHER if effect.tier == FURTHER else 1.0
+            found.append(Explanation(effect.name, EFFECT, members, weight=weight))
     return found
 
 
+def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
+    """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
+    mechanism, _, rest = effect.name.partition("_")
+    if mechanism not in _IDEALISED:
+        return
+    along = points.columns["time_s"] if mechanism == "drift" else points.readings[:, AXES.index(rest[0])]
+    span = float(np.ptp(along))
+    if span == 0:
+        return
+    u = (2 * (along - along.min()) / span - 1)[:, None, None]
+    forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
+    basis = effect.basis(points, ()) * np.array([c.prior_sd for c in effect.coefficients])
+    for s, t in forms:
+        columns = model.seen(basis * (1 + s * u + t * (1.5 * u**2 - 0.5)), values)
+        yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)
+
+
 def finer(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
-    """An explanation with some of its periods divided: each gives way to five about it that share its weight."""
-    effect = CATALOGUE[explanation.name]
+    """An explanation with some of its shapes divided: each gives way to five about it that share its weight."""
+    effect = EVERY[explanation.name]
     points = model.artefact.points.at(model.placed(values))
-    frequency = np.array([1 / member.shape[0] for member in explanation.members])
-    step = float(np.median(np.diff(np.sort(frequency))))
+    shaped = [i for i, member in enumerate(explanation.members) if member.shape]
+    even = dict(zip(shaped, evenly(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True))
+    step = float(np.median(np.diff(np.sort(list(even.values())))))
     kept = list(explanation.members)
     for i in members:
         kept[i] = replace(kept[i], weight=kept[i].weight / len(_DIVIDED))
         for part in _DIVIDED:
             if part:
-                shape = (float(1 / (frequency[i] + part * step)),)
+                shape = (float(unevenly(effect, np.array(even[i] + part * step))),)
                 kept.append(Member(_seen(model, effect, points, shape, values), shape, kept[i].weight))
     return replace(explanation, members=tuple(kept))
+
+
+def evenly(effect: Effect, shape: Floats) -> Floats:
+    """An effect's nonlinear parameter on the scale on which it is tried evenly: frequency for a period, else its logarithm."""
+    return 1 / shape if _periodic(effect) else np.log(shape)
+
+
+def unevenly(effect: Effect, value: Floats) -> Floats:
+    """What :func:`evenly` was given."""
+    return 1 / value if _periodic(effect) else np.exp(value)
+
+
+def _periodic(effect: Effect) -> bool:
+    return effect.shape[0].name == "period_mm"
 
 
 def several(singles: Sequence[Explanation]) -> list[Explanation]:
@@ -112,7 +177,7 @@ def several(singles: Sequence[Explanation]) -> list[Explanation]:
 
     It names none of them, but opens the gate to those that are visible together only.
     """
-    columns = [e.members[0].columns for e in singles if len(e.members) == 1]
+    columns = [e.members[0].columns for e in singles if not e.shaped]
     if len(columns) < 2:
         return []
     together = np.hstack(columns)
@@ -125,9 +190,9 @@ def several(singles: Sequence[Explanation]) -> list[Explanation]:
 
 
 def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
-    """Values of an effect's nonlinear parameter to try: periods that the readings can tell apart."""
-    if not effect.shape:
-        yield ()
+    """Values of an effect's nonlinear parameter to try: of a period, those that the readings can tell apart."""
+    if not effect.shape or not _periodic(effect):
+        yield from effect.trials()
         return
     readings = points.readings[:, AXES.index(effect.name[-1])]
     span = float(np.ptp(readings))
@@ -145,28 +210,45 @@ def _seen(model: MeasurementModel, effect: Effect, points: Points, shape: tuple[
 
 
 def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
-    """Smooth functions: errors along each axis of each reading, and of every covariate of the observations."""
-    found = []
+    """Functions that nobody knows, smooth or with one jump.
+
+    Errors along each axis of each reading and of the place, scales of time, and anything of each covariate of the
+    observations.
+    """
     points = model.artefact.points.at(model.placed(values))
+    found = [*_of_readings(model, points, values), *_of_place(model, points, values), *_of_time(model, points, values)]
+    for name, covariate in covariates(model).items():
+        members = tuple(Member(f, weight=weight, values=f) for f, weight in _functions(covariate))
+        found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, name))
+    return found
+
+
+def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """Errors along each axis as functions of each reading."""
     for i, axis in enumerate(AXES):
         readings = points.readings[:, i]
         if np.ptp(readings) < 1.0:
             continue
+        functions = list(_functions(readings))
         for j, direction in enumerate(AXES):
+            members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
             name = f"error along {direction.upper()} as a function of {axis.upper()}"
-            factors = [_UNKNOWN_SD * factor for factor in _smooth(readings)]
-            members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
-            found.append(Explanation(name, UNKNOWN, members, readings, factors[0], f"{axis}_mm"))
-    found += list(_changing(model, points, values))
-    for name, covariate in covariates(model).items():
-        factors = [_UNKNOWN_SD * factor for factor in _smooth(covariate)]
-        members = tuple(Member(factor) for factor in factors)
-        found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, factors[0], name))
-    return found
+            mechanism = "" if i == j else f"straightness_{axis}_{direction}"
+            yield Explanation(name, UNKNOWN, members, readings, f"{axis}_mm", mechanism)
 
 
-def _changing(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
-    """Scales that change with time."""
+def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """Errors along each axis as functions of the place in the volume."""
+    if np.sum(np.ptp(points.readings, axis=0) > 1.0) < 2:
+        return
+    factors = list(_smooth_in_space(points.readings))
+    for j, direction in enumerate(AXES):
+        members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
+        yield Explanation(f"error along {direction.upper()} as a function of the place", UNKNOWN, members)
+
+
+def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """Scales of each axis as functions of time."""
     time = points.columns.get("time_s")
     if time is None or len(np.unique(time)) < 3:
         return
@@ -176,10 +258,10 @@ def _changing(model: MeasurementModel, points: Points, values: Floats) -> Iterat
         if half < 1.0:
             continue
         lever = ((readings - readings.mean()) / half)[:, None]
-        factors = [_UNKNOWN_SD * factor for factor in _smooth(time)]
-        members = tuple(Member(model.seen(_along(i, lever * factor), values)) for factor in factors)
-        name = f"scale of {axis.upper()} as a function of time"
-        yield Explanation(name, UNKNOWN, members, time, factors[0], "time_s")
+        members = tuple(
+            Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in _functions(time)
+        )
+        yield Explanation(f"scale of {axis.upper()} as a function of time", UNKNOWN, members, time, "time_s")
 
 
 def _along(axis: int, factor: Floats) -> Floats:
@@ -211,6 +293,19 @@ def mean_of(model: MeasurementModel, values: Floats) -> Floats:
     return np.array([key[m, r] for m, r in zip(artefact.measurement, artefact.repeat, strict=True)])[model.used]
 
 
+def _functions(covariate: Floats) -> Iterator[tuple[Floats, float]]:
+    """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps."""
+    for factor in _smooth(covariate):
+        yield _UNKNOWN_SD * factor, 1.0
+    distinct = np.unique(covariate)
+    gaps = np.diff(distinct)
+    parts = np.array_split(np.arange(len(gaps)), min(len(gaps), _MOST_STEPS))
+    widest = np.array([part[np.argmax(gaps[part])] for part in parts])
+    chosen = distinct[widest] + 0.5 * gaps[widest]
+    for place in chosen:
+        yield _UNKNOWN_SD * np.where(covariate > place, 1.0, -1.0)[:, None], 1 / len(chosen)
+
+
 def _smooth(covariate: Floats) -> Iterator[Floats]:
     """Factors (n, r) of squared-exponential covariances over a covariate (Karhunen–Loève on a grid, Nyström beyond)."""
     low, span = float(covariate.min()), float(np.ptp(covariate))
@@ -222,3 +317,16 @@ def _smooth(covariate: Floats) -> Iterator[Floats]:
         keep = eigenvalues > _KEPT * eigenvalues[-1]
         cross = np.exp(-0.5 * ((place[:, None] - grid[None, :]) / length) ** 2)
         yield cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
+
+
+def _smooth_in_space(readings: Floats) -> Iterator[Floats]:
+    """Factors (n, r), mm, of squared-exponential covariances over readings (n, 3) (Nyström on some of their places)."""
+    place = (readings - readings.min(axis=0)) / float(np.ptp(readings, axis=0).max())
+    distinct = np.unique(np.round(place, 6), axis=0)
+    some = distinct[np.unique(np.linspace(0, len(distinct) - 1, _SPACE_PLACES).round().astype(int))]
+    among, across = (np.sum((points[:, None] - some) ** 2, axis=2) for points in (some, place))
+    for length in _SPACE_LENGTHS:
+        eigenvalues, vectors = linalg.eigh(np.exp(-0.5 * among / length**2))
+        keep = np.flatnonzero(eigenvalues > _KEPT * eigenvalues[-1])[-_SPACE_RANK:]
+        factor = np.exp(-0.5 * across / length**2) @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
+        yield _UNKNOWN_SD * factor

@@ -10,6 +10,7 @@ from scipy import special
 from cmm_uq.inference.posterior import Posterior, Progress, sample
 from cmm_uq.inference.shaped import Shaped, sample_shaped
 from cmm_uq.measurement import MeasurementModel
+from cmm_uq.mismatch.explanations import evenly, unevenly
 from cmm_uq.mismatch.noise import Kind
 from cmm_uq.mismatch.search import Found
 from cmm_uq.physics.effect import Effect
@@ -72,13 +73,13 @@ def _nodes(found: Found, effect: Effect) -> Floats:
     comparison = found.first.comparison
     index = next(i for i in found.chosen if found.first.explanations[i].name == effect.name)
     granted = [v for v in found.versions if v.explanation != index]
-    ((group, cube),) = comparison.each(comparison.left[:, None], granted, [index])
-    frequency = np.array([1 / found.first.explanations[index].members[m].shape[0] for m in group.member])
+    ((group, cube),) = comparison.each(None, granted, [index])
+    even = evenly(effect, np.array([found.first.explanations[index].members[m].shape[0] for m in group.member]))
     evidence = special.logsumexp(cube[:, :, 0], axis=1)
-    step = float(np.median(np.diff(np.sort(frequency)))) if len(frequency) > 1 else 0.1 * float(frequency[0])
-    likely = frequency[evidence > evidence.max() - _IMPROBABLE]
+    step = float(np.median(np.diff(np.sort(even)))) if len(even) > 1 else 0.1 * abs(float(even[0]))
+    likely = even[evidence > evidence.max() - _IMPROBABLE]
     offsets = np.arange(-_FINER, _FINER + 1) / _FINER
     fine = np.unique(np.round((likely[:, None] + step * offsets).ravel() / step * _FINER)) * step / _FINER
     (shape,) = effect.shape
-    fine = fine[(fine >= 1 / shape.high) & (fine <= 1 / shape.low)]
-    return np.sort(1 / fine)
+    low, high = np.sort(evenly(effect, np.array([shape.low, shape.high])))
+    return np.sort(unevenly(effect, np.unique(np.clip(fine, low, high))))

@@ -80,13 +80,14 @@ def tails(residual: Floats) -> Kind:
     return Kind("tails", _TAILS_DOF, whitening, log_whitening, TAILS, float(np.sum(log_t - normal)))
 
 
-def kinds(placing: Ints, order: Floats) -> list[Kind]:
+def kinds(placing: Ints, order: Floats, direction: Ints) -> list[Kind]:
     """Kinds of noise that a recording could show.
 
     Parameters
     ----------
     placing : (m,) observations with the same number share an offset: repeats of one quantity in one placing.
     order : (m,) time, or place in the recording, of each observation.
+    direction : (m,) noise that is correlated in time is so among observations with the same number only.
     """
     m = len(placing)
     _, place, repeats = np.unique(placing, return_inverse=True, return_counts=True)
@@ -95,7 +96,8 @@ def kinds(placing: Ints, order: Floats) -> list[Kind]:
     found = [Kind("white", 0.0, sparse.eye_array(m, format="csr"), 0.0, WHITE - TAILS)]
     if shared:
         found += [_shared(ratio, place, repeats, share) for ratio in PLACING_RATIOS]
-    return found + [_correlated(phi, np.argsort(order, kind="stable"), share) for phi in CORRELATIONS]
+    sequence = np.lexsort((order, direction))
+    return found + [_correlated(phi, sequence, direction[sequence], share) for phi in CORRELATIONS]
 
 
 def _shared(ratio: float, place: Ints, repeats: Ints, probability: float) -> Kind:
@@ -107,14 +109,15 @@ def _shared(ratio: float, place: Ints, repeats: Ints, probability: float) -> Kin
     return Kind("placing", ratio, whitening, -float(np.log(grown).sum()), probability)
 
 
-def _correlated(phi: float, sequence: Ints, probability: float) -> Kind:
-    """First-order autoregression along a sequence."""
+def _correlated(phi: float, sequence: Ints, chain: Ints, probability: float) -> Kind:
+    """First-order autoregression along a sequence (m,) of observations, in chains that are numbered (m,)."""
     m, innovation = len(sequence), np.sqrt(1 - phi**2)
-    diagonal = np.concatenate([[1.0], np.full(m - 1, 1 / innovation)])
-    below = np.full(m - 1, -phi / innovation)
-    rows, columns = np.append(sequence, sequence[1:]), np.append(sequence, sequence[:-1])
+    follows = np.append(False, chain[1:] == chain[:-1])
+    diagonal = np.where(follows, 1 / innovation, 1.0)
+    below = np.full(int(follows.sum()), -phi / innovation)
+    rows, columns = np.append(sequence, sequence[follows]), np.append(sequence, sequence[np.flatnonzero(follows) - 1])
     whitening = sparse.csr_array((np.append(diagonal, below), (rows, columns)), shape=(m, m))
-    return Kind("correlated", phi, whitening, -(m - 1) * float(np.log(innovation)), probability)
+    return Kind("correlated", phi, whitening, float(np.log(diagonal).sum()), probability)
 
 
 def sigma_grid(stated: float | None, residual: float) -> tuple[Floats, Floats]:

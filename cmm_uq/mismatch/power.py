@@ -2,8 +2,9 @@
 
 Nothing is approximated but the noise, which is white: recordings are drawn on the plan's own design, and the search's own
 statistic, with its own rivals, priors and false-alarm rate, decides on each. What it sees of a draw is a quadratic form, so
-that a recording costs a millisecond. *Detected*: the gate opens. *Named*: the gate opens, and the true effect alone is more
-probable than any other known effect alone and than none.
+that a recording costs some milliseconds. *Detected*: the gate opens. *Named*: besides, the true effect alone is more probable
+than any other known effect alone and than none, and so much that no other is said to be as possible
+(:data:`~cmm_uq.mismatch.search.NOT_TOLD_APART`): with twins that nobody can tell apart, a lucky guess is no name.
 
 (Baarda 1968 and Teunissen 2018 call these sizes minimal detectable and minimal identifiable bias.)
 """
@@ -20,22 +21,25 @@ from scipy import special
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.mismatch.combinations import EFFECTS, UNKNOWNS
+from cmm_uq.mismatch.combinations import Prior
 from cmm_uq.mismatch.evidence import Comparison
 from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN
-from cmm_uq.mismatch.search import DRAWS, _statistic, race_of
+from cmm_uq.mismatch.search import DRAWS, NOT_TOLD_APART, _statistic, race_of
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 
 POWER = 0.8
 
-SIZES = np.geomspace(3.0, 30.0, 6)
+SIZES = np.geomspace(3.0, 30.0, 4)
 """Sizes of an effect that are tried: its rms in all observations together, what is fitted projected out, over the noise."""
 
-_LARGER = np.array([0.9, 1.0, 1.1, 1.25, 1.5, 2.0])
+_LARGER = np.array([1.0, 1.3])
 """Noise as it looks, over what it is, at which the gate's threshold is found."""
 
 _TAIL = 0.2
+_CERTAIN = float(np.log(0.95 / 0.05))
+"""Log odds of an effect against everything else from which on no other is said to be as possible."""
+
 _ALLOWED = 3.0
 """Prior standard deviations up to which an effect is reckoned with."""
 
@@ -102,7 +106,7 @@ def without_fault(facts: ArtefactFacts, model: MeasurementModel, sigma: float, s
 
 def powers(
     model: MeasurementModel, effects: Sequence[Effect], *, stated: float | None, sigma: float, alpha: float, seed: int,
-    draws: int = 48,
+    draws: int = 24,
 ) -> Iterator[Power]:  # fmt: skip
     """Power of the diagnosis of a model's recording, for effects that the model does not name.
 
@@ -225,22 +229,19 @@ class _Rule:
     @cached_property
     def _priors(self) -> Floats:
         """(c,) log probability, beforehand, of each explanation alone among combinations; minus infinity for several."""
-        kinds = [explanation.kind for explanation in self.comparison.explanations]
-        log = np.full(len(kinds), -np.inf)
-        for i, kind in enumerate(kinds):
-            if kind == EFFECT:
-                log[i] = np.log(EFFECTS[1] * UNKNOWNS[0] / kinds.count(EFFECT))
-            elif kind == UNKNOWN:
-                log[i] = np.log(EFFECTS[0] * UNKNOWNS[1] / kinds.count(UNKNOWN))
-        return log
+        prior = Prior(self.comparison.explanations)
+        return np.array([prior.log([i]) for i in range(len(self.comparison.explanations))])
 
     def __call__(self, data: Floats, true: int) -> tuple[Floats, Floats]:
-        """By how much the statistic (b,) passes the gate, and the true effect the most probable of all others."""
+        """By how much the statistic (b,) passes the gate, and the true effect what would let others stand beside it."""
         statistic, odds = _statistic(self.comparison, data)
         weight = odds + self._priors[:, None]
         kinds = np.array([explanation.kind for explanation in self.comparison.explanations])
-        nothing = np.full((1, data.shape[1]), np.log(EFFECTS[0] * UNKNOWNS[0]))
+        nothing = np.full((1, data.shape[1]), Prior(self.comparison.explanations).log([]))
         none = special.logsumexp(np.vstack([nothing, weight[kinds == UNKNOWN]]), axis=0)
         others = weight[(kinds == EFFECT) & (np.arange(len(kinds)) != true)]
-        best = np.maximum(none, others.max(axis=0, initial=-np.inf))
-        return statistic - self.threshold(data), weight[true] - best
+        other = others.max(axis=0, initial=-np.inf)
+        asserted = weight[true] - np.maximum(none, other)
+        without_rival = np.minimum(asserted, weight[true] - other + np.log(NOT_TOLD_APART))
+        all_but_certain = weight[true] - special.logsumexp(np.vstack([none, others]), axis=0) - _CERTAIN
+        return statistic - self.threshold(data), np.maximum(without_rival, all_but_certain)

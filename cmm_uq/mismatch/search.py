@@ -6,7 +6,6 @@ statistic is the evidence of "something" over "nothing"; its distribution under 
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import comb
@@ -30,7 +29,7 @@ from cmm_uq.mismatch.explanations import (
     unknown,
 )
 from cmm_uq.mismatch.noise import Kind, kinds, order_of, sigma_grid, tails
-from cmm_uq.physics.catalogue import CATALOGUE
+from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.points import Floats, Ints
 
 SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}
@@ -45,6 +44,9 @@ _MISFIT = 20.0
 
 ASSERTED = 0.5
 """Probability from which an effect, or one of those that cannot be told from it, is asserted."""
+
+_MECHANISM = 0.2
+"""Probability from which an effect is asserted when all that is asked is whether it has its own form or any other."""
 
 _PROBABLE = 0.003
 """Probability from which the period in a combination is refined."""
@@ -94,6 +96,7 @@ class Found:
     versions : of them, and of what is unknown besides, in the most probable combination.
     model : the job's model with what was left out.
     unexplained : probability that something unknown acts besides.
+    rough : of the effects found, those of which another form is more probable than their own.
     """
 
     first: Race
@@ -103,6 +106,7 @@ class Found:
     versions: tuple[Version, ...]
     model: MeasurementModel
     unexplained: float
+    rough: Key = frozenset()
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -124,9 +128,9 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     if first.p_value >= alpha:
         return Found(first, first.comparison, None, frozenset(), (), model, 0.0)
     combinations = explore(first.comparison)
-    if periods := _periods(combinations):
+    if shapes := _shapes(combinations):
         explanations = [
-            finer(first.model, first.values, e, periods[i]) if i in periods else e
+            finer(first.model, first.values, e, shapes[i]) if i in shapes else e
             for i, e in enumerate(first.explanations)
         ]
         first = replace(first, comparison=replace(first.comparison, explanations=explanations))
@@ -135,11 +139,22 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     versions = combinations.versions(chosen)
     found = model if not chosen else _with(first, versions, chosen)
     last = comparison_of(found, stated, ())
-    return Found(first, last, combinations, chosen, versions, found, combinations.unknown_beside(chosen))
+    rough = frozenset(i for i in chosen if _rough(first.comparison, versions, i) > ASSERTED)
+    return Found(first, last, combinations, chosen, versions, found, combinations.unknown_beside(chosen), rough)
 
 
-def _periods(combinations: Combinations) -> dict[int, set[int]]:
-    """Members of the periodic effects, by explanation, that probable combinations contain."""
+def _rough(comparison: Comparison, versions: Sequence[Version], index: int) -> float:
+    """Probability that an effect, beside the others, has another form than its own."""
+    members = comparison.explanations[index].members
+    evidence = np.full(len(members), -np.inf)
+    for group, cube in comparison.each(None, [v for v in versions if v.explanation != index], [index]):
+        evidence[group.member] = special.logsumexp(cube[:, :, 0], axis=1) + group.weight
+    weight = np.exp(evidence - special.logsumexp(evidence))
+    return float(weight[[member.rough for member in members]].sum())
+
+
+def _shapes(combinations: Combinations) -> dict[int, set[int]]:
+    """Members of the effects with a nonlinear parameter, by explanation, that probable combinations contain."""
     found: dict[int, set[int]] = {}
     for key, probability in combinations.probability.items():
         for version in combinations.found[key].versions if probability > _PROBABLE else ():
@@ -152,7 +167,19 @@ def _asserted(combinations: Combinations) -> Key:
     """The most probable set of known effects, without those that something else could well be instead."""
     chosen = max(combinations.of_effects, key=lambda key: combinations.of_effects[key])
     doubtful = [i for i in chosen if combinations.of(i) < ASSERTED and _with_rivals(combinations, chosen, i) < ASSERTED]
-    return chosen - frozenset(doubtful)
+    return (chosen - frozenset(doubtful)) | _of_any_form(combinations)
+
+
+def _of_any_form(combinations: Combinations) -> Key:
+    """Effects that are improbable only because an unknown function of the same mechanism describes them as well."""
+    index, found = {e.name: i for i, e in enumerate(combinations.explanations)}, set()
+    for j, function in enumerate(combinations.explanations):
+        i = index.get(function.mechanism)
+        if i is None or combinations.of(i) < _MECHANISM:
+            continue
+        if sum(p for key, p in combinations.probability.items() if i in key or j in key) >= ASSERTED:
+            found.add(i)
+    return frozenset(found)
 
 
 def _with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
@@ -196,7 +223,7 @@ def _with(race: Race, versions: Sequence[Version], chosen: Key) -> MeasurementMo
     for version in sorted(versions, key=lambda v: v.explanation):
         if version.explanation in chosen:
             explanation = race.explanations[version.explanation]
-            added.append(CATALOGUE[explanation.name])
+            added.append(EVERY[explanation.name])
             if added[-1].shape:
                 shapes[explanation.name] = explanation.members[version.member].shape
     return replace(race.model, effects=(*race.model.effects, *added), shapes=shapes)
@@ -207,24 +234,35 @@ def noise_kinds(model: MeasurementModel) -> list[Kind]:
     time = model.artefact.points.columns.get("time_s")
     order = order_of(None if time is None else mean_of(model, time), int(model.used.sum()))
     least_squares, linear = model.estimate().least_squares, model.estimate().linear
-    return [*kinds(repeated_quantity(model), order), tails(least_squares.residuals / linear.noise_scale)]
+    return [
+        *kinds(repeated_quantity(model), order, _direction(model)[model.used]),
+        tails(least_squares.residuals / linear.noise_scale),
+    ]
 
 
 def repeated_quantity(model: MeasurementModel) -> Ints:
     """Numbers (m,) that used observations share when they repeat one quantity: one point, or pair, of one placing."""
     artefact = model.artefact
-    points = np.sort(artefact.points.point[artefact.rows], axis=1)
-    # the coordinates of one point are observations of their own: first, second and third of the same reading
-    _, reading = np.unique(
-        np.column_stack([artefact.measurement, artefact.repeat, points]), axis=0, return_inverse=True
-    )
+    key = np.column_stack([artefact.measurement, _points_of(model), _direction(model)])
+    _, number = np.unique(key, axis=0, return_inverse=True)
+    return np.asarray(number.ravel()[model.used], dtype=np.int64)
+
+
+def _points_of(model: MeasurementModel) -> Ints:
+    return np.sort(model.artefact.points.point[model.artefact.rows], axis=1)
+
+
+def _direction(model: MeasurementModel) -> Ints:
+    """Which of the observations of one reading each is (m,): the coordinates of a point are observations of their own."""
+    artefact = model.artefact
+    key = np.column_stack([artefact.measurement, artefact.repeat, _points_of(model)])
+    _, reading = np.unique(key, axis=0, return_inverse=True)
     order = np.argsort(reading.ravel(), kind="stable")
     first = np.concatenate([[True], np.diff(reading.ravel()[order]) > 0])
     place = np.arange(len(order))
     direction = np.empty_like(place)
     direction[order] = place - np.maximum.accumulate(np.where(first, place, 0))
-    _, number = np.unique(np.column_stack([artefact.measurement, points, direction]), axis=0, return_inverse=True)
-    return np.asarray(number.ravel()[model.used], dtype=np.int64)
+    return direction
 
 
 def _certified(model: MeasurementModel, sigma: float) -> Floats:
@@ -242,8 +280,10 @@ def _held(model: MeasurementModel) -> NDArray[np.bool_]:
 
 
 def _log_prior(rivals: Sequence[Explanation]) -> Floats:
-    count = Counter(e.kind for e in rivals)
-    return np.log([SHARES[e.kind] / count[e.kind] for e in rivals])
+    total = dict.fromkeys(SHARES, 0.0)
+    for e in rivals:
+        total[e.kind] += e.weight
+    return np.log([SHARES[e.kind] * e.weight / total[e.kind] for e in rivals])
 
 
 def _gate(comparison: Comparison, seed: int) -> tuple[float, Floats]:
@@ -273,7 +313,7 @@ def _statistic(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
     single = [
         i
         for i, e in enumerate(comparison.explanations)
-        if e.kind == EFFECT and len(e.members) == 1 and i in comparison.visible
+        if e.kind == EFFECT and e.weight == 1 and not e.shaped and i in comparison.visible
     ]
     if len(single) < 2:
         return log_odds, odds

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.mismatch.combinations import EFFECTS, UNKNOWNS, explore, log_evidence_together, log_prior
+from cmm_uq.mismatch.combinations import EFFECTS, UNKNOWNS, Prior, explore, log_evidence_together
 from cmm_uq.mismatch.evidence import AMPLITUDES, Comparison, Version
 from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.mismatch.noise import kinds, sigma_grid
@@ -26,7 +26,7 @@ def rivals(random: np.random.Generator, effects: int = 8) -> list[Explanation]:
 
 
 def comparison(observed: Floats, explanations: list[Explanation]) -> Comparison:
-    noise = kinds(np.repeat(np.arange(M // 2), 2), np.arange(M, dtype=np.float64))
+    noise = kinds(np.repeat(np.arange(M // 2), 2), np.arange(M, dtype=np.float64), np.zeros(M, dtype=np.int64))
     sigma, log_sigma = sigma_grid(0.01, 0.02)
     return Comparison(observed, np.ones((M, 1)), noise, sigma, log_sigma, explanations, np.full(M, np.sqrt(2)), 0.01)
 
@@ -116,8 +116,11 @@ def test_two_that_are_one_and_the_same_share_their_probability() -> None:
 def test_prior_probabilities_of_all_combinations_sum_to_one() -> None:
     random = np.random.default_rng(7)
     explanations = rivals(random, 5)
+    explanations[1] = replace(explanations[1], weight=0.1)
     keys = [
         set(key) for r in range(len(explanations) + 1) for key in itertools.combinations(range(len(explanations)), r)
     ]
-    total = sum(np.exp(log_prior(explanations, key)) for key in keys)
+    prior = Prior(explanations)
+    total = sum(np.exp(prior.log(key)) for key in keys)
     assert total == pytest.approx(sum(EFFECTS) * sum(UNKNOWNS[:2]))
+    assert prior.log({1}) == pytest.approx(prior.log({0}) + np.log(0.1))

@@ -178,3 +178,25 @@ def test_the_false_alarm_rate_is_asked_for() -> None:
     weak = diagnose(model, stated_um=1.0, alpha=1e-6, seed=0)
     assert weak.verdict == "consistent"
     assert weak.p_value == diagnose(replace(model), stated_um=1.0, alpha=0.5, seed=0).p_value
+
+
+def test_a_jump_is_located_between_the_readings_about_it() -> None:
+    points = recording({}, Noise(1e-3))
+    error = np.zeros_like(points.xyz)
+    error[:, 2] = np.where(points.xyz[:, 0] > 500.0, 8e-3, 0.0)
+    found = diagnosed(recording({}, Noise(1e-3), error=error))
+    assert not found.effects
+    low, high = next(place.region for place in found.where if place.what == "error along Z as a function of X")
+    assert low < 500.0 < high
+    assert high - low < 60.0
+
+
+def test_a_known_mechanism_of_another_form_is_named_in_part() -> None:
+    """Straightness as an asymmetric bow, which the effect's symmetric one describes but in part."""
+    points = recording({}, Noise(1e-3))
+    place = points.xyz[:, 0] / 900.0
+    error = np.zeros_like(points.xyz)
+    error[:, 1] = 12e-3 * (1 - (2 * place - 1) ** 2) * (1 + 0.6 * (2 * place - 1))
+    found = diagnosed(recording({}, Noise(1e-3), error=error))
+    assert found.verdict == "partial"
+    assert [item.effect for item in found.effects] == ["straightness_x_y"]
