@@ -25,7 +25,7 @@ def ballbar() -> Setting:
 
 
 def step_gauge() -> Setting:
-    return setting(ArtefactFacts(kind="step_gauge", u_um=0.4), pitch_mm=20.0, length_mm=1000.0)
+    return setting(ArtefactFacts(kind="step_gauge", u_um=0.4), pitch_mm=20.0, length_mm=1000.0, repeats=1)
 
 
 def plate() -> Setting:

@@ -42,7 +42,8 @@ class Outlook:
     placings : of them all.
     points : the same as one recording.
     identifiability : of the effects named; ``None`` for a shift job.
-    powers : how large each effect that the job does not name must be for the diagnosis to find it; empty when not asked for.
+    powers : how large each effect that the job does not name must be for the diagnosis to find it; empty when not asked for,
+        and for placings that give way to others by a criterion which does not part effects.
     """
 
     placings: tuple[Placing, ...]
@@ -128,7 +129,8 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
         estimate = setting.model(points).estimate().least_squares
         setting = replace(setting, sigma=max(estimate.sigma_of_residuals, 1e-3 * MICROMETRE))
     rivals = setting.rivals(points)
-    start = _outlook(setting, placings, points, rivals, power, seed, _part(tell, 0.1, 0.5))
+    compared = setting.plan.criterion in (None, "separation")
+    start = _outlook(setting, placings, points, rivals, power and compared, seed, _part(tell, 0.1, 0.5))
     tell("Searching for better placings", 0.55)
     chosen, kept, scores = _searched(setting, start, rivals, name)
     better = None

@@ -9,7 +9,7 @@ import numpy as np
 from cmm_uq.analysis.planning import RECORDED, Plan
 from cmm_uq.certificate.wording import listed
 from cmm_uq.measurement.model import ARTEFACT
-from cmm_uq.physics.catalogue import CATALOGUE
+from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.planning.identifiability import Determined, Identifiability
 from cmm_uq.planning.placing import Placing
 
@@ -25,7 +25,7 @@ CRITERIA = {
 
 def title_of(name: str) -> str:
     """An effect in words."""
-    return CATALOGUE[name].title if name in CATALOGUE else name
+    return EVERY[name].title if name in EVERY else name
 
 
 def combination(parts: Mapping[tuple[str, str], float]) -> str:
@@ -55,7 +55,7 @@ def named(parameter: Determined) -> str:
     owner, name = parameter.unknown.key
     if owner == ARTEFACT:
         return f"Artefact, {name}"
-    effect = CATALOGUE[owner]
+    effect = EVERY[owner]
     return effect.title if len(effect.coefficients) == 1 else f"{effect.title}, {name}"
 
 
@@ -66,7 +66,7 @@ def pairs(found: Identifiability) -> list[str]:
         joined = [group for group in groups if first in group or second in group]
         merged = {first, second}.union(*joined)
         groups = [group for group in groups if group not in joined] + [merged]
-    return [listed([title_of(name) for name in CATALOGUE if name in group]) for group in groups]
+    return [listed([title_of(name) for name in EVERY if name in group]) for group in groups]
 
 
 def base_name(plan: Plan) -> str:
