@@ -19,7 +19,7 @@ TEMPERATURES = (*SCALES, "temp_artefact_c", "temp_table_top_c", "temp_table_bott
 BALLS = ("ballbar", "plate", "triangle", "bryan")
 """Kinds whose points are centres of balls or cylinders, each of several touches."""
 
-LONGEST_PAUSE, SHORTEST_BALL = 3600.0, 1.0
+LONGEST_PAUSE, SHORTEST_BALL = 6 * 3600.0, 0.6
 """s between points of one placing that no operator waits, and that no machine probes a ball in."""
 
 _STUCK_ROWS, _STUCK_PART, _MOVING = 8, 0.15, 0.9
@@ -244,4 +244,5 @@ def _longest_run(values: Floats) -> tuple[int, int]:
 
 def about_whole_column(found: Finding, points: Points) -> bool:
     """Whether half a column or more is concerned."""
-    return found.column in points.columns and 2 * len(found.measurements) >= len(np.unique(points.measurement))
+    concerned = np.isin(points.lines, found.lines) if found.lines else np.isin(points.measurement, found.measurements)
+    return found.column in points.columns and 2 * int(concerned.sum()) >= len(points)

@@ -69,12 +69,13 @@ def _refuse_whole(search: Search, where: str) -> None:
     bad = int(search.bad.sum())
     told = _missed(search)
     best, fewest = None, min(max(2, int(_EDGES * len(points))), bad // _SEVERAL)
+    strays = max(_EDGES, _astray(points))
     for change in (*changes(shape), *changes_of_blocks(shape)):
         if _shrinks(change, shape):
             continue
         xyz, reference = search.changed(change, np.arange(len(points)))
         left = int(np.sum(shape.misfit(xyz, reference) > shape.tolerance))
-        if left <= fewest and outside_travel(points.at(xyz)).any(axis=1).mean() <= _EDGES:
+        if left <= fewest and _astray(points.at(xyz)) <= strays:
             best, fewest = change, left - 1
     if best is not None:
         raise CmmUqError(f"{told}, and fit once one mistake is undone: {best.what}",
@@ -83,6 +84,11 @@ def _refuse_whole(search: Search, where: str) -> None:
         if np.ptp(column) == 0 and bad > MOST * len(points):
             raise CmmUqError(f"{told}: {axis}_mm is stuck at {column[0]:g} in every row", where=f"{where}, column {axis}_mm",
                              fix="Export the recording again")  # fmt: skip
+
+
+def _astray(points: Points) -> float:
+    """Part of the points whose readings lie outside the travel."""
+    return float(np.any(outside_travel(points), axis=1).mean())
 
 
 def _refuse_another(search: Search, facts: ArtefactFacts, where: str) -> None:

@@ -17,7 +17,7 @@ from cmm_uq.points import AXES, Floats, Ints, Points
 MOST = 0.2
 """Part of the rows that may be left out; with more damage the recording is refused."""
 
-_PART = 0.2
+_PART, _STRAYS = 0.2, 0.05
 _FEW, _MANY = 16, 60
 _MOST_BALLS = 400
 _SAME_PLACE = 10.0
@@ -59,6 +59,7 @@ class Search:
         self._placing = np.full(len(points), -1)
         for i, rows in enumerate(shape.rows):
             self._placing[rows] = i
+        self._inside = bool(np.any(outside_travel(points)[~self.bad], axis=1).mean() < _STRAYS) if len(sound) else False
         self._xyz, self._reference = points.xyz, shape.reference
         self._open, self._settled = self.bad.copy(), np.zeros(len(points), dtype=bool)
 
@@ -205,11 +206,11 @@ class Search:
         return None
 
     def _fit(self, rows: Ints, xyz: Floats, reference: Floats, edges: int = 0) -> bool:
-        """Whether these rows fit as well as the sound ones, inside the travel, where their repeats are."""
+        """Whether these rows fit as well as the sound ones, inside the travel as these are, where their repeats are."""
         after = self.shape.misfit(xyz, reference, self._placings(rows))[rows]
         return (
             int(np.sum(after > self._fine)) <= edges
-            and not np.any(outside_travel(self.points.at(xyz))[rows])
+            and not (self._inside and np.any(outside_travel(self.points.at(xyz))[rows]))
             and self._near_repeats(rows, xyz) >= len(rows) - edges
         )
 

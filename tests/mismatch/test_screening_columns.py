@@ -40,6 +40,13 @@ def test_a_whole_column_in_another_unit_is_refused_though_the_model_does_not_use
     assert error.value.where == f"bar.csv line 2, column {column}"
 
 
+def test_one_value_of_a_recording_of_few_placings_is_no_whole_column(ballbar_points: Points) -> None:
+    two = ballbar_points.select(np.arange(4))
+    spoilt = with_columns(two, temp_x_c=np.array([20.0, 20.1, 293.2, 20.2]))
+    (found,) = screen(spoilt, needed=set(), set_aside=[], where="bar.csv")
+    assert found.kind == "unit"
+
+
 def test_one_kelvin_among_degrees_leaves_the_column_out(ballbar_points: Points) -> None:
     values = warming(ballbar_points)
     values[4] += 273.15
@@ -62,7 +69,7 @@ def test_a_column_that_the_model_uses_is_never_left_out_but_refused(ballbar_poin
 def test_a_clock_in_other_units_shows_in_the_time_from_ball_to_ball(
     ballbar_points: Points, factor: float, says: str
 ) -> None:
-    """Thirty seconds a ball: nobody waits eight hours between the two of a bar, and no machine probes one in half a second."""
+    """Thirty seconds a ball: nobody waits eight hours between the two of a bar, no machine probes one in half a second."""
     time = 30.0 * np.arange(len(ballbar_points))
     assert kinds(with_columns(ballbar_points, time_s=time)) == []
     (found,) = column_findings(with_columns(ballbar_points, time_s=factor * time), "ballbar")

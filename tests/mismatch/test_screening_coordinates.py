@@ -300,6 +300,15 @@ def test_a_gauge_counted_from_its_other_end_is_told(ballbar_points: Points) -> N
     assert "counted from the other end" in swap.why
 
 
+def test_a_row_in_inches_is_named_though_the_origin_is_missing(ballbar_points: Points) -> None:
+    """Every reading lies outside the travel then, so that the travel says nothing about this row."""
+    xyz = ballbar_points.xyz + np.array([-700.0, 300.0, 200.0])
+    xyz[3] /= INCH
+    found = screened(ballbar_points.at(xyz), bar_facts(), needed=set(), set_aside=[], where="bar.csv")
+    assert found.findings[0].kind == "unit"
+    assert found.findings[0].lines == (5,)
+
+
 def test_several_damages_at_once_are_each_named(ballbar_points: Points) -> None:
     xyz = ballbar_points.xyz.copy()
     xyz[3] /= INCH
