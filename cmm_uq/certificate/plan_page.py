@@ -19,6 +19,7 @@ from cmm_uq.certificate.plan_words import (
     pairs,
     smallest,
     title_of,
+    unit_of,
 )
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
@@ -170,7 +171,7 @@ def _determined(plan: Plan) -> tuple[Block, ...]:
     heads = (Column("Parameter", numeric=False), Column("Expected u"), Column("Unit", numeric=False),
              Column("Allowed by physics"), Column("", numeric=False))  # fmt: skip
     rows = tuple(
-        (named(p), expected(p), p.unknown.unit, f"{p.unknown.prior_sd:.3g}" if p.unknown.prior_sd < 1e6 else "any",
+        (named(p), expected(p), unit_of(p), f"{p.unknown.prior_sd:.3g}" if p.unknown.prior_sd < 1e6 else "any",
          STATUS[p.status])
         for p in found.parameters
     )  # fmt: skip

@@ -67,12 +67,16 @@ def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
             ax.axis("off")
             left = i / A_ROW + 0.008
             figure.text(left, 1 - 4.5 / height, f"{first + i}", fontsize=10, color=ACCENT, fontweight="bold")
-            figure.text(left + 0.035, 1 - 4.5 / height, placing.title, fontsize=8, color=INK, fontweight="bold")
+            figure.text(left + 0.035, 1 - 4.5 / height, placing.title, fontsize=7.5, color=INK, fontweight="bold")
             figure.text(left, 1 - 9.5 / height, ends(placing), fontsize=TINY, color=MUTED)
         last = first + len(placings) - 1
         numbers = f"Placing {first}" if last == first else f"Placings {first} to {last}"
         told = "; ".join(f"{first + i}: {p.title}, {ends(p)} mm" for i, p in enumerate(placings))
-        return Plot(f"{numbers}: scale readings in mm; dashed lines drop to the table.", told, as_svg(figure))
+        return Plot(
+            f"{numbers}: scale readings in mm; ○ is the first point, dashed lines drop to the table.",
+            told,
+            as_svg(figure),
+        )
 
 
 def _seen(xyz: Floats) -> Floats:

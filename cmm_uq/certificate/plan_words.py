@@ -12,6 +12,7 @@ from cmm_uq.measurement.model import ARTEFACT
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.planning.identifiability import Determined, Identifiability
 from cmm_uq.planning.placing import Placing
+from cmm_uq.units import MICROMETRE
 
 STATUS = {"determined": "determined", "weak": "weakly: hardly better than physics allows", "free": "not determined"}
 
@@ -46,15 +47,22 @@ def combination(parts: Mapping[tuple[str, str], float]) -> str:
 
 
 def expected(parameter: Determined) -> str:
-    """Expected standard uncertainty."""
-    return "–" if parameter.u is None else f"{parameter.u:.2g}"
+    """Expected standard uncertainty, in the unit of :func:`unit_of`."""
+    if parameter.u is None:
+        return "–"
+    return f"{parameter.u / (MICROMETRE if parameter.unknown.unit == 'mm' else 1.0):.2g}"
+
+
+def unit_of(parameter: Determined) -> str:
+    """Unit of an expected uncertainty: sizes of the artefact in micrometres."""
+    return "µm" if parameter.unknown.unit == "mm" else parameter.unknown.unit
 
 
 def named(parameter: Determined) -> str:
     """A parameter in words."""
     owner, name = parameter.unknown.key
     if owner == ARTEFACT:
-        return f"Artefact, {name}"
+        return f"Artefact, {name.removesuffix('_mm').replace('_', ' ')}"
     effect = EVERY[owner]
     return effect.title if len(effect.coefficients) == 1 else f"{effect.title}, {name}"
 

@@ -40,14 +40,14 @@ def command(
 
 def _summarise(plan: Plan) -> None:
     from cmm_uq.certificate.plan_page import placing_rows
-    from cmm_uq.certificate.plan_words import STATUS, combination, expected, named, pairs
+    from cmm_uq.certificate.plan_words import STATUS, combination, expected, named, pairs, unit_of
 
     _table(("No.", "Set up", "From → to / mm", "Points", "min"), placing_rows(plan))
     for text in plan.free:
         typer.echo(f"No reading shows: {text}.")
     found = plan.outlook.identifiability
     if found is not None:
-        rows = [(named(p), f"u = {expected(p)} {p.unknown.unit}", STATUS[p.status]) for p in found.parameters]
+        rows = [(named(p), f"u = {expected(p)} {unit_of(p)}", STATUS[p.status]) for p in found.parameters]
         _table(("Parameter", "Expected", ""), rows)
         for parts in found.free:
             typer.echo(f"Stays free: {combination(parts)}.")

@@ -36,7 +36,7 @@ class Chosen:
 
     Parameters
     ----------
-    indices : of the candidates taken, in the order of their choice; one may be taken twice.
+    indices : of the candidates taken, in ascending order.
     after, before : score with and without them; smaller is better.
     """
 
@@ -99,7 +99,7 @@ def step(score: Score, start: Floats, each: Floats) -> Floats:
     return score(start + each)
 
 
-def choose(told: Told, start: Floats, score: Score, count: int) -> Chosen:
+def choose(told: Told, start: Floats, score: Score, count: int, *, again: bool = False) -> Chosen:
     """Take ``count`` candidates, greedily, then exchange them one for one until nothing gains.
 
     Where no single candidate improves the score (nothing is told apart by one placing alone), the one is taken that shrinks
@@ -110,31 +110,43 @@ def choose(told: Told, start: Floats, score: Score, count: int) -> Chosen:
     told : candidates.
     start : (k, k) information of what is there already, certificates included.
     score : see :func:`score_of`.
+    again : whether a candidate may be taken more than once; it may in any case once all are taken.
     """
+    again = again or count > len(told.each)
     everything = score_of("D", told, [i for i in range(len(told.prior)) if i not in told.nuisance])
     taken: list[int] = []
     information, before = start.copy(), float(score(start[None])[0])
     now = before
     for _ in range(count):
-        scores = step(score, information, told.each)
+        scores = _free(step(score, information, told.each), taken, again)
         best = int(np.argmin(scores))
         if scores[best] > now - _GAIN * (1 + abs(now)):
-            best = int(np.argmin(step(everything, information, told.each)))
+            best = int(np.argmin(_free(step(everything, information, told.each), taken, again)))
         taken.append(best)
         information, now = information + told.each[best], float(scores[best])
-    return Chosen(*_exchanged(told, information, score, taken), before)
+    return Chosen(*_exchanged(told, information, score, taken, again), before)
 
 
-def _exchanged(told: Told, information: Floats, score: Score, taken: list[int]) -> tuple[tuple[int, ...], float]:
+def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
+    """Scores, infinite for candidates that must not be taken a second time."""
+    if not again:
+        scores = scores.copy()
+        scores[list(taken)] = np.inf
+    return scores
+
+
+def _exchanged(
+    told: Told, information: Floats, score: Score, taken: list[int], again: bool
+) -> tuple[tuple[int, ...], float]:
     """Exchange one for one, in turn, until a whole round gains nothing."""
     now = float(score(information[None])[0])
     at, unchanged, tries = 0, 0, 0
     while unchanged < len(taken) and tries < _MOST_TRIES:
         without = information - told.each[taken[at]]
-        scores = step(score, without, told.each)
+        scores = _free(step(score, without, told.each), taken, again)
         best = int(np.argmin(scores))
         unchanged, tries = unchanged + 1, tries + 1
         if scores[best] < now - _BETTER * (1 + abs(now)):
             taken[at], information, now, unchanged = best, without + told.each[best], float(scores[best]), 0
         at = (at + 1) % len(taken)
-    return tuple(taken), now
+    return tuple(sorted(taken)), now
