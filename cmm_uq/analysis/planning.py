@@ -15,11 +15,11 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
 from cmm_uq.mismatch.power import Power, powers, without_fault
 from cmm_uq.physics.effect import Effect
-from cmm_uq.planning.candidates import candidates
+from cmm_uq.planning.candidates import candidates, like
 from cmm_uq.planning.exchange import choose, score_of
 from cmm_uq.planning.identifiability import Identifiability, identifiability
 from cmm_uq.planning.information import told, whole
-from cmm_uq.planning.placing import Placing, appended, joined, split
+from cmm_uq.planning.placing import Pattern, Placing, appended, joined, split
 from cmm_uq.planning.ready import ready_plan
 from cmm_uq.planning.setting import Setting
 from cmm_uq.points import Floats, Points
@@ -198,8 +198,7 @@ def _searched(
         return None, 0, None
     keep = plan.more is not None or name == RECORDED
     kept = start.placings if keep else ()
-    centre = _centre(setting, start) if setting.artefact.kind == "bryan" else None
-    possible = candidates(setting, centre)
+    possible = _possible(setting, start, name)
     known = told(setting, possible, rivals)
     existing = known.prior + whole(setting, start.points, rivals)
     wanted = known.where(rivals) if plan.criterion == "separation" else known.where(setting.named)
@@ -218,12 +217,17 @@ def _seen(rows: list[int], information: Floats) -> list[int]:
     return [i for i in rows if size[i] > 1e-12 * size.max()]
 
 
-def _centre(setting: Setting, start: Outlook) -> Floats | None:
-    """Of the fixed ball of a swept bar, in scale readings."""
+def _possible(setting: Setting, start: Outlook, name: str) -> tuple[Placing, ...]:
+    """Candidates: of a recording the artefact with the points that were recorded in its first placing."""
     artefact = setting.model(start.points).artefact
-    if not isinstance(artefact, Bryan):
-        return None
-    return np.asarray(artefact.centres(start.points.readings, artefact.sizes[0].nominal)[0], dtype=np.float64)
+    if isinstance(artefact, Bryan):
+        centre = artefact.centres(start.points.readings, artefact.sizes[0].nominal)[0]
+        return candidates(setting, np.asarray(centre, dtype=np.float64))
+    if name != RECORDED or artefact.kind == "triangle":
+        return candidates(setting)
+    pattern, attitude, _ = Pattern.of_recording(start.placings[0].points)
+    again = pattern.once().repeated(setting.plan.repeats)
+    return like(again, artefact.kind, setting.volume, attitude, setting.plan.candidates)
 
 
 def _affordable(setting: Setting, count: int, possible: Sequence[Placing]) -> int:

@@ -13,7 +13,6 @@ from cmm_uq.certificate.plan_words import (
     STATUS,
     base_name,
     combination,
-    ends,
     expected,
     named,
     pairs,
@@ -147,7 +146,7 @@ def _sections(plan: Plan) -> tuple[Section, ...]:
 def placing_rows(plan: Plan) -> list[tuple[str, ...]]:
     """Number, title, from and to, points and time of every placing to be measured."""
     return [
-        (str(number), placing.title, ends(placing), str(len(placing.points)), f"{time:.0f}")
+        (str(number), placing.title, placing.ends, str(len(placing.points)), f"{time:.0f}")
         for number, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.measured + 1)
     ]
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plan_words import ends
 from cmm_uq.certificate.plot_style import (
     ACCENT,
     INK,
@@ -68,10 +67,10 @@ def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
             left = i / A_ROW + 0.008
             figure.text(left, 1 - 4.5 / height, f"{first + i}", fontsize=10, color=ACCENT, fontweight="bold")
             figure.text(left + 0.035, 1 - 4.5 / height, placing.title, fontsize=7.5, color=INK, fontweight="bold")
-            figure.text(left, 1 - 9.5 / height, ends(placing), fontsize=TINY, color=MUTED)
+            figure.text(left, 1 - 9.5 / height, placing.ends, fontsize=TINY, color=MUTED)
         last = first + len(placings) - 1
         numbers = f"Placing {first}" if last == first else f"Placings {first} to {last}"
-        told = "; ".join(f"{first + i}: {p.title}, {ends(p)} mm" for i, p in enumerate(placings))
+        told = "; ".join(f"{first + i}: {p.title}, {p.ends} mm" for i, p in enumerate(placings))
         return Plot(
             f"{numbers}: scale readings in mm; ○ is the first point, dashed lines drop to the table.",
             told,

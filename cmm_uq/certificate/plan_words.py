@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from cmm_uq.analysis.planning import RECORDED, Plan
 from cmm_uq.certificate.wording import listed
 from cmm_uq.measurement.model import ARTEFACT
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.planning.identifiability import Determined, Identifiability
-from cmm_uq.planning.placing import Placing
 from cmm_uq.units import MICROMETRE
 
 STATUS = {"determined": "determined", "weak": "weakly: hardly better than physics allows", "free": "not determined"}
@@ -81,14 +78,6 @@ def base_name(plan: Plan) -> str:
     """Of the placings to start from."""
     count = len(plan.start.placings)
     return f"the recording ({count} placings)" if plan.name == RECORDED else f"{plan.name} ({count} placings)"
-
-
-def ends(placing: Placing) -> str:
-    """Where the artefact stands, in scale readings, mm."""
-    readings = placing.points.readings
-    far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
-    first, last = (", ".join(f"{value:.0f}".replace("-", "−") for value in readings[row]) for row in (0, far))
-    return f"({first})" if far == 0 else f"({first}) → ({last})"
 
 
 def smallest(amplitude: float | None) -> str:

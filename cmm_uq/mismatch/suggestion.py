@@ -155,7 +155,7 @@ def _best(
             odds = float(np.exp(min(log_odds[best], 50.0)))
             times = "once" if repetitions == 1 else f"{repetitions} times"
             what = (
-                f"Place the {title} {_where(places[best])} mm in scale readings and measure it {times}: odds of about "
+                f"Place the {title} at {places[best].ends} mm in scale readings and measure it {times}: odds of "
                 f"{_round(odds)} : 1 for the true one are to be expected, {_round(float(np.exp(min(before, 50.0))))} : 1 "
                 "without it."
             )
@@ -186,12 +186,5 @@ def _expected(told: _Told, information: Floats, pair: tuple[str, str], sizes: Ma
     return np.asarray(np.minimum(found[0], found[1]), dtype=np.float64)
 
 
-def _where(place: Placing) -> str:
-    readings = place.points.readings
-    far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
-    ends = [", ".join(f"{value:.0f}" for value in readings[row]) for row in (0, far)]
-    return f"from ({ends[0]}) to ({ends[1]})" if far else f"at ({ends[0]})"
-
-
 def _round(odds: float) -> str:
-    return f"{odds:.0f}" if odds < 1000 else "1000 and more"
+    return f"{odds:.0f}" if odds < 1000 else "more than 1000"

@@ -41,6 +41,14 @@ class Placing:
         readings = self.points.readings
         return np.asarray(0.5 * (readings.min(axis=0) + readings.max(axis=0)))
 
+    @property
+    def ends(self) -> str:
+        """Scale readings of the first point and of the farthest from it, mm: ``(250, 0, −40) → (650, 0, −40)``."""
+        readings = self.points.readings
+        far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
+        first, last = (", ".join(f"{value:.0f}" for value in readings[row]).replace("-", "−") for row in (0, far))
+        return f"({first}) → ({last})" if far else f"({first})"
+
 
 @dataclass(frozen=True, eq=False)
 class Pattern:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,20 @@ def test_what_a_recording_determined_is_what_its_report_says() -> None:
     expected = [p.u for p in plan.start.identifiability.parameters]
     # the design is taken at zero errors and not at the estimated ones, half a milliradian off
     np.testing.assert_allclose(expected, np.sqrt(np.diag(estimate.covariance))[: len(expected)], rtol=2e-3)
+
+
+def test_further_placings_of_a_recording_are_of_the_artefact_that_was_recorded(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(ROOT / "examples" / "step-gauge-simulated", tmp_path / "job"))
+    with (folder / "job.toml").open("a", encoding="utf-8") as file:
+        file.write('\n[plan]\ncriterion = "D"\nmore = 1\ncandidates = 60\n')
+    plan = make_plan(read_job(folder, recorded=False), power=False)
+    (placing,) = plan.to_measure
+    first = plan.start.placings[0].points
+    np.testing.assert_array_equal(
+        np.unique(placing.points.columns["reference_mm"]), np.unique(first.columns["reference_mm"])
+    )
+    assert set(first.columns) <= set(plan.outlook.points.columns)
+    assert plan.measured == 7
 
 
 def test_a_budget_of_time_bounds_the_placings_that_are_searched_for(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from cmm_uq.analysis.planning import Plan, make_plan
 from cmm_uq.certificate.html import render_html
 from cmm_uq.certificate.plan_page import plan_document, plan_results
 from cmm_uq.certificate.plan_picture import gain_plot, placing_pictures
-from cmm_uq.certificate.plan_words import combination, ends
+from cmm_uq.certificate.plan_words import combination
 from cmm_uq.certificate.results_file import as_json
 from cmm_uq.jobs.reading import read_job
 from cmm_uq.planning.ready import ready_plan
@@ -56,7 +56,7 @@ def test_every_artefact_has_a_picture_of_each_placing(kind: str) -> None:
     svg = "".join(plot.svg for plot in plots)
     for number, placing in enumerate(placings, 1):
         assert re.search(rf">\s*{number}\s*<", svg)
-        assert ends(placing) in svg
+        assert placing.ends in svg
 
 
 def test_what_has_no_end_stands_at_the_edge() -> None:

@@ -37,7 +37,9 @@ def diagnosed(
 
 def log_odds(found: Any, facts: ArtefactFacts, what: str, repetitions: int, pair: tuple[str, str], true: str) -> float:
     """Half the χ² by which the false one of a pair fits worse, recording and further bars together, without noise."""
-    ends = [np.array([float(v) for v in part.split(")")[0].split(", ")]) for part in what.split("(")[1:3]]
+    ends = [
+        np.array([float(v.replace("−", "-")) for v in part.split(")")[0].split(", ")]) for part in what.split("(")[1:3]
+    ]
     points = found.after.artefact.points
     bar = np.array(ends) - points.machine.origin_mm
     number = int(points.measurement.max()) + 1
@@ -82,7 +84,7 @@ def test_a_gauge_on_seven_lines_is_told_where_to_lay_an_eighth() -> None:
     pair = ("rotation_x_y", "rotation_y_x")
     found = diagnosed(GAUGE, placings, "rotation_x_y", 8.0, pair)
     (suggestion,) = suggestions(found, GAUGE)
-    assert suggestion.what.startswith("Place the step gauge from (")
+    assert suggestion.what.startswith("Place the step gauge at (")
     assert "1 : 1 without it" in suggestion.what
     assert suggestion.odds >= ODDS
 
