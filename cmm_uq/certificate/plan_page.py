@@ -200,20 +200,33 @@ def _gain(plan: Plan) -> tuple[Block, ...]:
         f"plan, {plan.kept} of them kept. Pairs that could not be told apart: {len(start.alike)} before, "
         f"{len(better.alike)} after; effects of which nothing shows: {len(start.unseen)} before, {len(better.unseen)} after."
     )]  # fmt: skip
-    blocks.append(gain_plot(
-        [named(p) for p in start.parameters], [p.u for p in start.parameters], [p.u for p in better.parameters],
-        names=names, quantity="Expected standard uncertainty",
-    ))  # fmt: skip
+    blocks += _beside(
+        [(named(p), p.u, q.u, unit_of(p), expected(p), expected(q))
+         for p, q in zip(start.parameters, better.parameters, strict=True)],
+        names, "Expected standard uncertainty",
+    )  # fmt: skip
     if plan.start.powers and plan.better.powers:
-        shown = [
-            (title_of(a.effect), a.identifiable, b.identifiable)
-            for a, b in zip(plan.start.powers, plan.better.powers, strict=True)
-            if a.identifiable is not None or b.identifiable is not None
-        ]
-        if shown:
-            labels, first, second = (list(column) for column in zip(*shown, strict=True))
-            blocks.append(gain_plot(labels, first, second, names=names, quantity="Smallest effect named rightly"))
+        blocks += _beside(
+            [(title_of(p.effect), p.identifiable, q.identifiable, p.unit, smallest(p.identifiable), smallest(q.identifiable))
+             for p, q in zip(plan.start.powers, plan.better.powers, strict=True)
+             if p.identifiable is not None or q.identifiable is not None],
+            names, "Smallest effect named rightly",
+        )  # fmt: skip
     return tuple(blocks)
+
+
+def _beside(
+    rows: list[tuple[str, float | None, float | None, str, str, str]], names: tuple[str, str], quantity: str
+) -> list[Block]:
+    """Both plans beside each other as a picture and in numbers: label, both values, unit, both in words."""
+    if not rows:
+        return []
+    heads = (Column(quantity, numeric=False), Column(names[0]), Column(names[1]), Column("Unit", numeric=False))
+    table = Table(f"{quantity} with both plans", heads, tuple((row[0], row[4], row[5], row[3]) for row in rows))
+    picture = gain_plot(
+        [row[0] for row in rows], [row[1] for row in rows], [row[2] for row in rows], names=names, quantity=quantity
+    )
+    return [picture, table]
 
 
 def _smallest(plan: Plan) -> tuple[Block, ...]:
