@@ -65,14 +65,14 @@ def screened(
     CmmUqError : a damage of the whole recording, of a whole column, or of one that the model uses.
     """
     shape = shape_of(facts, points)
-    damaged = coordinate_findings(points, facts, shape, where) if shape else []
+    damaged = coordinate_findings(points, facts, shape, set_aside, where) if shape else []
     odd = screen(points, needed=needed, set_aside=set_aside, where=where, kind=facts.kind)
     if shape and shape.together:
         damaged = [_reversal(found, points, needed) for found in damaged]
     findings = (*damaged, *(_left_out(f) for f in odd if not _told(f, damaged)))
     lost = sorted({row for found in findings for row in found.rows})
     kept = points.select(np.delete(np.arange(len(points)), lost)) if lost else points
-    gone = {found.column for found in findings if found.set_aside and not found.rows}
+    gone = {found.column for found in findings if found.set_aside and found.column in SENSORS}
     kept = replace(kept, columns={name: values for name, values in kept.columns.items() if name not in gone})
     return Screened(kept, findings)
 

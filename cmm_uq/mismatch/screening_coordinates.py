@@ -6,6 +6,8 @@ left out; nothing is repaired in silence.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from cmm_uq.artefacts import artefact_of
@@ -23,13 +25,16 @@ _ABSURD = (1.0, 2e4)
 """mm; a bar shorter or longer than this is in another unit."""
 
 
-def coordinate_findings(points: Points, facts: ArtefactFacts, shape: Shape, where: str) -> list[Finding]:
+def coordinate_findings(
+    points: Points, facts: ArtefactFacts, shape: Shape, set_aside: Collection[int], where: str
+) -> list[Finding]:
     """Damaged coordinates, each with the rows to leave out.
 
     Parameters
     ----------
     points : the recording.
     facts, shape : what the job says of its artefact, and what that asks of the points.
+    set_aside : measurements that the job leaves out of the estimates; however many of them are damaged is no matter.
     where : the recording's name, for messages.
 
     Raises
@@ -38,13 +43,13 @@ def coordinate_findings(points: Points, facts: ArtefactFacts, shape: Shape, wher
     """
     _refuse_absurd_size(shape, where)
     search = Search(points, shape)
-    bad = int(search.bad.sum())
-    if bad >= _SEVERAL:
+    counted = ~np.isin(points.measurement, list(set_aside))
+    if search.bad.sum() >= _SEVERAL:
         _refuse_whole(search, where)
-    if 2 * bad > len(points):
+    if 2 * int(search.bad[counted].sum()) > counted.sum():
         _refuse_another(search, facts, where)
-    found = search.findings() if bad else []
-    lost = {row for f in found for row in f.rows}
+    found = search.findings() if search.bad.any() else []
+    lost = {row for f in found for row in f.rows if counted[row]}
     if len(lost) > max(MOST * len(points), 2):
         raise CmmUqError(
             f"{len(lost)} of {len(points)} points do not fit the artefact; {found[0].why}", where=where,

@@ -333,6 +333,16 @@ def test_damage_of_a_third_of_a_recording_is_refused(ballbar_points: Points) -> 
         screened(ballbar_points.at(xyz), bar_facts(), needed=set(), set_aside=[], where="bar.csv")
 
 
+def test_what_the_job_sets_aside_already_does_not_count_as_damage(ballbar_points: Points) -> None:
+    xyz = ballbar_points.xyz.copy()
+    rows = np.arange(0, 80, 6)
+    xyz[rows] += [11.0, 23.0, 31.0]
+    aside = np.unique(ballbar_points.measurement[rows]).tolist()
+    found = screened(ballbar_points.at(xyz), bar_facts(), needed=set(), set_aside=aside, where="bar.csv")
+    assert set(found.points.measurement).isdisjoint(aside)
+    assert len(found.points) == 80 - 2 * len(aside)
+
+
 def test_the_recording_of_another_bar_is_refused_in_the_words_of_the_bar(ballbar_points: Points) -> None:
     with pytest.raises(CmmUqError, match=r"by the certificate 410 mm"):
         screened(ballbar_points, bar_facts(410.0), needed=set(), set_aside=[], where="bar.csv")
