@@ -13,17 +13,14 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.inference.ensembles import Chains, Progress, refined, run_ensembles
+from cmm_uq.inference.ensembles import Chains, Progress
 from cmm_uq.points import Floats
 from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
 from cmm_uq.selfcalibration.series import RepeatedDrift, ShiftedSeries
 from cmm_uq.selfcalibration.smooth_function import FINEST, SmoothFunction
-from cmm_uq.selfcalibration.smooth_model import Coefficients, SmoothModel
+from cmm_uq.selfcalibration.smooth_model import Coefficients, SmoothModel, sampled
 from cmm_uq.units import HOUR, MICROMETRE
 
-DRAWS = 2000
-"""Of the curve, taken evenly from the chains."""
-EFFECTIVE_SAMPLES = 2000
 _TYPICAL = 5 * MICROMETRE
 _DRIFT = 10 * MICROMETRE
 """Standard deviation of the drift, mm per hour."""
@@ -136,21 +133,9 @@ class CurveEstimate:
     @cached_property
     def residuals(self) -> tuple[Floats, Floats]:
         """(n,) what does not fit, mm: with no error of the machine but its scale, and with the curve."""
-        model = self.coefficients.model
-        design = np.hstack([model.flat, model.columns])
-        # shifts keep to what is known of them: free ones would explain any reading by a scale of nothing
-        held = np.hstack(
-            [np.zeros((len(model.column_sd), model.flat.shape[1])), np.diag(self.sigma.mean() / model.column_sd)]
-        )
-        weighted = np.vstack([design / model.noise_scale[:, None], held])
-        wanted = np.r_[model.observed / model.noise_scale, np.zeros(len(held))]
-        before = model.observed - design @ np.linalg.lstsq(weighted, wanted, rcond=None)[0]
-        c = self.coefficients
-        found = model.functions[0]
-        explained = c.flat.mean(axis=0) @ model.flat.T + c.columns.mean(axis=0) @ model.columns.T
-        explained += found.factor * c.function(0, found.position).mean(axis=0)
         count = len(self.series.reading)
-        return np.asarray(before[:count]), np.asarray((model.observed - explained)[:count])
+        before = self.coefficients.model.without_functions(float(self.sigma.mean()))
+        return before[:count], self.coefficients.left[:count]
 
 
 def estimate_curve(
@@ -179,12 +164,7 @@ def estimate_curve(
     if len(series.reading) - model.flat.shape[1] < 1:
         raise CmmUqError(f"{len(series.reading)} readings of {len(series.numbers)} points leave nothing to compare",
                          fix="Read more points in both placings, or a third placing")  # fmt: skip
-    centre, factor = refined(model.log_density, *model.laplace(), seed)
-    chains = run_ensembles(
-        model.log_density, centre, factor, seed, progress, effective_samples=EFFECTIVE_SAMPLES, steps_at_once=200
-    )
-    chosen = chains.draws[np.linspace(0, len(chains.draws) - 1, min(DRAWS, len(chains.draws))).astype(int)]
-    coefficients = model.draw(chosen, np.random.default_rng(np.random.SeedSequence([seed, 1])))
+    coefficients, chains = sampled(model, seed, progress)
     return CurveEstimate(series, known, coefficients, chains, seed, known is not None or series.u_shift == 0)
 
 

@@ -11,14 +11,14 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.inference.ensembles import Chains, Progress, refined, run_ensembles
+from cmm_uq.inference.ensembles import Chains, Progress
 from cmm_uq.points import AXES, Floats
-from cmm_uq.selfcalibration.curve import DRAWS, EFFECTIVE_SAMPLES, Curve
+from cmm_uq.selfcalibration.curve import Curve
 from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
 from cmm_uq.selfcalibration.placed_plate import PlacedPlate
 from cmm_uq.selfcalibration.plane_model import PlaneModel, plane_model
 from cmm_uq.selfcalibration.plane_undetermined import FreeInPlane, free_in_plane
-from cmm_uq.selfcalibration.smooth_model import Coefficients
+from cmm_uq.selfcalibration.smooth_model import Coefficients, sampled
 
 _FINE = 41
 
@@ -140,18 +140,8 @@ class PlaneEstimate:
     @cached_property
     def residuals(self) -> tuple[Floats, Floats]:
         """(n, 2) what does not fit, mm: with scales and squareness alone, and with the curves."""
-        model, c = self.model.smooth, self.coefficients
-        design = np.hstack([model.flat, model.columns])
-        held = np.hstack(
-            [np.zeros((len(model.column_sd), model.flat.shape[1])), np.diag(self.sigma.mean() / model.column_sd)]
-        )
-        weighted = np.vstack([design / model.noise_scale[:, None], held])
-        wanted = np.r_[model.observed / model.noise_scale, np.zeros(len(held))]
-        before = model.observed - design @ np.linalg.lstsq(weighted, wanted, rcond=None)[0]
-        fitted = c.flat.mean(axis=0) @ model.flat.T + c.columns.mean(axis=0) @ model.columns.T
-        for index, f in enumerate(model.functions):
-            fitted += f.factor * c.function(index, f.position).mean(axis=0)
-        return before.reshape(2, -1).T, (model.observed - fitted).reshape(2, -1).T
+        before = self.model.smooth.without_functions(float(self.sigma.mean()))
+        return before.reshape(2, -1).T, self.coefficients.left.reshape(2, -1).T
 
 
 def estimate_plane(
@@ -175,11 +165,5 @@ def estimate_plane(
     progress : told the part of the sampling done.
     """
     model = plane_model(plate, known, chain, sigma)
-    smooth = model.smooth
-    centre, factor = refined(smooth.log_density, *smooth.laplace(), seed)
-    chains = run_ensembles(
-        smooth.log_density, centre, factor, seed, progress, effective_samples=EFFECTIVE_SAMPLES, steps_at_once=200
-    )
-    chosen = chains.draws[np.linspace(0, len(chains.draws) - 1, min(DRAWS, len(chains.draws))).astype(int)]
-    coefficients = smooth.draw(chosen, np.random.default_rng(np.random.SeedSequence([seed, 1])))
+    coefficients, chains = sampled(model.smooth, seed, progress)
     return PlaneEstimate(plate, known, model, coefficients, chains, free_in_plane(plate, model), seed)

@@ -16,11 +16,15 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg, optimize
 
+from cmm_uq.inference.ensembles import Chains, Progress, refined, run_ensembles
 from cmm_uq.inference.posterior import SIGMA_BOUNDS
 from cmm_uq.points import Floats
 from cmm_uq.selfcalibration.smooth_function import LONGEST, SmoothFunction
 from cmm_uq.selfcalibration.smooth_marginal import BATCH, Marginal, marginal
 
+DRAWS = 2000
+"""Of everything linear, taken evenly from the chains."""
+EFFECTIVE_SAMPLES = 2000
 _AMPLITUDE_BOUNDS = (1e-4, 1e2)
 """Of each amplitude over its typical size."""
 _LENGTH, _LENGTH_SPREAD = 0.2, 0.6
@@ -55,6 +59,7 @@ class SmoothModel:
     functions : at least one.
     scatter : of repeats, where σ is to be estimated from them too.
     sigma : standard uncertainty of one reading, mm; ``None`` when it is to be estimated.
+    growth_bounds : least and largest size of the ends over the middle's.
     """
 
     observed: Floats
@@ -65,6 +70,7 @@ class SmoothModel:
     functions: tuple[SmoothFunction, ...]
     scatter: Scatter | None
     sigma: float | None
+    growth_bounds: tuple[float, float] = (1 / 30, 30.0)
 
     @property
     def dimension(self) -> int:
@@ -104,8 +110,8 @@ class SmoothModel:
 
     def _bounds(self) -> tuple[Floats, Floats]:
         shortest = max(f.shortest / f.range for f in self.functions)
-        low = [*[_AMPLITUDE_BOUNDS[0]] * len(self.functions), min(shortest, LONGEST / 2), 1 / 30]
-        high = [*[_AMPLITUDE_BOUNDS[1]] * len(self.functions), LONGEST, 30.0]
+        low = [*[_AMPLITUDE_BOUNDS[0]] * len(self.functions), min(shortest, LONGEST / 2), self.growth_bounds[0]]
+        high = [*[_AMPLITUDE_BOUNDS[1]] * len(self.functions), LONGEST, self.growth_bounds[1]]
         if self.sigma is None:
             low, high = [*low, SIGMA_BOUNDS[0]], [*high, SIGMA_BOUNDS[1]]
         return np.log(low), np.log(high)
@@ -190,6 +196,17 @@ class SmoothModel:
             spread = sigma[:, None] * random.standard_normal((len(sd), Q.shape[1]))
             yield w, x, linalg.solve_triangular(R, (left @ Q + spread).T).T
 
+    def without_functions(self, sigma: float) -> Floats:
+        """(n,) residuals of the flat and other columns alone, mm, by least squares.
+
+        The other columns keep to what is known of them: free ones would explain any reading by a scale of nothing.
+        """
+        design = np.hstack([self.flat, self.columns])
+        held = np.hstack([np.zeros((len(self.column_sd), self.flat.shape[1])), np.diag(sigma / self.column_sd)])
+        weighted = np.vstack([design / self.noise_scale[:, None], held])
+        wanted = np.r_[self.observed / self.noise_scale, np.zeros(len(held))]
+        return np.asarray(self.observed - design @ np.linalg.lstsq(weighted, wanted, rcond=None)[0])
+
     def _explained(self, w: Floats, growth: Floats, x: Floats) -> Floats:
         """What functions and columns explain of every observation, (N, n)."""
         explained = x @ self.columns.T
@@ -225,3 +242,22 @@ class Coefficients:
         """One of the functions at positions (m,): (N, m)."""
         part = self.model._split(self.coefficients)[index]
         return self.model.functions[index].values(x, part, self.growth)
+
+    @property
+    def left(self) -> Floats:
+        """(n,) observed minus the posterior mean of everything that explains it, mm."""
+        model = self.model
+        fitted = self.flat.mean(axis=0) @ model.flat.T + self.columns.mean(axis=0) @ model.columns.T
+        for index, f in enumerate(model.functions):
+            fitted += f.factor * self.function(index, f.position).mean(axis=0)
+        return np.asarray(model.observed - fitted)
+
+
+def sampled(model: SmoothModel, seed: int, progress: Progress | None) -> tuple[Coefficients, Chains]:
+    """Draws of everything linear, evenly along chains of θ, and the chains."""
+    centre, factor = refined(model.log_density, *model.laplace(), seed)
+    chains = run_ensembles(
+        model.log_density, centre, factor, seed, progress, effective_samples=EFFECTIVE_SAMPLES, steps_at_once=200
+    )
+    chosen = chains.draws[np.linspace(0, len(chains.draws) - 1, min(DRAWS, len(chains.draws))).astype(int)]
+    return model.draw(chosen, np.random.default_rng(np.random.SeedSequence([seed, 1]))), chains

@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.points import Points
 from cmm_uq.selfcalibration.curve import CurveEstimate, estimate_curve
-from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan, integrated
+from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan, integrated, integrated_by_monte_carlo
 from cmm_uq.selfcalibration.series import shifted_series
 from tests.selfcalibration.shifted import PITCH_20, bent, read
 
@@ -148,3 +148,24 @@ def test_the_same_seed_gives_the_same_draws() -> None:
     series = shifted_series(points, "x", np.array([0.0, 20.0]), 0.5)
     one, other = (estimate_curve(series, KNOWN, seed=5).curve.draws for _ in range(2))
     np.testing.assert_array_equal(one, other)
+
+
+def test_with_next_to_no_smoothness_the_posterior_is_the_integration_with_its_propagated_uncertainty(
+    paper: CurveEstimate,
+) -> None:
+    """A shift by the pitch determines every place once, so nothing else can come out: GUM, Monte Carlo and posterior agree.
+
+    Hyper-parameters held at 150 µm, a correlation length of 14 mm and σ = 1.1 µm; 10 000 draws give u to 0.7 %.
+    """
+    a, b = paper.series.pair
+    theta = np.tile([np.log(30.0), np.log(0.03), 0.0, np.log(NOISE)], (10_000, 1))
+    free = replace(paper, coefficients=paper.coefficients.model.draw(theta, np.random.default_rng(2))).at(a)
+    noise = np.full((2, 23), NOISE / np.sqrt(10))
+    law = integrated(a, b, noise, known=KNOWN)
+    trials = integrated_by_monte_carlo(a, b, noise, known=KNOWN)
+    np.testing.assert_allclose(free.u[1:], law.u[1:], rtol=0.035, atol=1e-9)
+    np.testing.assert_allclose(trials.u[1:], law.u[1:], rtol=0.012, atol=1e-9)
+    np.testing.assert_allclose(free.error, law.error, atol=5 * law.u.max() / 100)
+    correlation = np.corrcoef(free.draws[:, 1:-1], rowvar=False)
+    spread = np.outer(law.u, law.u)[1:-1, 1:-1]
+    np.testing.assert_allclose(correlation, law.covariance[1:-1, 1:-1] / spread, atol=0.05)
