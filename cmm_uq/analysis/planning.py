@@ -15,7 +15,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
 from cmm_uq.mismatch.power import Power, powers, without_fault
 from cmm_uq.physics.effect import Effect
-from cmm_uq.planning.candidates import candidates, like
+from cmm_uq.planning.candidates import candidates, like, thinned
 from cmm_uq.planning.exchange import choose, score_of
 from cmm_uq.planning.identifiability import Identifiability, identifiability
 from cmm_uq.planning.information import told, whole
@@ -29,6 +29,9 @@ from cmm_uq.units import MICROMETRE
 
 RECORDED = "recording"
 """Name of the placings of a recording that is there already."""
+
+SPREAD = "an even spread of candidates"
+"""Name of the placings to compare with where the usual plan is not possible."""
 
 Progress = Callable[[str, float], None]
 
@@ -150,7 +153,14 @@ def _part(tell: Progress, low: float, high: float) -> Callable[[float], None]:
 def _start(job: Job, setting: Setting) -> tuple[str, tuple[Placing, ...], Points]:
     if len(job.points):
         return RECORDED, split(job.points, "recorded as measurement {}"), job.points
-    name, placings = ready_plan(setting)
+    try:
+        name, placings = ready_plan(setting)
+    except CmmUqError:
+        plan = setting.plan
+        if plan.ready is not None or plan.criterion is None or plan.number is None:
+            raise
+        # the usual plan is not possible here, and not asked for
+        name, placings = SPREAD, thinned(iter(candidates(setting)), plan.number, setting.volume)
     return name, placings, _joined(setting, placings)
 
 
@@ -205,7 +215,7 @@ def _searched(
     wanted = _seen(wanted, known.each.sum(axis=0) + existing)
     score = score_of(plan.criterion, known, wanted)
     count = plan.more or plan.number or (1 if keep else len(start.placings))
-    count = _affordable(setting, count, possible)
+    count = _affordable(setting, count, possible, () if name == RECORDED else kept)
     chosen = choose(known, existing if keep else known.prior, score, count)
     added = tuple(possible[i] for i in chosen.indices)
     return (*kept, *added), len(kept), (float(score(existing[None])[0]), chosen.after)
@@ -230,15 +240,18 @@ def _possible(setting: Setting, start: Outlook, name: str) -> tuple[Placing, ...
     return like(again, artefact.kind, setting.volume, attitude, setting.plan.candidates)
 
 
-def _affordable(setting: Setting, count: int, possible: Sequence[Placing]) -> int:
+def _affordable(setting: Setting, count: int, possible: Sequence[Placing], kept: Sequence[Placing]) -> int:
+    """At most as many as there is time for beside those that are kept."""
     budget = setting.plan.budget_min
     if budget is None:
         return count
     each = max(minutes(setting, placing) for placing in possible)
-    if budget < each:
-        raise CmmUqError(f"{budget:g} min are too short for a single placing, which takes {each:.1f} min",
+    left = budget - sum(minutes(setting, placing) for placing in kept)
+    if left < each:
+        beside = f" beside the {len(kept)} that are kept" if kept else ""
+        raise CmmUqError(f"{budget:g} min are too short for a single placing{beside}, which takes {each:.1f} min",
                          where="job.toml [plan] budget_min", fix="Give more time, or fewer repeats")  # fmt: skip
-    return min(count, int(budget / each))
+    return min(count, int(left / each))
 
 
 def _in_time(setting: Setting, name: str, placings: Sequence[Placing]) -> tuple[Condition, ...]:

@@ -152,4 +152,5 @@ def _triangles(setting: Setting) -> Iterator[Placing]:
         except CmmUqError:  # it does not fit this plane
             continue
         for placing, some in zip(tipped, split(points), strict=True):
-            yield Placing(placing.title, replace(some.points, machine=setting.machine))
+            if volume.heights[0] <= some.middle[2] <= volume.heights[1]:
+                yield Placing(placing.title, replace(some.points, machine=setting.machine))

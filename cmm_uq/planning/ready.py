@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.artefacts.triangle_placings import placed_triangle
+from cmm_uq.artefacts.triangle_placings import PLANES, SEVEN_PLACINGS, placed_triangle
 from cmm_uq.artefacts.triangle_standard import TriangleStandard
 from cmm_uq.errors import CmmUqError
 from cmm_uq.planning import patterns
@@ -36,6 +36,8 @@ _PARALLELS = (
     ((1, 0, 0), (0.5, 0.5, 0.5)), ((0, 1, 0), (0.4, 0.5, 0.5)), ((0, 0, 1), (0.65, 0.55, 0.5)),
     ((0, 0, 1), (0.45, 0.3, 0.5)),
 )  # fmt: skip
+
+_ACROSS = {"plate": " (across it)", "triangle": " (across it)"}
 
 NEARLY_CUBIC = 2.0
 """Longest over shortest axis up to which a volume counts as nearly cubic here."""
@@ -83,9 +85,9 @@ def _lines(
 def _allowed(setting: Setting, direction: Floats) -> None:
     if not setting.volume.allows(direction):
         raise CmmUqError(
-            f"no fixture holds the artefact {words(direction)}, which this plan asks for",
+            f"no fixture holds the artefact {words(direction)}{_ACROSS.get(setting.artefact.kind, '')}, which this plan wants",
             where="job.toml [plan.fixtures] directions",
-            fix="Allow the direction, or ask for number = … placings by a criterion",
+            fix='Allow the direction, or leave out ready and ask for number = 20 placings by criterion = "D"',
         )  # fmt: skip
 
 
@@ -142,9 +144,9 @@ def triangle_placings(setting: Setting) -> tuple[Placing, ...]:
     """The seven placings of the triangle standard."""
     sides = TriangleStandard.of(setting.artefact).sides
     machine = replace(setting.machine, travel_mm=setting.volume.box)
+    for placing in SEVEN_PLACINGS:
+        _allowed(setting, np.eye(3)[3 - sum(PLANES[placing.plane])])
     points = placed_triangle(machine, sides, repeats=setting.plan.repeats)
-    from cmm_uq.artefacts.triangle_placings import SEVEN_PLACINGS
-
     return tuple(
         Placing(placing.title, replace(some.points, machine=setting.machine))
         for placing, some in zip(SEVEN_PLACINGS, split(points), strict=True)

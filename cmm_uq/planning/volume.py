@@ -41,12 +41,12 @@ class Volume:
 
         Raises
         ------
-        CmmUqError : none of them is known, or the margin leaves nothing.
+        CmmUqError : none of them is known, the plan's volume exceeds the travel, or the margin leaves nothing.
         """
         box = np.empty((3, 2))
         for i, axis in enumerate(AXES):
             if axis in plan.volume_mm:
-                box[i] = plan.volume_mm[axis]
+                box[i] = _within_travel(machine, axis, plan.volume_mm[axis])
             elif recorded is not None and not np.all(np.isfinite(machine.travel_mm[i])):
                 box[i] = recorded[:, i].min() - plan.margin_mm, recorded[:, i].max() + plan.margin_mm
             else:
@@ -117,3 +117,13 @@ class Volume:
             f"{self.size[axis]:.4g} mm", where="job.toml [plan] volume_mm or [machine] travel_mm",
             fix="Use a smaller artefact, another plan, or a smaller margin_mm",
         )  # fmt: skip
+
+
+def _within_travel(machine: Machine, axis: str, wanted: Sequence[float]) -> Sequence[float]:
+    low, high = machine.travel_mm[AXES.index(axis)]
+    if wanted[0] < low - _ROUNDING or wanted[1] > high + _ROUNDING:  # false where the travel is not known
+        raise CmmUqError(
+            f"{axis} = [{wanted[0]:g}, {wanted[1]:g}] mm goes beyond the travel of {low:g} to {high:g} mm",
+            where="job.toml [plan] volume_mm", fix="Keep inside the travel, or mend [machine] travel_mm",
+        )  # fmt: skip
+    return wanted

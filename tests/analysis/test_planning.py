@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning import RECORDED, Plan, make_plan
+from cmm_uq.analysis.planning import RECORDED, SPREAD, Plan, make_plan
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.reading import read_job
 from tests.conftest import ROOT
@@ -130,8 +130,10 @@ def test_power_comes_for_every_effect_that_the_job_does_not_name(tmp_path: Path)
     ("", SIX, 1000.0, "long along"),
     ("volume_mm = { z = [-200.0, 0.0] }", SIX, 400.0, "long along"),
     ('criterion = "D"', SIX, 2000.0, "long along"),
+    ('criterion = "D"\nnumber = 9', SIX, 2000.0, "no placing is possible"),
     ("[plan.fixtures]\ndirections = [[0.0, 0.0, 1.0]]", SIX, 400.0, "no fixture holds the artefact"),
     ('criterion = "D"\nbudget_min = 2', SIX, 400.0, "too short for a single placing"),
+    ('criterion = "D"\nmore = 1\nbudget_min = 123', SIX, 400.0, "beside the 20 that are kept"),
     ('criterion = "separation"\nrivals = ["rotation_x_z"]', SIX, 400.0, "at least 2 effects"),
     ('rivals = ["hysteresis_x"]', SIX, 400.0, "needs the column approach_x"),
     ('rivals = ["rotation_w_z"]', SIX, 400.0, "unknown effect"),
@@ -144,8 +146,15 @@ def test_what_cannot_be_planned_is_refused_with_its_reason(
         planned(tmp_path, plan, effects, length)
 
 
-def test_an_artefact_that_no_allowed_direction_holds_can_still_be_planned_by_a_criterion(tmp_path: Path) -> None:
-    """Fixtures that the standard's diagonals need are missing; the search uses what there is."""
-    fixtures = "\n[plan.fixtures]\ndirections = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]]"
+def test_where_the_standard_plan_is_not_possible_a_criterion_finds_another(tmp_path: Path) -> None:
+    """A stand that holds the bar level only: no diagonal of the standard in height."""
+    fixtures = "\n[plan.fixtures]\ndirections = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]"
+    level = '"scale_x", "scale_y", "squareness_xy"'
     with pytest.raises(CmmUqError, match="no fixture"):
-        planned(tmp_path, 'criterion = "D"\nnumber = 12' + fixtures)
+        planned(tmp_path, 'criterion = "D"' + fixtures, level)
+    plan = planned(tmp_path, 'criterion = "D"\nnumber = 12' + fixtures, level)
+    assert plan.name == SPREAD
+    assert len(plan.to_measure) == 12
+    assert plan.scores is not None
+    assert plan.scores[1] < plan.scores[0]
+    assert {round(float(abs(p.points.xyz[1, 2] - p.points.xyz[0, 2])), 6) for p in plan.to_measure} == {0.0}

@@ -24,7 +24,7 @@ def test_candidates_lie_inside_and_can_be_recorded(kind: str) -> None:
     for placing in found:
         assert np.all(placing.points.readings >= chosen.volume.box[:, 0] - 1e-6)
         assert np.all(placing.points.readings <= chosen.volume.box[:, 1] + 1e-6)
-        if kind in ("ballbar", "step_gauge", "gauge_blocks", "plate", "plane"):
+        if kind != "sphere":  # of a hemisphere the ball is held, not the middle of its points
             assert -450.0 - 1e-6 <= placing.middle[2] <= -150.0 + 1e-6
     assert len(artefact_of(facts, joined(found)).noise_scale) >= len(found)
 

@@ -73,3 +73,8 @@ def test_heights_bound_the_middle_of_the_artefact() -> None:
 def test_a_margin_that_leaves_nothing_is_refused() -> None:
     with pytest.raises(CmmUqError, match="margin of 300 mm leaves nothing"):
         Volume.of(MACHINE, PlanFacts(volume_mm={"z": [-500.0, 0.0]}, margin_mm=300.0))
+
+
+def test_a_volume_beyond_the_travel_is_refused() -> None:
+    with pytest.raises(CmmUqError, match=r"x = \[0, 1000\] mm goes beyond the travel of 0 to 900 mm"):
+        Volume.of(MACHINE, PlanFacts(volume_mm={"x": [0.0, 1000.0]}))
