@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cmm_uq.analysis.consequences import consequences
 from cmm_uq.analysis.estimation import model_of, without_outliers
 from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.analysis.shifting import refuse_shift
@@ -14,8 +15,9 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import read_job
 from cmm_uq.measurement import MeasurementModel
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS, diagnose
-from cmm_uq.mismatch.screening import Finding, screen
+from cmm_uq.mismatch.screening import Finding, screened
 from cmm_uq.mismatch.suggestion import suggestions
+from cmm_uq.physics.catalogue import effects
 
 
 def diagnose_job(
@@ -48,12 +50,15 @@ def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
     ------
     CmmUqError : the recording does not fit the model.
     """
-    artefact = artefact_of(job.facts.artefact, job.points, where=job.recording_path)
-    model = model_of(job, artefact)
-    needed = {column for effect in model.effects for column in effect.columns}
-    found = screen(job.points, needed=needed, set_aside=job.facts.recording.set_aside, where=job.recording_path)
+    where = job.recording_path
+    acting = effects(job.facts.model.effects, where="job.toml [model] effects")
+    recording = screened(
+        job.points, job.facts.artefact, needed={column for effect in acting for column in effect.columns},
+        set_aside=job.facts.recording.set_aside, where=where,
+    )  # fmt: skip
+    model = model_of(job, artefact_of(job.facts.artefact, recording.points, where=where))
     model, outliers = without_outliers(model)
-    return model, (*found, *outliers)
+    return model, (*recording.findings, *outliers)
 
 
 def diagnosed(
@@ -68,4 +73,5 @@ def diagnosed(
     """Diagnose the screened model of a job."""
     stated = job.facts.recording.u_coordinate_um
     diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress)
-    return Diagnosed(job, findings, diagnosis, suggestions(diagnosis, job.facts.artefact))
+    changes = consequences(job, diagnosis, seed)
+    return Diagnosed(job, findings, diagnosis, suggestions(diagnosis, job.facts.artefact), changes)

@@ -30,7 +30,7 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
     CmmUqError : an unknown effect, or a measurement to set aside that is not there.
     """
     stated, aside = job.facts.recording.u_coordinate_um, job.facts.recording.set_aside
-    if unknown := set(aside) - set(artefact.measurement.tolist()):
+    if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
     return MeasurementModel(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from cmm_uq.analysis.consequences import Consequences
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import Statement
@@ -70,12 +71,14 @@ class Diagnosed:
     job, findings : what was read, and what the screening found.
     diagnosis : what is missing.
     suggestions : what to measure next.
+    consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
     """
 
     job: Job
     findings: tuple[Finding, ...]
     diagnosis: Diagnosis
     suggestions: tuple[Suggestion, ...]
+    consequences: Consequences | None = None
 
 
 @dataclass(frozen=True, eq=False)

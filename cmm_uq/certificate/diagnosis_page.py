@@ -12,7 +12,8 @@ from cmm_uq.certificate.diagnosis_words import VERDICTS, noise_words, sentence
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.plots import curve_with_band, length_plot
 from cmm_uq.certificate.results_file import SCHEMA, diagnosis_data
-from cmm_uq.certificate.wording import probability
+from cmm_uq.certificate.wording import expanded, probability
+from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.units import MICROMETRE
 
@@ -63,6 +64,7 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
     sections = (
         Section("What was left out", _left_out(found)),
         Section("Before and after", _before_after(found)),
+        Section("What a correction would change", _consequences(found)),
         Section("Where the mismatch lives", _where(found)),
         Section("Rival explanations", (_rivals(found),)),
         Section("Noise", tuple(Paragraph(text) for text in noise)),
@@ -126,6 +128,31 @@ def _changes(found: Diagnosed) -> Table | None:
     )
     heads = (Column("Parameter", numeric=False), Column("Before"), Column("After"), Column("Unit", numeric=False))
     return Table("What it changes in the estimates (least squares)", heads, rows) if rows else None
+
+
+def _consequences(found: Diagnosed) -> tuple[Block, ...]:
+    """Figures and decisions of the recording, and of the same recording corrected for what was left out."""
+    if found.consequences is None:
+        return ()
+    blocks: list[Block] = []
+    rows = []
+    for name, (before, after) in found.consequences.figures.items():
+        (one, U_one, _), (two, U_two, _) = expanded(before), expanded(after)
+        rows.append((TITLES[name], f"{one} ± {U_one}", f"{two} ± {U_two}", UNITS[name]))
+    heads = (Column("Figure", numeric=False), Column("As recorded"), Column("Corrected"), Column("Unit", numeric=False))
+    if rows:
+        note = (
+            "± is the expanded uncertainty for 95 %, for repetitions of the recording with the correction as it stands."
+        )
+        blocks.append(Table("Figures of performance", heads, tuple(rows), (note,)))
+    decisions = tuple(
+        (f"{before.facts.standard}, {before.quantity}", before.decision.outcome, after.decision.outcome)
+        for before, after in found.consequences.statements
+    )
+    if decisions:
+        columns = tuple(Column(title, numeric=False) for title in ("Statement", "As recorded", "Corrected"))
+        blocks.append(Table("Statements of conformity", columns, decisions))
+    return tuple(blocks)
 
 
 def _where(found: Diagnosed) -> tuple[Block, ...]:

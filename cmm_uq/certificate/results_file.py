@@ -49,7 +49,7 @@ def results(result: Result) -> dict[str, Any]:
 
 def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
     """The ``diagnosis`` part."""
-    d = found.diagnosis
+    d, changes = found.diagnosis, found.consequences
     return {
         "verdict": d.verdict,
         "p_value": d.p_value,
@@ -82,6 +82,10 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
             "elpd_gain": d.improvement.elpd_gain, "elpd_gain_se": d.improvement.elpd_gain_se,
         },
         "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
+        "corrected": None if changes is None else {
+            "accuracy": {name: {"before": _quantity(a), "after": _quantity(b)} for name, (a, b) in changes.figures.items()},
+            "conformity": [{"before": _statement(a), "after": _statement(b)} for a, b in changes.statements],
+        },
     }  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from types import FrameType
@@ -13,6 +14,9 @@ from cmm_uq.errors import CmmUqError
 
 BAD_INPUT = 2
 """Exit code of everything that the user can mend."""
+
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Matrices here are small: more threads cost more than they gain, and how many there are would show in the last digits."""
 
 app = typer.Typer(
     name="cmm-uq",
@@ -42,6 +46,8 @@ def _version(version: bool = typer.Option(False, "--version", help="Print the ve
 
 def main() -> None:
     """Run the command; bad input ends with its message and exit code 2, an interruption without half a report."""
+    for variable in THREADS:
+        os.environ.setdefault(variable, "1")
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
     try:

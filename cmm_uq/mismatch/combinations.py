@@ -163,7 +163,7 @@ class _Search:
     def __init__(self, comparison: Comparison) -> None:
         self.comparison = comparison
         self.prior = Prior(comparison.explanations)
-        self.candidates = [i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)]
+        self.candidates = {i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)}
         self.settled: dict[Key, Combination] = {}
         self._expanded: set[Key] = set()
         self._waiting: dict[Key, tuple[float, tuple[Version, ...]]] = {}
@@ -192,9 +192,10 @@ class _Search:
         self._expanded.add(key)
         known = self.settled[key]
         fixed = float(self.comparison.log_evidence_of(known.versions)[0])
-        others = [i for i in self.candidates if i not in key]
         base = known.log_posterior - self.prior.log(key) - fixed
-        for i, (total, version) in self.comparison.beside(known.versions, others).items():
+        for i, (total, version) in self.comparison.beside(known.versions, self.candidates).items():
+            if i in key or i not in self.candidates:
+                continue
             larger = key | {i}
             estimate = base + total + self.prior.log(larger)
             if larger in self.settled or estimate <= self._waiting.get(larger, (-np.inf, ()))[0]:
@@ -233,7 +234,7 @@ def log_evidence_together(comparison: Comparison, versions: Sequence[Version]) -
         before = tuple(best)
         for i, version in enumerate(best):
             others = best[:i] + best[i + 1 :]
-            totals[i], best[i] = comparison.beside(others, [version.explanation])[version.explanation]
+            totals[i], best[i] = comparison.beside(others, (version.explanation,))[version.explanation]
         if tuple(best) == before or len(best) == 1:
             break
     fixed = float(comparison.log_evidence_of(best)[0])

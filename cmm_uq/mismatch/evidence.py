@@ -10,7 +10,7 @@ beside them needs nothing but the inner products of all columns, which are compu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -64,20 +64,36 @@ class _Group:
     r: int
 
     def columns(self, stack: Floats) -> Floats:
-        """Their columns (m, M·r)."""
-        first, last = int(self.start[0]), int(self.start[-1]) + self.r
-        if last - first == len(self.start) * self.r:
-            return stack[:, first:last]
-        return stack[:, (self.start[:, None] + np.arange(self.r)).ravel()]
+        """Their columns (m, M·r), one after the other."""
+        return stack[:, int(self.start[0]) : int(self.start[-1]) + self.r]
 
-    def only(self, explanations: Sequence[int] | None) -> _Group:
-        if explanations is None:
+    @cached_property
+    def first(self) -> Ints:
+        """Where each explanation's members begin; they follow one another."""
+        return np.flatnonzero(np.diff(self.explanation, prepend=-1))
+
+    def part(self, among: Container[int] | None) -> slice:
+        """Members from the first to the last of some explanations; all by default."""
+        if among is None:
+            return slice(None)
+        chosen = [k for k, i in enumerate(self.explanation[self.first].tolist()) if i in among]
+        if not chosen:
+            return slice(0, 0)
+        ends = np.append(self.first[1:], len(self.explanation))
+        return slice(int(self.first[chosen[0]]), int(ends[chosen[-1]]))
+
+    def only(self, part: slice) -> _Group:
+        """The group of some members."""
+        if part == slice(None):
             return self
-        chosen = np.isin(self.explanation, explanations)
         return _Group(
-            self.explanation[chosen], self.member[chosen], self.weight[chosen], self.start[chosen],
-            self.amplitudes[chosen], self.r,
-        )  # fmt: skip
+            self.explanation[part],
+            self.member[part],
+            self.weight[part],
+            self.start[part],
+            self.amplitudes[part],
+            self.r,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +289,7 @@ class Comparison:
         self,
         left: Floats | None = None,
         granted: Sequence[Version] = (),
-        explanations: Sequence[int] | None = None,
+        among: Container[int] | None = None,
     ) -> tuple[Floats, Floats]:
         """Log evidence (b,) of what is granted, and (c, b) of each explanation beside it.
 
@@ -281,43 +297,42 @@ class Comparison:
         ----------
         left : (m, b) data, by default the recording's.
         granted : explanations taken for granted.
-        explanations : to consider, by default all; minus infinity for the others.
+        among : explanations that are wanted, by default all; of others the evidence may be minus infinity.
         """
         total = np.full((len(self.explanations), 1 if left is None else left.shape[1]), -np.inf)
-        for group, each in self.each(left, granted, explanations):
+        for group, each in self.each(left, granted, among):
             gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight[:, None]
-            for explanation, gain in zip(group.explanation, gains, strict=True):
-                total[explanation] = np.logaddexp(total[explanation], gain)
+            chosen = group.explanation[group.first]
+            total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
         return self.log_evidence_of(granted, left), total
 
     def beside(
-        self, granted: Sequence[Version] = (), explanations: Sequence[int] | None = None
+        self, granted: Sequence[Version] = (), among: Container[int] | None = None
     ) -> dict[int, tuple[float, Version]]:
-        """Log evidence of each explanation beside what is granted, and its best version."""
-        found: dict[int, tuple[float, Version]] = {}
-        best: dict[int, float] = {}
-        for group, cube in self.each(None, granted, explanations):
+        """Log evidence of each explanation beside what is granted, at least of those wanted, and its best version."""
+        total = np.full(len(self.explanations), -np.inf)
+        most, best = total.copy(), {}
+        for group, cube in self.each(None, granted, among):
             each = cube[:, :, 0]
             gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight
-            at = each.argmax(axis=1)
-            most = each.max(axis=1) + group.weight
-            for m, (i, j) in enumerate(zip(group.explanation.tolist(), group.member.tolist(), strict=True)):
-                total = float(gains[m])
-                if i in found:
-                    total = float(np.logaddexp(found[i][0], total))
-                if most[m] >= best.get(i, -np.inf):
-                    best[i] = float(most[m])
-                    found[i] = total, Version(i, j, float(group.amplitudes[m, at[m]]))
-                else:
-                    found[i] = total, found[i][1]
-        return found
+            chosen = group.explanation[group.first]
+            total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
+            largest = each.max(axis=1) + group.weight
+            better = np.maximum.reduceat(largest, group.first) > most[chosen]
+            order = np.lexsort((-largest, group.explanation))[group.first[better]]
+            for m, a in zip(order.tolist(), each[order].argmax(axis=1).tolist(), strict=True):
+                i = int(group.explanation[m])
+                most[i] = largest[m]
+                best[i] = Version(i, int(group.member[m]), float(group.amplitudes[m, a]))
+        return {i: (float(total[i]), version) for i, version in best.items()}
 
     def best(self, left: Floats, explanations: Sequence[int]) -> list[Version]:
         """Version with most evidence among some visible explanations, for each column of data (m, b)."""
         found = [Version(0, 0, 0.0)] * left.shape[1]
         most = np.full(left.shape[1], -np.inf)
         for group, each in self.each(left, (), explanations):
-            flat = (each + group.weight[:, None, None]).reshape(-1, left.shape[1])
+            weight = np.where(np.isin(group.explanation, explanations), group.weight, -np.inf)
+            flat = (each + weight[:, None, None]).reshape(-1, left.shape[1])
             at = flat.argmax(axis=0)
             for column in np.flatnonzero(flat.max(axis=0) > most):
                 m, a = divmod(int(at[column]), AMPLITUDES)
@@ -331,22 +346,22 @@ class Comparison:
         return np.asarray(special.logsumexp(np.stack(every), axis=0), dtype=np.float64)
 
     def each(
-        self, data: Floats | None, granted: Sequence[Version], explanations: Sequence[int] | None = None
+        self, data: Floats | None, granted: Sequence[Version], among: Container[int] | None = None
     ) -> Iterator[tuple[_Group, Floats]]:
-        """Log evidence (M, a, b) of every member at every size beside what is granted, by groups of members."""
+        """Log evidence (M, a, b) of members at every size beside what is granted, by groups; ``among`` are wanted at least."""
         stack, groups = self._stack
         known = self._beside(data, granted)
         ends = np.cumsum([each.seen_by.shape[1] for each in known])[:-1]
         seen_by = np.hstack([each.seen_by for each in known])
         for index, group in enumerate(groups):
-            chosen = group.only(explanations)
+            part = group.part(among)
+            chosen = group.only(part)
             if not len(chosen.start):
                 continue
-            position = (chosen.start - group.start[0]) // group.r
-            seen = (chosen.columns(stack).T @ seen_by).reshape(len(position), group.r, -1)
-            total = np.full((len(position), AMPLITUDES, len(known[0].squares)), -np.inf)
-            for beside, blocks, part in zip(known, self._blocks, np.split(seen, ends, axis=2), strict=True):
-                one = self._under(beside, chosen, blocks[index][position], part)
+            seen = (chosen.columns(stack).T @ seen_by).reshape(len(chosen.start), group.r, -1)
+            total = np.full((len(chosen.start), AMPLITUDES, len(known[0].squares)), -np.inf)
+            for beside, blocks, its in zip(known, self._blocks, np.split(seen, ends, axis=2), strict=True):
+                one = self._under(beside, chosen, blocks[index][part], its)
                 np.logaddexp(total, one, out=total)
             yield chosen, total
 

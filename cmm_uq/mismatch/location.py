@@ -43,10 +43,12 @@ def located(race: Race, alpha: float) -> tuple[Place, ...]:
     """Every covariate of which a function is significant at ``alpha``, the most significant first."""
     if race.p_value >= alpha:
         return ()
-    unknowns = [i for i, e in enumerate(race.explanations) if e.kind == UNKNOWN]
     found = []
+    unknowns = {i for i, e in enumerate(race.explanations) if e.kind == UNKNOWN}
     for i, (_, version) in race.comparison.beside((), unknowns).items():
         explanation = race.explanations[i]
+        if i not in unknowns:
+            continue
         name, covariate = explanation.covariate_name, explanation.covariate
         p_value = tail_probability(race.null_maximum, float(race.log_odds[i]))
         if name is None or covariate is None or p_value >= alpha:
@@ -87,7 +89,7 @@ def _jump(race: Race, index: int, x: Floats, order: Ints) -> tuple[float, float]
     """Range of the sorted covariate that holds a step with 95 % probability."""
     members = race.explanations[index].members
     evidence = np.full(len(members), -np.inf)
-    for group, cube in race.comparison.each(None, (), [index]):
+    for group, cube in race.comparison.each(None, (), (index,)):
         if group.r == 1:
             evidence[group.member] = special.logsumexp(cube[:, :, 0], axis=1)
     probability = np.exp(evidence - special.logsumexp(evidence))

@@ -48,7 +48,7 @@ ASSERTED = 0.5
 _MECHANISM = 0.2
 """Probability from which an effect is asserted when all that is asked is whether it has its own form or any other."""
 
-_PROBABLE = 0.003
+_PROBABLE = 0.02
 """Probability from which the period in a combination is refined."""
 
 NOT_TOLD_APART = 0.02
@@ -147,7 +147,7 @@ def _rough(comparison: Comparison, versions: Sequence[Version], index: int) -> f
     """Probability that an effect, beside the others, has another form than its own."""
     members = comparison.explanations[index].members
     evidence = np.full(len(members), -np.inf)
-    for group, cube in comparison.each(None, [v for v in versions if v.explanation != index], [index]):
+    for group, cube in comparison.each(None, [v for v in versions if v.explanation != index], (index,)):
         evidence[group.member] = special.logsumexp(cube[:, :, 0], axis=1) + group.weight
     weight = np.exp(evidence - special.logsumexp(evidence))
     return float(weight[[member.rough for member in members]].sum())
@@ -323,8 +323,8 @@ def _statistic(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
         together.setdefault(version, []).append(column)
     for version, columns in together.items():
         alone, both = comparison.log_evidence(data[:, columns], [version], single)
-        both[version.explanation] = -np.inf
-        gain = special.logsumexp(both, axis=0) - alone + odds[version.explanation, columns]
+        others = [i for i in single if i != version.explanation]
+        gain = special.logsumexp(both[others], axis=0) - alone + odds[version.explanation, columns]
         log_odds[columns] = np.logaddexp(log_odds[columns], pair + gain)
     return log_odds, odds
 

@@ -16,7 +16,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.reading import read_job
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-KINDS = sorted(path.name for path in EXAMPLES.iterdir() if (path / "job.toml").exists() and "shift" not in path.name)
+KINDS = sorted({path.parent.name for path in EXAMPLES.glob("*/*.csv") if "shift" not in path.parent.name})
 Damage = Callable[[pd.DataFrame], pd.DataFrame]
 
 
