@@ -68,6 +68,6 @@ def _recording_to_be(plan: Plan) -> bytes:
     wishes = plan.setting.plan
     points = joined(
         plan.to_measure, seconds_per_point=wishes.seconds_per_point, minutes_per_placing=wishes.minutes_per_placing,
-        first=plan.measured + 1,
+        first=plan.first,
     )  # fmt: skip
     return b"# planned, nothing is measured yet: nominal coordinates\n" + recording(points)

@@ -92,6 +92,11 @@ class Plan:
         return len(self.start.placings) if self.name == RECORDED else 0
 
     @property
+    def first(self) -> int:
+        """Number of the first measurement that is to be made."""
+        return int(self.job.points.measurement.max()) + 1 if self.name == RECORDED else 1
+
+    @property
     def to_measure(self) -> tuple[Placing, ...]:
         """Placings that are still to be measured."""
         return self.outlook.placings[self.measured :]
@@ -152,7 +157,8 @@ def _part(tell: Progress, low: float, high: float) -> Callable[[float], None]:
 
 def _start(job: Job, setting: Setting) -> tuple[str, tuple[Placing, ...], Points]:
     if len(job.points):
-        return RECORDED, split(job.points, "recorded as measurement {}"), job.points
+        points = job.points.select(~np.isin(job.points.measurement, job.facts.recording.set_aside))
+        return RECORDED, split(points, "recorded as measurement {}"), points
     try:
         name, placings = ready_plan(setting)
     except CmmUqError:

@@ -22,7 +22,7 @@ from cmm_uq.certificate.plan_words import (
 )
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
-from cmm_uq.mismatch.power import POWER
+from cmm_uq.mismatch.power import POWER, SIZES
 from cmm_uq.units import MICROMETRE
 
 SCHEMA = "cmm-uq/plan/1"
@@ -34,7 +34,6 @@ def plan_results(plan: Plan) -> dict[str, Any]:
         "criterion": plan.setting.plan.criterion, "score_before": plan.scores[0], "score_after": plan.scores[1],
         "kept": plan.kept, "added": len(plan.better.placings) - plan.kept, **_outlook_data(plan.better),
     }  # fmt: skip
-    first = plan.measured + 1
     return {
         "schema": SCHEMA,
         "software": {"name": "cmm-uq", "version": __version__},
@@ -45,9 +44,9 @@ def plan_results(plan: Plan) -> dict[str, Any]:
         "free": list(plan.free),
         "conditions": [{"what": condition.what, "met": condition.met} for condition in plan.conditions],
         "placings": [
-            {"measurement": first + i, "title": placing.title, "minutes": time,
+            {"measurement": number, "title": placing.title, "minutes": time,
              "middle_mm": placing.middle.tolist(), "points": len(placing.points)}
-            for i, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True))
+            for number, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.first)
         ],
         "minutes": sum(plan.minutes),
     }  # fmt: skip
@@ -132,7 +131,7 @@ def _sections(plan: Plan) -> tuple[Section, ...]:
     return (
         Section("Placings", _placings(plan)),
         Section("Pictures of the placings", tuple(
-            placing_pictures(plan.to_measure, plan.setting.volume.box, plan.measured + 1) if plan.to_measure else ()
+            placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first) if plan.to_measure else ()
         )),
         Section("What these placings determine", _determined(plan)),
         Section("What a better plan gains", _gain(plan)),
@@ -147,7 +146,7 @@ def placing_rows(plan: Plan) -> list[tuple[str, ...]]:
     """Number, title, from and to, points and time of every placing to be measured."""
     return [
         (str(number), placing.title, placing.ends, str(len(placing.points)), f"{time:.0f}")
-        for number, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.measured + 1)
+        for number, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.first)
     ]
 
 
@@ -158,7 +157,7 @@ def _placings(plan: Plan) -> tuple[Block, ...]:
              Column("Points"), Column("Time", "min"))  # fmt: skip
     notes = [f"Every point {plan.setting.plan.repeats} times; points count repeats."]
     if plan.measured:
-        notes.append(f"Measurements 1 to {plan.measured} are recorded already.")
+        notes.append(f"{plan.measured} measurements are recorded already.")
     return (Table("Placings in the order of measurement", heads, tuple(placing_rows(plan)), tuple(notes)),)
 
 
@@ -240,6 +239,7 @@ def _smallest(plan: Plan) -> tuple[Block, ...]:
     )
     note = (
         f"Size found in {100 * POWER:.0f} of 100 recordings, at {100 * FALSE_ALARMS:g} % of false alarms. Named rightly: the "
-        "effect alone is more probable than any other and than none; – where only a size beyond what physics allows would be."
+        "effect alone is more probable than any other and than none, and no other is left as possible. – where that is so "
+        f"for no size that physics allows, or for none up to {SIZES[-1]:.0f} times the noise in all observations together."
     )
     return (Table("Smallest effects", heads, rows, (note,)),)

@@ -87,6 +87,15 @@ def test_what_a_recording_determined_is_what_its_report_says() -> None:
     np.testing.assert_allclose(expected, np.sqrt(np.diag(estimate.covariance))[: len(expected)], rtol=2e-3)
 
 
+def test_measurements_set_aside_determine_nothing(job: Path) -> None:
+    text = (job / "job.toml").read_text("utf-8").replace("[recording]\n", "[recording]\nset_aside = [20]\n")
+    (job / "job.toml").write_text(text, encoding="utf-8")
+    plan = make_plan(read_job(job, recorded=False), power=False)
+    assert plan.measured == 19
+    assert 20 not in plan.start.points.measurement
+    assert plan.first == 21
+
+
 def test_further_placings_of_a_recording_are_of_the_artefact_that_was_recorded(tmp_path: Path) -> None:
     folder = Path(shutil.copytree(ROOT / "examples" / "step-gauge-simulated", tmp_path / "job"))
     with (folder / "job.toml").open("a", encoding="utf-8") as file:
