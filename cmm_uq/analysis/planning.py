@@ -271,6 +271,9 @@ def _in_time(setting: Setting, name: str, placings: Sequence[Placing]) -> tuple[
 def _shift_plan(job: Job, setting: Setting) -> Plan:
     """Series of a shift job, and what their readings cannot tell."""
     facts = setting.artefact
+    if facts.plane is not None:
+        raise CmmUqError("the placings of a plate shifted in a plane are not planned",
+                         where="job.toml [artefact] plane", fix="cmm-uq report says what those of a recording leave open")  # fmt: skip
     if setting.plan.criterion is not None:
         candidates(setting)  # which says why there are none
     name, placings, points = _start(job, setting)
@@ -279,8 +282,9 @@ def _shift_plan(job: Job, setting: Setting) -> Plan:
         job.recording_path,
     )  # fmt: skip
     left = undetermined(series, scale_known=facts.known is not None)
-    free = [f"errors that repeat every {left.period:.4g} mm, or a whole part of it, show in no reading: every shift is a "
-            "multiple of that length"]  # fmt: skip
+    free = [
+        f"errors that repeat every {left.period:.4g} mm, or a half, a third … of it: every shift is a multiple of it"
+    ]
     if facts.known is None:
         free.append("the mean scale of the axis: no length of the artefact is known")
     if left.patterns.shape[1]:

@@ -167,3 +167,8 @@ def test_where_the_standard_plan_is_not_possible_a_criterion_finds_another(tmp_p
     assert plan.scores is not None
     assert plan.scores[1] < plan.scores[0]
     assert {round(float(abs(p.points.xyz[1, 2] - p.points.xyz[0, 2])), 6) for p in plan.to_measure} == {0.0}
+
+
+def test_a_plate_shifted_in_a_plane_is_left_to_its_report() -> None:
+    with pytest.raises(CmmUqError, match="are not planned"):
+        make_plan(read_job(ROOT / "examples" / "shift-plate-simulated", recorded=False))
