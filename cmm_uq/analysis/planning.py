@@ -272,8 +272,10 @@ def _shift_plan(job: Job, setting: Setting) -> Plan:
     """Series of a shift job, and what their readings cannot tell."""
     facts = setting.artefact
     if facts.plane is not None:
-        raise CmmUqError("the placings of a plate shifted in a plane are not planned",
-                         where="job.toml [artefact] plane", fix="cmm-uq report says what those of a recording leave open")  # fmt: skip
+        raise CmmUqError(
+            "the placings of a plate shifted in a plane are not planned", where="job.toml [artefact] plane",
+            fix="cmm-uq report says what those of a recording leave open",
+        )  # fmt: skip
     if setting.plan.criterion is not None:
         candidates(setting)  # which says why there are none
     name, placings, points = _start(job, setting)
