@@ -19,7 +19,7 @@ from cmm_uq.planning.identifiability import NOT_TOLD_APART, identifiability
 from cmm_uq.planning.information import certified, gram
 from cmm_uq.planning.placing import joined
 from cmm_uq.planning.ready import ready_plan
-from cmm_uq.planning.separation import cosines, left_of, visible
+from cmm_uq.planning.separation import FAINT, cosines, imitators, left_of, visible
 from cmm_uq.planning.setting import Setting
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Machine
@@ -84,15 +84,14 @@ def others(setting: Setting, points: object) -> dict[str, str]:
     cosine, seen = cosines(left, alone), visible(left, alone)
     cells = dict.fromkeys(CATALOGUE, "–")
     for a, i in enumerate(rows):
-        alike = [names[rows[b]] for b in range(len(rows)) if b != a and seen[b] and cosine[a, b] > NOT_TOLD_APART]
-        alike = sorted({name for name in alike if name != names[i]})
-        said = (
-            "not seen"
-            if not seen[a]
-            else f"like {', '.join(map(short, alike))}"
-            if alike
-            else (f"**{model.unknowns[i].prior_sd / np.sqrt(left[a, a]):.2g} {model.unknowns[i].unit}**")
-        )
+        alike = {names[rows[b]] for b in range(len(rows)) if b != a and seen[b] and cosine[a, b] > NOT_TOLD_APART}
+        hidden = imitators(information, i, base) if information[i, i] > FAINT else []
+        if seen[a] and alike - {names[i]}:
+            said = f"like {', '.join(sorted(map(short, alike - {names[i]})))}"
+        elif seen[a]:
+            said = f"**{model.unknowns[i].prior_sd / np.sqrt(left[a, a]):.2g} {model.unknowns[i].unit}**"
+        else:
+            said = f"as {', '.join(dict.fromkeys(short(names[j]) for j in hidden))}" if hidden else "not seen"
         cells[names[i]] = said
     return {name: cell for name, cell in cells.items() if name not in SIX}
 

@@ -11,6 +11,7 @@ from cmm_uq.certificate.plan_picture import gain_plot, placing_pictures
 from cmm_uq.certificate.plan_words import (
     CRITERIA,
     STATUS,
+    absorbed,
     base_name,
     combination,
     expected,
@@ -68,6 +69,7 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
         ],
         "singular_values": found.singular_values.tolist(),
         "indistinguishable": [{"effects": [a, b], "cosine": cosine} for a, b, cosine in found.alike],
+        "absorbed": [{"effect": name, "as": list(others)} for name, others in found.absorbed],
         "unseen": list(found.unseen),
         "smallest": [
             {"effect": power.effect, "parameter": power.parameter, "unit": power.unit,
@@ -180,6 +182,7 @@ def _determined(plan: Plan) -> tuple[Block, ...]:
     blocks.append(Table("What to expect", heads, rows, (note,)))
     blocks += [Paragraph(f"Stays free: {combination(parts)}.", tone="warning") for parts in found.free]
     blocks += [Paragraph(f"Could not be told apart: {text}.") for text in pairs(found)]
+    blocks += [Paragraph(f"If it acts, it will be taken for what the job names: {text}.") for text in absorbed(found)]
     if found.unseen:
         blocks.append(
             Paragraph(f"Nothing would show of: {', '.join(title_of(name) for name in found.unseen)}.", tone="note")
@@ -197,7 +200,8 @@ def _gain(plan: Plan) -> tuple[Block, ...]:
     blocks: list[Block] = [Paragraph(
         f"Searched for: {CRITERIA[criterion]}, by greedy choice and exchange. {before} placings before, {count} in the better "
         f"plan, {plan.kept} of them kept. Pairs that could not be told apart: {len(start.alike)} before, "
-        f"{len(better.alike)} after; effects of which nothing shows: {len(start.unseen)} before, {len(better.unseen)} after."
+        f"{len(better.alike)} after; effects of which nothing shows, or that pass for named ones: "
+        f"{len(start.unseen) + len(start.absorbed)} before, {len(better.unseen) + len(better.absorbed)} after."
     )]  # fmt: skip
     blocks += _beside(
         [(named(p), p.u, q.u, unit_of(p), expected(p), expected(q))

@@ -74,6 +74,16 @@ def pairs(found: Identifiability) -> list[str]:
     return [listed([title_of(name) for name in EVERY if name in group]) for group in groups]
 
 
+def absorbed(found: Identifiability) -> list[str]:
+    """Effects that would be taken for others: ``sag of the artefact for scale error of X and scale error of Y``."""
+    own = "the artefact's own size"
+    return [
+        f"{title_of(name)} for {listed([own if other == ARTEFACT else title_of(other) for other in others])}"
+        for name, others in found.absorbed
+        if others
+    ]
+
+
 def base_name(plan: Plan) -> str:
     """Of the placings to start from."""
     count = len(plan.start.placings)

@@ -40,7 +40,7 @@ def command(
 
 def _summarise(plan: Plan) -> None:
     from cmm_uq.certificate.plan_page import placing_rows
-    from cmm_uq.certificate.plan_words import STATUS, combination, expected, named, pairs, unit_of
+    from cmm_uq.certificate.plan_words import STATUS, absorbed, combination, expected, named, pairs, unit_of
 
     _table(("No.", "Set up", "From → to / mm", "Points", "min"), placing_rows(plan))
     for text in plan.free:
@@ -53,6 +53,8 @@ def _summarise(plan: Plan) -> None:
             typer.echo(f"Stays free: {combination(parts)}.")
         for text in pairs(found):
             typer.echo(f"Could not be told apart: {text}.")
+        for text in absorbed(found):
+            typer.echo(f"Would be taken for what the job names: {text}.")
     for condition in plan.conditions:
         typer.echo(f"{'met' if condition.met else 'NOT MET'}: {condition.what}")
 

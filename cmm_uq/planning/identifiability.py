@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from scipy import linalg
@@ -18,8 +19,11 @@ from cmm_uq.measurement import MeasurementModel
 from cmm_uq.measurement.model import ARTEFACT
 from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.information import certified, gram, scales
-from cmm_uq.planning.separation import cosines, left_of, visible
+from cmm_uq.planning.separation import FAINT, cosines, imitators, left_of, visible
 from cmm_uq.points import Floats
+
+Pair = tuple[str, str, float]
+"""Two effects and the absolute cosine between them."""
 
 NOT_TOLD_APART = 0.98
 """Cosine from which on two effects could hardly be told apart: a fifth of one is all that the other cannot imitate."""
@@ -58,13 +62,15 @@ class Identifiability:
     free : combinations, each by the keys of its parameters and their parts, that leave every observation as it is.
     singular_values : of the design whitened by the noise and scaled by the prior standard deviations, largest first.
     alike : pairs of effects, and their cosine, that could not be told apart.
-    unseen : effects, not named by the job, of which nothing would show.
+    absorbed : effects, not named by the job, that would be taken for some that it names; with the names of these.
+    unseen : effects, not named by the job, of which nothing would show at all.
     """
 
     parameters: tuple[Determined, ...]
     free: tuple[Mapping[tuple[str, str], float], ...]
     singular_values: Floats
-    alike: tuple[tuple[str, str, float], ...]
+    alike: tuple[Pair, ...]
+    absorbed: tuple[tuple[str, tuple[str, ...]], ...]
     unseen: tuple[str, ...]
 
     @property
@@ -84,9 +90,12 @@ def identifiability(model: MeasurementModel, rivals: Sequence[Effect] = ()) -> I
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear = model.linearised(values)
     estimate = solve(_enough(linear))
-    alike, unseen = _pairs(model, rivals, values)
+    information = gram(model, values) + certified(model.unknowns)
+    named = _named_pairs(information, [unknown.key[0] for unknown in model.unknowns])
+    alike, absorbed, unseen = _among_rivals(model, rivals) if rivals else ([], (), ())
     return Identifiability(
-        _parameters(linear, estimate), _free(estimate), _singular_values(linear), alike, unseen,
+        _parameters(linear, estimate), _free(estimate), _singular_values(linear),
+        tuple(sorted([*named, *alike], key=lambda pair: -pair[2])), absorbed, unseen,
     )  # fmt: skip
 
 
@@ -137,44 +146,43 @@ def _free(estimate: LeastSquares) -> tuple[Mapping[tuple[str, str], float], ...]
     )
 
 
-def _pairs(
-    model: MeasurementModel, rivals: Sequence[Effect], values: Floats
-) -> tuple[tuple[tuple[str, str, float], ...], tuple[str, ...]]:
-    """Pairs not told apart: of named effects with all others fitted, of rivals with everything named fitted."""
-    named = [unknown.key[0] for unknown in model.unknowns]
-    effects = [i for i, name in enumerate(named) if name != ARTEFACT]
-    information = gram(model, values) + certified(model.unknowns)
-    found = list(_named_pairs(information, effects, named))
-    if not rivals:
-        return tuple(found), ()
+def _among_rivals(
+    model: MeasurementModel, rivals: Sequence[Effect]
+) -> tuple[list[Pair], tuple[tuple[str, tuple[str, ...]], ...], tuple[str, ...]]:
+    """Pairs of rivals not told apart, everything named fitted; rivals taken for named effects; rivals that do not show."""
     wider = replace(model, effects=(*model.effects, *rivals))
     information = gram(wider, np.array([u.prior_mean for u in wider.unknowns])) + certified(wider.unknowns)
     names = [unknown.key[0] for unknown in wider.unknowns]
-    fitted = [i for i, name in enumerate(names) if name in named]
-    others = [i for i in range(len(names)) if i not in fitted]
-    left = left_of(information, others, fitted)
-    alone = np.diag(information)[others]
+    own = {effect.name for effect in model.effects} | {ARTEFACT}
+    fitted = [i for i, name in enumerate(names) if name in own]
+    others = [i for i, name in enumerate(names) if name not in own]
+    left, alone = left_of(information, others, fitted), np.diag(information)[others]
     seen, cosine = visible(left, alone), cosines(left, alone)
-    unseen = {names[i] for i in others} - {names[i] for i, there in zip(others, seen, strict=True) if there}
     alike = (cosine > NOT_TOLD_APART) & seen[:, None] & seen[None, :]
-    found += [
+    found = [
         (names[others[a]], names[others[b]], float(cosine[a, b]))
         for a, b in zip(*np.nonzero(np.triu(alike, 1)), strict=True)
         if names[others[a]] != names[others[b]]
     ]
-    return tuple(sorted(found, key=lambda pair: -pair[2])), tuple(n for n in dict.fromkeys(names) if n in unseen)
+    hidden = [i for i, there in zip(others, seen, strict=True) if not there]
+    shown = {names[i] for i, there in zip(others, seen, strict=True) if there}
+    absorbed = {
+        names[i]: tuple(dict.fromkeys(names[j] for j in imitators(information, i, fitted)))
+        for i in hidden
+        if information[i, i] > FAINT and names[i] not in shown
+    }
+    unseen = [names[i] for i in hidden if names[i] not in shown and names[i] not in absorbed]
+    return found, tuple(absorbed.items()), tuple(dict.fromkeys(unseen))
 
 
-def _named_pairs(information: Floats, effects: list[int], names: list[str]) -> list[tuple[str, str, float]]:
+def _named_pairs(information: Floats, names: Sequence[str]) -> list[Pair]:
     """Pairs of named effects, each with everything else fitted."""
     found = []
-    for a, i in enumerate(effects):
-        for j in effects[a + 1 :]:
-            rest = [k for k in range(len(information)) if k not in (i, j)]
-            left = left_of(information, [i, j], rest)
-            alone = np.diag(information)[[i, j]]
-            if names[i] != names[j] and np.all(visible(left, alone)):
-                cosine = float(cosines(left, alone)[0, 1])
-                if cosine > NOT_TOLD_APART:
-                    found.append((names[i], names[j], cosine))
+    effects = [i for i, name in enumerate(names) if name != ARTEFACT]
+    for i, j in combinations(effects, 2):
+        rest = [k for k in range(len(information)) if k not in (i, j)]
+        left, alone = left_of(information, [i, j], rest), np.diag(information)[[i, j]]
+        cosine = float(cosines(left, alone)[0, 1])
+        if names[i] != names[j] and np.all(visible(left, alone)) and cosine > NOT_TOLD_APART:
+            found.append((names[i], names[j], cosine))
     return found

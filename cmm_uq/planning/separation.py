@@ -21,6 +21,8 @@ FAINT = 1.0
 """Information, for an effect of its prior standard deviation, below which it does not stand out of the noise."""
 
 _RIDGE = 1e-13
+_PART = 0.1
+"""Share from which on a column counts as part of what looks like another."""
 
 
 def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> Floats:
@@ -62,3 +64,15 @@ def cosines(left: Floats, alone: Floats) -> Floats:
 def visible(left: Floats, alone: Floats) -> NDArray[np.bool_]:
     """(..., r) whether anything of each effect is left."""
     return np.asarray(np.einsum("...ii->...i", left) > np.maximum(SEEN * alone, FAINT))
+
+
+def imitators(information: Floats, row: int, base: Sequence[int]) -> list[int]:
+    """Rows of the base that together look like an effect that they hide, those that matter.
+
+    By least squares of the effect's column on those of the base; of many solutions the smallest.
+    """
+    fitted = list(base)
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information / scale[:, None] / scale[None, :]
+    parts = np.linalg.lstsq(scaled[np.ix_(fitted, fitted)], scaled[fitted, row], rcond=_RIDGE**0.5)[0]
+    return [i for i, part in zip(fitted, parts, strict=True) if abs(part) > _PART]

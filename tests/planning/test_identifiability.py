@@ -124,3 +124,10 @@ def test_a_level_surface_shows_none_of_the_classical_factors() -> None:
     facts, _ = EVERY_KIND["plane"]
     chosen = setting(facts)
     assert {p.status for p in found(chosen, ready_plan(chosen)[1]).parameters} == {"free"}
+
+
+def test_sag_that_the_job_does_not_name_is_taken_for_the_scales_of_the_table_axes() -> None:
+    chosen = setting(BALLBAR, named=("scale_x", "scale_y", "scale_z"))
+    plan = found(chosen, bars(chosen, (1, 0, 0), (0, 1, 0), (0, 0, 1)), "artefact_sag", "rotation_z_z")
+    assert plan.absorbed == (("artefact_sag", ("scale_x", "scale_y")),)
+    assert plan.unseen == ("rotation_z_z",)
