@@ -219,6 +219,9 @@ def _searched(
     existing = known.prior + whole(setting, start.points, rivals)
     wanted = known.where(rivals) if plan.criterion == "separation" else known.where(setting.named)
     wanted = _seen(wanted, known.each.sum(axis=0) + existing)
+    if not wanted:
+        raise CmmUqError("no candidate placing shows any of these effects", where="job.toml [model] effects",
+                         fix="Name effects that this artefact can show, or use another artefact")  # fmt: skip
     score = score_of(plan.criterion, known, wanted)
     count = plan.more or plan.number or (1 if keep else len(start.placings))
     count = _affordable(setting, count, possible, () if name == RECORDED else kept)

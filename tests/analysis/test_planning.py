@@ -144,6 +144,7 @@ def test_power_comes_for_every_effect_that_the_job_does_not_name(tmp_path: Path)
     ('criterion = "D"\nbudget_min = 2', SIX, 400.0, "too short for a single placing"),
     ('criterion = "D"\nmore = 1\nbudget_min = 123', SIX, 400.0, "beside the 20 that are kept"),
     ('criterion = "separation"\nrivals = ["rotation_x_z"]', SIX, 400.0, "at least 2 effects"),
+    ('criterion = "D"', '"rotation_z_z"', 400.0, "no candidate placing shows any of these effects"),
     ('rivals = ["hysteresis_x"]', SIX, 400.0, "needs the column approach_x"),
     ('rivals = ["rotation_w_z"]', SIX, 400.0, "unknown effect"),
     ('ready = "ISO 10360-2"', SIX, 400.0, "not for ballbar"),
