@@ -166,7 +166,7 @@ def _reached(margin: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Rule:
-    """The search's rule on data (m', b), mm."""
+    """The search's rule on data (m, b), mm, of which the baseline has been taken."""
 
     comparison: Comparison
     sigma: float
