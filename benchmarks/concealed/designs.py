@@ -30,7 +30,9 @@ class Design:
     length: float | None
 
 
-def surroundings(random: np.random.Generator, n: int, approach: np.ndarray | None) -> dict:
+def surroundings(random: np.random.Generator, series: np.ndarray, approach: np.ndarray | None) -> dict:
+    """What is recorded beside n points; ``series`` (n,) tells which were measured under one load."""
+    n = len(series)
     warm = 20 + np.cumsum(random.normal(0, 0.9 / np.sqrt(n), n))
     recorded = {} if approach is None else {f"approach_{a}": approach[:, i] for i, a in enumerate("xyz")}
     recorded |= {f"temp_{a}_c": warm + random.normal(0, 0.5) + 0.6 * random.standard_normal(n) for a in "xyz"}
@@ -38,7 +40,7 @@ def surroundings(random: np.random.Generator, n: int, approach: np.ndarray | Non
     recorded["temp_table_top_c"] = warm + 0.8 * random.standard_normal(n)
     recorded["temp_table_bottom_c"] = warm + 0.8 * random.standard_normal(n) - 0.5
     recorded["time_s"] = np.arange(n) * 30.0
-    recorded["load_kg"] = np.round(random.uniform(5, 60, n), 1)
+    recorded["load_kg"] = np.round(random.uniform(5, 60, series.max() + 1), 1)[series]
     return recorded
 
 
@@ -62,7 +64,7 @@ def ballbar(random: np.random.Generator, placings: int, repeats: int) -> Design:
     D[rows, 2 * rows], D[rows, 2 * rows + 1] = -direction, direction
     outward = np.empty((n, 3))
     outward[0::2], outward[1::2] = -direction, direction
-    recorded = surroundings(random, n, random.choice([-1.0, 1.0], (n, 3)))
+    recorded = surroundings(random, 4 * measurement + np.array(repeat), random.choice([-1.0, 1.0], (n, 3)))
     for name, values in recorded.items():
         if name.startswith("temp"):
             recorded[name] = np.repeat(values[::2], 2)
@@ -99,7 +101,9 @@ def step_gauge(random: np.random.Generator) -> Design:
     measurement = np.array(measurement)
     point = np.tile(np.arange(1, 2 * len(faces) + 1), n // (2 * len(faces)))
     free = (measurement[:, None] == np.unique(measurement)).astype(float)
-    recorded = {"reference_mm": np.array(reference)} | surroundings(random, n, np.array(approach))
+    recorded = {"reference_mm": np.array(reference)} | surroundings(
+        random, 4 * measurement + np.array(repeat), np.array(approach)
+    )
     return Design(
         "step_gauge", np.array(true), measurement, point, np.array(repeat), recorded, {}, D.reshape(n, -1), free, 1.0, None,
         None,
@@ -137,7 +141,7 @@ def plate(random: np.random.Generator) -> Design:
         columns += [inside * np.cross(np.eye(3)[i], centred) for i in range(3)]
     free = np.column_stack([column.ravel() for column in columns])
     recorded = {f"reference_{a}_mm": np.tile(grid[:, i], n // 25) for i, a in enumerate("xyz")}
-    recorded |= surroundings(random, n, random.choice([-1.0, 1.0], (n, 3)))
+    recorded |= surroundings(random, 4 * measurement + np.array(repeat), random.choice([-1.0, 1.0], (n, 3)))
     return Design(
         "plate", true, measurement, np.tile(np.arange(1, 26), n // 25), np.array(repeat), recorded, {}, np.eye(3 * n), free,
         1.0, None, None,
@@ -159,7 +163,9 @@ def sphere(random: np.random.Generator) -> Design:
     D[np.arange(n), np.arange(n)] = normals
     free = np.hstack([(measurement == k)[:, None] * normals for k in np.unique(measurement)])
     recorded = {f"n{a}": normals[:, i] for i, a in enumerate("xyz")}
-    recorded |= surroundings(random, n, -np.sign(np.where(np.abs(normals) > 0.3, normals, 0.0)))
+    recorded |= surroundings(
+        random, 4 * measurement + np.array(repeat), -np.sign(np.where(np.abs(normals) > 0.3, normals, 0.0))
+    )
     return Design(
         "sphere", np.repeat(centres, 80, axis=0) + radius * normals, measurement, np.tile(np.arange(1, 41), n // 40), repeat,
         recorded, {}, D.reshape(n, -1), free, 1.0, np.ones((n, 1)), 2 * radius,

@@ -155,7 +155,8 @@ def _attempt(random: np.random.Generator, what: str, kind: str, folder: Path) ->
     _write(folder, p, design, named, design.length if certified else None, stated if says else None)
     return {
         "named": named, "hidden": sizes, "root_lambda": wanted, "sigma_um": sigma * 1e3, "stated": says,
-        "certified": certified, "rivals": rivals, "stands_in": stands_in, **shape, "observations": len(oracle.column(KNOWN["scale_x"])),
+        "certified": certified, "rivals": rivals, "stands_in": stands_in,
+        **shape, "observations": len(oracle.column(KNOWN["scale_x"])),
     }  # fmt: skip
 
 

@@ -234,33 +234,38 @@ class Comparison:
         return found
 
     @cached_property
-    def _blocks(self) -> list[list[Floats]]:
-        """Inner products (M, r, r) of each member's columns, by kind of noise and group."""
+    def _blocks(self) -> list[Floats]:
+        """Inner products (k, M, r, r) of each member's columns under each kind of noise, by group."""
         stack, groups = self._stack
         found = []
-        for noise in self._noises:
-            blocks = []
-            for group in groups:
-                parts = np.array_split(group.columns(stack), max(1, len(group.start) * group.r // _COLUMNS), axis=1)
-                other = np.hstack([noise(part) for part in parts]).T.reshape(-1, group.r, len(stack))
-                each = group.columns(stack).T.reshape(-1, group.r, len(stack))
-                blocks.append(each @ other.transpose(0, 2, 1))
+        for group in groups:
+            columns = group.columns(stack)
+            each = columns.T.reshape(-1, group.r, len(stack))
+            blocks = np.empty((len(self._noises), len(each), group.r, group.r))
+            for block, noise in zip(blocks, self._noises, strict=True):
+                parts = np.array_split(columns, max(1, columns.shape[1] // _COLUMNS), axis=1)
+                other = np.hstack([noise(part) for part in parts]).T.reshape(each.shape)
+                block[:] = each @ other.transpose(0, 2, 1)
             found.append(blocks)
         return found
 
     @cached_property
-    def _left_weighed(self) -> list[Floats]:
-        """Precision times what the baseline leaves (m, 1), by kind of noise."""
-        return [noise(self.left[:, None]) for noise in self._noises]
+    def _left_weighed(self) -> Floats:
+        """Precision times what the baseline leaves (k, m, 1), by kind of noise."""
+        return self._by_noise(self.left[:, None])
+
+    def _by_noise(self, columns: Floats) -> Floats:
+        """Precision times columns (m, b), by kind of noise (k, m, b)."""
+        return np.stack([noise(columns) for noise in self._noises])
 
     @cached_property
     def squares(self) -> Floats:
-        """Sum of squares of what the baseline leaves, mm², whitened by each kind of noise."""
-        return np.array([float(self.left @ weighed[:, 0]) for weighed in self._left_weighed])
+        """Sum of squares (k,) of what the baseline leaves, mm², whitened by each kind of noise."""
+        return np.asarray(self._left_weighed[:, :, 0] @ self.left, dtype=np.float64)
 
     @cached_property
-    def _weighed(self) -> dict[tuple[int, int], list[Floats]]:
-        """Precision times the columns of members that were ever granted, by kind of noise."""
+    def _weighed(self) -> dict[tuple[int, int], Floats]:
+        """Precision times the columns of members that were ever granted (k, m, r)."""
         return {}
 
     def over_sigma(self, squares: Floats) -> Floats:
@@ -342,8 +347,9 @@ class Comparison:
 
     def log_evidence_of(self, granted: Sequence[Version], left: Floats | None = None) -> Floats:
         """Log evidence (b,) of what is granted, at the size granted, for data (m, b)."""
-        every = [self.over_sigma(known.squares) + known.log for known in self._beside(left, granted)]
-        return np.asarray(special.logsumexp(np.stack(every), axis=0), dtype=np.float64)
+        known = self._beside(left, granted)
+        every = self.over_sigma(known.squares) + known.log[:, None]
+        return np.asarray(special.logsumexp(every, axis=0), dtype=np.float64)
 
     def each(
         self, data: Floats | None, granted: Sequence[Version], among: Container[int] | None = None
@@ -351,74 +357,70 @@ class Comparison:
         """Log evidence (M, a, b) of members at every size beside what is granted, by groups; ``among`` are wanted at least."""
         stack, groups = self._stack
         known = self._beside(data, granted)
-        ends = np.cumsum([each.seen_by.shape[1] for each in known])[:-1]
-        seen_by = np.hstack([each.seen_by for each in known])
-        for index, group in enumerate(groups):
+        kinds, b = known.squares.shape
+        for group, blocks in zip(groups, self._blocks, strict=True):
             part = group.part(among)
             chosen = group.only(part)
             if not len(chosen.start):
                 continue
-            seen = (chosen.columns(stack).T @ seen_by).reshape(len(chosen.start), group.r, -1)
-            total = np.full((len(chosen.start), AMPLITUDES, len(known[0].squares)), -np.inf)
-            for beside, blocks, its in zip(known, self._blocks, np.split(seen, ends, axis=2), strict=True):
-                one = self._under(beside, chosen, blocks[index][part], its)
-                np.logaddexp(total, one, out=total)
+            seen = (chosen.columns(stack).T @ known.seen_by).reshape(len(chosen.start), group.r, kinds, -1)
+            total = np.empty((len(chosen.start), AMPLITUDES, b))
+            size = max(1, _BLOCK // (kinds * AMPLITUDES * b))
+            for begin in range(0, len(total), size):
+                some = slice(begin, begin + size)
+                total[some] = self._under(known, chosen.amplitudes[some], blocks[:, part][:, some], seen[some])
             yield chosen, total
 
-    def _under(self, beside: _Beside, group: _Group, blocks: Floats, seen: Floats) -> Floats:
-        """Log evidence (M, a, b) of a group's members under one kind of noise.
+    def _under(self, known: _Beside, amplitudes: Floats, blocks: Floats, seen: Floats) -> Floats:
+        """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise.
 
         Parameters
         ----------
-        blocks : (M, r, r) their inner products.
-        seen : (M, r, b + g) theirs with the data and with what is granted.
+        amplitudes : (M, a) to try.
+        blocks : (k, M, r, r) their inner products.
+        seen : (M, r, k, b + g) theirs with the data and with what is granted.
         """
-        shown = seen[:, :, : len(beside.squares)]
-        if seen.shape[2] > len(beside.squares):
-            hidden = seen[:, :, len(beside.squares) :]
-            blocks = blocks - hidden @ hidden.transpose(0, 2, 1)
-        strengths, turn = (blocks[:, 0], None) if group.r == 1 else np.linalg.eigh(blocks)
-        strengths = np.maximum(strengths, 1e-300)
-        if turn is not None:
-            shown = turn.transpose(0, 2, 1) @ shown
-        ratio = group.amplitudes[:, :, None] ** 2 * strengths[:, None, :]  # (M, a, r)
-        taken = group.amplitudes[:, :, None] ** 2 / (1 + ratio)
-        found = np.empty((len(group.start), AMPLITUDES, shown.shape[2]))
-        block = max(1, _BLOCK // (AMPLITUDES * shown.shape[2]))
-        for begin in range(0, len(found), block):
-            part = slice(begin, begin + block)
-            squares = beside.squares - taken[part] @ shown[part] ** 2
-            found[part] = self.over_sigma(squares)
-        found += beside.log - 0.5 * np.log1p(ratio).sum(axis=2)[..., None]
-        return found
+        b = known.squares.shape[1]
+        by_kind = seen.transpose(2, 0, 1, 3)
+        shown, hidden = by_kind[..., :b], by_kind[..., b:]
+        if hidden.shape[3]:
+            blocks = blocks - hidden @ hidden.swapaxes(2, 3)
+        if blocks.shape[3] == 1:
+            strengths = blocks[..., 0]
+        else:
+            strengths, turn = np.linalg.eigh(blocks)
+            shown = turn.swapaxes(2, 3) @ shown
+        variance = (amplitudes**2)[:, :, None]
+        ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
+        squares = known.squares[:, None, None, :] - (variance / (1 + ratio)) @ shown**2
+        log = self.over_sigma(squares)
+        log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
+        return np.asarray(np.logaddexp.reduce(log, axis=0), dtype=np.float64)
 
-    def _beside(self, data: Floats | None, granted: Sequence[Version]) -> list[_Beside]:
+    def _beside(self, data: Floats | None, granted: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is granted."""
         plain = self.left[:, None] if data is None else data
-        columns = [version.amplitude * self._columns(version) for version in granted]
-        taken = np.hstack(columns) if granted else None
-        found = []
-        for index, noise in enumerate(self._noises):
-            weighed = self._left_weighed[index] if data is None else noise(data)
-            squares = np.einsum("mb,mb->b", plain, weighed)
-            if taken is None:
-                found.append(_Beside(weighed, squares, noise.log))
-                continue
-            other = np.hstack([v.amplitude * self._weighed_columns(v)[index] for v in granted])
+        weighed = self._left_weighed if data is None else self._by_noise(data)
+        squares = np.einsum("mb,kmb->kb", plain, weighed)
+        log = np.array([noise.log for noise in self._noises])
+        if granted:
+            taken = np.hstack([version.amplitude * self._columns(version) for version in granted])
+            other = np.concatenate([v.amplitude * self._weighed_columns(v) for v in granted], axis=2)
             factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ other)
-            rows = np.linalg.solve(factor, other.T)
+            rows = np.linalg.solve(factor, other.swapaxes(1, 2))
             seen = rows @ plain
-            log = noise.log - _log_diagonal(factor)
-            found.append(_Beside(np.hstack([weighed - rows.T @ seen, rows.T]), squares - np.sum(seen**2, axis=0), log))
-        return found
+            log = log - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+            squares = squares - np.sum(seen**2, axis=1)
+            weighed = np.concatenate([weighed - rows.swapaxes(1, 2) @ seen, rows.swapaxes(1, 2)], axis=2)
+        return _Beside(weighed.transpose(1, 0, 2).reshape(len(plain), -1), squares, log)
 
     def _columns(self, version: Version) -> Floats:
         return self._stack[0][:, self._where[version.explanation, version.member]]
 
-    def _weighed_columns(self, version: Version) -> list[Floats]:
+    def _weighed_columns(self, version: Version) -> Floats:
         key = version.explanation, version.member
         if key not in self._weighed:
-            self._weighed[key] = [noise(self._columns(version)) for noise in self._noises]
+            self._weighed[key] = self._by_noise(self._columns(version))
         return self._weighed[key]
 
 
@@ -428,14 +430,14 @@ def _log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """Data beside what is granted, under one kind of noise.
+    """Data beside what is granted, under each of k kinds of noise.
 
-    ``seen_by`` (m, b + g): Σ⁻¹·data and the rows of what is granted, side by side; ``squares`` (b,) dataᵀ·Σ⁻¹·data; ``log``
-    probability of this noise less that of its determinant.
+    ``seen_by`` (m, k·(b + g)): of each kind Σ⁻¹·data and the rows of what is granted, side by side; ``squares`` (k, b)
+    dataᵀ·Σ⁻¹·data; ``log`` (k,) probability of the noise less that of its determinant.
 
     With Σ = N + C·Cᵀ and rows = chol(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
     """
 
     seen_by: Floats
     squares: Floats
-    log: float
+    log: Floats

@@ -41,7 +41,10 @@ _FURTHER = 0.1
 
 _SPACE_LENGTHS = (0.5, 0.25)
 _SPACE_PLACES, _SPACE_RANK = 120, 40
-_MOST_STEPS = 64
+_MOST_STEPS = 40
+_SUDDEN = ("time_s", "row")
+"""Covariates of an observation at which an error may jump."""
+
 _MOST_PERIODS = 240
 _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 _KEPT = 1e-3
@@ -218,7 +221,8 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
     points = model.artefact.points.at(model.placed(values))
     found = [*_of_readings(model, points, values), *_of_place(model, points, values), *_of_time(model, points, values)]
     for name, covariate in covariates(model).items():
-        members = tuple(Member(f, weight=weight, values=f) for f, weight in _functions(covariate))
+        functions = _functions(covariate) if name in _SUDDEN else ((f, 1.0) for f in _smooth_functions(covariate))
+        members = tuple(Member(f, weight=weight, values=f) for f, weight in functions)
         found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, name))
     return found
 
@@ -257,7 +261,7 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
         half = 0.5 * float(np.ptp(readings))
         if half < 1.0:
             continue
-        lever = ((readings - readings.mean()) / half)[:, None]
+        lever = (readings / half)[:, None]
         members = tuple(
             Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in _functions(time)
         )
@@ -295,8 +299,8 @@ def mean_of(model: MeasurementModel, values: Floats) -> Floats:
 
 def _functions(covariate: Floats) -> Iterator[tuple[Floats, float]]:
     """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps."""
-    for factor in _smooth(covariate):
-        yield _UNKNOWN_SD * factor, 1.0
+    for function in _smooth_functions(covariate):
+        yield function, 1.0
     distinct = np.unique(covariate)
     gaps = np.diff(distinct)
     parts = np.array_split(np.arange(len(gaps)), min(len(gaps), _MOST_STEPS))
@@ -306,8 +310,8 @@ def _functions(covariate: Floats) -> Iterator[tuple[Floats, float]]:
         yield _UNKNOWN_SD * np.where(covariate > place, 1.0, -1.0)[:, None], 1 / len(chosen)
 
 
-def _smooth(covariate: Floats) -> Iterator[Floats]:
-    """Factors (n, r) of squared-exponential covariances over a covariate (Karhunen–Loève on a grid, Nyström beyond)."""
+def _smooth_functions(covariate: Floats) -> Iterator[Floats]:
+    """Factors (n, r), mm, of squared-exponential covariances over a covariate (Karhunen–Loève on a grid, Nyström beyond)."""
     low, span = float(covariate.min()), float(np.ptp(covariate))
     place = (covariate - low) / span
     grid = np.linspace(0, 1, _GRID)
@@ -316,7 +320,7 @@ def _smooth(covariate: Floats) -> Iterator[Floats]:
         eigenvalues, vectors = linalg.eigh(kernel)
         keep = eigenvalues > _KEPT * eigenvalues[-1]
         cross = np.exp(-0.5 * ((place[:, None] - grid[None, :]) / length) ** 2)
-        yield cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
+        yield _UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
 
 
 def _smooth_in_space(readings: Floats) -> Iterator[Floats]:
