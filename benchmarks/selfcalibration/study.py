@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from collections import defaultdict
 
@@ -107,6 +108,22 @@ def study(machines: int, estimated: int, seed: int) -> dict[str, object]:
                 whole[name].append(bool(np.all(away <= curve.simultaneous_factor * curve.u[1:])))
             for method, e in found.items():
                 left[name][method].append(float(np.ptp(e - true)))
+                if index < estimated and method != "joint":
+                    left[name][f"{method}, where joint"].append(float(np.ptp(e - true)))
+        if (index + 1) % 25 == 0 and index < estimated:
+            print(
+                json.dumps(summed(index + 1, index + 1, seed, left, inside, whole, seconds)),
+                file=sys.stderr,
+                flush=True,
+            )
+    return summed(machines, estimated, seed, left, inside, whole, seconds)
+
+
+def summed(
+    machines: int, estimated: int, seed: int, left: dict[str, dict[str, list[float]]], inside: dict[str, list[Floats]],
+    whole: dict[str, list[bool]], seconds: list[float],
+) -> dict[str, object]:  # fmt: skip
+    """Medians and coverage of what has been done so far."""
     return {
         "machines": machines, "estimated": estimated, "seed": seed,
         "median_residual_um": {

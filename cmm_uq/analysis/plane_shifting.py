@@ -7,9 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.analysis.shifting import check_facts
+from cmm_uq.analysis.shifting import check_facts, check_known, known_points
 from cmm_uq.conformity.quantity import Quantity
-from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job, KnownLength
 from cmm_uq.physics.error_map import ErrorMap
@@ -20,9 +19,6 @@ from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
 from cmm_uq.selfcalibration.placed_plate import PlacedPlate, placed_plate
 from cmm_uq.selfcalibration.plane import PlaneEstimate, estimate_plane
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
-
-_MISREAD = 0.02
-"""Part of a known length by which the readings may differ from it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,15 +107,6 @@ def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) 
 
 
 def _known(given: KnownLength, plate: PlacedPlate) -> KnownSpan:
-    where = "job.toml [artefact] known"
-    index = {int(number): i for i, number in enumerate(plate.numbers)}
-    for number in (given.from_point, given.to_point):
-        if number not in index:
-            raise CmmUqError(f"there is no ball {number}", where=where,
-                             fix=f"Balls are {plate.numbers[0]} to {plate.numbers[-1]}")  # fmt: skip
-    first, last = index[given.from_point], index[given.to_point]
-    measured = float(np.linalg.norm(plate.balls[last] - plate.balls[first]))
-    if abs(measured - given.length_mm) > _MISREAD * given.length_mm:
-        raise CmmUqError(f"balls {given.from_point} and {given.to_point} read {measured:.6g} mm apart, not "
-                         f"{given.length_mm:g} mm", where=where, fix="Mend the length or the points")  # fmt: skip
+    first, last = known_points(given, plate.numbers)
+    check_known(given, float(np.linalg.norm(plate.balls[last] - plate.balls[first])))
     return KnownSpan(first, last, given.length_mm, given.u_um * MICROMETRE)

@@ -12,7 +12,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job, KnownLength
 from cmm_uq.physics.error_map import ErrorMap
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 from cmm_uq.selfcalibration.correction_table import correction_table
 from cmm_uq.selfcalibration.curve import Curve, CurveEstimate, estimate_curve
 from cmm_uq.selfcalibration.integration_uncertainty import IntegratedCurve, KnownSpan, integrated
@@ -22,7 +22,10 @@ from cmm_uq.selfcalibration.undetermined import Undetermined, undetermined
 from cmm_uq.units import MICROMETRE, PPM
 
 KIND = "shift"
+KNOWN = "job.toml [artefact] known"
 _FINE = 101
+_MISREAD = 0.02
+"""Part of a known length by which the readings may differ from it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,21 +156,41 @@ def check_facts(job: Job) -> None:
                          fix="Take the series out of the recording and its shift out of shifts_mm")  # fmt: skip
 
 
-def _known(given: KnownLength, series: ShiftedSeries) -> KnownSpan:
-    where = "job.toml [artefact] known"
-    index = {int(number): i for i, number in enumerate(series.numbers)}
+def known_points(given: KnownLength, numbers: Ints) -> tuple[int, int]:
+    """Indices into ``numbers`` of the two points of a known length.
+
+    Raises
+    ------
+    CmmUqError : a point that was not read, or the same twice.
+    """
+    index = {int(number): i for i, number in enumerate(numbers)}
     for number in (given.from_point, given.to_point):
         if number not in index:
-            raise CmmUqError(f"there is no point {number}", where=where,
-                             fix=f"Points are {series.numbers[0]} to {series.numbers[-1]}")  # fmt: skip
-    first, last = index[given.from_point], index[given.to_point]
-    if first == last:
-        raise CmmUqError(f"from and to are both point {given.from_point}", where=where, fix="Name two points")
+            raise CmmUqError(
+                f"there is no point {number}", where=KNOWN, fix=f"Points are {numbers[0]} to {numbers[-1]}"
+            )
+    if given.from_point == given.to_point:
+        raise CmmUqError(f"from and to are both point {given.from_point}", where=KNOWN, fix="Name two points")
+    return index[given.from_point], index[given.to_point]
+
+
+def check_known(given: KnownLength, measured: float) -> None:
+    """Refuse a known length that the readings contradict grossly.
+
+    Raises
+    ------
+    CmmUqError : with what was read, mm.
+    """
+    if abs(measured - given.length_mm) > _MISREAD * given.length_mm:
+        raise CmmUqError(f"points {given.from_point} and {given.to_point} read {measured:.6g} mm apart, not "
+                         f"{given.length_mm:g} mm", where=KNOWN, fix="Mend the length or the points")  # fmt: skip
+
+
+def _known(given: KnownLength, series: ShiftedSeries) -> KnownSpan:
+    first, last = known_points(given, series.numbers)
     mean = [float(np.mean((series.reading - series.shifts[series.series])[series.point == i])) for i in (first, last)]
     measured = mean[1] - mean[0]
-    if abs(abs(measured) - given.length_mm) > 0.02 * given.length_mm:
-        raise CmmUqError(f"points {given.from_point} and {given.to_point} read {abs(measured):.6g} mm apart, not "
-                         f"{given.length_mm:g} mm", where=where, fix="Mend the length or the points")  # fmt: skip
+    check_known(given, abs(measured))
     return KnownSpan(first, last, float(np.copysign(given.length_mm, measured)), given.u_um * MICROMETRE)
 
 

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.ensembles import Chains, Progress
 from cmm_uq.points import AXES, Floats
 from cmm_uq.selfcalibration.curve import Curve
@@ -21,6 +22,8 @@ from cmm_uq.selfcalibration.plane_undetermined import FreeInPlane, free_in_plane
 from cmm_uq.selfcalibration.smooth_model import Coefficients, sampled
 
 _FINE = 41
+_LEAST_LEFT = 6
+"""Coordinates beyond balls and placings that must be left to tell of the machine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +166,14 @@ def estimate_plane(
     sigma : standard uncertainty of one coordinate of one reading, mm; from repeats and residuals when left out.
     seed : of everything random.
     progress : told the part of the sampling done.
+
+    Raises
+    ------
+    CmmUqError : too few readings.
     """
     model = plane_model(plate, known, chain, sigma)
+    if (left := len(model.smooth.observed) - model.smooth.flat.shape[1]) < _LEAST_LEFT:
+        raise CmmUqError(f"{len(plate.ball)} readings of {len(plate.numbers)} balls leave {left} coordinates to compare",
+                         fix="Read more balls in each placing, or one more placing")  # fmt: skip
     coefficients, chains = sampled(model.smooth, seed, progress)
     return PlaneEstimate(plate, known, model, coefficients, chains, free_in_plane(plate, model), seed)

@@ -30,8 +30,6 @@ SCALE_SD, SQUARENESS_SD = 300 * PPM, 500 * ARCSECOND
 _TYPICAL, _TYPICAL_ROTATION = 5 * MICROMETRE, 5 * ARCSECOND
 _SHORTEST = 1 / 8
 """Shortest correlation length as a part of the range."""
-_GROWTH_BOUNDS = 0.5, 8.0
-"""Ends that are quieter than the middle by more than this look all the same: a plateau that only costs sampling."""
 _ROUNDS = 4
 _MICRO_PRIOR = 1e-3
 """Noise over prior in the start's least squares, mm."""
@@ -88,9 +86,7 @@ def plane_model(plate: PlacedPlate, known: KnownSpan | None, chain: str, sigma: 
         change = found[: placings.shape[1]].reshape(-1, 3)
         moved, turned = moved + np.vstack([np.zeros(2), change[:, :2]]), turned + np.r_[0.0, change[:, 2]]
         balls = balls + (held + tied @ found[placings.shape[1] : flat.shape[1]]).reshape(-1, 2)
-    smooth = SmoothModel(
-        observed, noise, flat, columns, sd, functions, None if sigma else plate.scatter, sigma, _GROWTH_BOUNDS
-    )
+    smooth = SmoothModel(observed, noise, flat, columns, sd, functions, None if sigma else plate.scatter, sigma)
     return PlaneModel(smooth, balls + held.reshape(-1, 2), tied, turning, lever, column)
 
 

@@ -30,7 +30,9 @@ _AMPLITUDE_BOUNDS = (1e-4, 1e2)
 _LENGTH, _LENGTH_SPREAD = 0.2, 0.6
 """Median correlation length as a part of the range, and the standard deviation of its logarithm: five hills or so."""
 _GROWTH_SPREAD = 1.5
-"""Standard deviation of the logarithm of the ends' size over the middle's: 1/7 to 7."""
+"""Standard deviation of the logarithm of the ends' size over the middle's."""
+_GROWTH_BOUNDS = 0.5, 8.0
+"""Ends that are quieter than the middle by more than this look all the same: a plateau on which chains would get stuck."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,6 @@ class SmoothModel:
     functions : at least one.
     scatter : of repeats, where σ is to be estimated from them too.
     sigma : standard uncertainty of one reading, mm; ``None`` when it is to be estimated.
-    growth_bounds : least and largest size of the ends over the middle's.
     """
 
     observed: Floats
@@ -70,7 +71,6 @@ class SmoothModel:
     functions: tuple[SmoothFunction, ...]
     scatter: Scatter | None
     sigma: float | None
-    growth_bounds: tuple[float, float] = (1 / 30, 30.0)
 
     @property
     def dimension(self) -> int:
@@ -110,8 +110,8 @@ class SmoothModel:
 
     def _bounds(self) -> tuple[Floats, Floats]:
         shortest = max(f.shortest / f.range for f in self.functions)
-        low = [*[_AMPLITUDE_BOUNDS[0]] * len(self.functions), min(shortest, LONGEST / 2), self.growth_bounds[0]]
-        high = [*[_AMPLITUDE_BOUNDS[1]] * len(self.functions), LONGEST, self.growth_bounds[1]]
+        low = [*[_AMPLITUDE_BOUNDS[0]] * len(self.functions), min(shortest, LONGEST / 2), _GROWTH_BOUNDS[0]]
+        high = [*[_AMPLITUDE_BOUNDS[1]] * len(self.functions), LONGEST, _GROWTH_BOUNDS[1]]
         if self.sigma is None:
             low, high = [*low, SIGMA_BOUNDS[0]], [*high, SIGMA_BOUNDS[1]]
         return np.log(low), np.log(high)

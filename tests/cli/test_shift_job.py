@@ -120,7 +120,7 @@ def rms_after_rigid_motion(found: np.ndarray, true: np.ndarray) -> float:
         (r'plane = "xy"', 'plane = "xy"\naxis = "x"', "leave out axis"),
         (r'plane = "xy"', 'plane = "xz"', "plane"),
         (r'plane = "xy"', 'plane = "yz"', "does not lie in the plane yz"),
-        (r"to = 25", "to = 26", "no ball 26"),
+        (r"to = 25", "to = 26", "no point 26"),
         (r"to = 25", "to = 5", "mm apart, not 565.688 mm"),
         (r"effects = \[\]", 'effects = ["scale_x"]', "not by effects"),
     ],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.physics.compensation import compensate_points, machine_compensation
 from cmm_uq.physics.kinematics import first_order
 from cmm_uq.physics.map_interpolation import ErrorMaps
@@ -143,6 +144,14 @@ def test_shifted_along_x_alone_an_arc_with_its_yaw_looks_like_turned_placings() 
 
 def test_shifted_along_both_axes_the_arc_is_seen() -> None:
     assert not {"straightness_x_y", "rotation_x_z", "linearity_y", "straightness_y_x"} & free(SHIFTED).names
+
+
+def test_three_balls_in_two_placings_tell_nothing_of_the_machine() -> None:
+    """12 coordinates, less 6 of the balls and 3 of the second placing."""
+    points = read(none, "xy", "XYZ", SHIFTED[:2], balls=GRID[[0, 3, 12]])
+    with pytest.raises(CmmUqError, match="leave 3 coordinates to compare") as caught:
+        estimate_plane(placed_plate(points, "xy"))
+    assert "one more placing" in str(caught.value.fix)
 
 
 def test_shifts_along_an_axis_have_a_period_that_no_placing_shows_unless_one_is_turned() -> None:
