@@ -15,8 +15,8 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.points import Floats
 
-RANK_TOLERANCE = 1e-9
-"""Singular values below this part of the largest are zero: rounding alone leaves about 1e-13."""
+RANK_TOLERANCE = 1e-7
+"""Singular values below this part of the largest are zero: rounding leaves about 1e-13, fitted placings of spheres 1e-8."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,6 +57,17 @@ def test_a_ball_of_unknown_diameter_hides_the_error_of_the_stylus_radius() -> No
     assert combination == pytest.approx({"probe_radius": 1.0, "artefact": 2e-3}, rel=1e-9)
 
 
+@pytest.mark.parametrize("normals", [True, False])
+def test_a_ball_of_unknown_diameter_hides_the_three_scales_together(normals: bool) -> None:
+    """In noisy recordings too, where rounding and the fit of each place blur the null space."""
+    scales = ["scale_x", "scale_y", "scale_z"]
+    for seed in range(20):
+        points = indicated(UNKNOWN_BALL, spheres(normals=normals), scales, [10.0, -5.0, 20.0], sigma=1.5e-3, seed=seed)
+        (combination,) = free(estimated(UNKNOWN_BALL, points, scales))
+        assert [combination[name] for name in scales] == pytest.approx([1.0, 1.0, 1.0], abs=1e-3)
+        assert combination["artefact"] == pytest.approx(25e-6, rel=0.01)
+
+
 def test_a_certified_diameter_leaves_nothing_open() -> None:
     assert free(estimated(BALL, spheres(), ["probe_radius", "probe_lobing"])) == []
 
