@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg
 
 from cmm_uq.inference.ensembles import Chains, Progress, refined, run_ensembles
 from cmm_uq.inference.posterior import SIGMA_BOUNDS
@@ -136,6 +136,8 @@ class SmoothModel:
 
     def laplace(self) -> tuple[Floats, Floats]:
         """Mode (d,) and triangular factor (d, d) of the covariance about it."""
+        from scipy import optimize  # takes longer to import than most commands run
+
         start = self._coarse()
         found = optimize.minimize(self._value_and_slope, start, jac=True, method="L-BFGS-B", bounds=self._inner())
         centre = np.asarray(found.x, dtype=np.float64)
