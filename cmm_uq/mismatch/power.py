@@ -30,7 +30,7 @@ from cmm_uq.points import Floats
 
 POWER = 0.8
 
-SIZES = np.geomspace(3.0, 30.0, 4)
+SIZES = np.array([3.0, 3.7, 4.4, 5.1, 6.0, 7.5, 12.0, 30.0])
 """Sizes of an effect that are tried: its rms in all observations together, what is fitted projected out, over the noise."""
 
 _LARGER = np.array([1.0, 1.3])
@@ -106,7 +106,7 @@ def without_fault(facts: ArtefactFacts, model: MeasurementModel, sigma: float, s
 
 def powers(
     model: MeasurementModel, effects: Sequence[Effect], *, stated: float | None, sigma: float, alpha: float, seed: int,
-    draws: int = 24,
+    draws: int = 20,
 ) -> Iterator[Power]:  # fmt: skip
     """Power of the diagnosis of a model's recording, for effects that the model does not name.
 
