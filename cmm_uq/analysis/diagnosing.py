@@ -74,4 +74,4 @@ def diagnosed(
     stated = job.facts.recording.u_coordinate_um
     diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress)
     changes = consequences(job, diagnosis, seed)
-    return Diagnosed(job, findings, diagnosis, suggestions(diagnosis, job.facts.artefact), changes)
+    return Diagnosed(job, findings, diagnosis, suggestions(diagnosis, job.facts.artefact, job.facts.plan), changes)

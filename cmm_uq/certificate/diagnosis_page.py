@@ -157,23 +157,24 @@ def _consequences(found: Diagnosed) -> tuple[Block, ...]:
 
 def _where(found: Diagnosed) -> tuple[Block, ...]:
     rows = tuple(
-        (place.what, place.covariate, f"{place.region[0]:.4g} … {place.region[1]:.4g}", f"{place.amplitude_um:.2g}",
+        (place.what, place.covariate, f"{place.region[0]:.4g} … {place.region[1]:.4g}", f"{place.amplitude_um:.3g}",
          f"{place.p_value:.1g}")
         for place in found.diagnosis.where
     )  # fmt: skip
     if not rows:
         return ()
-    heads = (Column("Smooth function", numeric=False), Column("Covariate", numeric=False), Column("Region"),
+    heads = (Column("Unknown function", numeric=False), Column("Covariate", numeric=False), Column("Region"),
              Column("Amplitude", "µm"), Column("p"))  # fmt: skip
     first = found.diagnosis.where[0]
     x, y, u = first.curve
     plot = curve_with_band(
         x, y, 2 * u, x_label=first.covariate, y_label="Error / µm",
         caption=f"What the residuals show: {first.what}, with U (k = 2).",
-        alternative=f"A smooth function with a largest value of {first.amplitude_um:.2g} µm.",
+        alternative=f"A function with a largest value of {first.amplitude_um:.3g} µm.",
     )  # fmt: skip
     note = (
-        "p is corrected for having looked everywhere; the region is where the function exceeds half its largest value."
+        "p is corrected for having looked everywhere; the region is where the function exceeds half its largest value, or "
+        "between which values it jumps. What the job's own model would absorb is no part of the function."
     )
     return (plot, Table("Covariates on which the residuals depend", heads, rows, (note,)))
 

@@ -13,8 +13,8 @@ from cmm_uq.mismatch.search import Race, tail_probability
 from cmm_uq.points import Floats, Ints
 from cmm_uq.units import MICROMETRE
 
-_UNSEEN = 0.1
-"""Part of its length below which a constant or a line is taken to be the baseline's own."""
+_UNSEEN = 0.05
+"""Part of a constant or a line that must show in the observations; with less, nothing is known of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ def located(race: Race, alpha: float) -> tuple[Place, ...]:
 def _function(race: Race, version: Version, x: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Best linear estimate of an unknown function and its standard uncertainty, mm, each (p,).
 
-    A constant or a line that the baseline absorbs is no part of the function: nothing is known of it.
+    A constant or a line that no observation shows, or that the baseline absorbs, is no part of the function.
     """
     comparison, member = race.comparison, race.explanations[version.explanation].members[version.member]
     columns = member.columns / comparison.noise_scale[:, None]
@@ -77,8 +77,8 @@ def _function(race: Race, version: Version, x: Floats, values: Floats) -> tuple[
     covariance = np.linalg.inv(precision)
     lines = np.column_stack([np.ones_like(x), (x - x.mean()) / np.ptp(x)])
     among = np.linalg.lstsq(values, lines, rcond=None)[0]
-    unseen = np.linalg.norm(left @ among, axis=0) < _UNSEEN * np.linalg.norm(columns @ among, axis=0)
-    unseen |= np.linalg.norm(columns @ among, axis=0) == 0
+    shown = np.sqrt(np.mean((left @ among) ** 2, axis=0))
+    unseen = shown < _UNSEEN * np.sqrt(np.mean((values @ among) ** 2, axis=0))
     lines = lines[:, unseen]
     values = values - lines @ np.linalg.lstsq(lines, values, rcond=None)[0]
     estimate = values @ (covariance @ (left.T @ comparison.left)) / variance

@@ -24,7 +24,7 @@ from cmm_uq.measurement import MeasurementModel, Noise
 from cmm_uq.mismatch.combinations import Prior
 from cmm_uq.mismatch.evidence import Comparison
 from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN
-from cmm_uq.mismatch.search import DRAWS, NOT_TOLD_APART, _statistic, race_of
+from cmm_uq.mismatch.search import DRAWS, NOT_TOLD_APART, race_of, statistic_of
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 
@@ -190,7 +190,7 @@ class _Rule:
             draws[:, columns] = sizes[g] * comparison.noise(comparison.kinds[g], random, len(columns))
         found = []
         for larger in _LARGER:
-            statistic = _statistic(comparison, larger * draws)[0]
+            statistic = statistic_of(comparison, larger * draws)[0]
             start = float(np.quantile(statistic, 1 - _TAIL))
             beyond = float((statistic[statistic > start] - start).mean())
             found.append(start + beyond * float(np.log(_TAIL / self.alpha)))
@@ -234,7 +234,7 @@ class _Rule:
 
     def __call__(self, data: Floats, true: int) -> tuple[Floats, Floats]:
         """By how much the statistic (b,) passes the gate, and the true effect what would let others stand beside it."""
-        statistic, odds = _statistic(self.comparison, data)
+        statistic, odds = statistic_of(self.comparison, data)
         weight = odds + self._priors[:, None]
         kinds = np.array([explanation.kind for explanation in self.comparison.explanations])
         nothing = np.full((1, data.shape[1]), Prior(self.comparison.explanations).log([]))

@@ -296,13 +296,13 @@ def _gate(comparison: Comparison, seed: int) -> tuple[float, Floats]:
     for g in np.unique(chosen):
         columns = np.flatnonzero(chosen == g)
         draws[:, columns] = sizes[g] * comparison.noise(comparison.kinds[g], random, len(columns))
-    statistic, odds = _statistic(comparison, np.column_stack([comparison.left, draws]))
+    statistic, odds = statistic_of(comparison, np.column_stack([comparison.left, draws]))
     unknowns = [i for i, e in enumerate(comparison.explanations) if e.kind == UNKNOWN]
     maxima = odds[unknowns, 1:].max(axis=0) if unknowns else np.zeros(0)
     return tail_probability(statistic[1:], float(statistic[0])), maxima
 
 
-def _statistic(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
+def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
     """Log odds (b,) of something for data (m', b): one explanation, or the best known effect with any other.
 
     Also the log evidence (c, b) of each explanation over nothing.
