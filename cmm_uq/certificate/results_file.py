@@ -66,7 +66,8 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         ],
         "indistinguishable": [list(group) for group in d.indistinguishable],
         "suggested_measurements": [
-            {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions, "odds": s.odds} for s in found.suggestions
+            {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions, "odds": s.odds}
+            for s in found.suggestions
         ],
         "noise": {
             "stated_coordinate_um": found.job.facts.recording.u_coordinate_um,

@@ -104,7 +104,7 @@ class _Noise:
     the determinant.
     """
 
-    whitening: sparse.csr_array
+    whitening: sparse.csr_array | Floats
     rows: Floats
     log: float
 

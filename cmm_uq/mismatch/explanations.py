@@ -42,6 +42,11 @@ _FURTHER = 0.1
 _SPACE_LENGTHS = (0.5, 0.25)
 _SPACE_PLACES, _SPACE_RANK = 120, 40
 _MOST_STEPS = 40
+_MANY_DIRECTIONS, _SEEN = 12, 1e-6
+
+_PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")
+"""Beginnings of columns that belong to a point's place, or have functions of their own."""
+
 _SUDDEN = ("time_s", "row")
 """Covariates of an observation at which an error may jump."""
 
@@ -220,6 +225,7 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
     """
     points = model.artefact.points.at(model.placed(values))
     found = [*_of_readings(model, points, values), *_of_place(model, points, values), *_of_time(model, points, values)]
+    found += [*_of_direction(model), *_of_all_scales(model, points, values)]
     for name, covariate in covariates(model).items():
         functions = _functions(covariate) if name in _SUDDEN else ((f, 1.0) for f in _smooth_functions(covariate))
         members = tuple(Member(f, weight=weight, values=f) for f, weight in functions)
@@ -268,6 +274,35 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
         yield Explanation(f"scale of {axis.upper()} as a function of time", UNKNOWN, members, time, "time_s")
 
 
+def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:
+    """Anything of the direction in which points were probed, where there are many."""
+    among = directions(model)
+    if len(np.unique(np.round(among, 3), axis=0)) >= _MANY_DIRECTIONS:
+        members = tuple(Member(factor) for factor in _smooth_in_space(among))
+        yield Explanation("error as a function of the probing direction", UNKNOWN, members)
+
+
+def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """One scale of all axes as a function of each further column."""
+    lever = points.readings / (0.5 * float(np.ptp(points.readings, axis=0).max()))
+    for name, column in points.columns.items():
+        if name.startswith(_PLACED) or len(np.unique(column)) < 3:
+            continue
+        members = tuple(
+            Member(model.seen(lever[:, :, None] * f[:, None, :], values), values=f) for f in _smooth_functions(column)
+        )
+        yield Explanation(f"scale of all axes as a function of {name}", UNKNOWN, members, column, name)
+
+
+def directions(model: MeasurementModel) -> Floats:
+    """Unit vectors (m, 3) along which used observations see a point move; zero where they see differences of points."""
+    points = model.artefact.points
+    values = model.estimate().least_squares.value
+    seen = model.seen(np.broadcast_to(np.eye(3), (len(points), 3, 3)), values)
+    length = np.linalg.norm(seen, axis=1, keepdims=True)
+    return np.where(length > _SEEN, seen / np.maximum(length, _SEEN), 0.0)
+
+
 def _along(axis: int, factor: Floats) -> Floats:
     displacement = np.zeros((len(factor), 3, factor.shape[1]))
     displacement[:, axis] = factor
@@ -290,11 +325,8 @@ def covariates(model: MeasurementModel) -> dict[str, Floats]:
 
 
 def mean_of(model: MeasurementModel, values: Floats) -> Floats:
-    """Mean of a column (n,) over the points of each used observation's (measurement, repeat), (m,)."""
-    points, artefact = model.artefact.points, model.artefact
-    means = points.group_means(values)
-    key = {(m, r): mean for m, r, mean in zip(points.measurement, points.repeat, means, strict=True)}
-    return np.array([key[m, r] for m, r in zip(artefact.measurement, artefact.repeat, strict=True)])[model.used]
+    """Mean of a column (n,) over the points of each used observation, (m,)."""
+    return np.asarray(values[model.artefact.rows].mean(axis=1)[model.used], dtype=np.float64)
 
 
 def _functions(covariate: Floats) -> Iterator[tuple[Floats, float]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse, special
+from scipy import linalg, sparse, special
 
 from cmm_uq.points import Floats, Ints
 
@@ -20,6 +20,9 @@ CORRELATIONS = (0.5, 0.85)
 
 WHITE = 0.8
 """Probability, beforehand, that noise is white; the rest is shared by the other kinds."""
+
+_FEW = 0.25
+"""Part of the observations; with fewer distinct directions than that, correlation is reckoned within each of them."""
 
 TAILS = 0.05
 """Probability of heavy tails, taken from that of white noise."""
@@ -41,7 +44,7 @@ class Kind:
     ----------
     name : ``white``, ``placing``, ``correlated`` or ``tails``.
     size : ratio of the placing's standard deviation to the reading's, or correlation of neighbours; 0 for white.
-    whitening : (m, m) sparse W; W times such noise, over the standard deviation of a reading, is white.
+    whitening : (m, m) W, sparse where it can be; W times such noise, over the standard deviation of a reading, is white.
     log_whitening : logarithm of its determinant.
     probability : beforehand.
     log_factor : logarithm by which its density exceeds that of a normal distribution with this covariance.
@@ -49,7 +52,7 @@ class Kind:
 
     name: str
     size: float
-    whitening: sparse.csr_array
+    whitening: sparse.csr_array | Floats
     log_whitening: float
     probability: float
     log_factor: float = 0.0
@@ -60,6 +63,8 @@ class Kind:
 
     def noise(self, normal: Floats) -> Floats:
         """Noise (m, b) of this kind from standard normal numbers."""
+        if isinstance(self.whitening, np.ndarray):
+            return np.asarray(linalg.solve_triangular(self.whitening, normal, lower=True), dtype=np.float64)
         return np.asarray(sparse.linalg.splu(self.whitening.tocsc()).solve(normal), dtype=np.float64)
 
 
@@ -80,14 +85,14 @@ def tails(residual: Floats) -> Kind:
     return Kind("tails", _TAILS_DOF, whitening, log_whitening, TAILS, float(np.sum(log_t - normal)))
 
 
-def kinds(placing: Ints, order: Floats, direction: Ints) -> list[Kind]:
+def kinds(placing: Ints, order: Floats, directions: Floats) -> list[Kind]:
     """Kinds of noise that a recording could show.
 
     Parameters
     ----------
     placing : (m,) observations with the same number share an offset: repeats of one quantity in one placing.
     order : (m,) time, or place in the recording, of each observation.
-    direction : (m,) noise that is correlated in time is so among observations with the same number only.
+    directions : (m, 3) along which each observation sees the noise of a point; zero where it sees a difference of points.
     """
     m = len(placing)
     _, place, repeats = np.unique(placing, return_inverse=True, return_counts=True)
@@ -96,8 +101,11 @@ def kinds(placing: Ints, order: Floats, direction: Ints) -> list[Kind]:
     found = [Kind("white", 0.0, sparse.eye_array(m, format="csr"), 0.0, WHITE - TAILS)]
     if shared:
         found += [_shared(ratio, place, repeats, share) for ratio in PLACING_RATIOS]
-    sequence = np.lexsort((order, direction))
-    return found + [_correlated(phi, sequence, direction[sequence], share) for phi in CORRELATIONS]
+    distinct, chain = np.unique(np.round(directions, 3), axis=0, return_inverse=True)
+    if len(distinct) > _FEW * m and directions.any(axis=1).all():
+        return found + [_correlated_along(phi, order, directions, share) for phi in CORRELATIONS]
+    sequence = np.lexsort((order, chain.ravel()))
+    return found + [_correlated(phi, sequence, chain.ravel()[sequence], share) for phi in CORRELATIONS]
 
 
 def _shared(ratio: float, place: Ints, repeats: Ints, probability: float) -> Kind:
@@ -118,6 +126,16 @@ def _correlated(phi: float, sequence: Ints, chain: Ints, probability: float) -> 
     rows, columns = np.append(sequence, sequence[follows]), np.append(sequence, sequence[np.flatnonzero(follows) - 1])
     whitening = sparse.csr_array((np.append(diagonal, below), (rows, columns)), shape=(m, m))
     return Kind("correlated", phi, whitening, float(np.log(diagonal).sum()), probability)
+
+
+def _correlated_along(phi: float, order: Floats, directions: Floats, probability: float) -> Kind:
+    """First-order autoregression of each coordinate, seen along directions that all differ."""
+    rank = np.argsort(np.argsort(order, kind="stable"), kind="stable")  # without ties: equal times would be singular
+    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    covariance = phi ** np.abs(rank[:, None] - rank) * (unit @ unit.T)
+    factor = linalg.cholesky(covariance, lower=True)
+    whitening = np.asarray(linalg.solve_triangular(factor, np.eye(len(rank)), lower=True), dtype=np.float64)
+    return Kind("correlated", phi, whitening, -float(np.log(np.diag(factor)).sum()), probability)
 
 
 def sigma_grid(stated: float | None, residual: float) -> tuple[Floats, Floats]:

@@ -22,6 +22,7 @@ from cmm_uq.mismatch.explanations import (
     SEVERAL,
     UNKNOWN,
     Explanation,
+    directions,
     finer,
     known,
     mean_of,
@@ -235,7 +236,7 @@ def noise_kinds(model: MeasurementModel) -> list[Kind]:
     order = order_of(None if time is None else mean_of(model, time), int(model.used.sum()))
     least_squares, linear = model.estimate().least_squares, model.estimate().linear
     return [
-        *kinds(repeated_quantity(model), order, _direction(model)[model.used]),
+        *kinds(repeated_quantity(model), order, directions(model)),
         tails(least_squares.residuals / linear.noise_scale),
     ]
 

@@ -15,5 +15,5 @@ def rest(c: Comparison) -> Floats:
 
 def covariance(kind: Kind) -> Floats:
     """(m, m) over the variance of a reading."""
-    whitening = kind.whitening.toarray()
+    whitening = kind.white(np.eye(kind.whitening.shape[0]))
     return np.asarray(linalg.inv(whitening.T @ whitening))

@@ -26,7 +26,7 @@ def rivals(random: np.random.Generator, effects: int = 8) -> list[Explanation]:
 
 
 def comparison(observed: Floats, explanations: list[Explanation]) -> Comparison:
-    noise = kinds(np.repeat(np.arange(M // 2), 2), np.arange(M, dtype=np.float64), np.zeros(M, dtype=np.int64))
+    noise = kinds(np.repeat(np.arange(M // 2), 2), np.arange(M, dtype=np.float64), np.zeros((M, 3)))
     sigma, log_sigma = sigma_grid(0.01, 0.02)
     return Comparison(observed, np.ones((M, 1)), noise, sigma, log_sigma, explanations, np.full(M, np.sqrt(2)), 0.01)
 

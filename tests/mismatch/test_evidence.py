@@ -21,7 +21,7 @@ def comparison(seed: int = 1) -> Comparison:
         Explanation("one column", EFFECT, (Member(random.standard_normal((m, 1))),)),
         Explanation("two versions", EFFECT, tuple(Member(0.3 * random.standard_normal((m, 3))) for _ in range(2))),
     ]
-    noise = kinds(np.repeat(np.arange(7), 2), np.arange(m, dtype=np.float64), np.zeros(m, dtype=np.int64))
+    noise = kinds(np.repeat(np.arange(7), 2), np.arange(m, dtype=np.float64), np.zeros((m, 3)))
     sigma, log_sigma = sigma_grid(None, 0.02)
     observed, baseline = 0.05 * random.standard_normal(m), random.standard_normal((m, 2))
     return Comparison(observed, baseline, noise, sigma, log_sigma, rivals, np.full(m, 1.4), 0.01)
@@ -115,16 +115,29 @@ def test_the_evidence_of_heavy_tails_is_below_that_of_student_s_t_and_meets_it_a
 
 
 def test_placings_are_a_kind_of_noise_only_where_they_are_repeated() -> None:
-    alone = {kind.name for kind in kinds(np.arange(6), np.arange(6.0), np.zeros(6, dtype=np.int64))}
+    alone = {kind.name for kind in kinds(np.arange(6), np.arange(6.0), np.zeros((6, 3)))}
     assert alone == {"white", "correlated"}
-    repeated = kinds(np.repeat([1, 2], 3), np.arange(6.0), np.array([0, 1] * 3))
+    repeated = kinds(np.repeat([1, 2], 4), np.arange(8.0), np.eye(3)[[0, 1] * 4])
     (half,) = [kind for kind in repeated if kind.name == "placing" and kind.size == 0.5]
-    assert covariance(half) == pytest.approx(np.eye(6) + 0.25 * np.kron(np.eye(2), np.ones((3, 3))), abs=1e-12)
+    assert covariance(half) == pytest.approx(np.eye(8) + 0.25 * np.kron(np.eye(2), np.ones((4, 4))), abs=1e-12)
     (near, _) = [kind for kind in repeated if kind.name == "correlated"]
-    apart = np.abs(np.subtract.outer(np.arange(6), np.arange(6)))
-    alike = np.equal.outer(np.arange(6) % 2, np.arange(6) % 2)
+    apart = np.abs(np.subtract.outer(np.arange(8), np.arange(8)))
+    alike = np.equal.outer(np.arange(8) % 2, np.arange(8) % 2)
     assert covariance(near) == pytest.approx(np.where(alike, 0.5 ** (apart / 2), 0.0), abs=1e-12)
     for kind in repeated:
         assert kind.log_whitening == pytest.approx(-0.5 * np.linalg.slogdet(covariance(kind))[1], abs=1e-12)
-    heavy = tails(np.arange(1.0, 7.0))
+    heavy = tails(np.arange(1.0, 9.0))
     assert sum(kind.probability for kind in [*repeated, heavy]) == pytest.approx(1.0)
+
+
+def test_correlated_coordinates_seen_along_many_directions_are_correlated_as_these_are() -> None:
+    random = np.random.default_rng(2)
+    n = random.standard_normal((10, 3))
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    *_, near, far = kinds(np.arange(10), np.arange(10.0), 2.0 * n)
+    coordinates = 0.5 ** np.abs(np.subtract.outer(np.arange(10), np.arange(10)))
+    wanted = np.einsum("ia,ij,ja->ij", n, coordinates, n)
+    assert covariance(near) == pytest.approx(wanted, abs=1e-12)
+    drawn = far.noise(random.standard_normal((10, 40_000)))
+    assert np.cov(drawn) == pytest.approx(covariance(far), abs=5 * np.sqrt(2 / 40_000))
+    assert near.log_whitening == pytest.approx(-0.5 * np.linalg.slogdet(wanted)[1], abs=1e-12)
