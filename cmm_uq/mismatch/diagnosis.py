@@ -107,7 +107,7 @@ def diagnose(
     stated = None if stated_um is None else stated_um * MICROMETRE
     found = search(model, stated, alpha=alpha, seed=seed)
     gain = improvement(model, found.model)
-    if found.effects and gain.elpd_gain <= 0:
+    if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
         found = replace(found, last=found.first.comparison, model=model, chosen=frozenset(), unexplained=1.0)
         gain = improvement(model, model)
     noise = _noise(found.last, stated)

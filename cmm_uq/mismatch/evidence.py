@@ -21,79 +21,10 @@ from scipy import linalg, sparse, special
 
 from cmm_uq.mismatch.explanations import Explanation
 from cmm_uq.mismatch.noise import Kind
-from cmm_uq.points import Floats, Ints
-
-AMPLITUDES = 7
-_SMALLEST = 0.4
-"""Smallest rms of an explanation that is considered, over the noise."""
-
-_ABSORBED = 1e-5
-"""Part of its length below which a column is the baseline's own."""
+from cmm_uq.mismatch.stack import AMPLITUDES, Group, Version, stacked
+from cmm_uq.points import Floats
 
 _BLOCK, _COLUMNS = 1_500_000, 500
-
-
-@dataclass(frozen=True)
-class Version:
-    """One version of an explanation at one size.
-
-    Parameters
-    ----------
-    explanation, member : which.
-    amplitude : standard deviation of its coefficients, in units of the noise.
-    """
-
-    explanation: int
-    member: int
-    amplitude: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Group:
-    """Members with the same number of columns, r.
-
-    ``explanation``, ``member`` (M,) say which; ``weight`` (M,) is the log probability of each within its explanation;
-    ``start`` (M,) the first of its columns in the stack; ``amplitudes`` (M, a) the sizes to try.
-    """
-
-    explanation: Ints
-    member: Ints
-    weight: Floats
-    start: Ints
-    amplitudes: Floats
-    r: int
-
-    def columns(self, stack: Floats) -> Floats:
-        """Their columns (m, M·r), one after the other."""
-        return stack[:, int(self.start[0]) : int(self.start[-1]) + self.r]
-
-    @cached_property
-    def first(self) -> Ints:
-        """Where each explanation's members begin; they follow one another."""
-        return np.flatnonzero(np.diff(self.explanation, prepend=-1))
-
-    def part(self, among: Container[int] | None) -> slice:
-        """Members from the first to the last of some explanations; all by default."""
-        if among is None:
-            return slice(None)
-        chosen = [k for k, i in enumerate(self.explanation[self.first].tolist()) if i in among]
-        if not chosen:
-            return slice(0, 0)
-        ends = np.append(self.first[1:], len(self.explanation))
-        return slice(int(self.first[chosen[0]]), int(ends[chosen[-1]]))
-
-    def only(self, part: slice) -> _Group:
-        """The group of some members."""
-        if part == slice(None):
-            return self
-        return _Group(
-            self.explanation[part],
-            self.member[part],
-            self.weight[part],
-            self.start[part],
-            self.amplitudes[part],
-            self.r,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,36 +95,8 @@ class Comparison:
         return int(len(self.observed) - self._reached.shape[1])
 
     @cached_property
-    def _stack(self) -> tuple[Floats, tuple[_Group, ...]]:
-        """Columns (m, K) that the baseline leaves of all members, those with equally many together."""
-        found: dict[int, list[tuple[int, int, float, Floats]]] = {}
-        whole = [
-            (owner, j, np.log(member.weight / total), member.columns / self.noise_scale[:, None])
-            for owner, explanation in enumerate(self.explanations)
-            for total in [sum(member.weight for member in explanation.members)]
-            for j, member in enumerate(explanation.members)
-        ]
-        lefts = np.split(
-            self.rest(np.hstack([columns for *_, columns in whole])),
-            np.cumsum([columns.shape[1] for *_, columns in whole])[:-1], axis=1,
-        ) if whole else []  # fmt: skip
-        for (owner, j, log, columns), left in zip(whole, lefts, strict=True):
-            if linalg.norm(left) > _ABSORBED * linalg.norm(columns):
-                found.setdefault(columns.shape[1], []).append((owner, j, log, left))
-        groups, stack, start = [], [np.zeros((len(self.observed), 0))], 0
-        for r in sorted(found):
-            chosen = found[r]
-            rms = np.array([linalg.norm(left) for *_, left in chosen]) / np.sqrt(max(self.degrees_of_freedom, 1))
-            largest = 1 / self.least_noise
-            smallest = np.minimum(_SMALLEST / rms, largest)
-            amplitudes = largest * (smallest / largest)[:, None] ** np.linspace(0, 1, AMPLITUDES)
-            explanation, member = (np.array([item[k] for item in chosen], dtype=np.int64) for k in (0, 1))
-            weight = np.array([item[2] for item in chosen])
-            starts = start + r * np.arange(len(chosen))
-            groups.append(_Group(explanation, member, weight, starts, amplitudes, r))
-            stack += [left for *_, left in chosen]
-            start += r * len(chosen)
-        return np.hstack(stack), tuple(groups)
+    def _stack(self) -> tuple[Floats, tuple[Group, ...]]:
+        return stacked(self.explanations, self.rest, self.noise_scale, self.least_noise, self.degrees_of_freedom)
 
     @cached_property
     def _where(self) -> dict[tuple[int, int], slice]:
@@ -353,7 +256,7 @@ class Comparison:
 
     def each(
         self, data: Floats | None, granted: Sequence[Version], among: Container[int] | None = None
-    ) -> Iterator[tuple[_Group, Floats]]:
+    ) -> Iterator[tuple[Group, Floats]]:
         """Log evidence (M, a, b) of members at every size beside what is granted, by groups; ``among`` are wanted at least."""
         stack, groups = self._stack
         known = self._beside(data, granted)

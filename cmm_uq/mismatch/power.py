@@ -24,7 +24,8 @@ from cmm_uq.measurement import MeasurementModel, Noise
 from cmm_uq.mismatch.combinations import Prior
 from cmm_uq.mismatch.evidence import Comparison
 from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN
-from cmm_uq.mismatch.search import DRAWS, NOT_TOLD_APART, race_of, statistic_of
+from cmm_uq.mismatch.gate import DRAWS, statistic_of
+from cmm_uq.mismatch.search import NOT_TOLD_APART, race_of
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 

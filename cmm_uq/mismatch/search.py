@@ -8,38 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.measurement import MeasurementModel
-from cmm_uq.mismatch.combinations import EFFECTS, Combinations, Key, explore
-from cmm_uq.mismatch.evidence import Comparison, Version
-from cmm_uq.mismatch.explanations import (
-    EFFECT,
-    SEVERAL,
-    UNKNOWN,
-    Explanation,
-    directions,
-    finer,
-    known,
-    mean_of,
-    several,
-    unknown,
-)
-from cmm_uq.mismatch.noise import Kind, kinds, order_of, sigma_grid, tails
+from cmm_uq.mismatch.combinations import Combinations, Key, explore
+from cmm_uq.mismatch.evidence import Comparison
+from cmm_uq.mismatch.explanations import Explanation, finer, known, several
+from cmm_uq.mismatch.gate import NOTHING, gate, log_prior
+from cmm_uq.mismatch.noise import sigma_grid
+from cmm_uq.mismatch.recorded_noise import noise_kinds
+from cmm_uq.mismatch.stack import Version
+from cmm_uq.mismatch.unknown_functions import unknown
 from cmm_uq.physics.catalogue import EVERY
-from cmm_uq.points import Floats, Ints
+from cmm_uq.points import Floats
 
-SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}
-"""Probability, beforehand, of one effect of the catalogue, of several, and of the unknown; the rest is for nothing missing."""
-
-NOTHING = 1 - sum(SHARES.values())
-
-DRAWS = 200
-_TAIL = 0.8
 _MISFIT = 20.0
 """Largest misfit, over the noise, that is reckoned with when the noise is not stated."""
 
@@ -197,10 +182,10 @@ def race_of(model: MeasurementModel, stated: float | None, seed: int) -> Race:
     comparison = comparison_of(model, stated, rivals)
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]
-    log_prior = _log_prior(rivals)
-    log_total = special.logsumexp(np.append(log_prior + log_odds, np.log(NOTHING)))
-    p_value, maxima = _gate(comparison, seed)
-    return Race(model, values, comparison, log_odds, np.exp(log_prior + log_odds - log_total), p_value, maxima)
+    prior = log_prior(rivals)
+    log_total = special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
+    p_value, maxima = gate(comparison, seed)
+    return Race(model, values, comparison, log_odds, np.exp(prior + log_odds - log_total), p_value, maxima)
 
 
 def comparison_of(model: MeasurementModel, stated: float | None, rivals: Sequence[Explanation]) -> Comparison:
@@ -230,42 +215,6 @@ def _with(race: Race, versions: Sequence[Version], chosen: Key) -> MeasurementMo
     return replace(race.model, effects=(*race.model.effects, *added), shapes=shapes)
 
 
-def noise_kinds(model: MeasurementModel) -> list[Kind]:
-    """Kinds of noise of the used observations."""
-    time = model.artefact.points.columns.get("time_s")
-    order = order_of(None if time is None else mean_of(model, time), int(model.used.sum()))
-    least_squares, linear = model.estimate().least_squares, model.estimate().linear
-    return [
-        *kinds(repeated_quantity(model), order, directions(model)),
-        tails(least_squares.residuals / linear.noise_scale),
-    ]
-
-
-def repeated_quantity(model: MeasurementModel) -> Ints:
-    """Numbers (m,) that used observations share when they repeat one quantity: one point, or pair, of one placing."""
-    artefact = model.artefact
-    key = np.column_stack([artefact.measurement, _points_of(model), _direction(model)])
-    _, number = np.unique(key, axis=0, return_inverse=True)
-    return np.asarray(number.ravel()[model.used], dtype=np.int64)
-
-
-def _points_of(model: MeasurementModel) -> Ints:
-    return np.sort(model.artefact.points.point[model.artefact.rows], axis=1)
-
-
-def _direction(model: MeasurementModel) -> Ints:
-    """Which of the observations of one reading each is (m,): the coordinates of a point are observations of their own."""
-    artefact = model.artefact
-    key = np.column_stack([artefact.measurement, artefact.repeat, _points_of(model)])
-    _, reading = np.unique(key, axis=0, return_inverse=True)
-    order = np.argsort(reading.ravel(), kind="stable")
-    first = np.concatenate([[True], np.diff(reading.ravel()[order]) > 0])
-    place = np.arange(len(order))
-    direction = np.empty_like(place)
-    direction[order] = place - np.maximum.accumulate(np.where(first, place, 0))
-    return direction
-
-
 def _certified(model: MeasurementModel, sigma: float) -> Floats:
     """What the certificates of sizes leave open (m, c), for one standard deviation, in units of this noise."""
     artefact = model.artefact
@@ -278,62 +227,3 @@ def _certified(model: MeasurementModel, sigma: float) -> Floats:
 def _held(model: MeasurementModel) -> NDArray[np.bool_]:
     """Which parameters of the linear model are sizes with a certificate; all others may take any value."""
     return np.array([unknown.known for unknown in model.unknowns], dtype=bool)
-
-
-def _log_prior(rivals: Sequence[Explanation]) -> Floats:
-    total = dict.fromkeys(SHARES, 0.0)
-    for e in rivals:
-        total[e.kind] += e.weight
-    return np.log([SHARES[e.kind] * e.weight / total[e.kind] for e in rivals])
-
-
-def _gate(comparison: Comparison, seed: int) -> tuple[float, Floats]:
-    """Probability, under nothing, of as much evidence for something; and the unknown functions' largest under nothing."""
-    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
-    draws = np.empty((len(comparison.left), DRAWS))
-    sizes = comparison.sigma[comparison.noise_posterior().argmax(axis=1)]
-    probability = np.array([kind.probability for kind in comparison.kinds])
-    chosen = random.choice(len(sizes), DRAWS, p=probability / probability.sum())
-    for g in np.unique(chosen):
-        columns = np.flatnonzero(chosen == g)
-        draws[:, columns] = sizes[g] * comparison.noise(comparison.kinds[g], random, len(columns))
-    statistic, odds = statistic_of(comparison, np.column_stack([comparison.left, draws]))
-    unknowns = [i for i, e in enumerate(comparison.explanations) if e.kind == UNKNOWN]
-    maxima = odds[unknowns, 1:].max(axis=0) if unknowns else np.zeros(0)
-    return tail_probability(statistic[1:], float(statistic[0])), maxima
-
-
-def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
-    """Log odds (b,) of something for data (m', b): one explanation, or the best known effect with any other.
-
-    Also the log evidence (c, b) of each explanation over nothing.
-    """
-    nothing, something = comparison.log_evidence(data)
-    odds = something - nothing
-    log_odds = special.logsumexp(_log_prior(comparison.explanations)[:, None] + odds, axis=0)
-    single = [
-        i
-        for i, e in enumerate(comparison.explanations)
-        if e.kind == EFFECT and e.weight == 1 and not e.shaped and i in comparison.visible
-    ]
-    if len(single) < 2:
-        return log_odds, odds
-    pair = np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(len(single), 2)) + np.log(NOTHING)
-    together: dict[Version, list[int]] = {}
-    for column, version in enumerate(comparison.best(data, single)):
-        together.setdefault(version, []).append(column)
-    for version, columns in together.items():
-        alone, both = comparison.log_evidence(data[:, columns], [version], single)
-        others = [i for i in single if i != version.explanation]
-        gain = special.logsumexp(both[others], axis=0) - alone + odds[version.explanation, columns]
-        log_odds[columns] = np.logaddexp(log_odds[columns], pair + gain)
-    return log_odds, odds
-
-
-def tail_probability(draws: Floats, value: float) -> float:
-    """Probability of reaching a value, from draws; beyond their upper fifth with an exponential tail."""
-    start = float(np.quantile(draws, _TAIL))
-    if value <= start:
-        return float((np.sum(draws >= value) + 1) / (len(draws) + 1))
-    beyond = draws[draws > start] - start
-    return float((1 - _TAIL) * np.exp(-(value - start) / beyond.mean()))

@@ -10,9 +10,10 @@ import pytest
 from scipy import special, stats
 
 from cmm_uq.mismatch.combinations import EFFECTS, UNKNOWNS, Prior, explore, log_evidence_together
-from cmm_uq.mismatch.evidence import AMPLITUDES, Comparison, Version
+from cmm_uq.mismatch.evidence import Comparison
 from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.mismatch.noise import kinds, sigma_grid
+from cmm_uq.mismatch.stack import AMPLITUDES, Version
 from cmm_uq.points import Floats
 from tests.mismatch.dense_noise import covariance, rest
 

@@ -8,8 +8,8 @@ from scipy import special, stats
 
 from cmm_uq.mismatch.evidence import Comparison
 from cmm_uq.mismatch.explanations import EFFECT, Explanation, Member
+from cmm_uq.mismatch.gate import tail_probability
 from cmm_uq.mismatch.noise import kinds, sigma_grid, tails
-from cmm_uq.mismatch.search import tail_probability
 from cmm_uq.points import Floats
 from tests.mismatch.dense_noise import covariance, rest
 

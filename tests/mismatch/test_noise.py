@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.analysis.diagnosing import screened_model
 from cmm_uq.jobs.reading import read_job
-from cmm_uq.mismatch.search import repeated_quantity
+from cmm_uq.mismatch.recorded_noise import repeated_quantity
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
