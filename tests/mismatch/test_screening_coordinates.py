@@ -339,8 +339,12 @@ def test_what_the_job_sets_aside_already_does_not_count_as_damage(ballbar_points
     xyz[rows] += [11.0, 23.0, 31.0]
     aside = np.unique(ballbar_points.measurement[rows]).tolist()
     found = screened(ballbar_points.at(xyz), bar_facts(), needed=set(), set_aside=aside, where="bar.csv")
-    assert set(found.points.measurement).isdisjoint(aside)
-    assert len(found.points) == 80 - 2 * len(aside)
+    # what a bar shows of a displaced ball is its length: less than 2.5 mm of 400 mm could be a machine's error
+    longer = np.abs(np.linalg.norm(xyz[1::2] - xyz[::2], axis=1) - 400.0)
+    damaged = ballbar_points.measurement[::2][longer > 2.5]
+    assert set(damaged) <= set(aside)
+    assert len(damaged) >= 13
+    assert set(found.points.measurement) == set(ballbar_points.measurement) - set(damaged)
 
 
 def test_the_recording_of_another_bar_is_refused_in_the_words_of_the_bar(ballbar_points: Points) -> None:
