@@ -1,4 +1,4 @@
-"""Diagnose concealed cases and count: ``python benchmarks/concealed/study.py FOLDER [--cases 13] [--summary DOCS]``.
+"""Diagnose concealed cases and count: ``python benchmarks/concealed/study.py FOLDER [--cases 13] [--seed 0] [--summary DOCS]``.
 
 The cases are made first and their truth is sealed by a hash. Every diagnosis is appended to ``FOLDER/found*.jsonl``, so that a
 run can be interrupted and resumed, or shared among processes (``--part``); ``--summary`` counts what is there.
@@ -19,7 +19,7 @@ from rich.progress import track
 from cmm_uq.analysis.diagnosing import diagnose_job
 
 
-def make(folder: Path, cases: int) -> list[dict]:
+def make(folder: Path, cases: int, seed: int) -> list[dict]:
     """All cases, by the folder's name; made once."""
     sealed = folder / "truth.json"
     if not sealed.exists():
@@ -29,7 +29,7 @@ def make(folder: Path, cases: int) -> list[dict]:
                 for i in range(cases):
                     name = f"{d}-{k}-{i}"
                     try:
-                        truths.append({"name": name, **case(d * 10**6 + k * 10**4 + i, what, kind, folder / name)})
+                        truths.append({"name": name, **case(seed * 10**8 + d * 10**6 + k * 10**4 + i, what, kind, folder / name)})
                     except RuntimeError:
                         break  # this artefact has nothing of the kind to hide
         sealed.write_text(json.dumps(truths), encoding="utf-8")
@@ -118,12 +118,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--cases", type=int, default=13, help="of each kind and artefact")
+    parser.add_argument("--seed", type=int, default=0, help="of the cases")
     parser.add_argument("--part", default="1/1", help="which part of how many, to share the work among processes")
     parser.add_argument("--only", help="kinds that contain this word")
     parser.add_argument("--summary", nargs="?", const="", help="count, and write page and plots into this folder")
     chosen = parser.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
-    truths = make(chosen.folder, chosen.cases)
+    truths = make(chosen.folder, chosen.cases, chosen.seed)
     if chosen.summary is None:
         part, of = map(int, chosen.part.split("/"))
         run(chosen.folder, truths, (part, of), chosen.only)
