@@ -1,4 +1,4 @@
-"""Diagnose concealed cases and count: ``python benchmarks/concealed/study.py FOLDER [--cases 13] [--seed 0] [--summary DOCS]``.
+"""Diagnose concealed cases and count: ``python benchmarks/concealed/study.py FOLDER [--cases 13] [--seed 0] [--summary D]``.
 
 The cases are made first and their truth is sealed by a hash. Every diagnosis is appended to ``FOLDER/found*.jsonl``, so that a
 run can be interrupted and resumed, or shared among processes (``--part``); ``--summary`` counts what is there.
@@ -27,9 +27,9 @@ def make(folder: Path, cases: int, seed: int) -> list[dict]:
         for d, what in enumerate(DESIGNS):
             for k, kind in enumerate(SIGNALS + NOTHING):
                 for i in range(cases):
-                    name = f"{d}-{k}-{i}"
+                    name, number = f"{d}-{k}-{i}", seed * 10**8 + d * 10**6 + k * 10**4 + i
                     try:
-                        truths.append({"name": name, **case(seed * 10**8 + d * 10**6 + k * 10**4 + i, what, kind, folder / name)})
+                        truths.append({"name": name, **case(number, what, kind, folder / name)})
                     except RuntimeError:
                         break  # this artefact has nothing of the kind to hide
         sealed.write_text(json.dumps(truths), encoding="utf-8")
