@@ -8,10 +8,8 @@ same bytes.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
+from written_job import write
 
 from cmm_uq.points import Floats
 
@@ -73,12 +71,5 @@ def recording() -> str:
     return "\n".join(lines) + "\n"
 
 
-def write(folder: Path) -> None:
-    place = folder / "shift-simulated"
-    place.mkdir(parents=True, exist_ok=True)
-    (place / "job.toml").write_text(TOML, encoding="utf-8")
-    (place / "recording.csv").write_text(recording(), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    write(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[2] / "examples")
+    write("shift-simulated", TOML, recording())
