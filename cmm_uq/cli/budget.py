@@ -8,13 +8,15 @@ from typing import Annotated
 
 import typer
 
+from cmm_uq.cli.options import Json, Quiet
+
 
 def command(
     file: Annotated[Path, typer.Argument(help="Measurement model: outputs, inputs, correlations, in TOML.")],
     out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<name of the file>]")] = None,
     seed: Annotated[int | None, typer.Option(help="Instead of the file's seed.", min=0)] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print results.json instead of the summary.")] = False,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
     from cmm_uq.budgeting import write_budget

@@ -7,12 +7,14 @@ from typing import Annotated
 
 import typer
 
+from cmm_uq.cli.options import Quiet
+
 
 def command(
     job: Annotated[Path, typer.Argument(help="Job folder with [machine] error_map.")],
     out: Annotated[Path, typer.Option(help="Folder for the compensated job.")],
     extrapolate: Annotated[bool, typer.Option(help="Extrapolate beyond the maps, and flag those points.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Correct a recording by its machine's error maps, as a job folder of its own."""
     from cmm_uq.compensating import write_compensated

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmm_uq.cli.options import Json, Out, Quiet, Seed
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -16,13 +17,11 @@ if TYPE_CHECKING:
 
 def command(
     job: Annotated[Path, typer.Argument(help="Job folder: job.toml and the recording that it names.")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>]")] = None,
-    seed: Annotated[
-        int, typer.Option(help="Seed of everything random; the same seed gives the same bytes.", min=0)
-    ] = 0,
+    out: Out = None,
+    seed: Seed = 0,
     alpha: Annotated[float, typer.Option(help="Rate of false alarms.")] = 0.01,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print results.json instead of the summary.")] = False,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
     with shown(quiet=quiet or json) as stage:

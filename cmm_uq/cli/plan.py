@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmm_uq.cli.options import Json, Out, Quiet
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -17,13 +18,13 @@ if TYPE_CHECKING:
 
 def command(
     job: Annotated[Path, typer.Argument(help="Job folder; its recording may still be missing.")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>]")] = None,
+    out: Out = None,
     power: Annotated[
         bool, typer.Option(help="Predict how large an effect must be for the diagnosis to find it.")
     ] = True,
     seed: Annotated[int, typer.Option(help="Seed of the recordings drawn for that.", min=0)] = 0,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print results.json instead of the summary.")] = False,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with shown(quiet=quiet or json) as stage:

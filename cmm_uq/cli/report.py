@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmm_uq.cli.options import Json, Out, Quiet, Seed
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -16,12 +17,10 @@ if TYPE_CHECKING:
 
 def command(
     job: Annotated[Path, typer.Argument(help="Job folder: job.toml and the recording that it names.")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>]")] = None,
-    seed: Annotated[
-        int, typer.Option(help="Seed of everything random; the same seed gives the same bytes.", min=0)
-    ] = 0,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print results.json instead of the summary.")] = False,
+    out: Out = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
     with shown(quiet=quiet or json) as stage:

@@ -7,13 +7,15 @@ from typing import Annotated
 
 import typer
 
+from cmm_uq.cli.options import Quiet
+
 
 def command(
     job: Annotated[Path, typer.Argument(help="Job folder whose recording gives the placings.")],
     truth: Annotated[Path, typer.Option(help="TOML file with the effects, the noise and the seed.")],
     out: Annotated[Path, typer.Option(help="Folder for the simulated job.")],
     seed: Annotated[int | None, typer.Option(help="Instead of the seed in the truth.", min=0)] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Draw a recording from the same model that report fits, as a job folder of its own."""
     from cmm_uq.simulation import write_simulation
