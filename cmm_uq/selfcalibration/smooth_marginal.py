@@ -8,6 +8,7 @@ Few observations: factor their covariance. Fewer coefficients than observations:
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +21,7 @@ BATCH = 250
 
 
 @dataclass(frozen=True, eq=False)
-class Marginal:
+class Marginal(ABC):
     """Observations, whitened and freed of all of which nothing is known beforehand.
 
     Parameters
@@ -45,14 +46,14 @@ class Marginal:
         some = [slice(i, i + BATCH) for i in range(0, len(sd), BATCH)]
         return np.asarray(rest + np.concatenate([self._log_density(sd[s], growth[s], sigma[s]) for s in some]))
 
-    def _log_density(self, sd: Floats, growth: Floats, sigma: Floats) -> Floats:
-        raise NotImplementedError
+    @abstractmethod
+    def _log_density(self, sd: Floats, growth: Floats, sigma: Floats) -> Floats: ...
 
+    @abstractmethod
     def draw(
         self, sd: Floats, growth: Floats, sigma: Floats, random: np.random.Generator
     ) -> tuple[Floats, Floats]:  # fmt: skip
         """One draw of w (N, J) and x (N, c) for each parameter vector, from their exact conditional distribution."""
-        raise NotImplementedError
 
 
 class ByObservations(Marginal):
