@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from cmm_uq.certificate.document import Paragraph
+from tests.certificate.reading import number
 from tests.certificate.simulated import SQUARE, blocks, recovered, table
 
 WHAT = "What to turn and what to enter"
 SECOND_WAY = "The six factors by the distance equations, a second way"
-
-
-def number(text: str) -> float:
-    return float(text.replace("−", "-"))
 
 
 def test_the_real_machine_is_told_what_to_turn() -> None:

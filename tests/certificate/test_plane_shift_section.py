@@ -16,6 +16,7 @@ from cmm_uq.certificate.results_file import as_json
 from cmm_uq.certificate.summary import summary
 from cmm_uq.selfcalibration.placed_plate import placed_plate
 from cmm_uq.selfcalibration.plane import estimate_plane
+from tests.certificate.reading import number, tables
 from tests.conftest import ROOT
 
 EXAMPLE = ROOT / "examples" / "shift-plate-simulated"
@@ -46,14 +47,6 @@ def only_shifted(result: PlaneShiftResult) -> PlaneShiftResult:
     points = result.job.points
     plate = placed_plate(points.select(points.measurement <= 4), "xy")
     return PlaneShiftResult(result.job, estimate_plane(plate))
-
-
-def tables(document: Document) -> dict[str, Table]:
-    return {b.caption: b for section in document.sections for b in section.blocks if isinstance(b, Table)}
-
-
-def number(cell: str) -> float:
-    return float(cell.replace("−", "-"))
 
 
 def test_it_tells_what_was_read_and_what_was_found_in_this_order(document: Document) -> None:

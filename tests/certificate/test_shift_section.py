@@ -11,10 +11,11 @@ import pytest
 
 from cmm_uq.analysis import ShiftResult, analyse
 from cmm_uq.certificate.compose import certificate
-from cmm_uq.certificate.document import Document, Plot, Table
+from cmm_uq.certificate.document import Document, Plot
 from cmm_uq.certificate.results_file import as_json
 from cmm_uq.certificate.shift_results import shift_results
 from cmm_uq.certificate.summary import summary
+from tests.certificate.reading import number, tables
 from tests.conftest import ROOT
 
 EXAMPLE = ROOT / "examples" / "shift-simulated"
@@ -45,14 +46,6 @@ def two_placings(tmp_path_factory: pytest.TempPathFactory) -> ShiftResult:
     found = analyse(job)
     assert isinstance(found, ShiftResult)
     return found
-
-
-def tables(document: Document) -> dict[str, Table]:
-    return {b.caption: b for section in document.sections for b in section.blocks if isinstance(b, Table)}
-
-
-def number(cell: str) -> float:
-    return float(cell.replace("−", "-"))
 
 
 def test_it_tells_what_was_read_and_what_was_found_in_this_order(document: Document) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.certificate.document import Plot
+from tests.certificate.reading import number
 from tests.certificate.simulated import SCALE, SQUARE, blocks, recovered, table
 
 JOB = "triangle-simulated"
@@ -10,10 +11,6 @@ ROTATIONS = {
     "rotation_x_x": 4.0, "rotation_x_y": -3.0, "rotation_x_z": 2.0, "rotation_y_x": 1.5, "rotation_y_y": -2.5,
     "rotation_y_z": 3.0, "rotation_z_x": -4.0, "rotation_z_y": 2.0, "rotation_z_z": 5.0,
 }  # fmt: skip
-
-
-def number(text: str) -> float:
-    return float(text.replace("−", "-"))
 
 
 def test_the_errors_put_into_the_example_are_found() -> None:
