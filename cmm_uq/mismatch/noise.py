@@ -5,6 +5,7 @@ The noise model belongs to the baseline. Set-up offsets or slow drifts of the no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +22,8 @@ CORRELATIONS = (0.5, 0.85)
 WHITE = 0.8
 """Probability, beforehand, that noise is white; the rest is shared by the other kinds."""
 
-_FEW = 0.25
-"""Part of the observations; with fewer distinct directions than that, correlation is reckoned within each of them."""
+_FEW = 12
+"""Directions; of no more than that, correlation is reckoned within each of them: a point may be seen along several at once."""
 
 TAILS = 0.05
 """Probability of heavy tails, taken from that of white noise."""
@@ -85,7 +86,14 @@ def tails(residual: Floats) -> Kind:
     return Kind("tails", _TAILS_DOF, whitening, log_whitening, TAILS, float(np.sum(log_t - normal)))
 
 
-def kinds(placing: Ints, order: Floats, directions: Floats) -> list[Kind]:
+def kinds(
+    placing: Ints,
+    order: Floats,
+    directions: Floats,
+    *,
+    white: float = WHITE,
+    correlations: Sequence[float] = CORRELATIONS,
+) -> list[Kind]:
     """Kinds of noise that a recording could show.
 
     Parameters
@@ -93,19 +101,21 @@ def kinds(placing: Ints, order: Floats, directions: Floats) -> list[Kind]:
     placing : (m,) observations with the same number share an offset: repeats of one quantity in one placing.
     order : (m,) time, or place in the recording, of each observation.
     directions : (m, 3) along which each observation sees the noise of a point; zero where it sees a difference of points.
+    white : probability, beforehand, that it is white; the others share the rest.
+    correlations : of neighbours in time to consider.
     """
     m = len(placing)
     _, place, repeats = np.unique(placing, return_inverse=True, return_counts=True)
     shared = len(repeats) < m
-    share = (1 - WHITE) / (len(CORRELATIONS) + shared * len(PLACING_RATIOS))
-    found = [Kind("white", 0.0, sparse.eye_array(m, format="csr"), 0.0, WHITE - TAILS)]
+    share = (1 - white) / (len(correlations) + shared * len(PLACING_RATIOS))
+    found = [Kind("white", 0.0, sparse.eye_array(m, format="csr"), 0.0, white - TAILS)]
     if shared:
         found += [_shared(ratio, place, repeats, share) for ratio in PLACING_RATIOS]
     distinct, chain = np.unique(np.round(directions, 3), axis=0, return_inverse=True)
-    if len(distinct) > _FEW * m and directions.any(axis=1).all():
-        return found + [_correlated_along(phi, order, directions, share) for phi in CORRELATIONS]
+    if len(distinct) > _FEW and directions.any(axis=1).all():
+        return found + [_correlated_along(phi, order, directions, share) for phi in correlations]
     sequence = np.lexsort((order, chain.ravel()))
-    return found + [_correlated(phi, sequence, chain.ravel()[sequence], share) for phi in CORRELATIONS]
+    return found + [_correlated(phi, sequence, chain.ravel()[sequence], share) for phi in correlations]
 
 
 def _shared(ratio: float, place: Ints, repeats: Ints, probability: float) -> Kind:
