@@ -1,4 +1,4 @@
-"""Whether what was found predicts placings that the fit has not seen."""
+"""Whether what was found predicts placings, or points, that the fit has not seen."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ class Improvement:
     Parameters
     ----------
     rms_before_um, rms_after_um : residual rms of the observations.
-    heldout_rms_before_um, heldout_rms_after_um : of predictions of placings that were left out of the fit.
-    elpd_gain, elpd_gain_se : gain in expected log predictive density, and its standard error over the placings.
+    heldout_rms_before_um, heldout_rms_after_um : of predictions of what was left out of the fit.
+    elpd_gain, elpd_gain_se : gain in expected log predictive density, and its standard error over what was held out.
+    unseen : what was held out.
     """
 
     rms_before_um: float
@@ -33,30 +34,32 @@ class Improvement:
     heldout_rms_after_um: float
     elpd_gain: float
     elpd_gain_se: float
+    unseen: str = "placings"
 
 
 def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvement:
-    """Compare two models of one recording by cross-validation over its placings.
+    """Compare two models of one recording by cross-validation over its placings, or the points of few placings.
 
-    Repeats of a placing are left out together. The predictive density is normal, with the noise of each model's own fit.
+    Repeats are left out together. The predictive density is normal, with the noise of each model's own fit.
     """
+    groups, unseen = _groups(before)
     rms = [_rms(model.estimate().least_squares.residuals) for model in (before, after)]
     if before.effects == after.effects:
-        held = _held_out(before)[0]
-        return Improvement(rms[0], rms[1], held, held, 0.0, 0.0)
-    first, second = _held_out(before), _held_out(after)
+        held = _held_out(before, groups)[0]
+        return Improvement(rms[0], rms[1], held, held, 0.0, 0.0, unseen)
+    first, second = _held_out(before, groups), _held_out(after, groups)
     gain = second[1] - first[1]
     se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0
-    return Improvement(rms[0], rms[1], first[0], second[0], float(gain.sum()), se)
+    return Improvement(rms[0], rms[1], first[0], second[0], float(gain.sum()), se, unseen)
 
 
-def _held_out(model: MeasurementModel) -> tuple[float, Floats]:
-    """Rms of predictions, µm, and log predictive density of each placing."""
+def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float, Floats]:
+    """Rms of predictions, µm, and log predictive density of each fold."""
     estimate = model.estimate()
     linear = estimate.linear
     sigma = max(estimate.least_squares.sigma_of_residuals, 1e-7)
     errors, densities = [], []
-    for out in _folds(_groups(model)):
+    for out in _folds(groups):
         train = replace(
             linear, observed=linear.observed[~out], design=linear.design[~out], placing=linear.placing[~out],
             noise_scale=linear.noise_scale[~out], sigma=sigma,
@@ -78,12 +81,17 @@ def _held_out(model: MeasurementModel) -> tuple[float, Floats]:
     return _rms(np.concatenate(errors)), np.array(densities)
 
 
-def _groups(model: MeasurementModel) -> NDArray[np.int64]:
-    """What is left out together: placings; of a single placing its points, each with its repeats."""
+def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], str]:
+    """What is left out together, and what it is: placings; of few placings their points. Each with its repeats.
+
+    Without one of a few placings the rest would often determine nothing: a gauge on seven lines has one along Y.
+    """
     artefact, used = model.artefact, model.used
-    if len(np.unique(artefact.measurement[used])) > 1:
-        return artefact.measurement[used]
-    return artefact.points.point[artefact.rows[:, 0]][used]
+    placing = artefact.measurement[used]
+    if len(np.unique(placing)) >= FOLDS:
+        return placing, "placings"
+    key = np.column_stack([placing, artefact.points.point[artefact.rows[:, 0]][used]])
+    return np.unique(key, axis=0, return_inverse=True)[1].ravel(), "points"
 
 
 def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:

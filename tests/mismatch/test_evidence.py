@@ -132,12 +132,12 @@ def test_placings_are_a_kind_of_noise_only_where_they_are_repeated() -> None:
 
 def test_correlated_coordinates_seen_along_many_directions_are_correlated_as_these_are() -> None:
     random = np.random.default_rng(2)
-    n = random.standard_normal((10, 3))
+    n = random.standard_normal((20, 3))
     n /= np.linalg.norm(n, axis=1, keepdims=True)
-    *_, near, far = kinds(np.arange(10), np.arange(10.0), 2.0 * n)
-    coordinates = 0.5 ** np.abs(np.subtract.outer(np.arange(10), np.arange(10)))
+    *_, near, far = kinds(np.arange(20), np.arange(20.0), 2.0 * n)
+    coordinates = 0.5 ** np.abs(np.subtract.outer(np.arange(20), np.arange(20)))
     wanted = np.einsum("ia,ij,ja->ij", n, coordinates, n)
     assert covariance(near) == pytest.approx(wanted, abs=1e-12)
-    drawn = far.noise(random.standard_normal((10, 40_000)))
+    drawn = far.noise(random.standard_normal((20, 40_000)))
     assert np.cov(drawn) == pytest.approx(covariance(far), abs=5 * np.sqrt(2 / 40_000))
     assert near.log_whitening == pytest.approx(-0.5 * np.linalg.slogdet(wanted)[1], abs=1e-12)
