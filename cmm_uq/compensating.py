@@ -7,11 +7,12 @@ import re
 from pathlib import Path
 
 from cmm_uq import __version__
+from cmm_uq.analysis.error_maps import maps_of
+from cmm_uq.analysis.refusals import refuse
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.job import SHIFT, Job
 from cmm_uq.jobs.reading import read_job, sha256
 from cmm_uq.physics.compensation import compensate_points, machine_compensation
-from cmm_uq.physics.error_map import parse_error_map
 from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.points import Points
 from cmm_uq.simulation import recording
@@ -30,15 +31,8 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
     ------
     CmmUqError : the job has no error map, or it does not serve these points.
     """
-    machine = job.facts.machine
-    if not machine.error_map:
-        raise CmmUqError("the job has no error map", where="job.toml [machine] error_map",
-                         fix='Name it: error_map = [ { file = "map.csv", temperature_c = 20.0 } ]')  # fmt: skip
-    maps = []
-    for given in machine.error_map:
-        found = parse_error_map(job.inputs[given.file], str(job.folder / given.file), temperature=given.temperature_c)
-        square = machine.squareness_arcsec
-        maps.append(found.with_squareness_arcsec(square.xy, square.yz, square.zx) if square else found)
+    maps = maps_of(job)
+    refuse(job, "compensated", but=SHIFT)
     compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
     try:
         return compensate_points(job.points, compensation), compensation.provenance()

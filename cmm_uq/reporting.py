@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.analysis import PlaneShiftResult, Result, ShiftResult, analyse
-from cmm_uq.analysis.diagnosing import diagnose_job
+from cmm_uq.analysis.diagnosing import diagnose_folder
+from cmm_uq.analysis.error_maps import MapsDiagnosed
 from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
 from cmm_uq.writing import staging, write_whole
@@ -67,7 +68,7 @@ def write_report(job: Path, out: Path | None = None, *, seed: int = 0, stage: St
 class WrittenDiagnosis:
     """A written diagnosis: what was found, contents of results.json, and what was written, by name."""
 
-    diagnosed: Diagnosed
+    diagnosed: Diagnosed | MapsDiagnosed
     results: bytes
     files: dict[str, Path]
 
@@ -93,19 +94,27 @@ def write_diagnosis(
     with ExitStack() as stack:
         place = stack.enter_context(staging(out)) if out else None
         tell("Searching for what was left out", 0.0)
-        found = diagnose_job(job, seed=seed, alpha=alpha, progress=lambda part: tell("Sampling", 0.7 + 0.2 * part))
+        found = diagnose_folder(job, seed=seed, alpha=alpha, progress=lambda part: tell("Sampling", 0.7 + 0.2 * part))
         folder = out or Path("reports") / found.job.facts.job.id
         place = place or stack.enter_context(staging(folder))
         tell("Composing the page", 0.9)
-        from cmm_uq.certificate.diagnosis_page import diagnosis_document, diagnosis_results
-        from cmm_uq.certificate.html import render_html
-        from cmm_uq.certificate.results_file import as_json
-
-        data = as_json(diagnosis_results(found))
-        page = render_html(diagnosis_document(found)).encode()
-        files = write_whole(place, folder, {"diagnosis.html": page, "results.json": data})
+        contents = _diagnosis_contents(found, seed)
+        files = write_whole(place, folder, contents)
     tell("Done", 1.0)
-    return WrittenDiagnosis(found, data, files)
+    return WrittenDiagnosis(found, contents["results.json"], files)
+
+
+def _diagnosis_contents(found: Diagnosed | MapsDiagnosed, seed: int) -> dict[str, bytes]:
+    from cmm_uq.certificate.diagnosis_page import diagnosis_document, diagnosis_results
+    from cmm_uq.certificate.html import render_html
+    from cmm_uq.certificate.map_page import maps_document, maps_results
+    from cmm_uq.certificate.results_file import as_json
+
+    if isinstance(found, MapsDiagnosed):
+        data, document = maps_results(found, seed), maps_document(found, seed)
+    else:
+        data, document = diagnosis_results(found), diagnosis_document(found)
+    return {"diagnosis.html": render_html(document).encode(), "results.json": as_json(data)}
 
 
 def _contents(result: Result | ShiftResult | PlaneShiftResult, tell: Stage) -> dict[str, bytes]:

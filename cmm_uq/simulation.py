@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.shifting import refuse_shift
+from cmm_uq.analysis.refusals import refuse
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.errors import CmmUqError, suggestion
@@ -64,7 +64,7 @@ def write_simulation(job: Path, truth: Path, out: Path, *, seed: int | None = No
     CmmUqError : bad input, or a folder that cannot be written to or already holds another recording.
     """
     read = read_job(job)
-    refuse_shift(read, "simulated")
+    refuse(read, "simulated")
     content = content_of(truth, "It gives the effects, the noise and the seed")
     drawn = checked(content, truth, Truth)
     if out.resolve() == read.folder.resolve():

@@ -10,11 +10,12 @@ from pathlib import Path
 from cmm_uq.analysis.diagnosing import diagnosed, screened_model
 from cmm_uq.analysis.estimation import accuracy, influences, noise, parameters, sizes, with_noise
 from cmm_uq.analysis.plane_shifting import PlaneShiftResult, analyse_plane
+from cmm_uq.analysis.refusals import refuse
 from cmm_uq.analysis.result import Result
-from cmm_uq.analysis.shifting import KIND, ShiftResult, analyse_shift
+from cmm_uq.analysis.shifting import ShiftResult, analyse_shift
 from cmm_uq.conformity.standards import statement
 from cmm_uq.inference.posterior import Progress, sample
-from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.job import SHIFT, Job
 from cmm_uq.jobs.reading import read_job
 
 __all__ = ["PlaneShiftResult", "Result", "ShiftResult", "analyse", "analyse_observations"]
@@ -36,9 +37,10 @@ def analyse(
     CmmUqError : the job cannot be analysed as it stands.
     """
     job = read_job(folder)
+    refuse(job, "reported", but=SHIFT)
     if job.facts.artefact.plane is not None:
         return analyse_plane(job, seed=seed, progress=progress)
-    if job.facts.artefact.kind == KIND:
+    if job.facts.artefact.kind == SHIFT:
         return analyse_shift(job, seed=seed, progress=progress)
     return analyse_observations(job, seed=seed, progress=progress)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from cmm_uq.analysis.consequences import consequences
+from cmm_uq.analysis.error_maps import MapsDiagnosed, diagnose_error_maps
 from cmm_uq.analysis.estimation import model_of, without_outliers
+from cmm_uq.analysis.refusals import refuse
 from cmm_uq.analysis.result import Diagnosed
-from cmm_uq.analysis.shifting import refuse_shift
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
-from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.job import ERROR_MAP, Job
 from cmm_uq.jobs.reading import read_job
 from cmm_uq.measurement import MeasurementModel
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS, diagnose
@@ -20,10 +21,10 @@ from cmm_uq.mismatch.suggestion import suggestions
 from cmm_uq.physics.catalogue import effects
 
 
-def diagnose_job(
+def diagnose_folder(
     folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
-) -> Diagnosed:
-    """Diagnose a job.
+) -> Diagnosed | MapsDiagnosed:
+    """Diagnose a job: a recording of an artefact, or the machine's error maps.
 
     Parameters
     ----------
@@ -35,10 +36,32 @@ def diagnose_job(
     ------
     CmmUqError : the job cannot be diagnosed as it stands.
     """
+    job = _read(folder, alpha)
+    if job.facts.artefact.kind == ERROR_MAP:
+        return diagnose_error_maps(job, seed=seed, alpha=alpha, progress=progress)
+    return _diagnose(job, seed, alpha, progress)
+
+
+def diagnose_job(
+    folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
+) -> Diagnosed:
+    """Diagnose a recording of an artefact; see :func:`diagnose_folder`.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be diagnosed as it stands, or has no such recording.
+    """
+    return _diagnose(_read(folder, alpha), seed, alpha, progress)
+
+
+def _read(folder: Path, alpha: float) -> Job:
     if not 1e-6 <= alpha <= 0.5:
         raise CmmUqError(f"a false-alarm rate of {alpha:g}", fix="Give one between 0.000001 and 0.5; 0.01 is usual")
-    job = read_job(folder)
-    refuse_shift(job, "diagnosed")
+    return read_job(folder)
+
+
+def _diagnose(job: Job, seed: int, alpha: float, progress: Progress | None) -> Diagnosed:
+    refuse(job, "diagnosed as a recording of an artefact" if job.facts.artefact.kind == ERROR_MAP else "diagnosed")
     model, findings = screened_model(job)
     return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
 

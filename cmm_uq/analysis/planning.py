@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.analysis.shifting import KIND
+from cmm_uq.analysis.refusals import refuse
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.conformity.plan_conditions import Condition, conditions
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.job import SHIFT, Job
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
 from cmm_uq.mismatch.power import Power, powers, without_fault
 from cmm_uq.physics.effect import Effect
@@ -128,8 +128,9 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     """
     tell = progress or (lambda what, part: None)
     tell("Reading what the placings determine", 0.05)
+    refuse(job, "planned", but=SHIFT)
     setting = Setting.of(job)
-    if setting.artefact.kind == KIND:
+    if setting.artefact.kind == SHIFT:
         return _shift_plan(job, setting)
     name, placings, points = _start(job, setting)
     setting = setting.sized(points)

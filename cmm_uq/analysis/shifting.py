@@ -21,7 +21,6 @@ from cmm_uq.selfcalibration.shift_integration import Method
 from cmm_uq.selfcalibration.undetermined import Undetermined, undetermined
 from cmm_uq.units import MICROMETRE, PPM
 
-KIND = "shift"
 KNOWN = "job.toml [artefact] known"
 _FINE = 101
 _MISREAD = 0.02
@@ -119,18 +118,6 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
     return ShiftResult(
         job, estimate, undetermined(series, scale_known=estimate.scale_known), _integrated(series, estimate, known)
     )
-
-
-def refuse_shift(job: Job, what: str) -> None:
-    """A clear error where a shift job cannot be had.
-
-    Raises
-    ------
-    CmmUqError : the job is of this kind.
-    """
-    if job.facts.artefact.kind == KIND:
-        raise CmmUqError(f"a shift job cannot be {what}: its machine error is a free function, no list of effects",
-                         where="job.toml [artefact] kind", fix="cmm-uq report JOB estimates it")  # fmt: skip
 
 
 def check_facts(job: Job) -> None:

@@ -78,7 +78,7 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
 def _left_out(found: Diagnosed) -> tuple[Block, ...]:
     d = found.diagnosis
     blocks: list[Block] = [Paragraph(VERDICTS[d.verdict])]
-    blocks += [Paragraph(sentence(item, d)) for item in d.effects]
+    blocks += [Paragraph(sentence(item, d.improvement)) for item in d.effects]
     blocks += [
         Paragraph(f"This recording cannot tell apart: {', '.join(group)}.", tone="warning")
         for group in d.indistinguishable
@@ -103,13 +103,21 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
     )  # fmt: skip
     rows = (
         ("Residual rms", f"{gain.rms_before_um:.2f}", f"{gain.rms_after_um:.2f}", "µm"),
-        ("Rms on held-out placings", f"{gain.heldout_rms_before_um:.2f}", f"{gain.heldout_rms_after_um:.2f}", "µm"),
+        (
+            f"Rms on held-out {gain.unseen}",
+            f"{gain.heldout_rms_before_um:.2f}",
+            f"{gain.heldout_rms_after_um:.2f}",
+            "µm",
+        ),
         ("Gain in log predictive density", "", f"{gain.elpd_gain:.1f} ± {gain.elpd_gain_se:.1f}", ""),
     )
     heads = (Column("Quantity", numeric=False), Column("Before"), Column("After"), Column("Unit", numeric=False))
     changes = _changes(found)
     table = Table(
-        "Improvement", heads, rows, ("Placings are left out with all their repeats; ± is one standard error.",)
+        "Improvement",
+        heads,
+        rows,
+        (f"{gain.unseen.capitalize()} are left out with all their repeats; ± is one standard error.",),
     )
     return (plot, table, changes) if changes else (plot, table)
 

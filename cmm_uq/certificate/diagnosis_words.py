@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.mismatch.diagnosis import Diagnosis, LeftOut
+from cmm_uq.mismatch.held_out import Improvement
 
 CAUSES = {
     "scale": "the scale or its compensation: check the linear compensation of this axis",
@@ -30,27 +32,36 @@ VERDICTS = {
 }
 
 
+def lines(found: Diagnosed) -> list[str]:
+    """Verdict and everything that follows from it, a sentence or two each."""
+    d = found.diagnosis
+    told = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
+    told += [f"Cannot be told apart by this recording: {', '.join(group)}." for group in d.indistinguishable]
+    told += [f"To part {' and '.join(s.separates)}: {s.what}" for s in found.suggestions]
+    return told + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
+
+
 def cause_of(effect: str) -> str:
     """What a technician looks for."""
     fitting = [name for name in CAUSES if effect.startswith(name)]
     return CAUSES[max(fitting, key=len)] if fitting else ""
 
 
-def sentence(item: LeftOut, diagnosis: Diagnosis) -> str:
-    """One left-out effect: size, cause, and what it explains."""
+def sentence(item: LeftOut, gain: Improvement) -> str:
+    """One left-out effect: size, cause, what it explains, and what was held out says."""
     alone = len(item.parameters) == 1
-    sizes = [(name, *expanded(quantity), quantity) for name, quantity in item.parameters.items()]
+    parameters = {name: q.times(1e6, "10⁻⁶/K") if q.unit == "1/K" else q for name, q in item.parameters.items()}
+    sizes = [(name, *expanded(quantity), quantity) for name, quantity in parameters.items()]
     words = [
         f"{'' if alone else f'{name} = '}{value} ± {U}\u00a0{quantity.unit} (k\u00a0=\u00a0{k})"
         if quantity.u > 0
         else f"{name} = {quantity.value:.4g}\u00a0{quantity.unit}"
         for name, value, U, k, quantity in sizes
     ]
-    gain = diagnosis.improvement
     return (
         f"{item.title}: {', '.join(words)}. What it points to: {cause_of(item.effect)}. "
         f"Probability {100 * item.probability:.1f}\u00a0%; explains {100 * item.explained:.0f}\u00a0% of the misfit; "
-        "on placings that the fit had not seen the rms falls from "
+        f"on {gain.unseen} that the fit had not seen the rms falls from "
         f"{gain.heldout_rms_before_um:.1f} to {gain.heldout_rms_after_um:.1f}\u00a0µm."
     )
 

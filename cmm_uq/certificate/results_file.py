@@ -15,6 +15,7 @@ from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import Statement
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.mismatch.held_out import Improvement
 from cmm_uq.mismatch.screening import Finding
 from cmm_uq.units import MICROMETRE
 
@@ -32,7 +33,7 @@ def results(result: Result) -> dict[str, Any]:
         "artefact": _quantities(result.sizes),
         "noise": {
             "stated_coordinate_um": result.noise.stated_um,
-            "coordinate_um": _quantity(result.noise.coordinate),
+            "coordinate_um": quantity_data(result.noise.coordinate),
             "p_value": result.noise.p_value,
             "contradicts_stated": result.noise.contradicts_stated,
         },
@@ -40,10 +41,10 @@ def results(result: Result) -> dict[str, Any]:
         "least_squares": _least_squares(result),
         "identifiability": _identifiability(result),
         "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
-        "accuracy_uncertainty": {name: _quantity(quantity) for name, quantity in result.accuracy.items()},
+        "accuracy_uncertainty": {name: quantity_data(quantity) for name, quantity in result.accuracy.items()},
         "conformity": [_statement(statement) for statement in result.statements],
         "diagnosis": diagnosis_data(result.diagnosed),
-        "screening": [_finding(finding, job.facts.recording.file) for finding in result.findings],
+        "screening": [finding_data(finding, job.facts.recording.file) for finding in result.findings],
     }
 
 
@@ -60,8 +61,8 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         ],
         "effects": [
             {"effect": item.effect, "probability": item.probability, "explained": item.explained,
-             "parameters": {name: _quantity(q) for name, q in item.parameters.items()},
-             "words": sentence(item, d)}
+             "parameters": {name: quantity_data(q) for name, q in item.parameters.items()},
+             "words": sentence(item, d.improvement)}
             for item in d.effects
         ],
         "indistinguishable": [list(group) for group in d.indistinguishable],
@@ -71,22 +72,28 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         ],
         "noise": {
             "stated_coordinate_um": found.job.facts.recording.u_coordinate_um,
-            "coordinate_um": _quantity(d.noise.coordinate), "placing_um": _quantity(d.noise.placing),
+            "coordinate_um": quantity_data(d.noise.coordinate), "placing_um": quantity_data(d.noise.placing),
             "correlated_in_time": d.noise.correlated_in_time, "heavy_tails": d.noise.heavy_tails,
             "contradicts_stated": d.noise.contradicts_stated,
         },
-        "screening": [_finding(f, found.job.facts.recording.file) for f in found.findings],
-        "improvement": {
-            "rms_before_um": d.improvement.rms_before_um, "rms_after_um": d.improvement.rms_after_um,
-            "heldout_rms_before_um": d.improvement.heldout_rms_before_um,
-            "heldout_rms_after_um": d.improvement.heldout_rms_after_um,
-            "elpd_gain": d.improvement.elpd_gain, "elpd_gain_se": d.improvement.elpd_gain_se,
-        },
+        "screening": [finding_data(f, found.job.facts.recording.file) for f in found.findings],
+        "improvement": improvement_data(d.improvement),
         "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
         "corrected": None if changes is None else {
-            "accuracy": {name: {"before": _quantity(a), "after": _quantity(b)} for name, (a, b) in changes.figures.items()},
+            "accuracy": {
+                name: {"before": quantity_data(a), "after": quantity_data(b)} for name, (a, b) in changes.figures.items()
+            },
             "conformity": [{"before": _statement(a), "after": _statement(b)} for a, b in changes.statements],
         },
+    }  # fmt: skip
+
+
+def improvement_data(gain: Improvement) -> dict[str, Any]:
+    """Before and after."""
+    return {
+        "rms_before_um": gain.rms_before_um, "rms_after_um": gain.rms_after_um,
+        "heldout_rms_before_um": gain.heldout_rms_before_um, "heldout_rms_after_um": gain.heldout_rms_after_um,
+        "elpd_gain": gain.elpd_gain, "elpd_gain_se": gain.elpd_gain_se,
     }  # fmt: skip
 
 
@@ -95,13 +102,13 @@ def as_json(data: Mapping[str, Any]) -> bytes:
     return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
-def _quantity(quantity: Quantity) -> dict[str, Any]:
+def quantity_data(quantity: Quantity) -> dict[str, Any]:
     """Value, standard uncertainty and 95 % interval."""
     return {"value": quantity.value, "u": quantity.u, "interval95": list(quantity.interval95)}
 
 
 def _quantities(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
-    return {name: _quantity(quantity) for name, quantity in quantities.items()}
+    return {name: quantity_data(quantity) for name, quantity in quantities.items()}
 
 
 def _sampling(result: Result) -> dict[str, Any]:
@@ -154,7 +161,7 @@ def _statement(statement: Statement) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _finding(finding: Finding, file: str) -> dict[str, Any]:
+def finding_data(finding: Finding, file: str) -> dict[str, Any]:
     """One finding of the screening."""
     return {
         "kind": finding.kind, "rows": [str(m) for m in finding.measurements], "lines": list(finding.lines),

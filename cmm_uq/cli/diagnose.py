@@ -12,6 +12,7 @@ from cmm_uq.cli.options import Json, Out, Quiet, Seed
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
+    from cmm_uq.analysis.error_maps import MapsDiagnosed
     from cmm_uq.analysis.result import Diagnosed
 
 
@@ -36,17 +37,15 @@ def command(
             typer.echo(path)
 
 
-def _summarise(found: Diagnosed) -> None:
-    from cmm_uq.certificate.diagnosis_words import VERDICTS, noise_words, sentence
-
-    diagnosis = found.diagnosis
-    typer.echo(f"{diagnosis.verdict.upper()} (p = {diagnosis.p_value:.2g}). {VERDICTS[diagnosis.verdict]}")
-    for item in diagnosis.effects:
-        typer.echo(sentence(item, diagnosis))
-    for group in diagnosis.indistinguishable:
-        typer.echo(f"Cannot be told apart by this recording: {', '.join(group)}.")
-    for suggestion in found.suggestions:
-        typer.echo(f"To part {' and '.join(suggestion.separates)}: {suggestion.what}")
-    for text in (*(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
-                 *noise_words(diagnosis, found.job.facts.recording.u_coordinate_um)):  # fmt: skip
+def _summarise(found: Diagnosed | MapsDiagnosed) -> None:
+    d, told = found.diagnosis, _told(found)
+    typer.echo(f"{d.verdict.upper()} (p = {d.p_value:.2g}). {told[0]}")
+    for text in (*told[1:], *(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings)):
         typer.echo(text)
+
+
+def _told(found: Diagnosed | MapsDiagnosed) -> list[str]:
+    from cmm_uq.analysis.error_maps import MapsDiagnosed
+    from cmm_uq.certificate import diagnosis_words, map_words
+
+    return map_words.lines(found) if isinstance(found, MapsDiagnosed) else diagnosis_words.lines(found)

@@ -96,7 +96,8 @@ class Density:
             return np.asarray(-0.5 * (squares / self.model.sigma**2 + prior))
         log_sigma = theta[:, k]
         inside = (log_sigma > np.log(SIGMA_BOUNDS[0])) & (log_sigma < np.log(SIGMA_BOUNDS[1]))
-        value = -0.5 * (squares * np.exp(-2 * log_sigma) + prior) - count * log_sigma
+        precision = np.exp(-2 * np.maximum(log_sigma, np.log(SIGMA_BOUNDS[0])))
+        value = -0.5 * (squares * precision + prior) - count * log_sigma
         return np.where(inside, value, -np.inf)
 
     def conditional(self, log_sigma: float) -> tuple[Floats, Floats, float]:

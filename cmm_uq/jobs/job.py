@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -15,8 +15,11 @@ from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.points import Points
 
 ArtefactKind = Literal[
-    "ballbar", "bryan", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere", "plane", "shift"
+    "ballbar", "bryan", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere", "plane", "shift", "error_map"
 ]
+SHIFT, ERROR_MAP = "shift", "error_map"
+"""Kinds that are no points of an artefact in the volume: readings along one axis, and the machine's error maps."""
+
 WITH_REFERENCES = ("step_gauge", "gauge_blocks", "plate")
 """Kinds whose certified figures stand in the recording; their ``u_um`` may stand without ``length_mm``."""
 
@@ -274,7 +277,7 @@ class ConformityFacts(_Table):
 
 
 class JobFile(_Table):
-    """All of job.toml."""
+    """All of job.toml. A job whose recording are the machine's error maps has no ``[recording]``."""
 
     job: JobFacts
     laboratory: Laboratory = Laboratory()
@@ -284,6 +287,14 @@ class JobFile(_Table):
     model: ModelFacts
     conformity: list[ConformityFacts] = []
     plan: PlanFacts = PlanFacts()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _maps_are_the_recording(cls, data: Any) -> Any:
+        artefact = data.get("artefact") if isinstance(data, dict) else None
+        if isinstance(artefact, dict) and artefact.get("kind") == ERROR_MAP and "recording" not in data:
+            return {**data, "recording": {"file": ""}}
+        return data
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.earlier import against_earlier
-from cmm_uq.jobs.job import Job, JobFile, MachineFacts
+from cmm_uq.jobs.job import ERROR_MAP, Job, JobFile, MachineFacts
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
@@ -38,15 +38,15 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
         raise CmmUqError(f"earlier compares two recordings of a plate, not of a {facts.artefact.kind}",
                          where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
     machine = _machine(facts.machine)
+    maps = [error_map.file for error_map in facts.machine.error_map]
+    if facts.artefact.kind == ERROR_MAP:
+        if facts.recording.file:
+            raise CmmUqError("error maps are the recording themselves", where=f"{path}: [recording] file",
+                             fix="Leave [recording] out, and name the maps under [machine] error_map")  # fmt: skip
+        return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path))
     if not recorded and not _inside(folder, facts.recording.file, path).exists():
-        none = np.zeros(0, dtype=np.int64)
-        return Job(folder, facts, Points(np.zeros((0, 3)), none, none, none, machine), inputs)
-    for name in (
-        facts.recording.file,
-        *filter(None, [earlier]),
-        *(error_map.file for error_map in facts.machine.error_map),
-    ):
-        inputs[name] = content_of(_inside(folder, name, path), f"Put it beside job.toml, or mend its name in {path}")
+        return Job(folder, facts, _no_points(machine), inputs)
+    inputs |= _contents(folder, [facts.recording.file, *filter(None, [earlier]), *maps], path)
     where = str(folder / facts.recording.file)
     points = read_recording(inputs[facts.recording.file], where, machine)
     if earlier is not None:
@@ -73,6 +73,18 @@ def content_of(path: Path, fix: str) -> bytes:
         raise CmmUqError("no such file", where=str(path), fix=fix) from None
     except OSError as error:
         raise CmmUqError(f"cannot be read: {error.strerror}", where=str(path), fix=fix) from error
+
+
+def _contents(folder: Path, names: Sequence[str], toml: Path) -> dict[str, bytes]:
+    return {
+        name: content_of(_inside(folder, name, toml), f"Put it beside job.toml, or mend its name in {toml}")
+        for name in names
+    }
+
+
+def _no_points(machine: Machine) -> Points:
+    none = np.zeros(0, dtype=np.int64)
+    return Points(np.zeros((0, 3)), none, none, none, machine)
 
 
 def _inside(folder: Path, name: str, toml: Path) -> Path:

@@ -254,6 +254,12 @@ class Comparison:
         every = self.over_sigma(known.squares) + known.log[:, None]
         return np.asarray(special.logsumexp(every, axis=0), dtype=np.float64)
 
+    def noise_probability(self, granted: Sequence[Version]) -> Floats:
+        """Probability (kinds,) of each kind of noise, given explanations at the sizes granted."""
+        known = self._beside(None, granted)
+        log = self.over_sigma(known.squares)[:, 0] + known.log
+        return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
+
     def each(
         self, data: Floats | None, granted: Sequence[Version], among: Container[int] | None = None
     ) -> Iterator[tuple[Group, Floats]]:

@@ -57,7 +57,7 @@ def located(race: Race, alpha: float) -> tuple[Place, ...]:
         x, order = np.unique(covariate, return_index=True)
         values = explanation.members[version.member].values
         y, u = _function(race, version, x, values[order])
-        region = _region(x, y) if values.shape[1] > 1 else _jump(race, i, x, order)
+        region = region_of(x, y) if values.shape[1] > 1 else _jump(race, i, x, order)
         curve = (x, y / MICROMETRE, u / MICROMETRE)
         found.append(Place(name, region, p_value, float(np.abs(y).max()) / MICROMETRE, explanation.name, curve))
     return tuple(sorted(found, key=lambda place: place.p_value))
@@ -100,7 +100,7 @@ def _jump(race: Race, index: int, x: Floats, order: Ints) -> tuple[float, float]
     return float(x[min(jumps)]), float(x[max(jumps) + 1])
 
 
-def _region(covariate: Floats, curve: Floats) -> tuple[float, float]:
+def region_of(covariate: Floats, curve: Floats) -> tuple[float, float]:
     """Range of the sorted covariate about the curve's largest value where it exceeds half of it."""
     high = np.abs(curve) >= 0.5 * np.abs(curve).max()
     first = last = int(np.argmax(np.abs(curve)))

@@ -39,7 +39,7 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
     found = [*_of_readings(model, points, values), *_of_place(model, points, values), *_of_time(model, points, values)]
     found += [*_of_direction(model), *_of_all_scales(model, points, values)]
     for name, covariate in covariates(model).items():
-        functions = _functions(covariate) if name in _SUDDEN else ((f, 1.0) for f in _smooth_functions(covariate))
+        functions = _functions(covariate) if name in _SUDDEN else ((f, 1.0) for f in smooth_functions(covariate))
         members = tuple(Member(f, weight=weight, values=f) for f, weight in functions)
         found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, name))
     return found
@@ -101,7 +101,7 @@ def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> I
         if name.startswith(_PLACED) or len(np.unique(column)) < 3:
             continue
         members = tuple(
-            Member(model.seen(lever[:, :, None] * f[:, None, :], values), values=f) for f in _smooth_functions(column)
+            Member(model.seen(lever[:, :, None] * f[:, None, :], values), values=f) for f in smooth_functions(column)
         )
         yield Explanation(f"scale of all axes as a function of {name}", UNKNOWN, members, column, name)
 
@@ -143,7 +143,7 @@ def mean_of(model: MeasurementModel, values: Floats) -> Floats:
 
 def _functions(covariate: Floats) -> Iterator[tuple[Floats, float]]:
     """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps."""
-    for function in _smooth_functions(covariate):
+    for function in smooth_functions(covariate):
         yield function, 1.0
     distinct = np.unique(covariate)
     gaps = np.diff(distinct)
@@ -154,7 +154,7 @@ def _functions(covariate: Floats) -> Iterator[tuple[Floats, float]]:
         yield UNKNOWN_SD * np.where(covariate > place, 1.0, -1.0)[:, None], 1 / len(chosen)
 
 
-def _smooth_functions(covariate: Floats) -> Iterator[Floats]:
+def smooth_functions(covariate: Floats) -> Iterator[Floats]:
     """Factors (n, r), mm, of squared-exponential covariances over a covariate (Karhunen–Loève on a grid, Nyström beyond)."""
     low, span = float(covariate.min()), float(np.ptp(covariate))
     place = (covariate - low) / span

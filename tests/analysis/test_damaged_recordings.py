@@ -16,7 +16,8 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.reading import read_job
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-KINDS = sorted({path.parent.name for path in EXAMPLES.glob("*/*.csv") if "shift" not in path.parent.name})
+NO_POINTS = {"shift-simulated", "shift-plate-simulated", "iota-1102-maps"}
+KINDS = sorted({path.parent.name for path in EXAMPLES.glob("*/*.csv")} - NO_POINTS)
 Damage = Callable[[pd.DataFrame], pd.DataFrame]
 
 
