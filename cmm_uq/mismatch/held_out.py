@@ -15,6 +15,9 @@ from cmm_uq.units import MICROMETRE
 
 FOLDS = 10
 
+_SINGULAR = 1e-9
+"""Part of the largest singular value below which another counts as zero."""
+
 
 @dataclass(frozen=True)
 class Improvement:
@@ -54,27 +57,30 @@ def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvemen
 
 
 def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float, Floats]:
-    """Rms of predictions, µm, and log predictive density of each fold."""
+    """Rms of predictions, µm, and log predictive density of each fold.
+
+    What a placing leaves open is taken from its other points, where there are some, and else is no part of the prediction.
+    """
     estimate = model.estimate()
     linear = estimate.linear
     sigma = max(estimate.least_squares.sigma_of_residuals, 1e-7)
     errors, densities = [], []
+    scale = linear.noise_scale[:, None]
+    every = np.hstack([linear.observed[:, None], linear.design]) / scale
+    placing = linear.placing / scale
     for out in _folds(groups):
         train = replace(
             linear, observed=linear.observed[~out], design=linear.design[~out], placing=linear.placing[~out],
             noise_scale=linear.noise_scale[~out], sigma=sigma,
         )  # fmt: skip
         mean, covariance, _ = Density(train).conditional(float(np.log(sigma)))
-        scale = linear.noise_scale[out]
-        y, A, B = (
-            linear.observed[out] / scale,
-            linear.design[out] / scale[:, None],
-            linear.placing[out] / scale[:, None],
-        )
-        Q = _complement(B)
-        error = Q.T @ (y - A @ mean)
-        spread = sigma**2 * np.eye(Q.shape[1]) + Q.T @ A @ covariance @ A.T @ Q
-        errors.append(error * scale.mean())
+        known = placing[out] @ np.linalg.pinv(placing[~out], rcond=_SINGULAR)
+        Q = _complement(placing[out] @ _free(placing[~out]))
+        left = Q.T @ (every[out] - known @ every[~out])
+        error, A = left[:, 0] - left[:, 1:] @ mean, left[:, 1:]
+        told = Q.T @ known
+        spread = sigma**2 * (np.eye(Q.shape[1]) + told @ told.T) + A @ covariance @ A.T
+        errors.append(error * linear.noise_scale[out].mean())
         factor = np.linalg.cholesky(spread)
         white = np.linalg.solve(factor, error)
         densities.append(-0.5 * white @ white - np.log(np.diag(factor)).sum() - 0.5 * len(error) * np.log(2 * np.pi))
@@ -101,12 +107,20 @@ def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
         yield np.isin(group, groups[k::count])
 
 
+def _free(columns: Floats) -> Floats:
+    """Orthonormal basis (q, r) of what columns (m, q) leave open of their coefficients."""
+    if not columns.size:
+        return np.eye(columns.shape[1])
+    _, s, V = np.linalg.svd(columns)
+    return V[int(np.sum(s > _SINGULAR * max(float(s[0]), 1e-300))) :].T
+
+
 def _complement(columns: Floats) -> Floats:
     """Orthonormal basis of what columns (m, q) do not reach, (m, m − rank)."""
     if not columns.shape[1]:
         return np.eye(len(columns))
     U, s, _ = np.linalg.svd(columns, full_matrices=True)
-    return U[:, int(np.sum(s > 1e-9 * max(float(s[0]), 1e-300))) :]
+    return U[:, int(np.sum(s > _SINGULAR * max(float(s[0]), 1e-300))) :]
 
 
 def _rms(values: Floats) -> float:

@@ -8,11 +8,14 @@ import pytest
 from scipy import stats
 
 from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge import StepGauge
 from cmm_uq.inference.posterior import Density
+from cmm_uq.jobs.reading import read_job
 from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.mismatch.held_out import improvement
+from cmm_uq.mismatch.held_out import FOLDS, improvement
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine, Points
+from tests.conftest import ROOT
 from tests.recordings import TRAVEL, bar_facts, bars
 
 SCALES = ("scale_x", "scale_y", "scale_z")
@@ -49,3 +52,25 @@ def test_the_gain_of_exact_refits_is_that_of_importance_sampling() -> None:
     gain = improvement(before, after)
     assert gain.elpd_gain > 0
     assert gain.elpd_gain == pytest.approx(second - first, abs=0.3)
+
+
+def test_points_of_a_few_lines_are_predicted_as_the_press_residuals_of_all_columns_say() -> None:
+    """Without rows O, e = (1 − H_OO)⁻¹ r (Cook & Weisberg 1982, 2.2.3), the gauge's place on each line being a column too."""
+    job = read_job(ROOT / "examples" / "step-gauge-simulated")
+    facts = job.facts.artefact.model_copy(update={"u_um": 1e-6})
+    model = MeasurementModel(StepGauge(facts, job.points), effects(("scale_x", "scale_y", "scale_z", "squareness_xy")))
+    linear = model.estimate().linear
+    y = linear.observed - linear.design[:, 4:] @ linear.prior_mean[4:]
+    columns = np.hstack([linear.design[:, :4], linear.placing])
+    Q = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0]
+    residual, hat = y - Q @ (Q.T @ y), Q @ Q.T
+    artefact = model.artefact
+    key = np.column_stack([artefact.measurement, artefact.points.point[artefact.rows[:, 0]]])
+    groups = np.unique(key, axis=0, return_inverse=True)[1].ravel()
+    errors = []
+    for k in range(FOLDS):
+        out = np.isin(groups, np.unique(groups)[k::FOLDS])
+        errors.append(np.linalg.solve(np.eye(out.sum()) - hat[np.ix_(out, out)], residual[out]))
+    found = improvement(model, model)
+    assert found.unseen == "points"
+    assert found.heldout_rms_before_um == pytest.approx(1e3 * np.sqrt(np.mean(np.concatenate(errors) ** 2)), rel=2e-3)
