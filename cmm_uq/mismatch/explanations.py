@@ -70,7 +70,7 @@ class Explanation:
     members : versions, as probable as their weights say.
     covariate : (p,) what an unknown function depends on, of the points or of the observations.
     covariate_name : its name in the recording.
-    mechanism : the effect that an unknown function would be, had it that effect's form.
+    mechanisms : effects whose forms an unknown function could have.
     weight : how readily it is thought of, beside others of its kind.
     """
 
@@ -79,7 +79,7 @@ class Explanation:
     members: tuple[Member, ...]
     covariate: Floats | None = None
     covariate_name: str | None = None
-    mechanism: str = ""
+    mechanisms: tuple[str, ...] = ()
     weight: float = 1.0
 
     @property

@@ -121,7 +121,7 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
         ]
         first = replace(first, comparison=replace(first.comparison, explanations=explanations))
         combinations = explore(first.comparison)
-    chosen = _asserted(combinations)
+    chosen = asserted(combinations)
     versions = combinations.versions(chosen)
     found = model if not chosen else _with(first, versions, chosen)
     last = comparison_of(found, stated, ())
@@ -149,22 +149,26 @@ def _shapes(combinations: Combinations) -> dict[int, set[int]]:
     return found
 
 
-def _asserted(combinations: Combinations) -> Key:
+def asserted(combinations: Combinations) -> Key:
     """The most probable set of known effects, without those that something else could well be instead."""
     chosen = max(combinations.of_effects, key=lambda key: combinations.of_effects[key])
     doubtful = [i for i in chosen if combinations.of(i) < ASSERTED and _with_rivals(combinations, chosen, i) < ASSERTED]
-    return (chosen - frozenset(doubtful)) | _of_any_form(combinations)
+    return (chosen - frozenset(doubtful)) | _of_any_form(combinations, chosen)
 
 
-def _of_any_form(combinations: Combinations) -> Key:
-    """Effects that are improbable only because an unknown function of the same mechanism describes them as well."""
+def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
+    """Effects that are improbable only because an unknown function of the same mechanism describes them as well.
+
+    None that could stand in the place of one that is chosen: together they would determine nothing.
+    """
     index, found = {e.name: i for i, e in enumerate(combinations.explanations)}, set()
+    instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
     for j, function in enumerate(combinations.explanations):
-        i = index.get(function.mechanism)
-        if i is None or combinations.of(i) < _MECHANISM:
-            continue
-        if sum(p for key, p in combinations.probability.items() if i in key or j in key) >= ASSERTED:
-            found.add(i)
+        for i in (index[name] for name in function.mechanisms if name in index):
+            if i in instead or combinations.of(i) < _MECHANISM:
+                continue
+            if sum(p for key, p in combinations.probability.items() if i in key or j in key) >= ASSERTED:
+                found.add(i)
     return frozenset(found)
 
 

@@ -25,6 +25,15 @@ _PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")
 _SUDDEN = ("time_s", "row")
 """Covariates of an observation at which an error may jump."""
 
+_MECHANISMS = {
+    a + b: (f"scale_{a}", f"periodic_scale_{a}") if a == b else (f"straightness_{a}_{b}",) for a in AXES for b in AXES
+} | {
+    "yx": ("straightness_y_x", "squareness_xy"),
+    "zy": ("straightness_z_y", "squareness_yz"),
+    "zx": ("straightness_z_x", "squareness_zx"),
+}
+"""Effects whose form an error along the second axis as a function of the first could have."""
+
 _KEPT = 1e-3
 _GRID = 60
 
@@ -41,7 +50,8 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
     for name, covariate in covariates(model).items():
         functions = _functions(covariate) if name in _SUDDEN else ((f, 1.0) for f in smooth_functions(covariate))
         members = tuple(Member(f, weight=weight, values=f) for f, weight in functions)
-        found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, name))
+        mechanisms = (name.replace("approach_", "hysteresis_"),) if name.startswith("approach_") else ()
+        found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, name, mechanisms))
     return found
 
 
@@ -55,8 +65,7 @@ def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Ite
         for j, direction in enumerate(AXES):
             members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
             name = f"error along {direction.upper()} as a function of {axis.upper()}"
-            mechanism = "" if i == j else f"straightness_{axis}_{direction}"
-            yield Explanation(name, UNKNOWN, members, readings, f"{axis}_mm", mechanism)
+            yield Explanation(name, UNKNOWN, members, readings, f"{axis}_mm", _MECHANISMS[axis + direction])
 
 
 def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
@@ -83,7 +92,8 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
         members = tuple(
             Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in _functions(time)
         )
-        yield Explanation(f"scale of {axis.upper()} as a function of time", UNKNOWN, members, time, "time_s")
+        name = f"scale of {axis.upper()} as a function of time"
+        yield Explanation(name, UNKNOWN, members, time, "time_s", (f"scale_{axis}",))
 
 
 def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:
