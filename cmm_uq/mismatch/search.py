@@ -125,7 +125,9 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     versions = combinations.versions(chosen)
     found = model if not chosen else _with(first, versions, chosen)
     last = comparison_of(found, stated, ())
-    rough = frozenset(i for i in chosen if _rough(first.comparison, versions, i) > ASSERTED)
+    rough = frozenset(
+        i for i in chosen if _rough(first.comparison, versions, i) > ASSERTED or _less_than_function(combinations, i)
+    )
     return Found(first, last, combinations, chosen, versions, found, combinations.unknown_beside(chosen), rough)
 
 
@@ -170,6 +172,16 @@ def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
             if sum(p for key, p in combinations.probability.items() if i in key or j in key) >= ASSERTED:
                 found.add(i)
     return frozenset(found)
+
+
+def _less_than_function(combinations: Combinations, index: int) -> bool:
+    """Whether an effect is less probable than an unknown function of its mechanism: its form is not the effect's own."""
+    effect = combinations.explanations[index].name
+    return any(
+        combinations.of(j) > combinations.of(index)
+        for j, function in enumerate(combinations.explanations)
+        if effect in function.mechanisms
+    )
 
 
 def _with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:

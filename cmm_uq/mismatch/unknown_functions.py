@@ -15,6 +15,12 @@ LENGTH_SCALES = (0.6, 0.25, 0.1)
 """Of unknown smooth functions, in parts of the covariate's range."""
 
 _SPACE_LENGTHS = (0.5, 0.25)
+_DIRECTION_LENGTHS = (0.5, 0.25, 0.08)
+"""In parts of the diameter of a sphere of directions; the shortest lets neighbouring directions differ at will."""
+
+_LOBES = (2, 4, 5, 6, 7, 8, 9, 10)
+"""Undulations in a turn; three are an effect of the catalogue."""
+
 _SPACE_PLACES, _SPACE_RANK = 120, 40
 _MOST_STEPS = 40
 _MANY_DIRECTIONS, _SEEN = 12, 1e-6
@@ -97,21 +103,30 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
 
 
 def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:
-    """Anything of the direction in which points were probed, where there are many."""
+    """Anything of the direction in which points were probed, where there are many; and lobes about Z."""
     among = directions(model)
-    if len(np.unique(np.round(among, 3), axis=0)) >= _MANY_DIRECTIONS:
-        members = tuple(Member(factor) for factor in _smooth_in_space(among))
-        yield Explanation("error as a function of the probing direction", UNKNOWN, members)
+    if len(np.unique(np.round(among, 3), axis=0)) < _MANY_DIRECTIONS:
+        return
+    members = tuple(Member(factor) for factor in _smooth_in_space(among, _DIRECTION_LENGTHS))
+    yield Explanation("error as a function of the probing direction", UNKNOWN, members)
+    azimuth = np.arctan2(among[:, 1], among[:, 0])
+    waves = [UNKNOWN_SD * np.column_stack([np.cos(k * azimuth), np.sin(k * azimuth)]) for k in _LOBES]
+    members = tuple(Member(wave, values=wave) for wave in waves)
+    yield Explanation("error in lobes about Z", UNKNOWN, members, np.degrees(azimuth), "azimuth_deg")
 
 
 def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
-    """One scale of all axes as a function of each further column."""
-    lever = points.readings / (0.5 * float(np.ptp(points.readings, axis=0).max()))
+    """One scale of all axes, about their zero or their middle, as a function of each further column."""
+    middle = 0.5 * (points.readings.min(axis=0) + points.readings.max(axis=0))
+    span = 0.5 * float(np.ptp(points.readings, axis=0).max())
+    levers = [(points.readings - about) / span for about in (np.zeros(3), middle)]
     for name, column in points.columns.items():
         if name.startswith(_PLACED) or len(np.unique(column)) < 3:
             continue
         members = tuple(
-            Member(model.seen(lever[:, :, None] * f[:, None, :], values), values=f) for f in smooth_functions(column)
+            Member(model.seen(lever[:, :, None] * f[:, None, :], values), values=f)
+            for lever in levers
+            for f in smooth_functions(column)
         )
         yield Explanation(f"scale of all axes as a function of {name}", UNKNOWN, members, column, name)
 
@@ -177,13 +192,13 @@ def smooth_functions(covariate: Floats) -> Iterator[Floats]:
         yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
 
 
-def _smooth_in_space(readings: Floats) -> Iterator[Floats]:
+def _smooth_in_space(readings: Floats, lengths: tuple[float, ...] = _SPACE_LENGTHS) -> Iterator[Floats]:
     """Factors (n, r), mm, of squared-exponential covariances over readings (n, 3) (Nyström on some of their places)."""
     place = (readings - readings.min(axis=0)) / float(np.ptp(readings, axis=0).max())
     distinct = np.unique(np.round(place, 6), axis=0)
     some = distinct[np.unique(np.linspace(0, len(distinct) - 1, _SPACE_PLACES).round().astype(int))]
     among, across = (np.sum((points[:, None] - some) ** 2, axis=2) for points in (some, place))
-    for length in _SPACE_LENGTHS:
+    for length in lengths:
         eigenvalues, vectors = linalg.eigh(np.exp(-0.5 * among / length**2))
         keep = np.flatnonzero(eigenvalues > _KEPT * eigenvalues[-1])[-_SPACE_RANK:]
         factor = np.exp(-0.5 * across / length**2) @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
