@@ -71,6 +71,8 @@ def content_of(path: Path, fix: str) -> bytes:
         return path.read_bytes()
     except FileNotFoundError:
         raise CmmUqError("no such file", where=str(path), fix=fix) from None
+    except IsADirectoryError:
+        raise CmmUqError("is a folder, not a file", where=str(path), fix=fix) from None
     except OSError as error:
         raise CmmUqError(f"cannot be read: {error.strerror}", where=str(path), fix=fix) from error
 

@@ -72,7 +72,8 @@ def read_model_file(path: Path) -> ModelFile:
         content = path.read_bytes()
         data = tomllib.loads(content.decode("utf-8-sig"))
     except OSError as error:
-        raise CmmUqError(f"cannot be read: {error.strerror or error}", where=str(path)) from error
+        fix = "Name the TOML file of the measurement model"
+        raise CmmUqError(f"cannot be read: {error.strerror or error}", where=str(path), fix=fix) from error
     except UnicodeDecodeError as error:
         raise CmmUqError("is not UTF-8 text", where=str(path), fix="Save it as UTF-8") from error
     except (tomllib.TOMLDecodeError, RecursionError) as error:

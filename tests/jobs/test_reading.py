@@ -88,6 +88,11 @@ def test_a_folder_without_a_job_is_refused(tmp_path: Path) -> None:
     assert "job.toml: no such file" in refused(tmp_path)
 
 
+def test_a_recording_that_is_a_folder_is_refused(job: Path) -> None:
+    (job / "day one").mkdir()
+    assert "day one: is a folder, not a file" in refused(edit(job, r"^file = .*", 'file = "day one"'))
+
+
 def test_a_job_that_is_no_text_is_refused(job: Path) -> None:
     (job / "job.toml").write_bytes(b"\xff\xfe[job]")
     assert "is not UTF-8 text" in refused(job)
