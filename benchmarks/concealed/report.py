@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,10 @@ nothing: noise stated at half or twice its size, set-up offsets of half or one s
 (0.5, 0.8), t noise of three or four degrees of freedom. A case is right when the verdict is, and all that is hidden and
 nothing else is named."""
 
+PEER = """\
+The same cases by a plain greedy χ² search that is given the true noise, takes it for white, and knows the catalogue's
+common effects (`benchmarks/concealed/greedy.py`):"""
+
 MIMICKED = "outside, but as a known effect"
 
 
@@ -43,9 +47,12 @@ def expected_calibration_error(p: np.ndarray, good: np.ndarray, bins: int = 10) 
     return float(total / len(p))
 
 
-def write(pairs: Pairs, right: Callable, covered: Callable, sealed: str, docs: Path | None) -> None:
+def write(pairs: Pairs, peers: Pairs, right: Callable, covered: Callable, sealed: str, docs: Path | None) -> None:
     lines = [f"{len(pairs)} cases, truth sealed before the run as `{sealed[:16]}…`.", ""]
-    lines += _table(pairs, right)
+    lines += _table(pairs, right, (*SIGNALS, MIMICKED, *NOTHING))
+    lines += ["", "In brackets: without counting effects named together as indistinguishable."]
+    if peers:
+        lines += ["", PEER, "", *_table(peers, right, ("one", "two", "three", "outside", *NOTHING))]
     named = [
         (t, name, item["probability"])
         for t, f in pairs
@@ -77,10 +84,10 @@ def write(pairs: Pairs, right: Callable, covered: Callable, sealed: str, docs: P
         _plots(pairs, right, p, good, docs / "images")
 
 
-def _table(pairs: Pairs, right: Callable) -> list[str]:
+def _table(pairs: Pairs, right: Callable, kinds: Sequence[str]) -> list[str]:
     designs = list(DESIGNS)
     lines = ["| hidden | " + " | ".join(designs) + " |", "| --- |" + " --- |" * len(designs)]
-    for kind in (*SIGNALS, MIMICKED, *NOTHING):
+    for kind in kinds:
         cells = []
         for what in designs:
             both = [right(t, f) for t, f in pairs if row_of(t) == kind and t["design"] == what]
@@ -90,7 +97,7 @@ def _table(pairs: Pairs, right: Callable) -> list[str]:
             strict, grouped = (sum(values) for values in zip(*both, strict=True))
             cells.append(f"{grouped} of {len(both)}" + (f" ({strict})" if strict != grouped else ""))
         lines.append(f"| {kind} | " + " | ".join(cells) + " |")
-    return [*lines, "", "In brackets: without counting effects named together as indistinguishable."]
+    return lines
 
 
 def _plots(pairs: Pairs, right: Callable, p: np.ndarray, good: np.ndarray, folder: Path) -> None:

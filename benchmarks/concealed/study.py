@@ -1,7 +1,8 @@
 """Diagnose concealed cases and count: ``python benchmarks/concealed/study.py FOLDER [--cases 13] [--seed 0] [--summary D]``.
 
 The cases are made first and their truth is sealed by a hash. Every diagnosis is appended to ``FOLDER/found*.jsonl``, so that a
-run can be interrupted and resumed, or shared among processes (``--part``); ``--summary`` counts what is there.
+run can be interrupted and resumed, or shared among processes (``--part``); ``--peer`` runs a plain search on the same cases;
+``--summary`` counts what is there.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from generator import DESIGNS, NOTHING, SIGNALS, case, seal
+from greedy import searched
 from physics import UNIT, kind_of
 from rich.progress import track
 
@@ -92,26 +94,37 @@ def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:
     return listed
 
 
-def run(folder: Path, truths: list[dict], part: tuple[int, int], only: str | None) -> None:
-    done = {json.loads(line)["name"] for file in folder.glob("found*.jsonl") for line in file.read_text().splitlines()}
+def run(folder: Path, truths: list[dict], part: tuple[int, int], only: str | None, peer: bool) -> None:
+    file = "peer" if peer else "found"
+    done = {found["name"] for found in _written(folder, file)}
     mine = [t for t in truths[part[0] - 1 :: part[1]] if t["name"] not in done and (only is None or only in t["kind"])]
-    with (folder / f"found{part[0]}.jsonl").open("a", encoding="utf-8") as out:
+    with (folder / f"{file}{part[0]}.jsonl").open("a", encoding="utf-8") as out:
         for truth in track(mine, "Diagnosing"):
-            found = diagnosed(folder / truth["name"])
+            job = folder / truth["name"]
+            found = plainly(job, truth["sigma_um"]) if peer else diagnosed(job)
             out.write(json.dumps({"name": truth["name"], **found}) + "\n")
             out.flush()
+
+
+def plainly(job: Path, sigma_um: float) -> dict:
+    """What the plain search finds, told as a diagnosis."""
+    named = searched(job, sigma_um)
+    return {"verdict": "explained" if named else "consistent", "effects": dict.fromkeys(named), "groups": []}
+
+
+def _written(folder: Path, file: str) -> list[dict]:
+    return [
+        json.loads(line) for path in sorted(folder.glob(f"{file}*.jsonl"))
+        for line in path.read_text(encoding="utf-8").splitlines()
+    ]  # fmt: skip
 
 
 def summary(folder: Path, truths: list[dict], docs: Path | None) -> None:
     from report import write
 
     by_name = {t["name"]: t for t in truths}
-    pairs = []
-    for file in sorted(folder.glob("found*.jsonl")):
-        for line in file.read_text(encoding="utf-8").splitlines():
-            found = json.loads(line)
-            pairs.append((by_name[found["name"]], found))
-    write(pairs, right, covered, seal(truths), docs)
+    pairs, peers = ([(by_name[f["name"]], f) for f in _written(folder, file)] for file in ("found", "peer"))
+    write(pairs, peers, right, covered, seal(truths), docs)
 
 
 def main() -> None:
@@ -120,6 +133,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=13, help="of each kind and artefact")
     parser.add_argument("--seed", type=int, default=0, help="of the cases")
     parser.add_argument("--part", default="1/1", help="which part of how many, to share the work among processes")
+    parser.add_argument("--peer", action="store_true", help="run the plain search instead")
     parser.add_argument("--only", help="kinds that contain this word")
     parser.add_argument("--summary", nargs="?", const="", help="count, and write page and plots into this folder")
     chosen = parser.parse_args()
@@ -127,7 +141,7 @@ def main() -> None:
     truths = make(chosen.folder, chosen.cases, chosen.seed)
     if chosen.summary is None:
         part, of = map(int, chosen.part.split("/"))
-        run(chosen.folder, truths, (part, of), chosen.only)
+        run(chosen.folder, truths, (part, of), chosen.only, chosen.peer)
     summary(chosen.folder, truths, Path(chosen.summary) if chosen.summary else None)
 
 
