@@ -54,11 +54,18 @@ class ColumnRace:
 
     The observations are the k − 1 orthonormal contrasts between the maps at each position: the function that they share is
     gone, and white noise is white still.
+
+    Parameters
+    ----------
+    column : what is compared.
+    rivals : that compete for how the maps differ.
+    granted : what the job knows of how they differ; of any size.
+    seed : of the null distribution and the draws.
     """
 
     column: MapColumn
     rivals: tuple[Rival, ...]
-    granted: tuple[Floats, ...]
+    granted: tuple[Rival, ...]
     seed: int
 
     @cached_property
@@ -83,7 +90,7 @@ class ColumnRace:
         columns = [self.seen(one, np.ones((len(place), 1))) for one in maps]
         if self.column.is_straightness:
             columns += [self.seen(one, place[:, None]) for one in maps]
-        return np.hstack([*columns, *self.granted])
+        return np.hstack([*columns, *(self.seen(rival.over_maps, rival.functions[0]) for rival in self.granted)])
 
     @cached_property
     def comparison(self) -> Comparison:
@@ -165,7 +172,7 @@ def race_of(column: MapColumn, named: Sequence[str], seed: int) -> ColumnRace:
     seed : of everything random.
     """
     rivals: list[Rival] = []
-    granted: list[Floats] = []
+    granted: list[Rival] = []
     place, temperatures = column.positions, column.temperatures
     functions = tuple(smooth_functions(place))
     changes = float(np.ptp(temperatures)) > 0
@@ -173,11 +180,7 @@ def race_of(column: MapColumn, named: Sequence[str], seed: int) -> ColumnRace:
         effect = f"thermal_scale_{column.axis}"
         excess = temperatures - REFERENCE_TEMPERATURE
         expansion = Rival(effect, excess, (EXPANSION.prior_sd * place[:, None],), effect=effect)
-        if effect in named:
-            contrasts = linalg.null_space(np.ones((1, len(excess)))).T
-            granted.append(np.asarray(np.kron((contrasts @ excess)[:, None], place[:, None]), dtype=np.float64))
-        else:
-            rivals.append(expansion)
+        (granted if effect in named else rivals).append(expansion)
     if len(temperatures) == 2:
         rivals.append(Rival(f"{column.title}, difference of the two maps", np.array([-0.5, 0.5]), functions))
     else:
