@@ -42,7 +42,7 @@ def row_of(truth: dict) -> str:
 
 def expected_calibration_error(p: np.ndarray, good: np.ndarray, bins: int = 10) -> float:
     """Mean over bins of equal width of |mean probability − fraction right|, weighted by how many are in each."""
-    which = np.minimum((p * bins).astype(int), bins - 1)
+    which = np.clip((p * bins).astype(int), 0, bins - 1)
     total = sum(np.sum(which == b) * abs(p[which == b].mean() - good[which == b].mean()) for b in np.unique(which))
     return float(total / len(p))
 
@@ -54,13 +54,14 @@ def write(pairs: Pairs, peers: Pairs, right: Callable, covered: Callable, sealed
     if peers:
         lines += ["", PEER, "", *_table(peers, right, ("one", "two", "three", "outside", *NOTHING))]
     named = [
-        (t, name, item["probability"])
+        (t, name, item["probability"], item["together"], {name}.union(*(g for g in f["groups"] if g[0] == name)))
         for t, f in pairs
         for name, item in f["effects"].items()
         if t["kind"] != "roughly"
     ]
-    p = np.array([probability for *_, probability in named])
-    good = np.array([name in t["hidden"] for t, name, _ in named])
+    p, together = np.array([each[2] for each in named]), np.array([each[3] for each in named])
+    good = np.array([name in t["hidden"] for t, name, *_ in named])
+    good_together = np.array([bool(group & set(t["hidden"])) for t, *_, group in named])
     hits = defaultdict(list)
     for t, f in pairs:
         for parameter, held in covered(t, f):
@@ -73,8 +74,12 @@ def write(pairs: Pairs, peers: Pairs, right: Callable, covered: Callable, sealed
         lines += [f"Intervals at 95 % hold the truth in {sum(every)} of {len(every)} ({100 * np.mean(every):.1f} %): "
                   + ", ".join(f"{k} {sum(v)}/{len(v)}" for k, v in sorted(hits.items())) + "."]  # fmt: skip
     if len(p):
-        lines += [f"Effects named {len(p)}, mean probability {p.mean():.3f}, right {good.mean():.3f}; expected calibration "
-                  f"error {expected_calibration_error(p, good):.3f}."]  # fmt: skip
+        lines += [
+            f"Effects named {len(p)}, mean probability {p.mean():.3f}, right {good.mean():.3f}; expected calibration error "
+            f"{expected_calibration_error(p, good):.3f}. Of them or one named as indistinguishable: mean probability "
+            f"{together.mean():.3f}, right {good_together.mean():.3f}; expected calibration error "
+            f"{expected_calibration_error(together, good_together):.3f}."
+        ]
     lines += [f"Seconds a case: median {np.median(seconds):.1f}, longest {seconds.max():.1f}."]
     print("\n".join(lines))
     if docs is not None:

@@ -48,6 +48,7 @@ def diagnosed(job: Path) -> dict:
         "effects": {
             item.effect: {
                 "probability": item.probability,
+                "together": item.together,
                 "parameters": {k: [q.value, q.u, *q.interval95] for k, q in item.parameters.items()},
             }
             for item in d.effects

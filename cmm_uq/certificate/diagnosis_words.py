@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.analysis.result import Diagnosed
-from cmm_uq.certificate.wording import expanded
+from cmm_uq.certificate.wording import expanded, probability
 from cmm_uq.mismatch.diagnosis import Diagnosis, LeftOut
 from cmm_uq.mismatch.held_out import Improvement
 
@@ -23,6 +23,9 @@ CAUSES = {
     "probe_lobing": "the probe's pre-travel has three lobes: qualify it in more directions",
 }
 """What to look for, by the beginning of the effect's name; the longest that fits counts."""
+
+_SAME = 0.01
+"""Difference of two probabilities that is not worth telling."""
 
 VERDICTS = {
     "consistent": "The recording agrees with the model that the job names.",
@@ -58,9 +61,11 @@ def sentence(item: LeftOut, gain: Improvement) -> str:
         else f"{name} = {quantity.value:.4g}\u00a0{quantity.unit}"
         for name, value, U, k, quantity in sizes
     ]
+    alike = item.together > item.probability + _SAME
+    together = f" ({probability(item.together)} of it or one that cannot be told from it)" if alike else ""
     return (
         f"{item.title}: {', '.join(words)}. What it points to: {cause_of(item.effect)}. "
-        f"Probability {100 * item.probability:.1f}\u00a0%; explains {100 * item.explained:.0f}\u00a0% of the misfit; "
+        f"Probability {probability(item.probability)}{together}; explains {100 * item.explained:.0f}\u00a0% of the misfit; "
         f"on {gain.unseen} that the fit had not seen the rms falls from "
         f"{gain.heldout_rms_before_um:.1f} to {gain.heldout_rms_after_um:.1f}\u00a0µm."
     )

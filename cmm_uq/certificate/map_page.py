@@ -43,7 +43,8 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
                 for item in d.differences
             ],
             "effects": [
-                {"effect": item.effect, "probability": item.probability, "explained": item.explained,
+                {"effect": item.effect, "probability": item.probability,
+                 "probability_together": item.together, "explained": item.explained,
                  "parameters": {name: quantity_data(q) for name, q in item.parameters.items()},
                  "words": sentence(item, d.improvement)}
                 for item in d.effects

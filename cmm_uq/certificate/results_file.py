@@ -60,7 +60,8 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
             for place in d.where
         ],
         "effects": [
-            {"effect": item.effect, "probability": item.probability, "explained": item.explained,
+            {"effect": item.effect, "probability": item.probability,
+             "probability_together": item.together, "explained": item.explained,
              "parameters": {name: quantity_data(q) for name, q in item.parameters.items()},
              "words": sentence(item, d.improvement)}
             for item in d.effects

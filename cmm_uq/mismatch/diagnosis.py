@@ -18,7 +18,7 @@ from cmm_uq.mismatch.held_out import Improvement, improvement
 from cmm_uq.mismatch.joint import Joint, joint_posterior
 from cmm_uq.mismatch.location import Place, located
 from cmm_uq.mismatch.noise import Kind
-from cmm_uq.mismatch.search import NOT_TOLD_APART, Found, Race, search
+from cmm_uq.mismatch.search import NOT_TOLD_APART, Found, Race, search, with_rivals
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 
@@ -40,6 +40,7 @@ class LeftOut:
     probability : among all rivals that could stand in its place, nothing and the unknown included.
     parameters : reported parameters, from the joint posterior.
     explained : part of the misfit's sum of squares that it takes away.
+    together : probability of it or one that these data cannot tell from it.
     """
 
     effect: str
@@ -47,6 +48,7 @@ class LeftOut:
     probability: float
     parameters: Mapping[str, Quantity]
     explained: float
+    together: float
 
 
 @dataclass(frozen=True)
@@ -144,8 +146,12 @@ def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
             name: Quantity.of_draws(_unwrapped(values) if name == "phase_rad" else values, units[name])
             for name, values in reported.items()
         }
-        probability = found.combinations.of(index[effect.name]) if found.combinations else 0.0
-        listed.append(LeftOut(effect.name, effect.title, probability, parameters, share if total > 0 else 0.0))
+        probability = together = 0.0
+        if found.combinations is not None:
+            probability = found.combinations.of(index[effect.name])
+            together = with_rivals(found.combinations, found.chosen, index[effect.name])
+        explained = share if total > 0 else 0.0
+        listed.append(LeftOut(effect.name, effect.title, probability, parameters, explained, together))
     return tuple(sorted(listed, key=lambda item: -item.probability))
 
 

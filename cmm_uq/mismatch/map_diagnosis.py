@@ -153,7 +153,7 @@ def _effect(race: ColumnRace) -> tuple[LeftOut, Posterior] | None:
         return None
     every, rest, left = (float(np.sum(residual(race, some) ** 2)) for some in ((), without, race.versions))
     probability = race.combinations.of(race.effect)
-    return LeftOut(effect.name, effect.title, probability, parameters, (rest - left) / every), posterior
+    return LeftOut(effect.name, effect.title, probability, parameters, (rest - left) / every, probability), posterior
 
 
 def _difference(race: ColumnRace, index: int, p_value: float) -> Difference:

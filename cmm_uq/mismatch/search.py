@@ -154,7 +154,7 @@ def _shapes(combinations: Combinations) -> dict[int, set[int]]:
 def asserted(combinations: Combinations) -> Key:
     """The most probable set of known effects, without those that something else could well be instead."""
     chosen = max(combinations.of_effects, key=lambda key: combinations.of_effects[key])
-    doubtful = [i for i in chosen if combinations.of(i) < ASSERTED and _with_rivals(combinations, chosen, i) < ASSERTED]
+    doubtful = [i for i in chosen if combinations.of(i) < ASSERTED and with_rivals(combinations, chosen, i) < ASSERTED]
     return (chosen - frozenset(doubtful)) | _of_any_form(combinations, chosen)
 
 
@@ -184,10 +184,11 @@ def _less_than_function(combinations: Combinations, index: int) -> bool:
     )
 
 
-def _with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
+def with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
     """Probability of an effect or one that these data cannot tell from it."""
     rivals = combinations.instead(chosen, index)
-    return combinations.of(index) + sum(combinations.of(i) for i, odds in rivals.items() if odds > NOT_TOLD_APART)
+    those = {index, *(i for i, odds in rivals.items() if odds > NOT_TOLD_APART)}
+    return float(sum(p for key, p in combinations.probability.items() if those & key))
 
 
 def race_of(model: MeasurementModel, stated: float | None, seed: int) -> Race:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import pytest
 
 from cmm_uq.mismatch.combinations import Combination, Combinations
 from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.mismatch.search import asserted
+from cmm_uq.mismatch.search import asserted, with_rivals
 
 BOW, TURN, SQUARE, FUNCTION = range(4)
 RIVALS = (
@@ -19,9 +20,12 @@ RIVALS = (
 )
 
 
+def combinations(probability: Mapping[tuple[int, ...], float]) -> Combinations:
+    return Combinations(RIVALS, {frozenset(key): Combination((), float(np.log(p))) for key, p in probability.items()})
+
+
 def found(probability: Mapping[tuple[int, ...], float]) -> set[int]:
-    combinations = {frozenset(key): Combination((), float(np.log(p))) for key, p in probability.items()}
-    return set(asserted(Combinations(RIVALS, combinations)))
+    return set(asserted(combinations(probability)))
 
 
 def test_the_most_probable_set_is_asserted() -> None:
@@ -45,3 +49,8 @@ def test_effects_whose_sum_is_a_function_that_nobody_named_are_asserted() -> Non
 def test_not_beside_one_that_stands_in_their_place() -> None:
     """Together two that cannot be told apart would determine nothing."""
     assert found({(TURN,): 0.5, (BOW,): 0.3, (FUNCTION,): 0.2}) == {TURN}
+
+
+def test_an_effect_or_its_rival_counts_once_where_both_hold() -> None:
+    some = combinations({(BOW,): 0.5, (TURN,): 0.2, (BOW, TURN): 0.2, (SQUARE,): 0.005, (): 0.095})
+    assert with_rivals(some, frozenset({BOW}), BOW) == pytest.approx(0.9)
