@@ -10,7 +10,7 @@ from cmm_uq.certificate.diagnosis_words import sentence
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.map_words import VERDICTS, difference_words, next_words, noise_words
 from cmm_uq.certificate.plots import curve_with_band
-from cmm_uq.certificate.results_file import SCHEMA, finding_data, improvement_data, quantity_data
+from cmm_uq.certificate.results_file import SCHEMA, effect_data, finding_data, improvement_data, quantity_data
 from cmm_uq.certificate.wording import probability
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.mismatch.map_diagnosis import Difference
@@ -42,13 +42,7 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
                  "instead": list(item.instead), "sign_turned": item.turned}
                 for item in d.differences
             ],
-            "effects": [
-                {"effect": item.effect, "probability": item.probability,
-                 "probability_together": item.together, "explained": item.explained,
-                 "parameters": {name: quantity_data(q) for name, q in item.parameters.items()},
-                 "words": sentence(item, d.improvement)}
-                for item in d.effects
-            ],
+            "effects": [effect_data(item, d.improvement) for item in d.effects],
             "indistinguishable": [],
             "suggested_measurements": [
                 {"separates": list(names), "what": what, "repetitions": 1, "odds": None} for names, what in next_words(d)

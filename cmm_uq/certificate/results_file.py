@@ -15,6 +15,7 @@ from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import Statement
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.mismatch.diagnosis import LeftOut
 from cmm_uq.mismatch.held_out import Improvement
 from cmm_uq.mismatch.screening import Finding
 from cmm_uq.units import MICROMETRE
@@ -59,13 +60,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
              "amplitude_um": place.amplitude_um, "what": place.what}
             for place in d.where
         ],
-        "effects": [
-            {"effect": item.effect, "probability": item.probability,
-             "probability_together": item.together, "explained": item.explained,
-             "parameters": {name: quantity_data(q) for name, q in item.parameters.items()},
-             "words": sentence(item, d.improvement)}
-            for item in d.effects
-        ],
+        "effects": [effect_data(item, d.improvement) for item in d.effects],
         "indistinguishable": [list(group) for group in d.indistinguishable],
         "suggested_measurements": [
             {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions, "odds": s.odds}
@@ -86,6 +81,14 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
             },
             "conformity": [{"before": _statement(a), "after": _statement(b)} for a, b in changes.statements],
         },
+    }  # fmt: skip
+
+
+def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
+    """One effect that was left out."""
+    return {
+        "effect": item.effect, "probability": item.probability, "probability_together": item.together,
+        "explained": item.explained, "parameters": _quantities(item.parameters), "words": sentence(item, gain),
     }  # fmt: skip
 
 
