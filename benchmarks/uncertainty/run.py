@@ -73,8 +73,8 @@ def main() -> None:
                 continue
             seconds, grown, figures, remark = found
             floor = floor or seconds
-            shown = ", ".join(f"{figure:.6g}" for figure in figures)  # type: ignore[attr-defined]
-            print(f"| {name} | {seconds:.3g} | {seconds / floor:.3g} | {grown:.0f} | {shown} | {remark} |")  # type: ignore[operator]
+            shown = ", ".join(f"{figure:.6g}" for figure in figures)
+            print(f"| {name} | {seconds:.3g} | {seconds / floor:.3g} | {grown:.0f} | {shown} | {remark} |")
     print("\n## Import, beyond starting the interpreter\n\n| | s |\n| --- | ---: |")
     for module in ("numpy", *IMPORTS):
         print(f"| {module} | {importing(module):.2f} |")

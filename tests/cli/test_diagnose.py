@@ -6,16 +6,15 @@ import json
 import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from tests.cli.process import run as run_command
 from tests.conftest import ROOT
 
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "cmm_uq", "diagnose", *map(str, arguments)], capture_output=True, text=True,
-                          check=False, encoding="utf-8")  # fmt: skip
+run = partial(run_command, "diagnose")
 
 
 @pytest.fixture

@@ -10,17 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.process import run
 from tests.conftest import ROOT
 
-COMMAND = [sys.executable, "-m", "cmm_uq"]
 EXAMPLE = ROOT / "examples" / "iota-1102-maps"
 TWO_MORE = "".join(f'    {{ file = "error_map_{t}C.csv", temperature_c = {t}.0 }},\n' for t in (25, 30))
 CHECK = ROOT.parent / "shared" / "check_results.py"
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False,
-                          encoding="utf-8")  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +11,9 @@ import pytest
 
 from cmm_uq.jobs.reading import read_job
 from tests.analysis.test_planning import JOB, SIX
+from tests.cli.process import run as run_command
 
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "cmm_uq", "plan", *map(str, arguments)], capture_output=True, text=True,
-                          check=False, encoding="utf-8")  # fmt: skip
+run = partial(run_command, "plan")
 
 
 @pytest.fixture

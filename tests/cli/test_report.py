@@ -13,13 +13,9 @@ from pathlib import Path
 import pikepdf
 import pytest
 
-COMMAND = [sys.executable, "-m", "cmm_uq"]
+from tests.cli.process import COMMAND, run
+
 FILES = ["certificate.html", "certificate.pdf", "results.json"]
-
-
-def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, cwd=cwd,
-                          encoding="utf-8")  # fmt: skip
 
 
 @pytest.fixture(scope="module")

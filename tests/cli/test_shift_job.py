@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +11,10 @@ import pikepdf
 import pytest
 
 from cmm_uq.analysis import ShiftResult, analyse
+from tests.cli.process import run
 from tests.conftest import ROOT
 
-COMMAND = [sys.executable, "-m", "cmm_uq"]
 EXAMPLE = ROOT / "examples" / "shift-simulated"
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False,
-                          encoding="utf-8")  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -60,7 +60,7 @@ def test_shares_add_up_to_one_and_nested_ones_to_their_line() -> None:
 
 def test_nesting_does_not_change_the_degrees_of_freedom() -> None:
     budget = end_gauge()
-    flat = [line for line in budget.lines if line.parts is None] + list(budget.lines[1].parts.lines)  # type: ignore[union-attr]
+    flat = [line for line in budget.lines if line.parts is None] + list(budget.lines[1].parts.lines)
     assert Budget("l", flat).dof == pytest.approx(budget.dof)
 
 

@@ -164,4 +164,4 @@ def test_an_evaluation_is_of_one_point() -> None:
 )
 def test_impossible_requests_are_refused(wrong: dict[str, object], problem: str) -> None:
     with pytest.raises(CmmUqError, match=problem):
-        Request(**wrong)  # type: ignore[arg-type]
+        Request(**wrong)

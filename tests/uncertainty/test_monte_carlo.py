@@ -35,7 +35,7 @@ def within_five_errors(found: Simulated, value: float, u: float, low: float, hig
 
 def four(kind: Callable[[], object], widest: Callable[[], object] | None = None) -> MeasurementModel:
     inputs = {name: kind() for name in "abc"} | {"d": (widest or kind)()}
-    return MeasurementModel(lambda a, b, c, d: a + b + c + d, inputs)  # type: ignore[arg-type]
+    return MeasurementModel(lambda a, b, c, d: a + b + c + d, inputs)
 
 
 def test_four_normal_inputs() -> None:

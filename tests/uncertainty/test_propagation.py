@@ -143,7 +143,7 @@ def test_many_points_are_propagated_as_they_would_be_one_by_one() -> None:
     x, u = np.linspace(1.0, 2.0, 5), np.linspace(0.01, 0.05, 5)
 
     def model(x: object, u: object) -> MeasurementModel:
-        inputs = {"x": normal(x, u, 7.0), "a": normal(0.3, 0.1), "b": student_t(1.0, 0.2, 3.0)}  # type: ignore[arg-type]
+        inputs = {"x": normal(x, u, 7.0), "a": normal(0.3, 0.1), "b": student_t(1.0, 0.2, 3.0)}
         return MeasurementModel(
             lambda x, a, b: {"y": np.exp(a * x) * b, "z": a + b}, inputs, ("y", "z"), {("a", "x"): 0.4}
         )

@@ -93,7 +93,7 @@ def position(**changes: object) -> BallbarPosition:
         "direction": np.array([0.6, 0.8, 0.0]),
         "centre_covariance_mm2": np.diag([3.0, 3.0, 12.0]) * 0.01**2 / 12_000,
     }
-    return BallbarPosition(**{**given, **changes})  # type: ignore[arg-type]
+    return BallbarPosition(**{**given, **changes})
 
 
 def test_scatter_of_thousands_of_points_is_a_fraction_of_a_micrometre() -> None:
