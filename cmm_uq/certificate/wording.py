@@ -28,7 +28,7 @@ def probability(p: float) -> str:
         return "<\u00a00.01\u00a0%"
     if p > 1 - 1e-4:
         return ">\u00a099.99\u00a0%"
-    return f"{100 * p:.{2 if p < 0.5 else 3}g}\u00a0%"
+    return f"{100 * p:.{2 if p < 0.5 else 3 if p < 0.999 else 4}g}\u00a0%"
 
 
 def title_of(key: tuple[str, str], result: Result) -> str:
