@@ -13,6 +13,7 @@ from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragrap
 from cmm_uq.certificate.plots import curve_with_band, length_plot
 from cmm_uq.certificate.results_file import SCHEMA, diagnosis_data
 from cmm_uq.certificate.wording import expanded, probability
+from cmm_uq.certificate.working_page import working_page
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.units import MICROMETRE
@@ -36,25 +37,17 @@ def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
 def diagnosis_document(found: Diagnosed) -> Document:
     """The page of a diagnosis."""
     facts, d = found.job.facts, found.diagnosis
-    return Document(
-        title="Diagnosis",
-        number=facts.job.id,
-        subject=f"{facts.machine.name}, measured on {facts.job.date.isoformat()}",
-        issuer=tuple(line for line in (facts.laboratory.name,) if line),
+    return working_page(
+        facts, "Diagnosis", f"measured on {facts.job.date.isoformat()}",
         particulars=(
             Facts((("Verdict", d.verdict), ("p-value of “nothing is missing”", f"{d.p_value:.2g}"),
                    ("False-alarm rate", f"{100 * d.alpha:g} %"))),
             Facts((("Machine", facts.machine.name), ("Artefact", d.before.artefact.title),
                    ("Effects that the job names", ", ".join(facts.model.effects) or "none"))),
         ),
-        warnings=tuple(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
+        warnings=(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
         sections=diagnosis_sections(found),
-        statements=(),
-        signatures=(),
-        attachments=(),
         produced_by=f"cmm-uq {__version__}, {d.posterior.sampler}, seed {d.posterior.seed}",
-        date=facts.job.date,
-        end="End of diagnosis",
     )  # fmt: skip
 
 

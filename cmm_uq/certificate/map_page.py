@@ -12,6 +12,7 @@ from cmm_uq.certificate.map_words import VERDICTS, difference_words, next_words,
 from cmm_uq.certificate.plots import curve_with_band
 from cmm_uq.certificate.results_file import SCHEMA, effect_data, finding_data, improvement_data, quantity_data
 from cmm_uq.certificate.wording import probability
+from cmm_uq.certificate.working_page import working_page
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.mismatch.map_diagnosis import Difference
 from cmm_uq.mismatch.map_search import ColumnRace
@@ -79,25 +80,17 @@ def maps_document(found: MapsDiagnosed, seed: int) -> Document:
         Section("Noise", tuple(Paragraph(text) for text in noise_words(d))),
         Section("What to measure next", tuple(Paragraph(what) for _, what in next_words(d))),
     )
-    return Document(
-        title="Diagnosis of error maps",
-        number=facts.job.id,
-        subject=f"{facts.machine.name}, {facts.job.date.isoformat()}",
-        issuer=tuple(line for line in (facts.laboratory.name,) if line),
+    return working_page(
+        facts, "Diagnosis of error maps", facts.job.date.isoformat(),
         particulars=(
             Facts((("Verdict", d.verdict), ("p-value of “the maps differ by noise alone”", f"{d.p_value:.2g}"),
                    ("False-alarm rate", f"{100 * d.alpha:g} %"))),
             Facts((("Machine", facts.machine.name), ("Error maps", maps),
                    ("Effects that the job names", ", ".join(facts.model.effects) or "none"))),
         ),
-        warnings=tuple(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
-        sections=tuple(section for section in sections if section.blocks),
-        statements=(),
-        signatures=(),
-        attachments=(),
+        warnings=(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
+        sections=sections,
         produced_by=", ".join(filter(None, (f"cmm-uq {__version__}", d.sampler, f"seed {seed}"))),
-        date=facts.job.date,
-        end="End of diagnosis",
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from cmm_uq.certificate.plan_words import (
     title_of,
     unit_of,
 )
+from cmm_uq.certificate.working_page import working_page
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
 from cmm_uq.mismatch.power import POWER, SIZES
@@ -86,24 +87,18 @@ def plan_document(plan: Plan) -> Document:
     stated = "" if plan.setting.stated is not None else " (assumed: the job states none)"
     if plan.name == RECORDED and plan.setting.stated is None:
         stated = " (from the recording's residuals)"
-    return Document(
-        title="Measurement plan",
-        number=facts.job.id,
-        subject=f"{facts.machine.name}, {_artefact(plan)}",
-        issuer=tuple(line for line in (facts.laboratory.name,) if line),
+    return working_page(
+        facts, "Measurement plan", _artefact(plan),
         particulars=(
             Facts((("Machine", facts.machine.name), ("Artefact", _artefact(plan)),
                    ("Effects to determine", ", ".join(facts.model.effects) or "the error of one axis"))),
             Facts((("Start from", base_name(plan)), ("To be measured", _to_measure(plan, total)),
                    ("Noise of a coordinate", f"{plan.setting.sigma / MICROMETRE:.2g} µm{stated}"))),
         ),
-        warnings=tuple(_warnings(plan)),
-        sections=tuple(section for section in _sections(plan) if section.blocks),
-        statements=(),
-        signatures=(),
+        warnings=_warnings(plan),
+        sections=_sections(plan),
         attachments=("plan.csv", "results.json") if plan.to_measure else ("results.json",),
         produced_by=f"cmm-uq {__version__}",
-        date=facts.job.date,
         end="End of plan",
     )  # fmt: skip
 
