@@ -69,6 +69,10 @@ def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress
         raise CmmUqError("one error map has nothing to be compared with", where=WHERE,
                          fix="Name two or more maps of the machine; with three it shows which of them differs")  # fmt: skip
     acting = effects(job.facts.model.effects, where="job.toml [model] effects")
+    for effect in acting:
+        if effect.columns and not effect.name.startswith("thermal_scale_"):
+            raise CmmUqError(f"{effect.name} needs {', '.join(effect.columns)}, which error maps do not have",
+                             where="job.toml [model] effects", fix="Leave it out")  # fmt: skip
     if job.facts.conformity:
         raise CmmUqError("error maps are diagnosed, no standard here decides on them",
                          where="job.toml [[conformity]]", fix="Leave it out")  # fmt: skip

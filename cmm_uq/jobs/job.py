@@ -292,8 +292,8 @@ class JobFile(_Table):
     @classmethod
     def _maps_are_the_recording(cls, data: Any) -> Any:
         artefact = data.get("artefact") if isinstance(data, dict) else None
-        if isinstance(artefact, dict) and artefact.get("kind") == ERROR_MAP and "recording" not in data:
-            return {**data, "recording": {"file": ""}}
+        if isinstance(artefact, dict) and artefact.get("kind") == ERROR_MAP:
+            return {"recording": {"file": ""}, **data}
         return data
 
 
