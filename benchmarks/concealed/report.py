@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from generator import DESIGNS, NOTHING, SIGNALS
+from scipy.stats import norm
 
 Pairs = list[tuple[dict, dict]]
 
@@ -125,6 +126,8 @@ def _plots(pairs: Pairs, right: Callable, p: np.ndarray, good: np.ndarray, folde
         rate = [values[(root >= a) & (root < b)].mean() if np.any((root >= a) & (root < b)) else np.nan
                 for a, b in itertools.pairwise(edges)]  # fmt: skip
         axes[0].plot(middle, rate, "o-", label=label)
+    strength = np.linspace(edges[0], edges[-1], 200)
+    axes[0].plot(strength, norm.sf(norm.isf(0.005) - strength), color="0.6", label="oracle that knows effect and noise")
     axes[0].set(xlabel="√λ of the weakest hidden effect", ylabel="part of the cases", ylim=(0, 1.03))
     axes[0].legend(frameon=False)
     if len(p):
