@@ -61,7 +61,7 @@ def _read(folder: Path, alpha: float) -> Job:
 
 
 def _diagnose(job: Job, seed: int, alpha: float, progress: Progress | None) -> Diagnosed:
-    refuse(job, "diagnosed as a recording of an artefact" if job.facts.artefact.kind == ERROR_MAP else "diagnosed")
+    refuse(job, "diagnosed as a recording of an artefact")
     model, findings = screened_model(job)
     return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
 
