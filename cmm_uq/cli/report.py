@@ -12,7 +12,7 @@ from cmm_uq.cli.options import Json, Out, Quiet, Seed
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
-    from cmm_uq.reporting import Report
+    from cmm_uq.commands.report import Report
 
 
 def command(
@@ -24,7 +24,7 @@ def command(
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
     with shown(quiet=quiet or json) as stage:
-        from cmm_uq.reporting import write_report
+        from cmm_uq.commands.report import write_report
 
         report = write_report(job, out, seed=seed, stage=stage)
     if json:
@@ -34,7 +34,7 @@ def command(
 
 
 def _summarise(report: Report) -> None:
-    from cmm_uq.certificate.summary import summary
+    from cmm_uq.commands.summary import summary
 
     rows = summary(report.result) + [(name, str(path), "") for name, path in report.files.items()]
     if sys.stdout.isatty():

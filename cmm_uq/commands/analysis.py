@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cmm_uq.analysis.diagnosing import diagnosed, screened_model
-from cmm_uq.analysis.estimation import accuracy, influences, noise, parameters, sizes, with_noise
-from cmm_uq.analysis.plane_shifting import PlaneShiftResult, analyse_plane
-from cmm_uq.analysis.refusals import refuse
-from cmm_uq.analysis.result import Result
-from cmm_uq.analysis.shifting import ShiftResult, analyse_shift
+from cmm_uq.commands.diagnosing import diagnosed, screened_model
+from cmm_uq.commands.estimation import accuracy, influences, noise, parameters, sizes, with_noise
+from cmm_uq.commands.refusals import refuse
 from cmm_uq.conformity.standards import statement
+from cmm_uq.documents.result import Result
 from cmm_uq.inference.posterior import Progress, sample
 from cmm_uq.jobs.job import SHIFT, Job
 from cmm_uq.jobs.reading import read_job
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult, analyse_shift
+from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult, analyse_plane
 
 __all__ = ["PlaneShiftResult", "Result", "ShiftResult", "analyse", "analyse_observations"]
 

@@ -36,10 +36,10 @@ def write_budget(file: Path, out: Path | None = None, *, seed: int | None = None
     folder = out or Path("reports") / file.stem
     with staging(folder) as place:
         evaluation = model.evaluate(seed)
-        from cmm_uq.certificate.budget_page import budget_document
-        from cmm_uq.certificate.html import render_html
-        from cmm_uq.certificate.pdf import render_pdf
-        from cmm_uq.certificate.results_file import as_json
+        from cmm_uq.documents.budget_page import budget_document
+        from cmm_uq.documents.html import render_html
+        from cmm_uq.documents.pdf import render_pdf
+        from cmm_uq.documents.results_file import as_json
         from cmm_uq.uncertainty.budget_results import results_of
 
         data = as_json({**results_of(evaluation), "inputs_sha256": {file.name: model.sha256}})

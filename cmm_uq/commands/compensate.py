@@ -7,15 +7,15 @@ import re
 from pathlib import Path
 
 from cmm_uq import __version__
-from cmm_uq.analysis.error_maps import maps_of
-from cmm_uq.analysis.refusals import refuse
+from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands.simulate import recording
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import SHIFT, Job
 from cmm_uq.jobs.reading import read_job, sha256
+from cmm_uq.kinds.error_maps.analysis import maps_of
 from cmm_uq.physics.compensation import compensate_points, machine_compensation
 from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.points import Points
-from cmm_uq.simulation import recording
 from cmm_uq.writing import staging, write_whole
 
 

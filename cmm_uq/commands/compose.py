@@ -6,29 +6,27 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from cmm_uq import __version__
-from cmm_uq.analysis.plane_shifting import PlaneShiftResult
-from cmm_uq.analysis.result import Result
-from cmm_uq.analysis.shifting import ShiftResult
-from cmm_uq.certificate import (
-    ballbar_section,
-    bryan_section,
-    gauge_section,
-    plane_section,
-    plane_shift_section,
-    plate_section,
-    shift_section,
-    sphere_section,
-    tolerance_section,
-    triangle_section,
-)
-from cmm_uq.certificate.corner import corner_plot
-from cmm_uq.certificate.diagnosis_page import diagnosis_sections
-from cmm_uq.certificate.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
-from cmm_uq.certificate.warning import warnings
-from cmm_uq.certificate.wording import expanded, listed, probability, title_of, units_of
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.standards import Statement
+from cmm_uq.documents import tolerance_section
+from cmm_uq.documents.corner import corner_plot
+from cmm_uq.documents.diagnosis_page import diagnosis_sections
+from cmm_uq.documents.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.warning import warnings
+from cmm_uq.documents.wording import expanded, listed, probability, title_of, units_of
 from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.kinds.ballbar import page as ballbar_section
+from cmm_uq.kinds.bryan import page as bryan_section
+from cmm_uq.kinds.gauge_lines import page as gauge_section
+from cmm_uq.kinds.plane import page as plane_section
+from cmm_uq.kinds.plate import page as plate_section
+from cmm_uq.kinds.shift_axis import page as shift_section
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult
+from cmm_uq.kinds.shift_plate import page as plane_shift_section
+from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
+from cmm_uq.kinds.sphere import page as sphere_section
+from cmm_uq.kinds.triangle import page as triangle_section
 from cmm_uq.uncertainty.rounding import rounded, significant
 from cmm_uq.units import MICROMETRE
 

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cmm_uq.analysis.consequences import consequences
-from cmm_uq.analysis.error_maps import MapsDiagnosed, diagnose_error_maps
-from cmm_uq.analysis.estimation import model_of, without_outliers
-from cmm_uq.analysis.refusals import refuse
-from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.artefacts import artefact_of
+from cmm_uq.commands.estimation import model_of, without_outliers
+from cmm_uq.commands.refusals import refuse
+from cmm_uq.conformity.consequences import consequences
+from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, diagnose
+from cmm_uq.documents.result import Diagnosed
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import ERROR_MAP, Job
 from cmm_uq.jobs.reading import read_job
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.mismatch.diagnosis import FALSE_ALARMS, diagnose
-from cmm_uq.mismatch.screening import Finding, screened
-from cmm_uq.mismatch.suggestion import suggestions
+from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed, diagnose_error_maps
+from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning.suggestion import suggestions
+from cmm_uq.screening.screened import Finding, screened
 
 
 def diagnose_folder(

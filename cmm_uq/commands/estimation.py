@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.result import LACK_OF_FIT, Influence, Noise
-from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.conformity.accuracy import with_uncertainty
-from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.documents.result import LACK_OF_FIT, Influence, Noise
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
-from cmm_uq.measurement import Estimate, MeasurementModel
-from cmm_uq.measurement.model import ARTEFACT
-from cmm_uq.mismatch.screening import Finding, gross_outliers
+from cmm_uq.model import Estimate, MeasurementModel
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.screening.screened import Finding, gross_outliers
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
 

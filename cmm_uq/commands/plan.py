@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.analysis.planning import Plan, Progress, make_plan
+from cmm_uq.commands.planning import Plan, Progress, make_plan
 from cmm_uq.jobs.reading import read_job
 from cmm_uq.planning.placing import joined
 from cmm_uq.writing import staging, write_whole
@@ -47,9 +47,9 @@ def write_plan(
         plan = make_plan(read_job(job, recorded=False), power=power, seed=seed, progress=tell)
         folder = out or Path("reports") / plan.job.facts.job.id
         place = place or stack.enter_context(staging(folder))
-        from cmm_uq.certificate.html import render_html
-        from cmm_uq.certificate.plan_page import plan_document, plan_results
-        from cmm_uq.certificate.results_file import as_json
+        from cmm_uq.commands.plan_page import plan_document, plan_results
+        from cmm_uq.documents.html import render_html
+        from cmm_uq.documents.results_file import as_json
 
         tell("Drawing the placings", 0.95)
         data = as_json(plan_results(plan))
@@ -63,7 +63,7 @@ def write_plan(
 
 def _recording_to_be(plan: Plan) -> bytes:
     """The placings as the CSV of a recording at nominal coordinates."""
-    from cmm_uq.simulation import recording
+    from cmm_uq.commands.simulate import recording
 
     wishes = plan.setting.plan
     points = joined(

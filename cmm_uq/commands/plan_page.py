@@ -5,10 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.analysis.planning import RECORDED, Outlook, Plan
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
-from cmm_uq.certificate.plan_picture import gain_plot, placing_pictures
-from cmm_uq.certificate.plan_words import (
+from cmm_uq.commands.plan_words import (
     CRITERIA,
     STATUS,
     absorbed,
@@ -21,10 +18,13 @@ from cmm_uq.certificate.plan_words import (
     title_of,
     unit_of,
 )
-from cmm_uq.certificate.working_page import working_page
+from cmm_uq.commands.planning import RECORDED, Outlook, Plan
+from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
+from cmm_uq.diagnosis.power import POWER, SIZES
+from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.plan_picture import gain_plot, placing_pictures
+from cmm_uq.documents.working_page import working_page
 from cmm_uq.jobs.reading import sha256
-from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
-from cmm_uq.mismatch.power import POWER, SIZES
 from cmm_uq.units import MICROMETRE
 
 SCHEMA = "cmm-uq/plan/1"

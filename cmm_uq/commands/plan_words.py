@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cmm_uq.analysis.planning import RECORDED, Plan
-from cmm_uq.certificate.wording import listed
-from cmm_uq.measurement.model import ARTEFACT
+from cmm_uq.commands.planning import RECORDED, Plan
+from cmm_uq.documents.wording import listed
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.planning.identifiability import Determined, Identifiability
 from cmm_uq.units import MICROMETRE

@@ -7,13 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.analysis.refusals import refuse
 from cmm_uq.artefacts.bryan import Bryan
+from cmm_uq.commands.refusals import refuse
 from cmm_uq.conformity.plan_conditions import Condition, conditions
+from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
+from cmm_uq.diagnosis.power import Power, powers, without_fault
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import SHIFT, Job
-from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
-from cmm_uq.mismatch.power import Power, powers, without_fault
+from cmm_uq.kinds.shift_axis.series import shifted_series
+from cmm_uq.kinds.shift_axis.undetermined import undetermined
 from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.candidates import candidates, like, thinned
 from cmm_uq.planning.exchange import choose, score_of
@@ -23,8 +25,6 @@ from cmm_uq.planning.placing import Pattern, Placing, appended, joined, split
 from cmm_uq.planning.ready import ready_plan
 from cmm_uq.planning.setting import Setting
 from cmm_uq.points import Floats, Points
-from cmm_uq.selfcalibration.series import shifted_series
-from cmm_uq.selfcalibration.undetermined import undetermined
 from cmm_uq.units import MICROMETRE
 
 RECORDED = "recording"

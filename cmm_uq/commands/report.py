@@ -7,11 +7,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.analysis import PlaneShiftResult, Result, ShiftResult, analyse
-from cmm_uq.analysis.diagnosing import diagnose_folder
-from cmm_uq.analysis.error_maps import MapsDiagnosed
-from cmm_uq.analysis.result import Diagnosed
-from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
+from cmm_uq.commands.analysis import PlaneShiftResult, Result, ShiftResult, analyse
+from cmm_uq.commands.diagnosing import diagnose_folder
+from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
+from cmm_uq.documents.result import Diagnosed
+from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.writing import staging, write_whole
 
 Stage = Callable[[str, float], None]
@@ -105,10 +105,10 @@ def write_diagnosis(
 
 
 def _diagnosis_contents(found: Diagnosed | MapsDiagnosed, seed: int) -> dict[str, bytes]:
-    from cmm_uq.certificate.diagnosis_page import diagnosis_document, diagnosis_results
-    from cmm_uq.certificate.html import render_html
-    from cmm_uq.certificate.map_page import maps_document, maps_results
-    from cmm_uq.certificate.results_file import as_json
+    from cmm_uq.documents.diagnosis_page import diagnosis_document, diagnosis_results
+    from cmm_uq.documents.html import render_html
+    from cmm_uq.documents.results_file import as_json
+    from cmm_uq.kinds.error_maps.page import maps_document, maps_results
 
     if isinstance(found, MapsDiagnosed):
         data, document = maps_results(found, seed), maps_document(found, seed)
@@ -118,10 +118,10 @@ def _diagnosis_contents(found: Diagnosed | MapsDiagnosed, seed: int) -> dict[str
 
 
 def _contents(result: Result | ShiftResult | PlaneShiftResult, tell: Stage) -> dict[str, bytes]:
-    from cmm_uq.certificate.compose import certificate
-    from cmm_uq.certificate.html import render_html
-    from cmm_uq.certificate.pdf import render_pdf
-    from cmm_uq.certificate.results_file import as_json, results
+    from cmm_uq.commands.compose import certificate
+    from cmm_uq.documents.html import render_html
+    from cmm_uq.documents.pdf import render_pdf
+    from cmm_uq.documents.results_file import as_json, results
 
     tell("Composing the certificate", 0.5)
     document = certificate(result)
@@ -129,10 +129,10 @@ def _contents(result: Result | ShiftResult | PlaneShiftResult, tell: Stage) -> d
     if isinstance(result, Result):
         data = as_json(results(result))
     else:
-        from cmm_uq.certificate.plane_shift_results import plane_shift_results
-        from cmm_uq.certificate.shift_results import shift_results
-        from cmm_uq.certificate.shift_section import TABLE_FILE
-        from cmm_uq.selfcalibration.correction_table import table_text
+        from cmm_uq.kinds.shift_axis.page import TABLE_FILE
+        from cmm_uq.kinds.shift_axis.results import shift_results
+        from cmm_uq.kinds.shift_plate.results import plane_shift_results
+        from cmm_uq.kinds.shifting.correction_table import table_text
 
         data = as_json(shift_results(result) if isinstance(result, ShiftResult) else plane_shift_results(result))
         more[TABLE_FILE] = table_text(result.table)

@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.refusals import refuse
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.artefacts.artefact import Artefact
+from cmm_uq.commands.refusals import refuse
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import content_of, read_job
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.jobs.truth import Truth
-from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.model import MeasurementModel, Noise
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from cmm_uq.analysis.plane_shifting import PlaneShiftResult
-from cmm_uq.analysis.result import Result
-from cmm_uq.analysis.shifting import ShiftResult
-from cmm_uq.certificate import plane_shift_section, shift_section
-from cmm_uq.certificate.warning import warnings
-from cmm_uq.certificate.wording import expanded, probability, title_of
 from cmm_uq.conformity.accuracy import TITLES
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.warning import warnings
+from cmm_uq.documents.wording import expanded, probability, title_of
+from cmm_uq.kinds.shift_axis import page as shift_section
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult
+from cmm_uq.kinds.shift_plate import page as plane_shift_section
+from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.uncertainty.rounding import rounded
 
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.conformity.accuracy import with_uncertainty
-from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import Statement, statement
+from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.inference.posterior import Density
 from cmm_uq.jobs.job import Job
-from cmm_uq.mismatch.diagnosis import Diagnosis
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
 _DRAWS = 1000

@@ -1,1 +1,1 @@
-"""Where a recording and its model differ: screening before anything is fitted, and outliers after."""
+"""Where a recording and its model differ, and what was left out of the model."""

@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
-from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, Found, Race, search, with_rivals
+from cmm_uq.diagnosis.held_out import Improvement, improvement
+from cmm_uq.diagnosis.joint import Joint, joint_posterior
+from cmm_uq.diagnosis.location import Place, located
+from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.posterior import Posterior, Progress
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.held_out import Improvement, improvement
-from cmm_uq.mismatch.joint import Joint, joint_posterior
-from cmm_uq.mismatch.location import Place, located
-from cmm_uq.mismatch.noise import Kind
-from cmm_uq.mismatch.search import NOT_TOLD_APART, Found, Race, search, with_rivals
+from cmm_uq.model import MeasurementModel
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
 FALSE_ALARMS = 0.01

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.inference.posterior import Density
-from cmm_uq.measurement import MeasurementModel
+from cmm_uq.model import MeasurementModel
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
+from cmm_uq.diagnosis.comparison.explanations import evenly, unevenly
+from cmm_uq.diagnosis.comparison.search import Found
+from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.inference.posterior import Posterior, Progress, sample
 from cmm_uq.inference.shaped import Shaped, sample_shaped
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.mismatch.explanations import evenly, unevenly
-from cmm_uq.mismatch.noise import Kind
-from cmm_uq.mismatch.search import Found
+from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 

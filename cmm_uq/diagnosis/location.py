@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from cmm_uq.mismatch.explanations import UNKNOWN
-from cmm_uq.mismatch.gate import tail_probability
-from cmm_uq.mismatch.search import Race
-from cmm_uq.mismatch.stack import Version
+from cmm_uq.diagnosis.comparison.explanations import UNKNOWN
+from cmm_uq.diagnosis.comparison.gate import tail_probability
+from cmm_uq.diagnosis.comparison.search import Race
+from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.points import Floats, Ints
 from cmm_uq.units import MICROMETRE
 

@@ -4,7 +4,7 @@ Nothing is approximated but the noise, which is white: recordings are drawn on t
 statistic, with its own rivals, priors and false-alarm rate, decides on each. What it sees of a draw is a quadratic form, so
 that a recording costs some milliseconds. *Detected*: the gate opens. *Named*: besides, the true effect alone is more probable
 than any other known effect alone and than none, and so much that no other is said to be as possible
-(:data:`~cmm_uq.mismatch.search.NOT_TOLD_APART`): with twins that nobody can tell apart, a lucky guess is no name.
+(:data:`~cmm_uq.diagnosis.comparison.search.NOT_TOLD_APART`): with twins that nobody can tell apart, a lucky guess is no name.
 
 (Baarda 1968 and Teunissen 2018 call these sizes minimal detectable and minimal identifiable bias.)
 """
@@ -19,13 +19,13 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.artefacts import artefact_of
+from cmm_uq.diagnosis.comparison.combinations import Prior
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN
+from cmm_uq.diagnosis.comparison.gate import DRAWS, statistic_of
+from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, race_of
 from cmm_uq.jobs.job import ArtefactFacts
-from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.mismatch.combinations import Prior
-from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN
-from cmm_uq.mismatch.gate import DRAWS, statistic_of
-from cmm_uq.mismatch.search import NOT_TOLD_APART, race_of
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 
@@ -118,7 +118,7 @@ def powers(
     stated : standard uncertainty of a coordinate that the diagnosis would be told, mm.
     sigma : that it truly has, mm.
     alpha : false-alarm rate.
-    seed : of the draws; the gate's own are those of seed 0 (:func:`~cmm_uq.mismatch.search.search`).
+    seed : of the draws; the gate's own are those of seed 0 (:func:`~cmm_uq.diagnosis.comparison.search.search`).
     draws : recordings drawn of each effect and size.
     """
     race = race_of(model, stated, 0)
@@ -178,7 +178,7 @@ class _Rule:
         """(t,) statistic at which the gate opens when the noise looks :data:`_LARGER` times what it is.
 
         The gate draws "nothing is missing" at the noise that fits the recording best, and a fault makes that larger. Its tail
-        is that of :func:`~cmm_uq.mismatch.search.tail_probability`.
+        is that of :func:`~cmm_uq.diagnosis.comparison.search.tail_probability`.
         """
         comparison = self.comparison
         random = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(2,)))

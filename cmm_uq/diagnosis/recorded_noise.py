@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.mismatch.noise import Kind, kinds, order_of, tails
-from cmm_uq.mismatch.unknown_functions import directions, mean_of
+from cmm_uq.diagnosis.comparison.unknown_functions import directions, mean_of
+from cmm_uq.diagnosis.noise import Kind, kinds, order_of, tails
+from cmm_uq.model import MeasurementModel
 from cmm_uq.points import Ints
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cmm_uq import __version__
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
-from cmm_uq.certificate.plots import budget_bars
+from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.plots import budget_bars
 from cmm_uq.uncertainty.budget import HEADINGS, Budget
 from cmm_uq.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
 from cmm_uq.uncertainty.evaluation import Evaluation, Stated

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plot_style import (
+from cmm_uq.documents.document import Plot
+from cmm_uq.documents.plot_style import (
     ACCENT,
     INK,
     MUTED,

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.result import Diagnosed
-from cmm_uq.certificate.diagnosis_words import VERDICTS, noise_words, sentence
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
-from cmm_uq.certificate.plots import curve_with_band, length_plot
-from cmm_uq.certificate.results_file import SCHEMA, diagnosis_data
-from cmm_uq.certificate.wording import expanded, probability
-from cmm_uq.certificate.working_page import working_page
 from cmm_uq.conformity.accuracy import TITLES, UNITS
+from cmm_uq.documents.diagnosis_words import VERDICTS, noise_words, sentence
+from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.plots import curve_with_band, length_plot
+from cmm_uq.documents.result import Diagnosed
+from cmm_uq.documents.results_file import SCHEMA, diagnosis_data
+from cmm_uq.documents.wording import expanded, probability
+from cmm_uq.documents.working_page import working_page
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.units import MICROMETRE
 

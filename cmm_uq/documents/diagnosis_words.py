@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cmm_uq.analysis.result import Diagnosed
-from cmm_uq.certificate.wording import expanded, probability
-from cmm_uq.mismatch.diagnosis import Diagnosis, LeftOut
-from cmm_uq.mismatch.held_out import Improvement
+from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
+from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.result import Diagnosed
+from cmm_uq.documents.wording import expanded, probability
 
 CAUSES = {
     "scale": "the scale or its compensation: check the linear compensation of this axis",

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.certificate import plot_style
-from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.templates import template_folder
+from cmm_uq.documents import plot_style
+from cmm_uq.documents.document import Document
+from cmm_uq.documents.templates import template_folder
 
 if TYPE_CHECKING:
     from jinja2 import Environment

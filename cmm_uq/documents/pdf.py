@@ -14,9 +14,9 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
-from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.plot_style import COLOURS
-from cmm_uq.certificate.templates import template_folder
+from cmm_uq.documents.document import Document
+from cmm_uq.documents.plot_style import COLOURS
+from cmm_uq.documents.templates import template_folder
 from cmm_uq.errors import CmmUqError
 
 EPOCH = "1970-01-01"

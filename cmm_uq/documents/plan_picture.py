@@ -8,19 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plot_style import (
-    ACCENT,
-    INK,
-    MUTED,
-    RULE,
-    TINY,
-    WIDTH_MM,
-    as_svg,
-    dots,
-    house_style,
-    new_figure,
-)
+from cmm_uq.documents.document import Plot
+from cmm_uq.documents.plot_style import ACCENT, INK, MUTED, RULE, TINY, WIDTH_MM, as_svg, dots, house_style, new_figure
 from cmm_uq.planning.placing import Placing
 from cmm_uq.points import AXES, Floats
 

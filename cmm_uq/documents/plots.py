@@ -1,7 +1,7 @@
 """The pictures of a certificate: lengths by position, residuals in the volume, a curve with its band, a budget.
 
-Each function takes plain arrays and words and gives back a :class:`~cmm_uq.certificate.document.Plot`. Nothing is
-computed here but where the ink goes. The posterior's picture is in :mod:`cmm_uq.certificate.corner`.
+Each function takes plain arrays and words and gives back a :class:`~cmm_uq.documents.document.Plot`. Nothing is
+computed here but where the ink goes. The posterior's picture is in :mod:`cmm_uq.documents.corner`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plot_style import (
+from cmm_uq.documents.document import Plot
+from cmm_uq.documents.plot_style import (
     ACCENT,
     BAND,
     DIVERGING,

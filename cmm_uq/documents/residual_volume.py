@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.result import Result
-from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plots import volume_plot
+from cmm_uq.documents.document import Plot
+from cmm_uq.documents.plots import volume_plot
+from cmm_uq.documents.result import Result
 from cmm_uq.units import MICROMETRE
 
 

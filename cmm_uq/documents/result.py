@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from cmm_uq.analysis.consequences import Consequences
-from cmm_uq.artefacts.artefact import Artefact
-from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.conformity.consequences import Consequences
 from cmm_uq.conformity.standards import Statement
+from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
-from cmm_uq.measurement import Estimate, MeasurementModel
-from cmm_uq.mismatch.diagnosis import Diagnosis
-from cmm_uq.mismatch.screening import Finding
-from cmm_uq.mismatch.suggestion import Suggestion
+from cmm_uq.model import Estimate, MeasurementModel
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.planning.suggestion import Suggestion
 from cmm_uq.points import Floats
+from cmm_uq.screening.screened import Finding
+from cmm_uq.uncertainty.quantity import Quantity
 
 LACK_OF_FIT = 0.01
 """Probability below which the residuals are held to contradict the stated noise."""

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.result import Diagnosed, Result
-from cmm_uq.certificate.diagnosis_words import sentence
 from cmm_uq.conformity.decision import rule_name
-from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import Statement
+from cmm_uq.diagnosis.diagnosis import LeftOut
+from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.result import Diagnosed, Result
 from cmm_uq.jobs.reading import sha256
-from cmm_uq.mismatch.diagnosis import LeftOut
-from cmm_uq.mismatch.held_out import Improvement
-from cmm_uq.mismatch.screening import Finding
+from cmm_uq.screening.screened import Finding
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
 SCHEMA = "cmm-uq/results/1"

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plot_style import (
+from cmm_uq.documents.document import Plot
+from cmm_uq.documents.plot_style import (
     ACCENT,
     BAND,
     DIVERGING,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from cmm_uq.analysis.result import Result
-from cmm_uq.certificate.document import Column, Section, Table
-from cmm_uq.certificate.tolerance_plot import tolerance_plot
-from cmm_uq.certificate.wording import expanded, listed
-from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.documents.document import Column, Section, Table
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.tolerance_plot import tolerance_plot
+from cmm_uq.documents.wording import expanded, listed
+from cmm_uq.uncertainty.quantity import Quantity
 
 
 def sections(result: Result) -> list[Section]:

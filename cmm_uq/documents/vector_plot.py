@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plot_style import ACCENT, MUTED, RULE, TINY, as_svg, dots, finite, house_style, new_figure
+from cmm_uq.documents.document import Plot
+from cmm_uq.documents.plot_style import ACCENT, MUTED, RULE, TINY, as_svg, dots, finite, house_style, new_figure
 
 _ROUND = (1.0, 2.0, 5.0)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cmm_uq.analysis.result import Result
-from cmm_uq.certificate.diagnosis_words import VERDICTS
-from cmm_uq.certificate.wording import listed, title_of
+from cmm_uq.documents.diagnosis_words import VERDICTS
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import listed, title_of
 from cmm_uq.uncertainty.rounding import significant
 
 ASSUMED = 0.25

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cmm_uq.analysis.result import Result
-from cmm_uq.conformity.quantity import Quantity
-from cmm_uq.measurement.model import ARTEFACT
+from cmm_uq.documents.result import Result
+from cmm_uq.model.measurement import ARTEFACT
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
 
 

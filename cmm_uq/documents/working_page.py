@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from cmm_uq.certificate.document import Document, Facts, Section
+from cmm_uq.documents.document import Document, Facts, Section
 from cmm_uq.jobs.job import JobFile
 
 

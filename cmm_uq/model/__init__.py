@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from cmm_uq.measurement.model import Estimate, MeasurementModel, Noise
+from cmm_uq.model.measurement import Estimate, MeasurementModel, Noise
 
 __all__ = ["Estimate", "MeasurementModel", "Noise"]

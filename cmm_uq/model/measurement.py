@@ -18,10 +18,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.least_squares import LeastSquares, solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 

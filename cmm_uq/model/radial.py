@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from cmm_uq.artefacts.artefact import Artefact, Size
-from cmm_uq.artefacts.placings import Placings
-from cmm_uq.artefacts.recorded import check_length, place
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.artefact import Artefact, Size
+from cmm_uq.model.placings import Placings
+from cmm_uq.model.recorded import check_length, place
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import MICROMETRE
 

@@ -11,10 +11,10 @@ from abc import abstractmethod
 
 import numpy as np
 
-from cmm_uq.artefacts.artefact import Artefact
-from cmm_uq.artefacts.placings import Placings
-from cmm_uq.artefacts.recorded import place
 from cmm_uq.errors import CmmUqError
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.placings import Placings
+from cmm_uq.model.recorded import place
 from cmm_uq.points import Floats, Points
 
 _ANOTHER_SHAPE = 0.05

@@ -14,15 +14,15 @@ from itertools import combinations
 import numpy as np
 
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.artefacts.bryan import Bryan
+from cmm_uq.diagnosis.comparison.explanations import shapes
+from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import WITH_REFERENCES, ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.measurement.model import ARTEFACT
-from cmm_uq.mismatch.diagnosis import Diagnosis
-from cmm_uq.mismatch.explanations import shapes
+from cmm_uq.model import MeasurementModel
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.planning.candidates import like
 from cmm_uq.planning.information import certified, gram, scales, shared

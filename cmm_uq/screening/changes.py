@@ -11,8 +11,8 @@ from itertools import combinations
 
 import numpy as np
 
-from cmm_uq.mismatch.screening_artefact import Shape
 from cmm_uq.points import AXES, Floats, Ints
+from cmm_uq.screening.shape import Shape
 
 UNITS = ((25.4, "inches"), (1e3, "metres"), (1e-3, "micrometres"), (10.0, "centimetres"))
 """Millimetres in what the recording may hold instead."""

@@ -9,8 +9,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.mismatch.screening_finding import Finding, at_lines, finding, span
 from cmm_uq.points import AXES, Floats, Ints, Points
+from cmm_uq.screening.finding import Finding, at_lines, finding, span
 
 Rows = NDArray[np.bool_]
 

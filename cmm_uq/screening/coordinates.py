@@ -13,11 +13,11 @@ import numpy as np
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
-from cmm_uq.mismatch.screening_artefact import Shape
-from cmm_uq.mismatch.screening_changes import Change, changes, changes_of_blocks
-from cmm_uq.mismatch.screening_finding import Finding, at_lines, finding
-from cmm_uq.mismatch.screening_search import MOST, Search, outside_travel
 from cmm_uq.points import AXES, Points
+from cmm_uq.screening.changes import Change, changes, changes_of_blocks
+from cmm_uq.screening.finding import Finding, at_lines, finding
+from cmm_uq.screening.search import MOST, Search, outside_travel
+from cmm_uq.screening.shape import Shape
 
 _SEVERAL = 4
 _EDGES = 0.05

@@ -17,12 +17,12 @@ from scipy import linalg, special
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.jobs.job import ArtefactFacts
-from cmm_uq.mismatch.screening_artefact import shape_of
-from cmm_uq.mismatch.screening_columns import SENSORS, about_whole_column, column_findings
-from cmm_uq.mismatch.screening_coordinates import coordinate_findings
-from cmm_uq.mismatch.screening_finding import Finding, finding, span
-from cmm_uq.mismatch.screening_search import outside_travel
 from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.screening.columns import SENSORS, about_whole_column, column_findings
+from cmm_uq.screening.coordinates import coordinate_findings
+from cmm_uq.screening.finding import Finding, finding, span
+from cmm_uq.screening.search import outside_travel
+from cmm_uq.screening.shape import shape_of
 
 __all__ = ["Finding", "Screened", "gross_outliers", "impossible_values", "repeated_figures", "screen", "screened"]
 

@@ -9,10 +9,10 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.mismatch.screening_artefact import Shape
-from cmm_uq.mismatch.screening_changes import Change, changes, changes_of_blocks
-from cmm_uq.mismatch.screening_finding import Finding, at_lines, finding
 from cmm_uq.points import AXES, Floats, Ints, Points
+from cmm_uq.screening.changes import Change, changes, changes_of_blocks
+from cmm_uq.screening.finding import Finding, at_lines, finding
+from cmm_uq.screening.shape import Shape
 
 MOST = 0.2
 """Part of the rows that may be left out; with more damage the recording is refused."""

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cmm_uq.artefacts.placings import Placings
 from cmm_uq.artefacts.plane import DIRECTION_POINT
 from cmm_uq.artefacts.plate import REFERENCES
 from cmm_uq.artefacts.triangle_standard import TriangleStandard, corners
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.placings import Placings
 from cmm_uq.points import AXES, Floats, Ints, Points
 
 TOLERANCE_MM, TOLERANCE_RATIO = 0.5, 5e-3

@@ -13,7 +13,7 @@ import pikepdf
 import pypdf
 import pytest
 
-from cmm_uq.budgeting import write_budget
+from cmm_uq.commands.budget import write_budget
 from cmm_uq.errors import CmmUqError
 
 COMPARISON_LOSS = """

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis import analyse
-from cmm_uq.compensating import write_compensated
+from cmm_uq.commands.analysis import analyse
+from cmm_uq.commands.compensate import write_compensated
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.reading import read_job
 from tests.conftest import ROOT

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.analysis import Result, analyse
-from cmm_uq.certificate.compose import STATEMENTS, certificate
-from cmm_uq.certificate.document import Decision, Document, Facts, Table
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.summary import summary
-from cmm_uq.certificate.warning import warnings
+from cmm_uq.commands.analysis import Result, analyse
+from cmm_uq.commands.compose import STATEMENTS, certificate
+from cmm_uq.commands.summary import summary
+from cmm_uq.documents.document import Decision, Document, Facts, Table
+from cmm_uq.documents.html import render_html
+from cmm_uq.documents.warning import warnings
 from tests.conftest import ROOT
 
 

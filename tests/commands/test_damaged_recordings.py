@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cmm_uq.analysis.diagnosing import diagnose_job
+from cmm_uq.commands.diagnosing import diagnose_job
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.reading import read_job
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning import RECORDED, SPREAD, Plan, make_plan
+from cmm_uq.commands.planning import RECORDED, SPREAD, Plan, make_plan
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.reading import read_job
 from tests.conftest import ROOT

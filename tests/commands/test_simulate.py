@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis import analyse
+from cmm_uq.commands.analysis import analyse
+from cmm_uq.commands.simulate import simulate, write_simulation
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.reading import read_job
 from cmm_uq.jobs.truth import NoiseFacts, Truth
-from cmm_uq.simulation import simulate, write_simulation
 
 TRUTH = """
 seed = 7

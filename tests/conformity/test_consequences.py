@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cmm_uq.analysis.diagnosing import diagnose_job
-from cmm_uq.analysis.result import Diagnosed
+from cmm_uq.commands.diagnosing import diagnose_job
 from cmm_uq.conformity.accuracy import figures
+from cmm_uq.documents.result import Diagnosed
 from cmm_uq.units import ARCSECOND
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "iota-1102-20C-compensated"

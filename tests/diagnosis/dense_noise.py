@@ -3,8 +3,8 @@
 import numpy as np
 from scipy import linalg
 
-from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.noise import Kind
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.points import Floats
 
 

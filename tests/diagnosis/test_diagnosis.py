@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.analysis.diagnosing import diagnose_job
 from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.commands.diagnosing import diagnose_job
+from cmm_uq.diagnosis.comparison.search import race_of
+from cmm_uq.diagnosis.diagnosis import Diagnosis, diagnose
+from cmm_uq.diagnosis.held_out import improvement
 from cmm_uq.jobs.reading import read_job
-from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.mismatch.diagnosis import Diagnosis, diagnose
-from cmm_uq.mismatch.held_out import improvement
-from cmm_uq.mismatch.search import race_of
-from cmm_uq.mismatch.suggestion import suggestions
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning.suggestion import suggestions
 from cmm_uq.points import Floats, Machine, Points
 from tests.conftest import ROOT
 from tests.recordings import TRAVEL, bar_facts, bars, with_columns

@@ -9,10 +9,10 @@ from scipy import stats
 
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge import StepGauge
+from cmm_uq.diagnosis.held_out import FOLDS, improvement
 from cmm_uq.inference.posterior import Density
 from cmm_uq.jobs.reading import read_job
-from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.mismatch.held_out import FOLDS, improvement
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine, Points
 from tests.conftest import ROOT

@@ -8,9 +8,9 @@ import numpy as np
 from scipy import stats
 
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.mismatch.power import POWER, Power, powers, without_fault
-from cmm_uq.mismatch.search import race_of
+from cmm_uq.diagnosis.comparison.search import race_of
+from cmm_uq.diagnosis.power import POWER, Power, powers, without_fault
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning.placing import joined
 from cmm_uq.planning.ready import ready_plan

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from cmm_uq.certificate.document import Document
-from tests.certificate.samples import ballbar_certificate
+from cmm_uq.documents.document import Document
+from tests.documents.samples import ballbar_certificate
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

@@ -6,19 +6,9 @@ import datetime as dt
 
 import numpy as np
 
-from cmm_uq.certificate.corner import corner_plot
-from cmm_uq.certificate.document import (
-    Column,
-    Decision,
-    Document,
-    Facts,
-    Paragraph,
-    Plot,
-    Section,
-    Signature,
-    Table,
-)
-from cmm_uq.certificate.plots import length_plot, volume_plot
+from cmm_uq.documents.corner import corner_plot
+from cmm_uq.documents.document import Column, Decision, Document, Facts, Paragraph, Plot, Section, Signature, Table
+from cmm_uq.documents.plots import length_plot, volume_plot
 
 HOSTILE = (
     '<script>alert(\'x\')</script> "q" & {{ 7*7 }} {% raw %} #panic("x") $x^2$ *b* _i_ @ref <label> \\u{41} `c` // d '

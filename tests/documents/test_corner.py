@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.certificate.corner import corner_plot
-from cmm_uq.certificate.plot_style import ACCENT, INK, MUTED
+from cmm_uq.documents.corner import corner_plot
+from cmm_uq.documents.plot_style import ACCENT, INK, MUTED
 from cmm_uq.errors import CmmUqError
-from tests.certificate.svg import Drawing, area, outlines, strokes
+from tests.documents.svg import Drawing, area, outlines, strokes
 
 WORDS = {"caption": "Posterior.", "alternative": "a"}
 NORMAL = np.random.default_rng(11).standard_normal((200_000, 2))

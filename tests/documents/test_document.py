@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.certificate.document import Column, Document, Table
-from tests.certificate.samples import document_of
+from cmm_uq.documents.document import Column, Document, Table
+from tests.documents.samples import document_of
 
 
 def test_every_document_is_json(certificate: Document) -> None:

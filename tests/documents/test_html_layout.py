@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import pytest
 from pypdf import PdfReader
 
-from cmm_uq.certificate.document import Column, Document, Section, Table
-from cmm_uq.certificate.html import render_html
-from tests.certificate.samples import HOSTILE, NUMBER, UNBREAKABLE, document_of
+from cmm_uq.documents.document import Column, Document, Section, Table
+from cmm_uq.documents.html import render_html
+from tests.documents.samples import HOSTILE, NUMBER, UNBREAKABLE, document_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pypdf import PdfReader
 
-from cmm_uq.certificate.document import Column, Document, Plot, Section, Table
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.documents.document import Column, Document, Plot, Section, Table
+from cmm_uq.documents.pdf import render_pdf
 from cmm_uq.errors import CmmUqError
-from tests.certificate.samples import HOSTILE, NUMBER, UNBREAKABLE, document_of, plots
+from tests.documents.samples import HOSTILE, NUMBER, UNBREAKABLE, document_of, plots
 
 ATTACHMENTS = {
     "job.toml": '[job]\nid = "µ"\n'.encode(),

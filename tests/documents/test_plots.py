@@ -10,12 +10,12 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plot_style import ACCENT, DIVERGING, MUTED
-from cmm_uq.certificate.plots import budget_bars, curve_with_band, length_plot, volume_plot
+from cmm_uq.documents.document import Plot
+from cmm_uq.documents.plot_style import ACCENT, DIVERGING, MUTED
+from cmm_uq.documents.plots import budget_bars, curve_with_band, length_plot, volume_plot
 from cmm_uq.errors import CmmUqError
-from tests.certificate.samples import plots
-from tests.certificate.svg import Drawing, outlines, strokes
+from tests.documents.samples import plots
+from tests.documents.svg import Drawing, outlines, strokes
 
 RANDOM = np.random.default_rng(3)
 WORDS = {"caption": "c", "alternative": "a"}
@@ -179,7 +179,7 @@ def test_two_runs_give_the_same_bytes_and_leave_no_trace() -> None:
 
 def test_matplotlib_is_imported_late_and_pyplot_never() -> None:
     code = (
-        "import sys, cmm_uq.certificate.plots as p, cmm_uq.certificate.corner\n"
+        "import sys, cmm_uq.documents.plots as p, cmm_uq.documents.corner\n"
         "assert 'matplotlib' not in sys.modules\n"
         "p.curve_with_band([0, 1], [0, 1], [1, 1], x_label='x', y_label='y', caption='c', alternative='a')\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"

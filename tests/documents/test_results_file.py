@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.analysis import analyse
-from cmm_uq.certificate.results_file import as_json, results
+from cmm_uq.commands.analysis import analyse
+from cmm_uq.documents.results_file import as_json, results
 from tests.conftest import ROOT
 
 

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from pypdf import PdfReader
 
-from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.documents.document import Document
+from cmm_uq.documents.html import render_html
+from cmm_uq.documents.pdf import render_pdf
 
 
 class Body(HTMLParser):

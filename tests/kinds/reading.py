@@ -1,6 +1,6 @@
 """Reads a composed document back."""
 
-from cmm_uq.certificate.document import Document, Table
+from cmm_uq.documents.document import Document, Table
 
 
 def tables(document: Document) -> dict[str, Table]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
-from cmm_uq.analysis import Result, analyse
-from cmm_uq.certificate.compose import certificate
-from cmm_uq.certificate.document import Block, Document, Table
+from cmm_uq.commands.analysis import Result, analyse
+from cmm_uq.commands.compose import certificate
+from cmm_uq.documents.document import Block, Document, Table
 from tests.conftest import ROOT
 
 SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}

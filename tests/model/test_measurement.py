@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.errors import CmmUqError
-from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine, Points
 from tests.recordings import TRAVEL, bar_facts, bars

@@ -10,12 +10,12 @@ import pytest
 
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.jobs.job import ArtefactFacts
-from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.mismatch.suggestion import ODDS, suggestions
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning import patterns
 from cmm_uq.planning.placing import Placing, along, joined
 from cmm_uq.planning.ready import ready_plan
+from cmm_uq.planning.suggestion import ODDS, suggestions
 from cmm_uq.points import Points
 from tests.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting
 

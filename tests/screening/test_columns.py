@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.mismatch.screening import screen, screened
-from cmm_uq.mismatch.screening_columns import column_findings
 from cmm_uq.points import Floats, Points
+from cmm_uq.screening.columns import column_findings
+from cmm_uq.screening.screened import screen, screened
 from tests.recordings import bar_facts, with_columns
 
 

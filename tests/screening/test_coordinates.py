@@ -12,8 +12,8 @@ import pytest
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.reading import read_job
-from cmm_uq.mismatch.screening import Screened, screened
 from cmm_uq.points import Floats, Points
+from cmm_uq.screening.screened import Screened, screened
 from tests.recordings import bar_facts, with_columns
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -11,10 +11,10 @@ import pytest
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.reading import read_job
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.mismatch.screening import gross_outliers, impossible_values, repeated_figures, screen
+from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Points
+from cmm_uq.screening.screened import gross_outliers, impossible_values, repeated_figures, screen
 from tests.recordings import bar_facts, with_columns
 
 

@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 from scipy import special
 
-from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.mismatch.stack import Version
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.points import Floats
 
 EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)

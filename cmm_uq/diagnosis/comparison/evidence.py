@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse, special
 
-from cmm_uq.mismatch.explanations import Explanation
-from cmm_uq.mismatch.noise import Kind
-from cmm_uq.mismatch.stack import AMPLITUDES, Group, Version, stacked
+from cmm_uq.diagnosis.comparison.explanations import Explanation
+from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
+from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.points import Floats
 
 _BLOCK, _COLUMNS = 1_500_000, 500

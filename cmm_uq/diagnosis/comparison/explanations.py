@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.measurement import MeasurementModel
+from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.physics.effect import FURTHER, Effect
 from cmm_uq.points import AXES, Floats, Points

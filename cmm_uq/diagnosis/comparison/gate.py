@@ -8,10 +8,10 @@ from math import comb
 import numpy as np
 from scipy import special
 
-from cmm_uq.mismatch.combinations import EFFECTS
-from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
-from cmm_uq.mismatch.stack import Version
+from cmm_uq.diagnosis.comparison.combinations import EFFECTS
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
+from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.points import Floats
 
 SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}

@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.mismatch.combinations import Combinations, Key, explore
-from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.explanations import Explanation, finer, known, several
-from cmm_uq.mismatch.gate import NOTHING, gate, log_prior
-from cmm_uq.mismatch.noise import sigma_grid
-from cmm_uq.mismatch.recorded_noise import noise_kinds
-from cmm_uq.mismatch.stack import Version
-from cmm_uq.mismatch.unknown_functions import unknown
+from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import Explanation, finer, known, several
+from cmm_uq.diagnosis.comparison.gate import NOTHING, gate, log_prior
+from cmm_uq.diagnosis.comparison.stack import Version
+from cmm_uq.diagnosis.comparison.unknown_functions import unknown
+from cmm_uq.diagnosis.noise import sigma_grid
+from cmm_uq.diagnosis.recorded_noise import noise_kinds
+from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.points import Floats
 

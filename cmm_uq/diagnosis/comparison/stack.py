@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-from cmm_uq.mismatch.explanations import Explanation
+from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.points import Floats, Ints
 
 AMPLITUDES = 7

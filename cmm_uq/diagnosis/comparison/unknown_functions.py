@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import linalg
 
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.mismatch.explanations import UNKNOWN, UNKNOWN_SD, Explanation, Member
+from cmm_uq.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD, Explanation, Member
+from cmm_uq.model import MeasurementModel
 from cmm_uq.points import AXES, Floats, Points
 
 LENGTH_SCALES = (0.6, 0.25, 0.1)

@@ -6,15 +6,15 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.result import Result
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.distance_equations import DistanceSolution, solve_distances
-from cmm_uq.certificate import adjustment_section
-from cmm_uq.certificate.budget_page import budget_blocks
-from cmm_uq.certificate.document import Column, Section, Table
-from cmm_uq.certificate.plots import length_plot
-from cmm_uq.certificate.residual_volume import flagged, residual_volume
+from cmm_uq.documents.budget_page import budget_blocks
+from cmm_uq.documents.document import Column, Section, Table
+from cmm_uq.documents.plots import length_plot
+from cmm_uq.documents.residual_volume import flagged, residual_volume
+from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.distances import page as adjustment_section
 from cmm_uq.uncertainty.budget import Budget, Line
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE

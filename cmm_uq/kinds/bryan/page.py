@@ -6,14 +6,14 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.result import Result
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.artefacts.distance_equations import DistanceSolution
-from cmm_uq.certificate import adjustment_section
-from cmm_uq.certificate.document import Section
-from cmm_uq.certificate.plots import length_plot
-from cmm_uq.certificate.residual_volume import flagged, residual_volume
+from cmm_uq.documents.document import Section
+from cmm_uq.documents.plots import length_plot
+from cmm_uq.documents.residual_volume import flagged, residual_volume
+from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.distances import page as adjustment_section
 from cmm_uq.units import MICROMETRE
 
 IN_TWO_STEPS = (

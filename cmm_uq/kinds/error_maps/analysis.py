@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
-from cmm_uq.mismatch.map_columns import columns_of
-from cmm_uq.mismatch.map_diagnosis import MapsDiagnosis, diagnose_maps
-from cmm_uq.mismatch.screening import Finding
+from cmm_uq.kinds.error_maps.columns import columns_of
+from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.physics.error_map import ErrorMap, parse_error_map
+from cmm_uq.screening.screened import Finding
 
 WHERE = "job.toml [machine] error_map"
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.mismatch.screening_finding import Finding
 from cmm_uq.physics.error_map import COLUMNS, ErrorMap
 from cmm_uq.points import AXES, Floats
+from cmm_uq.screening.finding import Finding
 from cmm_uq.units import ARCSECOND, METRE, MICROMETRE
 
 LEAST_POSITIONS = 4

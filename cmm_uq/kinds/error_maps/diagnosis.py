@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.diagnosis.diagnosis import LeftOut
+from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.diagnosis.location import region_of
 from cmm_uq.inference.posterior import Posterior, Progress
-from cmm_uq.mismatch.diagnosis import LeftOut
-from cmm_uq.mismatch.held_out import Improvement
-from cmm_uq.mismatch.location import region_of
-from cmm_uq.mismatch.map_columns import MapColumn, turned
-from cmm_uq.mismatch.map_fit import expansion, function, held_out, noise_of, residual
-from cmm_uq.mismatch.map_search import ColumnRace, Rival, race_of
+from cmm_uq.kinds.error_maps.columns import MapColumn, turned
+from cmm_uq.kinds.error_maps.fit import expansion, function, held_out, noise_of, residual
+from cmm_uq.kinds.error_maps.search import ColumnRace, Rival, race_of
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
 _WELL_KNOWN = 0.95

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from cmm_uq.diagnosis.comparison.stack import Version
+from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.inference.posterior import Posterior, sample
-from cmm_uq.mismatch.map_search import ColumnRace
-from cmm_uq.mismatch.noise import Kind
-from cmm_uq.mismatch.stack import Version
+from cmm_uq.kinds.error_maps.search import ColumnRace
 from cmm_uq.physics.thermal import EXPANSION
 from cmm_uq.points import Floats
 

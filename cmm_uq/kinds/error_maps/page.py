@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.analysis.error_maps import MapsDiagnosed
-from cmm_uq.certificate.diagnosis_words import sentence
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
-from cmm_uq.certificate.map_words import VERDICTS, difference_words, next_words, noise_words
-from cmm_uq.certificate.plots import curve_with_band
-from cmm_uq.certificate.results_file import SCHEMA, effect_data, finding_data, improvement_data, quantity_data
-from cmm_uq.certificate.wording import probability
-from cmm_uq.certificate.working_page import working_page
+from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.plots import curve_with_band
+from cmm_uq.documents.results_file import SCHEMA, effect_data, finding_data, improvement_data, quantity_data
+from cmm_uq.documents.wording import probability
+from cmm_uq.documents.working_page import working_page
 from cmm_uq.jobs.reading import sha256
-from cmm_uq.mismatch.map_diagnosis import Difference
-from cmm_uq.mismatch.map_search import ColumnRace
+from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
+from cmm_uq.kinds.error_maps.diagnosis import Difference
+from cmm_uq.kinds.error_maps.search import ColumnRace
+from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
 
 _PICTURES = 3
 

@@ -14,14 +14,14 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-from cmm_uq.mismatch.combinations import Combinations, Key, explore
-from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.mismatch.gate import gate
-from cmm_uq.mismatch.map_columns import MapColumn, roughness
-from cmm_uq.mismatch.noise import kinds, tails
-from cmm_uq.mismatch.stack import Version
-from cmm_uq.mismatch.unknown_functions import smooth_functions
+from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
+from cmm_uq.diagnosis.comparison.gate import gate
+from cmm_uq.diagnosis.comparison.stack import Version
+from cmm_uq.diagnosis.comparison.unknown_functions import smooth_functions
+from cmm_uq.diagnosis.noise import kinds, tails
+from cmm_uq.kinds.error_maps.columns import MapColumn, roughness
 from cmm_uq.physics.thermal import EXPANSION
 from cmm_uq.points import Floats
 from cmm_uq.units import REFERENCE_TEMPERATURE

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cmm_uq.analysis.error_maps import MapsDiagnosed
-from cmm_uq.certificate.diagnosis_words import sentence
-from cmm_uq.certificate.wording import probability
-from cmm_uq.mismatch.map_diagnosis import Difference, MapsDiagnosis
+from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.wording import probability
+from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
+from cmm_uq.kinds.error_maps.diagnosis import Difference, MapsDiagnosis
 
 VERDICTS = {
     "consistent": "The maps agree with each other within their noise.",

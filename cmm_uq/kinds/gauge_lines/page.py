@@ -6,14 +6,14 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.result import Result
 from cmm_uq.artefacts.gauge import StepGauge
-from cmm_uq.artefacts.gauge_lines import GaugeLine, lines_of
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.certificate.plots import length_plot
-from cmm_uq.certificate.residual_volume import flagged, residual_volume
-from cmm_uq.certificate.wording import listed
 from cmm_uq.conformity.measurement_lines import LEAST_SHARE, missing_lines, position_of, share_of_travel
+from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.plots import length_plot
+from cmm_uq.documents.residual_volume import flagged, residual_volume
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import listed
+from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE

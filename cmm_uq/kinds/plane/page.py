@@ -6,11 +6,11 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.result import Result
 from cmm_uq.artefacts.plane import PlaneSurface, ProbedPlane
-from cmm_uq.certificate.document import Block, Column, Section, Table
-from cmm_uq.certificate.plots import length_plot
-from cmm_uq.certificate.residual_volume import flagged, residual_volume
+from cmm_uq.documents.document import Block, Column, Section, Table
+from cmm_uq.documents.plots import length_plot
+from cmm_uq.documents.residual_volume import flagged, residual_volume
+from cmm_uq.documents.result import Result
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
 

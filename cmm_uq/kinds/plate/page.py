@@ -6,13 +6,13 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.result import Result
 from cmm_uq.artefacts.plate import Plate
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.certificate.vector_plot import vector_plot
-from cmm_uq.certificate.wording import expanded
-from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.vector_plot import vector_plot
+from cmm_uq.documents.wording import expanded
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE, PPM
 

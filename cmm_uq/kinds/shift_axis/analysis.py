@@ -7,18 +7,18 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job, KnownLength
+from cmm_uq.kinds.shift_axis.curve import Curve, CurveEstimate, estimate_curve
+from cmm_uq.kinds.shift_axis.integration_uncertainty import IntegratedCurve, KnownSpan, integrated
+from cmm_uq.kinds.shift_axis.series import ShiftedSeries, shifted_series
+from cmm_uq.kinds.shift_axis.shift_integration import Method
+from cmm_uq.kinds.shift_axis.undetermined import Undetermined, undetermined
+from cmm_uq.kinds.shifting.correction_table import correction_table
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.points import Floats, Ints
-from cmm_uq.selfcalibration.correction_table import correction_table
-from cmm_uq.selfcalibration.curve import Curve, CurveEstimate, estimate_curve
-from cmm_uq.selfcalibration.integration_uncertainty import IntegratedCurve, KnownSpan, integrated
-from cmm_uq.selfcalibration.series import ShiftedSeries, shifted_series
-from cmm_uq.selfcalibration.shift_integration import Method
-from cmm_uq.selfcalibration.undetermined import Undetermined, undetermined
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, PPM
 
 KNOWN = "job.toml [artefact] known"

@@ -14,11 +14,11 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.ensembles import Chains, Progress
+from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.kinds.shift_axis.series import RepeatedDrift, ShiftedSeries
+from cmm_uq.kinds.shifting.smooth_function import FINEST, SmoothFunction
+from cmm_uq.kinds.shifting.smooth_model import Coefficients, SmoothModel, sampled
 from cmm_uq.points import Floats
-from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
-from cmm_uq.selfcalibration.series import RepeatedDrift, ShiftedSeries
-from cmm_uq.selfcalibration.smooth_function import FINEST, SmoothFunction
-from cmm_uq.selfcalibration.smooth_model import Coefficients, SmoothModel, sampled
 from cmm_uq.units import HOUR, MICROMETRE
 
 _TYPICAL = 5 * MICROMETRE

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.points import Floats
-from cmm_uq.selfcalibration.shift_integration import (
+from cmm_uq.kinds.shift_axis.shift_integration import (
     Method,
     Readings,
     calibration_curve,
@@ -19,6 +18,7 @@ from cmm_uq.selfcalibration.shift_integration import (
     position_error,
     with_known_length,
 )
+from cmm_uq.points import Floats
 
 _STEP = 1e-30
 """Of the complex derivative, which is exact to rounding at any step."""

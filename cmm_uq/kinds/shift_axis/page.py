@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.shifting import ShiftResult
-from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table
-from cmm_uq.certificate.plots import curve_with_band, length_plot
-from cmm_uq.certificate.wording import expanded
+from cmm_uq.documents.document import Block, Column, Facts, Paragraph, Section, Table
+from cmm_uq.documents.plots import curve_with_band, length_plot
+from cmm_uq.documents.wording import expanded
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE

@@ -6,13 +6,13 @@ from dataclasses import asdict
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.analysis.shifting import ShiftResult
-from cmm_uq.certificate.results_file import SCHEMA
-from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.documents.results_file import SCHEMA
 from cmm_uq.inference.ensembles import Chains
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult
+from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.points import Floats
-from cmm_uq.selfcalibration.curve import Curve
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
 

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.shifting.repeats import Means, means_over_repeats
+from cmm_uq.kinds.shifting.smooth_model import Scatter
 from cmm_uq.points import AXES, Floats, Ints, Points
-from cmm_uq.selfcalibration.repeats import Means, means_over_repeats
-from cmm_uq.selfcalibration.smooth_model import Scatter
 from cmm_uq.units import HOUR
 
 _ALIKE = 1e-3

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cmm_uq.kinds.shift_axis.series import ShiftedSeries
 from cmm_uq.points import Floats
-from cmm_uq.selfcalibration.series import ShiftedSeries
 
 _ALIKE = 0.05
 """Shifts whose rest is below this part of the smallest are multiples of each other, as far as smooth functions can see."""

@@ -7,17 +7,17 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.analysis.shifting import check_facts, check_known, known_points
-from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job, KnownLength
+from cmm_uq.kinds.shift_axis.analysis import check_facts, check_known, known_points
+from cmm_uq.kinds.shift_axis.curve import Curve
+from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate, placed_plate
+from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
+from cmm_uq.kinds.shifting.correction_table import plane_correction_table
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.points import AXES
-from cmm_uq.selfcalibration.correction_table import plane_correction_table
-from cmm_uq.selfcalibration.curve import Curve
-from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
-from cmm_uq.selfcalibration.placed_plate import PlacedPlate, placed_plate
-from cmm_uq.selfcalibration.plane import PlaneEstimate, estimate_plane
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
 
 

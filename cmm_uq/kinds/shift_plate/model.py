@@ -17,12 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate, rotations
+from cmm_uq.kinds.shifting.smooth_function import SmoothFunction
+from cmm_uq.kinds.shifting.smooth_model import SmoothModel
 from cmm_uq.physics.kinematics import carried_offset
 from cmm_uq.points import AXES, Floats
-from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
-from cmm_uq.selfcalibration.placed_plate import PlacedPlate, rotations
-from cmm_uq.selfcalibration.smooth_function import SmoothFunction
-from cmm_uq.selfcalibration.smooth_model import SmoothModel
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
 
 SCALE_SD, SQUARENESS_SD = 300 * PPM, 500 * ARCSECOND

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.plane_shifting import PlaneShiftResult
-from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Plot, Section, Table
-from cmm_uq.certificate.plots import curve_with_band
-from cmm_uq.certificate.shift_section import SIGN, TABLE_FILE
-from cmm_uq.certificate.vector_plot import vector_plot
-from cmm_uq.certificate.wording import expanded, listed
-from cmm_uq.conformity.quantity import Quantity
+from cmm_uq.documents.document import Block, Column, Facts, Paragraph, Plot, Section, Table
+from cmm_uq.documents.plots import curve_with_band
+from cmm_uq.documents.vector_plot import vector_plot
+from cmm_uq.documents.wording import expanded, listed
+from cmm_uq.kinds.shift_axis.curve import Curve
+from cmm_uq.kinds.shift_axis.page import SIGN, TABLE_FILE
+from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
+from cmm_uq.kinds.shift_plate.undetermined import title
 from cmm_uq.points import AXES
-from cmm_uq.selfcalibration.curve import Curve
-from cmm_uq.selfcalibration.plane_undetermined import title
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import ARCSECOND, MICROMETRE
 

@@ -11,9 +11,9 @@ from itertools import combinations
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.shifting.repeats import Means, means_over_repeats
+from cmm_uq.kinds.shifting.smooth_model import Scatter
 from cmm_uq.points import AXES, Floats, Ints, Points
-from cmm_uq.selfcalibration.repeats import Means, means_over_repeats
-from cmm_uq.selfcalibration.smooth_model import Scatter
 
 _ALIKE_MM, _ALIKE_RAD = 1.0, np.radians(1.0)
 """Placings nearer to each other than this are the same."""

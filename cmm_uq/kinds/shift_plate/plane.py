@@ -13,13 +13,13 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.ensembles import Chains, Progress
+from cmm_uq.kinds.shift_axis.curve import Curve
+from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.kinds.shift_plate.model import PlaneModel, plane_model
+from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate
+from cmm_uq.kinds.shift_plate.undetermined import FreeInPlane, free_in_plane
+from cmm_uq.kinds.shifting.smooth_model import Coefficients, sampled
 from cmm_uq.points import AXES, Floats
-from cmm_uq.selfcalibration.curve import Curve
-from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
-from cmm_uq.selfcalibration.placed_plate import PlacedPlate
-from cmm_uq.selfcalibration.plane_model import PlaneModel, plane_model
-from cmm_uq.selfcalibration.plane_undetermined import FreeInPlane, free_in_plane
-from cmm_uq.selfcalibration.smooth_model import Coefficients, sampled
 
 _FINE = 41
 _LEAST_LEFT = 6

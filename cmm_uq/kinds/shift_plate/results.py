@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.analysis.plane_shifting import PlaneShiftResult
-from cmm_uq.certificate.results_file import SCHEMA
-from cmm_uq.certificate.shift_results import curve_data, quantity_data, rms_um, sampling_data
+from cmm_uq.documents.results_file import SCHEMA
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.kinds.shift_axis.results import curve_data, quantity_data, rms_um, sampling_data
+from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.points import AXES
 from cmm_uq.units import ARCSECOND, MICROMETRE
 

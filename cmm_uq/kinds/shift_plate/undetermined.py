@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
+from cmm_uq.kinds.shift_axis.undetermined import common_period
+from cmm_uq.kinds.shift_plate.model import PlaneModel
+from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate
 from cmm_uq.points import AXES, Floats
-from cmm_uq.selfcalibration.placed_plate import PlacedPlate
-from cmm_uq.selfcalibration.plane_model import PlaneModel
-from cmm_uq.selfcalibration.undetermined import common_period
 
 _ALIKE = 0.02
 """What changes the readings by less than this part of its own size is not determined by them."""

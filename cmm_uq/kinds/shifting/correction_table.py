@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cmm_uq.kinds.shift_axis.curve import Curve
+from cmm_uq.kinds.shift_plate.plane import PlaneEstimate
 from cmm_uq.physics.error_map import AxisErrors, ErrorMap, write_error_map
 from cmm_uq.physics.kinematics import carried_offset
 from cmm_uq.points import AXES, Floats, Machine
-from cmm_uq.selfcalibration.curve import Curve
-from cmm_uq.selfcalibration.plane import PlaneEstimate
 from cmm_uq.units import ARCSECOND, MICROMETRE
 
 _DECIMALS = 3

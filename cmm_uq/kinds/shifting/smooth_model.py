@@ -18,9 +18,9 @@ from scipy import linalg
 
 from cmm_uq.inference.ensembles import Chains, Progress, refined, run_ensembles
 from cmm_uq.inference.posterior import SIGMA_BOUNDS
+from cmm_uq.kinds.shifting.smooth_function import LONGEST, SmoothFunction
+from cmm_uq.kinds.shifting.smooth_marginal import BATCH, Marginal, marginal
 from cmm_uq.points import Floats
-from cmm_uq.selfcalibration.smooth_function import LONGEST, SmoothFunction
-from cmm_uq.selfcalibration.smooth_marginal import BATCH, Marginal, marginal
 
 DRAWS = 2000
 """Of everything linear, taken evenly from the chains."""

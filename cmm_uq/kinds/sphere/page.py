@@ -6,11 +6,11 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.result import Result
 from cmm_uq.artefacts.sphere import Sphere
-from cmm_uq.certificate.document import Column, Plot, Section, Table
-from cmm_uq.certificate.plots import length_plot, volume_plot
-from cmm_uq.certificate.residual_volume import flagged
+from cmm_uq.documents.document import Column, Plot, Section, Table
+from cmm_uq.documents.plots import length_plot, volume_plot
+from cmm_uq.documents.residual_volume import flagged
+from cmm_uq.documents.result import Result
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
 

@@ -6,13 +6,13 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.result import Result
 from cmm_uq.artefacts.triangle import Triangle
-from cmm_uq.artefacts.triangle_equations import PARAMETERS, solve_equations
-from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
-from cmm_uq.certificate.plots import length_plot
-from cmm_uq.certificate.wording import expanded
+from cmm_uq.documents.document import Block, Column, Paragraph, Plot, Section, Table
+from cmm_uq.documents.plots import length_plot
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import expanded
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.triangle.equations import PARAMETERS, solve_equations
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.mismatch.combinations import EFFECTS, UNKNOWNS, Prior, explore, log_evidence_together
-from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.mismatch.noise import kinds, sigma_grid
-from cmm_uq.mismatch.stack import AMPLITUDES, Version
+from cmm_uq.diagnosis.comparison.combinations import EFFECTS, UNKNOWNS, Prior, explore, log_evidence_together
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
+from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Version
+from cmm_uq.diagnosis.noise import kinds, sigma_grid
 from cmm_uq.points import Floats
-from tests.mismatch.dense_noise import covariance, rest
+from tests.diagnosis.dense_noise import covariance, rest
 
 M = 30
 

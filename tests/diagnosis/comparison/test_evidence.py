@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.mismatch.evidence import Comparison
-from cmm_uq.mismatch.explanations import EFFECT, Explanation, Member
-from cmm_uq.mismatch.gate import tail_probability
-from cmm_uq.mismatch.noise import kinds, sigma_grid, tails
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation, Member
+from cmm_uq.diagnosis.comparison.gate import tail_probability
+from cmm_uq.diagnosis.noise import kinds, sigma_grid, tails
 from cmm_uq.points import Floats
-from tests.mismatch.dense_noise import covariance, rest
+from tests.diagnosis.dense_noise import covariance, rest
 
 
 def comparison(seed: int = 1) -> Comparison:

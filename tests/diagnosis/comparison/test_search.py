@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from cmm_uq.mismatch.combinations import Combination, Combinations
-from cmm_uq.mismatch.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.mismatch.search import asserted, with_rivals
+from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.diagnosis.comparison.search import asserted, with_rivals
 
 BOW, TURN, SQUARE, FUNCTION = range(4)
 RIVALS = (

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cmm_uq.certificate.document import Paragraph
-from tests.certificate.reading import number
-from tests.certificate.simulated import SQUARE, blocks, recovered, table
+from cmm_uq.documents.document import Paragraph
+from tests.kinds.reading import number
+from tests.kinds.simulated import SQUARE, blocks, recovered, table
 
 WHAT = "What to turn and what to enter"
 SECOND_WAY = "The six factors by the distance equations, a second way"

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.mismatch.map_columns import MapColumn, columns_of, roughness, turned
-from cmm_uq.mismatch.map_diagnosis import MapsDiagnosis, diagnose_maps
-from cmm_uq.mismatch.map_fit import expansion as expansion_of
-from cmm_uq.mismatch.map_search import race_of
+from cmm_uq.kinds.error_maps.columns import MapColumn, columns_of, roughness, turned
+from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
+from cmm_uq.kinds.error_maps.fit import expansion as expansion_of
+from cmm_uq.kinds.error_maps.search import race_of
 from cmm_uq.physics.error_map import AxisErrors, ErrorMap, read_error_map
 from cmm_uq.units import ARCSECOND, MICROMETRE
 from tests.conftest import ROOT

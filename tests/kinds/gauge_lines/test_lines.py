@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts.gauge import StepGauge
-from cmm_uq.artefacts.gauge_lines import lines_of, periodic_part
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.kinds.gauge_lines.lines import lines_of, periodic_part
 from tests.artefacts.constructions import indicated, step_gauge
 
 GAUGE = ArtefactFacts(kind="step_gauge")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.certificate.document import Paragraph, Plot
-from tests.certificate.simulated import SCALE, SQUARE, analysed, blocks, recovered, table
+from cmm_uq.documents.document import Paragraph, Plot
 from tests.conftest import ROOT
+from tests.kinds.simulated import SCALE, SQUARE, analysed, blocks, recovered, table
 
 JOB = "step-gauge-simulated"
 

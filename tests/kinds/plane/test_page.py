@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.certificate.document import Facts
-from tests.certificate.simulated import blocks, recovered, table
+from cmm_uq.documents.document import Facts
 from tests.conftest import ROOT
+from tests.kinds.simulated import blocks, recovered, table
 
 JOB = "plane-simulated"
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.certificate.document import Facts, Paragraph, Plot
-from tests.certificate.simulated import SCALE, blocks, recovered, table
+from cmm_uq.documents.document import Facts, Paragraph, Plot
 from tests.conftest import ROOT
+from tests.kinds.simulated import SCALE, blocks, recovered, table
 
 JOB = "plate-simulated"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis import ShiftResult, analyse
+from cmm_uq.commands.analysis import ShiftResult, analyse
 from cmm_uq.errors import CmmUqError
 from tests.conftest import ROOT
 

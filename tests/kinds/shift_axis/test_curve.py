@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cmm_uq.kinds.shift_axis.curve import CurveEstimate, estimate_curve
+from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan, integrated, integrated_by_monte_carlo
+from cmm_uq.kinds.shift_axis.series import shifted_series
 from cmm_uq.points import Points
-from cmm_uq.selfcalibration.curve import CurveEstimate, estimate_curve
-from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan, integrated, integrated_by_monte_carlo
-from cmm_uq.selfcalibration.series import shifted_series
-from tests.selfcalibration.shifted import PITCH_20, bent, read
+from tests.kinds.shifting.shifted import PITCH_20, bent, read
 
 NOISE = 1.1e-3
 KNOWN = KnownSpan(0, 22, 440.0, 0.0)

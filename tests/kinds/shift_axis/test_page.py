@@ -9,14 +9,14 @@ import shutil
 import numpy as np
 import pytest
 
-from cmm_uq.analysis import ShiftResult, analyse
-from cmm_uq.certificate.compose import certificate
-from cmm_uq.certificate.document import Document, Plot
-from cmm_uq.certificate.results_file import as_json
-from cmm_uq.certificate.shift_results import shift_results
-from cmm_uq.certificate.summary import summary
-from tests.certificate.reading import number, tables
+from cmm_uq.commands.analysis import ShiftResult, analyse
+from cmm_uq.commands.compose import certificate
+from cmm_uq.commands.summary import summary
+from cmm_uq.documents.document import Document, Plot
+from cmm_uq.documents.results_file import as_json
+from cmm_uq.kinds.shift_axis.results import shift_results
 from tests.conftest import ROOT
+from tests.kinds.reading import number, tables
 
 EXAMPLE = ROOT / "examples" / "shift-simulated"
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.shift_axis.series import shifted_series
+from cmm_uq.kinds.shifting.repeats import NOISE_RATIO
 from cmm_uq.points import Points
-from cmm_uq.selfcalibration.repeats import NOISE_RATIO
-from cmm_uq.selfcalibration.series import shifted_series
-from tests.selfcalibration.shifted import bent, read
+from tests.kinds.shifting.shifted import bent, read
 
 PLACES = 20.0 * np.arange(6)
 SHIFTS = np.array([0.0, 20.0])

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan, integrated, integrated_by_monte_carlo
-from cmm_uq.selfcalibration.shift_integration import (
+from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan, integrated, integrated_by_monte_carlo
+from cmm_uq.kinds.shift_axis.shift_integration import (
     Method,
     calibration_curve,
     compensated_positions,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmm_uq.kinds.shift_axis.series import ShiftedSeries, shifted_series
+from cmm_uq.kinds.shift_axis.shift_integration import calibration_curve, position_error
+from cmm_uq.kinds.shift_axis.undetermined import common_period, undetermined
 from cmm_uq.points import Floats
-from cmm_uq.selfcalibration.series import ShiftedSeries, shifted_series
-from cmm_uq.selfcalibration.shift_integration import calibration_curve, position_error
-from cmm_uq.selfcalibration.undetermined import common_period, undetermined
-from tests.selfcalibration.shifted import PITCH_20, bent, read
+from tests.kinds.shifting.shifted import PITCH_20, bent, read
 
 PITCH_40 = 40.0 * np.arange(12)
 

@@ -7,17 +7,17 @@ import json
 import numpy as np
 import pytest
 
-from cmm_uq.analysis import PlaneShiftResult, analyse
-from cmm_uq.certificate.compose import certificate
-from cmm_uq.certificate.document import Document, Paragraph, Plot, Table
-from cmm_uq.certificate.plane_shift_results import plane_shift_results
-from cmm_uq.certificate.plane_shift_section import sections, warnings
-from cmm_uq.certificate.results_file import as_json
-from cmm_uq.certificate.summary import summary
-from cmm_uq.selfcalibration.placed_plate import placed_plate
-from cmm_uq.selfcalibration.plane import estimate_plane
-from tests.certificate.reading import number, tables
+from cmm_uq.commands.analysis import PlaneShiftResult, analyse
+from cmm_uq.commands.compose import certificate
+from cmm_uq.commands.summary import summary
+from cmm_uq.documents.document import Document, Paragraph, Plot, Table
+from cmm_uq.documents.results_file import as_json
+from cmm_uq.kinds.shift_plate.page import sections, warnings
+from cmm_uq.kinds.shift_plate.placed_plate import placed_plate
+from cmm_uq.kinds.shift_plate.plane import estimate_plane
+from cmm_uq.kinds.shift_plate.results import plane_shift_results
 from tests.conftest import ROOT
+from tests.kinds.reading import number, tables
 
 EXAMPLE = ROOT / "examples" / "shift-plate-simulated"
 

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.shift_plate.placed_plate import placed_plate, rigid_motion, rotations
 from cmm_uq.points import Points
-from cmm_uq.selfcalibration.placed_plate import placed_plate, rigid_motion, rotations
-from tests.selfcalibration.placed import GRID, SHIFTED, TURNED, none, read
+from tests.kinds.shifting.placed import GRID, SHIFTED, TURNED, none, read
 
 
 def recorded(*placings: tuple[float, float, float]) -> Points:

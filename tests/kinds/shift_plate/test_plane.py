@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.kinds.shift_plate.model import plane_model
+from cmm_uq.kinds.shift_plate.placed_plate import placed_plate
+from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
+from cmm_uq.kinds.shift_plate.undetermined import FreeInPlane, free_in_plane
+from cmm_uq.kinds.shifting.correction_table import plane_correction_table
 from cmm_uq.physics.compensation import compensate_points, machine_compensation
 from cmm_uq.physics.kinematics import first_order
 from cmm_uq.physics.map_interpolation import ErrorMaps
 from cmm_uq.points import AXES, Floats
-from cmm_uq.selfcalibration.correction_table import plane_correction_table
-from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
-from cmm_uq.selfcalibration.placed_plate import placed_plate
-from cmm_uq.selfcalibration.plane import PlaneEstimate, estimate_plane
-from cmm_uq.selfcalibration.plane_model import plane_model
-from cmm_uq.selfcalibration.plane_undetermined import FreeInPlane, free_in_plane
-from tests.selfcalibration.placed import GRID, SHIFTED, TURNED, bent, none, read
+from tests.kinds.shifting.placed import GRID, SHIFTED, TURNED, bent, none, read
 
 DIAGONAL = KnownSpan(0, 15, float(np.linalg.norm(GRID[15])), 0.3e-3)
 NOISE = 0.5e-3

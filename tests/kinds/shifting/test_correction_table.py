@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.kinds.shift_axis.curve import Curve
+from cmm_uq.kinds.shifting.correction_table import correction_table, table_text
 from cmm_uq.physics.error_map import parse_error_map
 from cmm_uq.points import Machine
-from cmm_uq.selfcalibration.correction_table import correction_table, table_text
-from cmm_uq.selfcalibration.curve import Curve
 
 POSITION = np.linspace(100.0, 500.0, 41)
 ERROR = 0.01 * np.sin(POSITION / 80)

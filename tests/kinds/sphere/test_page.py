@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from tests.certificate.simulated import analysed, recovered, table
 from tests.conftest import ROOT
+from tests.kinds.simulated import analysed, recovered, table
 
 JOB = "sphere-simulated"
 

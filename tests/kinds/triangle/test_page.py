@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cmm_uq.certificate.document import Plot
-from tests.certificate.reading import number
-from tests.certificate.simulated import SCALE, SQUARE, blocks, recovered, table
+from cmm_uq.documents.document import Plot
+from tests.kinds.reading import number
+from tests.kinds.simulated import SCALE, SQUARE, blocks, recovered, table
 
 JOB = "triangle-simulated"
 ROTATIONS = {
