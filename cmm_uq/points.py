@@ -1,7 +1,7 @@
 """The ground floor: a measurement is points, read on a machine.
 
 Every room of the package speaks of these two objects. ``jobs`` makes them from files, ``physics`` moves them,
-``artefacts`` turns them into observations.
+artefacts turn them into observations.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import numpy as np
 
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.jobs.job import ArtefactFacts
-from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine, Points
 

@@ -12,8 +12,8 @@ import time
 import numpy as np
 from rich.progress import track
 
-from cmm_uq.mismatch.map_columns import columns_of
-from cmm_uq.mismatch.map_diagnosis import MapsDiagnosis, diagnose_maps
+from cmm_uq.kinds.error_maps.columns import columns_of
+from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
 from cmm_uq.physics.error_map import AxisErrors, ErrorMap
 
 TRAVEL = ((0, 900), (0, 550), (-500, 0))

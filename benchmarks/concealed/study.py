@@ -18,7 +18,7 @@ from greedy import searched
 from physics import UNIT, kind_of
 from rich.progress import track
 
-from cmm_uq.analysis.diagnosing import diagnose_job
+from cmm_uq.commands.diagnosing import diagnose_job
 
 
 def make(folder: Path, cases: int, seed: int) -> list[dict]:

@@ -19,7 +19,7 @@ from cmm_uq.artefacts import artefact_of
 from cmm_uq.artefacts.triangle_placings import placed_triangle
 from cmm_uq.artefacts.triangle_standard import TriangleStandard
 from cmm_uq.jobs.job import ArtefactFacts
-from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Ints, Machine, Points
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.measurement.model import ARTEFACT
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import CATALOGUE, effects
 from cmm_uq.planning.identifiability import NOT_TOLD_APART, identifiability
 from cmm_uq.planning.information import certified, gram

@@ -13,8 +13,8 @@ import numpy as np
 from settings import SETTINGS
 
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.measurement.model import ARTEFACT
+from cmm_uq.model import MeasurementModel, Noise
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.planning.identifiability import identifiability
 from cmm_uq.planning.placing import joined
 from cmm_uq.planning.ready import ready_plan

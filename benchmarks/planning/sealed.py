@@ -20,11 +20,11 @@ import numpy as np
 from settings import SETTINGS
 
 from cmm_uq.artefacts import artefact_of
+from cmm_uq.diagnosis.comparison.search import search
+from cmm_uq.diagnosis.diagnosis import _indistinguishable
+from cmm_uq.diagnosis.power import powers, without_fault
 from cmm_uq.errors import CmmUqError
-from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.mismatch.diagnosis import _indistinguishable
-from cmm_uq.mismatch.power import powers, without_fault
-from cmm_uq.mismatch.search import search
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import CATALOGUE
 from cmm_uq.planning.candidates import candidates
 from cmm_uq.planning.exchange import choose, score_of

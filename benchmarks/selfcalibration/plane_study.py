@@ -19,11 +19,11 @@ import numpy as np
 
 from benchmarks.examples.shift_plate_job import PLACINGS
 from benchmarks.selfcalibration.machines import RANGE, machine
+from cmm_uq.kinds.shift_axis.curve import Curve
+from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.kinds.shift_plate.placed_plate import placed_plate
+from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
 from cmm_uq.points import Floats, Points
-from cmm_uq.selfcalibration.curve import Curve
-from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
-from cmm_uq.selfcalibration.placed_plate import placed_plate
-from cmm_uq.selfcalibration.plane import PlaneEstimate, estimate_plane
 from cmm_uq.units import ARCSECOND, PPM
 
 NOISE, REPEATS, U_LENGTH = 0.7e-3, 3, 0.5e-3

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.artefacts.gauge import GaugeBlocks, StepGauge
@@ -15,6 +14,7 @@ from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.artefacts.triangle import Triangle
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Points
 
 KINDS: Mapping[str, Callable[..., Artefact]] = MappingProxyType(

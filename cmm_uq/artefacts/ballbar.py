@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.artefacts.artefact import Artefact, Indications, Size
-from cmm_uq.artefacts.recorded import check_length, expansion
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.artefact import Artefact, Indications, Size
+from cmm_uq.model.recorded import check_length, expansion
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import MICROMETRE
 

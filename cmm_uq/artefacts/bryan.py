@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.artefacts.distance_equations import DistanceSolution, solve_distances
-from cmm_uq.artefacts.placings import Placings
-from cmm_uq.artefacts.radial import Radial
-from cmm_uq.artefacts.recorded import expansion, place
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.placings import Placings
+from cmm_uq.model.radial import Radial
+from cmm_uq.model.recorded import expansion, place
 from cmm_uq.points import Floats, Points
 
 

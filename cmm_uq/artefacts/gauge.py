@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.artefact import Artefact, Indications, Size
-from cmm_uq.artefacts.placings import Placings
-from cmm_uq.artefacts.recorded import certified_sd, check_length, columns_needed, expansion, place
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.artefact import Artefact, Indications, Size
+from cmm_uq.model.placings import Placings
+from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
 from cmm_uq.points import AXES, Floats, Ints, Points
 
 _SAME_FACE = 1e-6

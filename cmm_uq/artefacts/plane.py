@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.artefact import Artefact, Size
-from cmm_uq.artefacts.placings import Placings
-from cmm_uq.artefacts.recorded import place
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.artefact import Artefact, Size
+from cmm_uq.model.placings import Placings
+from cmm_uq.model.recorded import place
 from cmm_uq.physics.probe_offset import OffsetPlane, offset_plane
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import MICROMETRE

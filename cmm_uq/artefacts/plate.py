@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.artefacts.artefact import Indications, Size
-from cmm_uq.artefacts.placings import Placings
-from cmm_uq.artefacts.recorded import certified_sd, check_length, columns_needed, expansion, place
-from cmm_uq.artefacts.rigid import Rigid
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.earlier import NOISE_RATIO
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.artefact import Indications, Size
+from cmm_uq.model.placings import Placings
+from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
+from cmm_uq.model.rigid import Rigid
 from cmm_uq.points import Floats, Points
 
 REFERENCES = ("reference_x_mm", "reference_y_mm", "reference_z_mm")

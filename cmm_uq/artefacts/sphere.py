@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.artefacts.placings import Placings
-from cmm_uq.artefacts.radial import Radial
-from cmm_uq.artefacts.recorded import expansion, place
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry import fit_sphere
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.placings import Placings
+from cmm_uq.model.radial import Radial
+from cmm_uq.model.recorded import expansion, place
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.units import MICROMETRE
 

@@ -10,9 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.artefacts.artefact import Size
-from cmm_uq.artefacts.recorded import check_length, expansion, place
-from cmm_uq.artefacts.rigid import Rigid
 from cmm_uq.artefacts.triangle_standard import (
     DIMENSIONS,
     SIDES_OF_DIMENSIONS,
@@ -22,6 +19,9 @@ from cmm_uq.artefacts.triangle_standard import (
 )
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.artefact import Size
+from cmm_uq.model.recorded import check_length, expansion, place
+from cmm_uq.model.rigid import Rigid
 from cmm_uq.points import Floats, Points
 
 _TITLES = ("Block 1–2", "Block 2–3", "Block 3–1", "Cylinder 1", "Cylinder 2", "Cylinder 3")

@@ -20,7 +20,7 @@ def command(
     json: Json = False,
 ) -> None:
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
-    from cmm_uq.budgeting import write_budget
+    from cmm_uq.commands.budget import write_budget
     from cmm_uq.uncertainty.budget_results import summary_rows
 
     written = write_budget(file, out, seed=seed, force=force)

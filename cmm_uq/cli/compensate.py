@@ -19,7 +19,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Correct a recording by its machine's error maps, as a job folder of its own."""
-    from cmm_uq.compensating import write_compensated
+    from cmm_uq.commands.compensate import write_compensated
 
     files = write_compensated(job, out, beyond="extrapolate" if extrapolate else "refuse", force=force)
     if not quiet:

@@ -13,8 +13,8 @@ from cmm_uq.cli.printing import put, say
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
-    from cmm_uq.analysis.error_maps import MapsDiagnosed
-    from cmm_uq.analysis.result import Diagnosed
+    from cmm_uq.documents.result import Diagnosed
+    from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 
 
 def command(
@@ -29,7 +29,7 @@ def command(
 ) -> None:
     """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
     with shown(quiet=quiet or json) as stage:
-        from cmm_uq.reporting import write_diagnosis
+        from cmm_uq.commands.report import write_diagnosis
 
         written = write_diagnosis(job, out, seed=seed, alpha=alpha, force=force, stage=stage)
     if json:
@@ -50,7 +50,8 @@ def _summarise(found: Diagnosed | MapsDiagnosed) -> None:
 
 
 def _told(found: Diagnosed | MapsDiagnosed) -> list[str]:
-    from cmm_uq.analysis.error_maps import MapsDiagnosed
-    from cmm_uq.certificate import diagnosis_words, map_words
+    from cmm_uq.documents import diagnosis_words
+    from cmm_uq.kinds.error_maps import words as map_words
+    from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 
     return map_words.lines(found) if isinstance(found, MapsDiagnosed) else diagnosis_words.lines(found)

@@ -13,7 +13,7 @@ from cmm_uq.cli.printing import put, say, table
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
-    from cmm_uq.analysis.planning import Plan
+    from cmm_uq.commands.planning import Plan
 
 
 def command(
@@ -30,7 +30,7 @@ def command(
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with shown(quiet=quiet or json) as stage:
-        from cmm_uq.planned import write_plan
+        from cmm_uq.commands.plan import write_plan
 
         written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage)
     if json:
@@ -44,8 +44,8 @@ def command(
 
 
 def _summarise(plan: Plan) -> None:
-    from cmm_uq.certificate.plan_page import placing_rows
-    from cmm_uq.certificate.plan_words import STATUS, absorbed, combination, expected, named, pairs, unit_of
+    from cmm_uq.commands.plan_page import placing_rows
+    from cmm_uq.commands.plan_words import STATUS, absorbed, combination, expected, named, pairs, unit_of
 
     table(placing_rows(plan), "No.", "Set up", "From → to / mm", "Points", "min")
     for text in plan.free:

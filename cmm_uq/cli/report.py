@@ -13,7 +13,7 @@ from cmm_uq.cli.printing import put, table
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
-    from cmm_uq.reporting import Report
+    from cmm_uq.commands.report import Report
 
 
 def command(
@@ -27,7 +27,7 @@ def command(
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
     with shown(quiet=quiet or json) as stage:
-        from cmm_uq.reporting import write_report
+        from cmm_uq.commands.report import write_report
 
         report = write_report(job, out, seed=seed, force=force, stage=stage)
     if json:
@@ -39,8 +39,8 @@ def command(
 
 
 def _summarise(report: Report) -> None:
-    from cmm_uq.certificate.origin import BANNERS
-    from cmm_uq.certificate.summary import summary
+    from cmm_uq.commands.summary import summary
+    from cmm_uq.documents.origin import BANNERS
     from cmm_uq.jobs.origin import MEASURED
 
     job = report.result.job

@@ -20,7 +20,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Draw a recording from the same model that report fits, as a job folder of its own."""
-    from cmm_uq.simulation import write_simulation
+    from cmm_uq.commands.simulate import write_simulation
 
     files = write_simulation(job, truth, out, seed=seed, force=force)
     if not quiet:

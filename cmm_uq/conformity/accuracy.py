@@ -12,8 +12,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
 TITLES: Mapping[str, str] = {

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.conformity.decision import Decision, decide
-from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ConformityFacts
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
 ISO_10360_2_LENGTHS = 105

@@ -15,8 +15,8 @@ from scipy import linalg
 
 from cmm_uq.inference.least_squares import LeastSquares, solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.measurement.model import ARTEFACT
+from cmm_uq.model import MeasurementModel
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.information import certified, gram, scales
 from cmm_uq.planning.separation import FAINT, cosines, imitators, left_of, visible

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.inference.linear_model import LinearModel, Unknown
-from cmm_uq.measurement import MeasurementModel
-from cmm_uq.measurement.model import ARTEFACT
+from cmm_uq.model import MeasurementModel
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.placing import Placing, joined
 from cmm_uq.planning.setting import Setting

@@ -8,7 +8,7 @@ from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import WITH_REFERENCES, ArtefactFacts, Job
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.measurement import MeasurementModel
+from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import CATALOGUE, effects
 from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.volume import Volume

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import secrets
 import shutil
 import time
@@ -25,6 +26,7 @@ from cmm_uq.writing.placing import JOURNAL, NEW, Journal, place, rolled_back
 from cmm_uq.writing.replacing import journal_for
 
 STAGE, LOCK, PLACING = ".unfinished-", ".lock", ".placing"
+_STAGED = re.compile(rf"{re.escape(STAGE)}([0-9a-f]{{12}})(?:{re.escape(LOCK)})?")
 PATIENCE_S = 5.0
 """How long to wait for another process that is putting its files into the same folder: renames take milliseconds."""
 
@@ -91,7 +93,7 @@ class Staged:
             (placing / f"{JOURNAL}.part").replace(placing / JOURNAL)
             synced(placing)
         except BaseException:
-            shutil.rmtree(placing, ignore_errors=True)
+            _drop(self.folder, self.token)
             raise
         _finish(self.folder, placing, journal)
 
@@ -102,8 +104,11 @@ class Staged:
             try:
                 self.stage.rename(placing)
             except OSError as error:
-                if not placing.is_dir():
+                if not os.path.lexists(placing):
                     raise
+                if not _token(placing):
+                    raise CmmUqError("is not this program's and stands in its way", where=str(placing),
+                                     fix="Remove it, or choose another folder with --out") from error  # fmt: skip
                 finish_interrupted(self.folder)
                 if time.monotonic() > deadline:
                     raise OutputError(
@@ -167,26 +172,31 @@ def staged(
 
 
 def finish_interrupted(folder: Path) -> None:
-    """Complete or roll back what a process that is no more left in a folder.
+    """Complete or roll back what a process that is no more left in a folder; a stranger's files there are left alone.
 
     Raises
     ------
     OutputError : it was committed and cannot be put in place.
     """
+    try:
+        names = [path.name for path in folder.iterdir() if path.name.startswith((STAGE, PLACING))]
+    except (OSError, ValueError):
+        return  # no folder, or none that can be read: whoever needs it will say so
     placing = folder / PLACING
-    if placing.is_dir() and not _alive(folder, _token(placing)):
+    token = _token(placing) if PLACING in names else ""
+    if token and not _alive(folder, token):
         journal = Journal.read(placing)
         if journal is None:
-            shutil.rmtree(placing, ignore_errors=True)
+            _drop(folder, token)
         else:
             with _told(folder):
                 _finish(folder, placing, journal)
-    for stage in folder.glob(f"{STAGE}*"):
-        token = stage.name.removeprefix(STAGE).removesuffix(LOCK)
-        if not _alive(folder, token):
-            shutil.rmtree(folder / f"{STAGE}{token}", ignore_errors=True)
+    for name in names:
+        staged_by = _STAGED.fullmatch(name)
+        if staged_by and not _alive(folder, staged_by[1]):
+            shutil.rmtree(folder / f"{STAGE}{staged_by[1]}", ignore_errors=True)
             with contextlib.suppress(OSError):
-                (folder / f"{STAGE}{token}{LOCK}").unlink()
+                (folder / f"{STAGE}{staged_by[1]}{LOCK}").unlink()
 
 
 def synced(folder: Path) -> None:
@@ -209,10 +219,12 @@ def _open(place: Staged) -> None:
 
 
 def _token(placing: Path) -> str:
+    """Whose stage a folder is; empty where it is not one."""
     try:
-        return (placing / "token").read_text(encoding="ascii")
+        token = (placing / "token").read_text(encoding="ascii")
     except (OSError, ValueError):
         return ""
+    return token if _STAGED.fullmatch(f"{STAGE}{token}") else ""
 
 
 def _alive(folder: Path, token: str) -> bool:
@@ -232,11 +244,22 @@ def _finish(folder: Path, placing: Path, journal: Journal) -> None:
         place(folder, placing, journal)
     except OSError:
         if rolled_back(folder, placing, journal):
-            shutil.rmtree(placing, ignore_errors=True)
+            _drop(folder, journal.token)
         raise
     synced(folder)
-    (placing / JOURNAL).unlink(missing_ok=True)
-    shutil.rmtree(placing, ignore_errors=True)
+    _drop(folder, journal.token)
+
+
+def _drop(folder: Path, token: str) -> None:
+    """Remove ``.placing``, first its name: half removed it is still known as this program's."""
+    placing, stage = folder / PLACING, folder / f"{STAGE}{token}"
+    with contextlib.suppress(OSError):
+        (placing / JOURNAL).unlink(missing_ok=True)
+    try:
+        placing.rename(stage)
+    except OSError:
+        stage = placing
+    shutil.rmtree(stage, ignore_errors=True)
 
 
 def _write(path: Path, content: bytes) -> None:

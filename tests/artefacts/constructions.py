@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.jobs.job import ArtefactFacts
-from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Ints, Machine, Points
 from tests.recordings import TRAVEL

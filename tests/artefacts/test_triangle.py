@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts.triangle import Triangle
-from cmm_uq.artefacts.triangle_equations import PARAMETERS, printed_perpendicularity, solve_equations
 from cmm_uq.artefacts.triangle_placings import SEVEN_PLACINGS, SHIFTED, Placing, placed_triangle
 from cmm_uq.artefacts.triangle_standard import TriangleStandard, corner_changes, corners
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.kinds.triangle.equations import PARAMETERS, printed_perpendicularity, solve_equations
 from cmm_uq.points import Machine, Points
 from tests.artefacts.constructions import estimated, free, indicated, model
 from tests.recordings import with_columns

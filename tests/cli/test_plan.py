@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.jobs.reading import read_job
-from tests.analysis.test_planning import JOB, SIX
 from tests.cli.process import run as run_command
+from tests.commands.test_planning import JOB, SIX
 
 run = partial(run_command, "plan")
 

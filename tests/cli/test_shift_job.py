@@ -10,7 +10,7 @@ import numpy as np
 import pikepdf
 import pytest
 
-from cmm_uq.analysis import ShiftResult, analyse
+from cmm_uq.commands.analysis import ShiftResult, analyse
 from tests.cli.process import run
 from tests.conftest import ROOT
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts.ballbar import Ballbar
-from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import Statement, statement
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts, ConformityFacts, MaximumPermissibleError, Standard
 from cmm_uq.points import Machine, Points
+from cmm_uq.uncertainty.quantity import Quantity
 from tests.recordings import bar_facts
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.jobs.reading import read_job
-from cmm_uq.measurement import MeasurementModel
+from cmm_uq.model import MeasurementModel
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import CATALOGUE, EVERY, FURTHER
 from cmm_uq.physics.effect import Effect, Parameter, Shape
 from cmm_uq.points import Floats, Points

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning import patterns
 from cmm_uq.planning.identifiability import Identifiability, identifiability

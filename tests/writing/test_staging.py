@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError, OutputError
@@ -290,6 +290,7 @@ def test_a_process_that_is_just_putting_files_in_place_is_waited_for(
     assert is_set(tmp_path, NEW)
 
 
+@settings(deadline=None)  # it waits for the disk
 @given(st.dictionaries(st.sampled_from(["a", "b", "sub/c", "d.csv"]), st.binary(max_size=20), min_size=1),
        st.dictionaries(st.sampled_from(["a", "b", "sub/c", "d.csv"]), st.binary(max_size=20), min_size=1))  # fmt: skip
 def test_any_set_replaces_any_other_of_its_owner(
@@ -299,6 +300,16 @@ def test_any_set_replaces_any_other_of_its_owner(
     write(out, first)
     write(out, second)
     assert is_set(out, second)
+
+
+def test_hidden_folders_of_a_stranger_are_left_alone(tmp_path: Path) -> None:
+    for name in (".unfinished-business", ".placing", ".unfinished-abc.lock"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "x").write_text("mine")
+    before = there(tmp_path)
+    with pytest.raises(CmmUqError, match=r"\.placing: is not this program's"):
+        write(tmp_path, NEW)
+    assert there(tmp_path) == before
 
 
 @pytest.mark.parametrize("name", ["../x", "/x", "a//b", "", "a/../b", "c:x", "a\\b", "a\0b"])

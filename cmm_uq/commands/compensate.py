@@ -1,0 +1,79 @@
+"""Compensated recordings: a job's readings corrected by its machine's error maps."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands.simulate import recording
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.derived_job import PROGRAM, derived_toml, is_compensated
+from cmm_uq.jobs.job import SHIFT, Job
+from cmm_uq.jobs.origin import first_line
+from cmm_uq.jobs.reading import read_job, sha256
+from cmm_uq.kinds.error_maps.analysis import maps_of
+from cmm_uq.physics.compensation import compensate_points, machine_compensation
+from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
+from cmm_uq.points import Points
+from cmm_uq.writing import Owner, staged
+
+PROVENANCE = "compensation.json"
+"""How the coordinates were corrected, in the folder of a compensated job."""
+
+
+def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict[str, object]]:
+    """The recording of a job at the coordinates that its error maps make of it, and how it came about.
+
+    Parameters
+    ----------
+    job : with ``[machine] error_map``.
+    beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
+
+    Raises
+    ------
+    CmmUqError : the job has no error map, or it does not serve these points.
+    """
+    maps = maps_of(job)
+    refuse(job, "compensated", but=SHIFT)
+    compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
+    try:
+        return compensate_points(job.points, compensation), compensation.provenance()
+    except CmmUqError as error:
+        where = ", ".join(part for part in (job.recording_path, error.where) if part)
+        raise CmmUqError(error.problem, where=where, fix=error.fix) from error
+
+
+def write_compensated(
+    job: Path, out: Path, *, beyond: Beyond = "refuse", force: bool = False
+) -> dict[str, Path]:  # fmt: skip
+    """Write a job folder with the compensated recording, marked as such; its job.toml names no error map any more.
+
+    Returns
+    -------
+    path of each file.
+
+    Raises
+    ------
+    CmmUqError : bad input, or something in the folder that this command did not write for this job.
+    OutputError : the folder cannot be written to.
+    """
+    read = read_job(job)
+    if is_compensated(read):
+        raise CmmUqError("is compensated already", where=f"{read.folder / 'job.toml'} [job] origin",
+                         fix="Compensate the measured recording")  # fmt: skip
+    if read.facts.recording.earlier is not None:
+        raise CmmUqError("the recordings of two dates are not compensated together",
+                         where=f"{read.folder / 'job.toml'} [recording] earlier",
+                         fix="Compensate each as a job of its own, then name the earlier result")  # fmt: skip
+    owner = Owner("compensate", read.facts.job.id, read.origin)
+    with staged(out, owner, inputs=read.paths, force=force, expected=(*read.inputs, PROVENANCE)) as place:
+        points, provenance = compensate_job(read, beyond=beyond)
+        told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
+        files = {
+            **{name: data for name, data in read.inputs.items() if name != "job.toml"},
+            read.facts.recording.file: first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
+            PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
+        }  # fmt: skip
+        toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec"))
+        return place.write({"job.toml": toml, **files})

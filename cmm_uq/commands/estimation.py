@@ -1,0 +1,128 @@
+"""The steps of the recipe between a screened recording and its posterior, and what follows from that posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.conformity.accuracy import with_uncertainty
+from cmm_uq.documents.result import LACK_OF_FIT, Influence, Noise
+from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.posterior import Posterior
+from cmm_uq.jobs.job import Job
+from cmm_uq.model import Estimate, MeasurementModel
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.measurement import ARTEFACT
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.screening.screened import Finding, gross_outliers
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import MICROMETRE
+
+
+def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
+    """The model that the job names.
+
+    Raises
+    ------
+    CmmUqError : an unknown effect, or a measurement to set aside that is not there.
+    """
+    stated, aside = job.facts.recording.u_coordinate_um, job.facts.recording.set_aside
+    if unknown := set(aside) - set(job.points.measurement.tolist()):
+        raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
+                         fix="Name measurements that the recording has")  # fmt: skip
+    return MeasurementModel(
+        artefact, effects(job.facts.model.effects, where="job.toml [model] effects"),
+        None if stated is None else stated * MICROMETRE, ~np.isin(artefact.measurement, aside),
+    )  # fmt: skip
+
+
+def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Finding]]:
+    """The model without gross outliers, and what they are; the figures of performance still count them."""
+    artefact, used, found = model.artefact, model.used.copy(), []
+    chosen = np.flatnonzero(used)
+    for index, times in gross_outliers(model.estimate().linear, artefact.measurement[chosen]):
+        i = int(chosen[index])
+        used[i] = False
+        measurement, repeat = int(artefact.measurement[i]), int(artefact.repeat[i])
+        rows = (artefact.points.measurement == measurement) & (artefact.points.repeat == repeat)
+        why = f"measurement {measurement}, repeat {repeat} is {times:.1f} of its standard deviations off what the others say"
+        lines = tuple(artefact.points.lines[rows].tolist()) if len(artefact.points.lines) else ()
+        found.append(Finding("outlier", (measurement,), lines, why, set_aside=True))
+    return replace(model, used=used), found
+
+
+def with_noise(model: MeasurementModel) -> tuple[MeasurementModel, Estimate, float | None]:
+    """Estimate; where the residuals contradict the stated noise, they replace it. Also the χ² test's probability."""
+    estimate = model.estimate()
+    result = estimate.least_squares
+    if model.sigma is None or result.degrees_of_freedom < 1:
+        return model, estimate, None
+    squares = float(np.sum((result.residuals / estimate.linear.noise_scale) ** 2))
+    p_value = float(special.chdtrc(result.degrees_of_freedom, squares / model.sigma**2))
+    if p_value < LACK_OF_FIT:
+        model = replace(model, sigma=None)
+        estimate = model.estimate()
+    return model, estimate, p_value
+
+
+def influences(model: MeasurementModel, estimate: Estimate, findings: tuple[Finding, ...]) -> tuple[Influence, ...]:
+    """What leaving out the later measurement of each pair of copies would change."""
+    found = []
+    result = estimate.least_squares
+    u = np.sqrt(np.diag(result.covariance))
+    for finding in findings:
+        if finding.kind != "duplicate" or finding.set_aside:
+            continue
+        measurement = finding.measurements[-1]
+        kept = model.used & (model.artefact.measurement != measurement)
+        without = replace(model, used=kept).estimate().least_squares
+        known = result.determined & without.determined & (u > 0)
+        if not known.any():
+            continue
+        change = np.where(known, np.abs(without.value - result.value) / np.where(known, u, 1.0), 0.0)
+        worst = int(np.argmax(change))
+        sd = without.residual_sd
+        found.append(Influence(
+            measurement, None if sd is None else sd / MICROMETRE, float(change[worst]), result.unknowns[worst].key
+        ))  # fmt: skip
+    return tuple(found)
+
+
+def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
+    """Reported parameters of each effect, by effect and name."""
+    found, column = {}, 0
+    for effect in model.effects:
+        draws = posterior.draws[:, column : column + len(effect.coefficients)]
+        column += len(effect.coefficients)
+        units = {parameter.name: parameter.unit for parameter in effect.reported}
+        reported = effect.to_reported(draws, np.zeros((len(draws), 0)))
+        found[effect.name] = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
+    return found
+
+
+def sizes(artefact: Artefact, posterior: Posterior) -> dict[str, Quantity]:
+    """Sizes of the artefact, by name."""
+    column = {u.key: i for i, u in enumerate(posterior.unknowns)}
+    return {
+        size.name: Quantity.of_draws(posterior.draws[:, column[ARTEFACT, size.name]], size.unit)
+        for size in artefact.sizes
+    }
+
+
+def noise(posterior: Posterior, stated_um: float | None, p_value: float | None) -> Noise:
+    """Noise of a coordinate."""
+    return Noise(Quantity.of_draws(posterior.sigma / MICROMETRE, "µm"), stated_um, p_value)
+
+
+def accuracy(model: MeasurementModel, estimate: Estimate, posterior: Posterior, seed: int) -> Mapping[str, Quantity]:
+    """Figures of performance of all recorded lengths; empty for an artefact that has none."""
+    artefact = model.artefact
+    lengths = artefact.lengths()
+    if lengths is None:
+        return {}
+    linear = replace(model, used=np.ones_like(model.used)).linearised(estimate.least_squares.value)
+    predicted = lengths - linear.observed + posterior.draws @ linear.design.T
+    return with_uncertainty(lengths, predicted, posterior.sigma[:, None] * artefact.noise_scale, seed)

@@ -1,0 +1,301 @@
+"""A job carried from its wishes to a plan: what its placings will tell, and which placings would tell more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cmm_uq.artefacts.bryan import Bryan
+from cmm_uq.commands.refusals import refuse
+from cmm_uq.conformity.plan_conditions import Condition, conditions
+from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
+from cmm_uq.diagnosis.power import Power, powers, without_fault
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import SHIFT, Job
+from cmm_uq.kinds.shift_axis.series import shifted_series
+from cmm_uq.kinds.shift_axis.undetermined import undetermined
+from cmm_uq.physics.effect import Effect
+from cmm_uq.planning.candidates import candidates, like, thinned
+from cmm_uq.planning.exchange import choose, score_of
+from cmm_uq.planning.identifiability import Identifiability, identifiability
+from cmm_uq.planning.information import told, whole
+from cmm_uq.planning.placing import Pattern, Placing, appended, joined, split
+from cmm_uq.planning.ready import ready_plan
+from cmm_uq.planning.setting import Setting
+from cmm_uq.points import Floats, Points
+from cmm_uq.units import MICROMETRE
+
+RECORDED = "recording"
+"""Name of the placings of a recording that is there already."""
+
+SPREAD = "an even spread of candidates"
+"""Name of the placings to compare with where the usual plan is not possible."""
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook:
+    """What some placings tell.
+
+    Parameters
+    ----------
+    placings : of them all.
+    points : the same as one recording.
+    identifiability : of the effects named; ``None`` for a shift job.
+    powers : how large each effect that the job does not name must be for the diagnosis to find it; empty when not asked for,
+        and for placings that give way to others by a criterion which does not part effects.
+    """
+
+    placings: tuple[Placing, ...]
+    points: Points
+    identifiability: Identifiability | None
+    powers: tuple[Power, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What to measure, and what it will tell.
+
+    Parameters
+    ----------
+    job, setting : what was asked.
+    name : of the placings to start from, a ready plan or the recording.
+    start : what these tell.
+    better : what the placings that were searched for tell, with those kept; ``None`` where none were.
+    kept : how many of the start are part of the better plan.
+    scores : of the criterion, before and after; smaller is better.
+    conditions : of the standard.
+    free : of a shift job, what no reading shows, in words.
+    """
+
+    job: Job
+    setting: Setting
+    name: str
+    start: Outlook
+    better: Outlook | None
+    kept: int
+    scores: tuple[float, float] | None
+    conditions: tuple[Condition, ...]
+    free: tuple[str, ...] = ()
+
+    @property
+    def outlook(self) -> Outlook:
+        """Of everything that will have been measured."""
+        return self.better or self.start
+
+    @property
+    def measured(self) -> int:
+        """How many of its placings are recorded already."""
+        return len(self.start.placings) if self.name == RECORDED else 0
+
+    @property
+    def first(self) -> int:
+        """Number of the first measurement that is to be made."""
+        return int(self.job.points.measurement.max()) + 1 if self.name == RECORDED else 1
+
+    @property
+    def to_measure(self) -> tuple[Placing, ...]:
+        """Placings that are still to be measured."""
+        return self.outlook.placings[self.measured :]
+
+    @property
+    def minutes(self) -> tuple[float, ...]:
+        """Time of each placing that is to be measured, min."""
+        return tuple(minutes(self.setting, placing) for placing in self.to_measure)
+
+
+def minutes(setting: Setting, placing: Placing) -> float:
+    """Time that a placing takes, min."""
+    return setting.plan.minutes_per_placing + setting.plan.seconds_per_point * len(placing.points) / 60
+
+
+def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress | None = None) -> Plan:
+    """Plan a job.
+
+    Parameters
+    ----------
+    job : with or without a recording.
+    power : whether to predict what the diagnosis would find.
+    seed : of the recordings drawn for that.
+    progress : told what is done, and the part of the whole.
+
+    Raises
+    ------
+    CmmUqError : the plan is impossible: no room, no fixture, no effect, no time.
+    """
+    tell = progress or (lambda what, part: None)
+    tell("Reading what the placings determine", 0.05)
+    refuse(job, "planned", but=SHIFT)
+    setting = Setting.of(job)
+    if setting.artefact.kind == SHIFT:
+        return _shift_plan(job, setting)
+    name, placings, points = _start(job, setting)
+    setting = setting.sized(points)
+    if name == RECORDED and job.facts.recording.u_coordinate_um is None:
+        estimate = setting.model(points).estimate().least_squares
+        setting = replace(setting, sigma=max(estimate.sigma_of_residuals, 1e-3 * MICROMETRE))
+    rivals = setting.rivals(points)
+    compared = setting.plan.criterion in (None, "separation")
+    start = _outlook(setting, placings, points, rivals, power and compared, seed, _part(tell, 0.1, 0.5))
+    tell("Searching for better placings", 0.55)
+    chosen, kept, scores = _searched(setting, start, rivals, name)
+    better = None
+    if chosen is not None:
+        points = _after(setting, points, chosen[kept:]) if name == RECORDED else _joined(setting, chosen)
+        better = _outlook(setting, chosen, points, rivals, power, seed, _part(tell, 0.6, 0.95))
+    met = conditions(name, [placing.points for placing in placings], job.points.machine) + _in_time(
+        setting, name, placings
+    )
+    return Plan(job, setting, name, start, better, kept, scores, met)
+
+
+def _part(tell: Progress, low: float, high: float) -> Callable[[float], None]:
+    return lambda part: tell("Predicting what the diagnosis would find", low + (high - low) * part)
+
+
+def _start(job: Job, setting: Setting) -> tuple[str, tuple[Placing, ...], Points]:
+    if len(job.points):
+        points = job.points.select(~np.isin(job.points.measurement, job.facts.recording.set_aside))
+        return RECORDED, split(points, "recorded as measurement {}"), points
+    try:
+        name, placings = ready_plan(setting)
+    except CmmUqError:
+        plan = setting.plan
+        if plan.ready is not None or plan.criterion is None or plan.number is None:
+            raise
+        # the usual plan is not possible here, and not asked for
+        name, placings = SPREAD, thinned(iter(candidates(setting)), plan.number, setting.volume)
+    return name, placings, _joined(setting, placings)
+
+
+def _joined(setting: Setting, placings: Sequence[Placing]) -> Points:
+    plan = setting.plan
+    return joined(
+        placings, seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing,
+        columns=plan.columns,
+    )  # fmt: skip
+
+
+def _after(setting: Setting, recorded: Points, added: Sequence[Placing]) -> Points:
+    """A recording and further placings, what else was recorded being at its mean there."""
+    points = _joined(setting, added)
+    places = split(replace(points, columns={
+        name: points.columns.get(name, np.full(len(points), float(values.mean())))
+        for name, values in recorded.columns.items()
+    }))  # fmt: skip
+    return appended(recorded, places)
+
+
+def _outlook(
+    setting: Setting, placings: tuple[Placing, ...], points: Points, rivals: tuple[Effect, ...], power: bool, seed: int,
+    tell: Callable[[float], None],
+) -> Outlook:  # fmt: skip
+    model = setting.model(points)
+    found = identifiability(model, rivals)
+    predicted: list[Power] = []
+    if power and rivals:
+        stated = setting.stated
+        quiet = without_fault(setting.artefact, model, setting.sigma, seed)
+        asked = powers(quiet, rivals, stated=stated, sigma=setting.sigma, alpha=FALSE_ALARMS, seed=seed)
+        for i, each in enumerate(asked):
+            predicted.append(each)
+            tell((i + 1) / len(rivals))
+    return Outlook(placings, points, found, tuple(predicted))
+
+
+def _searched(
+    setting: Setting, start: Outlook, rivals: tuple[Effect, ...], name: str
+) -> tuple[tuple[Placing, ...] | None, int, tuple[float, float] | None]:
+    """All placings of the better plan, how many of them were there before, and the criterion before and after."""
+    plan = setting.plan
+    if plan.criterion is None:
+        return None, 0, None
+    keep = plan.more is not None or name == RECORDED
+    kept = start.placings if keep else ()
+    possible = _possible(setting, start, name)
+    known = told(setting, possible, rivals)
+    existing = known.prior + whole(setting, start.points, rivals)
+    wanted = known.where(rivals) if plan.criterion == "separation" else known.where(setting.named)
+    wanted = _seen(wanted, known.each.sum(axis=0) + existing)
+    if not wanted:
+        raise CmmUqError("no candidate placing shows any of these effects", where="job.toml [model] effects",
+                         fix="Name effects that this artefact can show, or use another artefact")  # fmt: skip
+    score = score_of(plan.criterion, known, wanted)
+    count = plan.more or plan.number or (1 if keep else len(start.placings))
+    count = _affordable(setting, count, possible, () if name == RECORDED else kept)
+    chosen = choose(known, existing if keep else known.prior, score, count)
+    added = tuple(possible[i] for i in chosen.indices)
+    return (*kept, *added), len(kept), (float(score(existing[None])[0]), chosen.after)
+
+
+def _seen(rows: list[int], information: Floats) -> list[int]:
+    """Only effects of which something could show anywhere."""
+    size = np.diag(information)
+    return [i for i in rows if size[i] > 1e-12 * size.max()]
+
+
+def _possible(setting: Setting, start: Outlook, name: str) -> tuple[Placing, ...]:
+    """Candidates: of a recording the artefact with the points that were recorded in its first placing."""
+    artefact = setting.model(start.points).artefact
+    if isinstance(artefact, Bryan):
+        centre = artefact.centres(start.points.readings, artefact.sizes[0].nominal)[0]
+        return candidates(setting, np.asarray(centre, dtype=np.float64))
+    if name != RECORDED or artefact.kind == "triangle":
+        return candidates(setting)
+    pattern, attitude, _ = Pattern.of_recording(start.placings[0].points)
+    again = pattern.once().repeated(setting.plan.repeats)
+    return like(again, artefact.kind, setting.volume, attitude, setting.plan.candidates)
+
+
+def _affordable(setting: Setting, count: int, possible: Sequence[Placing], kept: Sequence[Placing]) -> int:
+    """At most as many as there is time for beside those that are kept."""
+    budget = setting.plan.budget_min
+    if budget is None:
+        return count
+    each = max(minutes(setting, placing) for placing in possible)
+    left = budget - sum(minutes(setting, placing) for placing in kept)
+    if left < each:
+        beside = f" beside the {len(kept)} that are kept" if kept else ""
+        raise CmmUqError(f"{budget:g} min are too short for a single placing{beside}, which takes {each:.1f} min",
+                         where="job.toml [plan] budget_min", fix="Give more time, or fewer repeats")  # fmt: skip
+    return min(count, int(left / each))
+
+
+def _in_time(setting: Setting, name: str, placings: Sequence[Placing]) -> tuple[Condition, ...]:
+    budget = setting.plan.budget_min
+    if budget is None or name == RECORDED:
+        return ()
+    total = sum(minutes(setting, placing) for placing in placings)
+    return (Condition(f"at most {budget:g} min: {total:.0f} min", total <= budget),)
+
+
+def _shift_plan(job: Job, setting: Setting) -> Plan:
+    """Series of a shift job, and what their readings cannot tell."""
+    facts = setting.artefact
+    if facts.plane is not None:
+        raise CmmUqError(
+            "the placings of a plate shifted in a plane are not planned", where="job.toml [artefact] plane",
+            fix="cmm-uq report says what those of a recording leave open",
+        )  # fmt: skip
+    if setting.plan.criterion is not None:
+        candidates(setting)  # which says why there are none
+    name, placings, points = _start(job, setting)
+    series = shifted_series(
+        points, facts.axis or "x", np.array(facts.shifts_mm, dtype=np.float64), facts.u_shift_um * MICROMETRE,
+        job.recording_path,
+    )  # fmt: skip
+    left = undetermined(series, scale_known=facts.known is not None)
+    free = [
+        f"errors that repeat every {left.period:.4g} mm, or a half, a third … of it: every shift is a multiple of it"
+    ]
+    if facts.known is None:
+        free.append("the mean scale of the axis: no length of the artefact is known")
+    if left.patterns.shape[1]:
+        free.append(
+            f"{left.patterns.shape[1]} independent patterns of error at the places read, unless errors are smooth"
+        )
+    start = Outlook(placings, points, None, ())
+    return Plan(job, setting, name, start, None, 0, None, _in_time(setting, name, placings), tuple(free))

@@ -1,0 +1,77 @@
+"""What it would change to correct for the effects that a diagnosis found: figures of performance, statements of conformity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.conformity.accuracy import with_uncertainty
+from cmm_uq.conformity.standards import Statement, statement
+from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.inference.posterior import Density
+from cmm_uq.jobs.job import Job
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import MICROMETRE
+
+_DRAWS = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Consequences:
+    """Figures and statements of a recording, as it stands and corrected for what was left out.
+
+    Parameters
+    ----------
+    figures : by name, before and after.
+    statements : as the job asks for, before and after.
+    """
+
+    figures: Mapping[str, tuple[Quantity, Quantity]]
+    statements: tuple[tuple[Statement, Statement], ...]
+
+
+def consequences(job: Job, diagnosis: Diagnosis, seed: int) -> Consequences | None:
+    """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
+
+    The uncertainty of a corrected figure is that of repeated recordings with this correction.
+
+    Parameters
+    ----------
+    seed : of the figures' repetitions.
+    """
+    found = {item.effect for item in diagnosis.effects}
+    model = replace(diagnosis.after, used=np.ones_like(diagnosis.after.used))
+    artefact = model.artefact
+    lengths = artefact.lengths()
+    if not found or (lengths is None and not job.facts.conformity):
+        return None
+    estimate = diagnosis.after.estimate()
+    linear, value = estimate.linear, estimate.least_squares.value
+    ours = np.array([unknown.key[0] in found for unknown in linear.unknowns])
+    coefficients = np.where(ours, value, 0.0)[: len(value) - len(artefact.sizes)]
+    points = artefact.points.at(artefact.points.xyz + model.errors(artefact.points.xyz, coefficients))
+    corrected = artefact_of(job.facts.artefact, points, where=job.recording_path)
+    before: dict[str, Quantity] = {}
+    after: dict[str, Quantity] = {}
+    late = corrected.lengths()
+    if lengths is not None and late is not None:
+        sigma = diagnosis.noise.coordinate.value * MICROMETRE
+        mean, covariance, _ = Density(linear).conditional(float(np.log(sigma)))
+        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(7,)))
+        draws = random.multivariate_normal(mean, covariance, _DRAWS, method="eigh")
+        whole = model.linearised(value)
+        predicted = lengths - whole.observed + draws @ whole.design.T
+        noise = np.broadcast_to(sigma * artefact.noise_scale, predicted.shape)
+        before = with_uncertainty(lengths, predicted, noise, seed)
+        after = with_uncertainty(late, predicted - draws[:, ours] @ whole.design[:, ours].T, noise, seed)
+    return Consequences(
+        {name: (before[name], after[name]) for name in before},
+        tuple(
+            (statement(wish, artefact, before, key), statement(wish, corrected, after, key))
+            for i, wish in enumerate(job.facts.conformity, 1)
+            for key in [f"[[conformity]] {i}"]
+        ),
+    )

@@ -1,0 +1,1 @@
+"""Where a recording and its model differ, and what was left out of the model."""

@@ -1,0 +1,1 @@
+"""Candidates for what a model leaves out, and their posterior probabilities."""

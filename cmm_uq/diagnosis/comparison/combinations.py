@@ -1,0 +1,242 @@
+"""Which explanations hold together: the posterior over combinations of them, found best first.
+
+Each combination has its marginal likelihood, the sizes of its members integrated one at a time about their joint best; each
+known effect has its posterior probability by summing over the combinations that contain it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.diagnosis.comparison.stack import Version
+from cmm_uq.points import Floats
+
+EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
+"""Probability, beforehand, of none, one, two, three and four known effects that the job does not name."""
+
+UNKNOWNS = (0.85, 0.12, 0.03)
+"""Of none, one and two smooth functions that nobody knows."""
+
+WINDOW = 7.0
+"""A combination less probable than one of its parts by more than this, in logarithm, is not followed."""
+
+SETTLED, FOLLOWED = 24, 8
+"""How many combinations of each size have their evidence computed, and are followed to the next size."""
+
+Key = frozenset[int]
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Explanations that hold together, the size of each at its best, and the log posterior up to a constant."""
+
+    versions: tuple[Version, ...]
+    log_posterior: float
+
+
+@dataclass(frozen=True, eq=False)
+class Combinations:
+    """All combinations worth following.
+
+    Parameters
+    ----------
+    explanations : of which they are made.
+    found : by the indices of their explanations.
+    """
+
+    explanations: Sequence[Explanation]
+    found: Mapping[Key, Combination]
+
+    @cached_property
+    def probability(self) -> dict[Key, float]:
+        """Of each combination."""
+        log = np.array([c.log_posterior for c in self.found.values()])
+        return dict(zip(self.found, np.exp(log - special.logsumexp(log)).tolist(), strict=True))
+
+    def effects_of(self, key: Key) -> Key:
+        """The known effects of a combination."""
+        return frozenset(i for i in key if self.explanations[i].kind == EFFECT)
+
+    @cached_property
+    def of_effects(self) -> dict[Key, float]:
+        """Probability of each set of known effects, whatever is unknown besides."""
+        total: dict[Key, float] = {}
+        for key, p in self.probability.items():
+            known = self.effects_of(key)
+            total[known] = total.get(known, 0.0) + p
+        return total
+
+    def versions(self, effects: Key) -> tuple[Version, ...]:
+        """Of the most probable combination with these known effects, or more."""
+        keys = [key for key in self.found if self.effects_of(key) >= effects]
+        return self.found[max(keys, key=lambda key: self.found[key].log_posterior)].versions
+
+    def unknown_beside(self, effects: Key) -> float:
+        """Probability that something unknown acts besides, given these known effects."""
+        beside = sum(p for key, p in self.probability.items() if self.effects_of(key) == effects and key != effects)
+        return beside / self.of_effects[effects]
+
+    def of(self, index: int) -> float:
+        """Probability that an explanation is part of the truth."""
+        return float(sum(p for key, p in self.probability.items() if index in key))
+
+    def instead(self, effects: Key, index: int) -> dict[int, float]:
+        """Odds of each other known effect in the place of one, the rest kept."""
+        rest, whole = effects - {index}, self.of_effects[effects]
+        return {
+            next(iter(other - rest)): p / whole
+            for other, p in self.of_effects.items()
+            if len(other) == len(effects) and rest < other and other != effects
+        }
+
+
+def explore(comparison: Comparison) -> Combinations:
+    """Follow the most probable combinations, level by level, then every exchange of one explanation of the best."""
+    search = _Search(comparison)
+    level: list[Key] = [frozenset()]
+    while level:
+        for key in level:
+            search.expand(key)
+        size = len(level[0]) + 1
+        level = [key for key in search.settle_best(size, SETTLED) if search.worth(key)]
+        level = search.best_of(level, FOLLOWED)
+    exchanged: set[Key] = set()
+    while (best := search.best()) not in exchanged:
+        exchanged.add(best)
+        for i in best:
+            fewer = tuple(v for v in search.settled[best].versions if v.explanation != i)
+            search.settle(fewer)
+            search.expand(keyed(fewer))
+        search.settle_best(len(best), SETTLED)
+    return Combinations(comparison.explanations, search.settled)
+
+
+def keyed(versions: Iterable[Version]) -> Key:
+    """Which explanations these are versions of."""
+    return frozenset(v.explanation for v in versions)
+
+
+class Prior:
+    """Probability, beforehand, of every combination: of how many, and among as many by the product of their weights."""
+
+    def __init__(self, explanations: Sequence[Explanation]) -> None:
+        self._weight = [(e.kind, float(np.log(e.weight))) for e in explanations]
+        self._counts = {
+            kind: np.log(counts) - np.log(_symmetric([e.weight for e in explanations if e.kind == kind], len(counts)))
+            for kind, counts in ((EFFECT, EFFECTS), (UNKNOWN, UNKNOWNS))
+        }
+
+    def log(self, key: Iterable[int]) -> float:
+        """Logarithm of the probability; minus infinity for a combination that is not considered."""
+        total, count = 0.0, dict.fromkeys(self._counts, 0)
+        for i in key:
+            kind, weight = self._weight[i]
+            if kind not in count:
+                return -np.inf
+            count[kind] += 1
+            total += weight
+        for kind, k in count.items():
+            if k >= len(self._counts[kind]):
+                return -np.inf
+            total += float(self._counts[kind][k])
+        return total
+
+
+def _symmetric(weights: Sequence[float], count: int) -> Floats:
+    """Sums over all sets of 0, 1, … members of the products of their weights (``count``,); one where there is no set."""
+    sums = np.zeros(count)
+    sums[0] = 1.0
+    for weight in weights:
+        sums[1:] += weight * sums[:-1]
+    return np.where(sums > 0, sums, 1.0)
+
+
+class _Search:
+    """Combinations settled so far, and those that wait for it with an estimate of their posterior."""
+
+    def __init__(self, comparison: Comparison) -> None:
+        self.comparison = comparison
+        self.prior = Prior(comparison.explanations)
+        self.candidates = {i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)}
+        self.settled: dict[Key, Combination] = {}
+        self._expanded: set[Key] = set()
+        self._waiting: dict[Key, tuple[float, tuple[Version, ...]]] = {}
+        self.settle(())
+
+    def best(self) -> Key:
+        """The most probable combination."""
+        return max(self.settled, key=lambda key: self.settled[key].log_posterior)
+
+    def worth(self, key: Key) -> bool:
+        """Whether a combination is at least as probable as one of its parts, but for the window."""
+        posterior = self.settled[key].log_posterior
+        parts = [self.settled[key - {i}].log_posterior for i in key if key - {i} in self.settled]
+        return posterior > max(parts, default=-np.inf) - WINDOW
+
+    def best_of(self, keys: Sequence[Key], count: int) -> list[Key]:
+        """The most probable, half of the places kept for known effects alone."""
+        order = sorted(keys, key=lambda key: -self.settled[key].log_posterior)
+        known = [key for key in order if not self._unknown(key)][: count // 2]
+        return known + [key for key in order if key not in known][: count - len(known)]
+
+    def expand(self, key: Key) -> None:
+        """Put every combination with one more explanation on the list."""
+        if key in self._expanded:
+            return
+        self._expanded.add(key)
+        known = self.settled[key]
+        fixed = float(self.comparison.log_evidence_of(known.versions)[0])
+        base = known.log_posterior - self.prior.log(key) - fixed
+        for i, (total, version) in self.comparison.beside(known.versions, self.candidates).items():
+            if i in key or i not in self.candidates:
+                continue
+            larger = key | {i}
+            estimate = base + total + self.prior.log(larger)
+            if larger in self.settled or estimate <= self._waiting.get(larger, (-np.inf, ()))[0]:
+                continue
+            self._waiting[larger] = estimate, (*known.versions, version)
+
+    def settle_best(self, size: int, count: int) -> list[Key]:
+        """Settle the most probable of this size that wait, half of the places kept for known effects alone."""
+        order = sorted((key for key in self._waiting if len(key) == size), key=lambda key: -self._waiting[key][0])
+        known = [key for key in order if not self._unknown(key)][: count // 2]
+        chosen = known + [key for key in order if key not in known][: count - len(known)]
+        for key in chosen:
+            self.settle(self._waiting.pop(key)[1])
+        return chosen
+
+    def settle(self, versions: tuple[Version, ...]) -> None:
+        """Find the best sizes of a combination, and its evidence."""
+        key = keyed(versions)
+        if key not in self.settled:
+            evidence, settled = log_evidence_together(self.comparison, versions)
+            log_posterior = evidence + self.prior.log(key)
+            self.settled[key] = Combination(settled, log_posterior)
+
+    def _unknown(self, key: Key) -> bool:
+        return any(self.comparison.explanations[i].kind == UNKNOWN for i in key)
+
+
+def log_evidence_together(comparison: Comparison, versions: Sequence[Version]) -> tuple[float, tuple[Version, ...]]:
+    """Log evidence of explanations that hold together, and the best version of each.
+
+    Exact for one; for several, the sizes and versions of each are summed with those of the others held at their best.
+    """
+    best = list(versions)
+    totals = [0.0] * len(best)
+    for _ in range(4):
+        before = tuple(best)
+        for i, version in enumerate(best):
+            others = best[:i] + best[i + 1 :]
+            totals[i], best[i] = comparison.beside(others, (version.explanation,))[version.explanation]
+        if tuple(best) == before or len(best) == 1:
+            break
+    fixed = float(comparison.log_evidence_of(best)[0])
+    return fixed + sum(total - fixed for total in totals), tuple(best)

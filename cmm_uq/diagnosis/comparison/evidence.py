@@ -1,0 +1,352 @@
+"""Marginal likelihoods of rival explanations, alone and together, in closed form.
+
+Everything enters linearly with a normal prior whose standard deviation is a multiple of the noise, so that the evidence of
+explanations depends on the data through one quadratic form; its integral over the noise is tabulated once, and the multiples
+are summed over a grid. What the job's model could absorb is projected out.
+
+Explanations that are *granted* join the covariance of the noise, at a given size. So the evidence of one more explanation
+beside them needs nothing but the inner products of all columns, which are computed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, sparse, special
+
+from cmm_uq.diagnosis.comparison.explanations import Explanation
+from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
+from cmm_uq.diagnosis.noise import Kind
+from cmm_uq.points import Floats
+
+_BLOCK, _COLUMNS = 1_500_000, 500
+
+
+@dataclass(frozen=True, eq=False)
+class _Noise:
+    """One kind of noise, what the baseline reaches projected out.
+
+    The precision of what is left is WᵀW − rowsᵀ·rows, with the whitening W (m, m); ``log``, the log probability less that of
+    the determinant.
+    """
+
+    whitening: sparse.csr_array | Floats
+    rows: Floats
+    log: float
+
+    def __call__(self, columns: Floats) -> Floats:
+        """Precision times columns (m, b)."""
+        whole = self.whitening.T @ (self.whitening @ columns)
+        return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Explanations against "nothing is missing".
+
+    Parameters
+    ----------
+    observed : (m,) observations over their noise scale, mm.
+    baseline : (m, p) columns over their noise scale that may take any coefficient.
+    kinds : of noise.
+    sigma, log_sigma : (s,) grid of the noise, mm, and its log probability.
+    explanations : rivals; columns in mm.
+    noise_scale : (m,).
+    least_noise : mm, the least that the noise may be; with it the largest coefficients are as large as physics allows.
+    certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
+    """
+
+    observed: Floats
+    baseline: Floats
+    kinds: Sequence[Kind]
+    sigma: Floats
+    log_sigma: Floats
+    explanations: Sequence[Explanation]
+    noise_scale: Floats
+    least_noise: float
+    certified: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @cached_property
+    def _reached(self) -> Floats:
+        """(m, m − m') orthonormal basis of what the baseline reaches."""
+        if not self.baseline.shape[1]:
+            return np.zeros((len(self.observed), 0))
+        length = np.linalg.norm(self.baseline, axis=0)
+        U, s, _ = linalg.svd(self.baseline / np.where(length > 0, length, 1.0), full_matrices=False)
+        return np.asarray(U[:, s > 1e-9 * s[0]], dtype=np.float64)
+
+    def rest(self, columns: Floats) -> Floats:
+        """What the baseline leaves of columns (m, b)."""
+        return columns - self._reached @ (self._reached.T @ columns)
+
+    @cached_property
+    def left(self) -> Floats:
+        """(m,) what the baseline leaves of the observations."""
+        return self.rest(self.observed[:, None])[:, 0]
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """m', how many observations that is worth."""
+        return int(len(self.observed) - self._reached.shape[1])
+
+    @cached_property
+    def _stack(self) -> tuple[Floats, tuple[Group, ...]]:
+        return stacked(self.explanations, self.rest, self.noise_scale, self.least_noise, self.degrees_of_freedom)
+
+    @cached_property
+    def _where(self) -> dict[tuple[int, int], slice]:
+        """Columns of the stack of each explanation's members."""
+        return {
+            (int(i), int(j)): slice(int(start), int(start) + group.r)
+            for group in self._stack[1]
+            for i, j, start in zip(group.explanation, group.member, group.start, strict=True)
+        }
+
+    @cached_property
+    def visible(self) -> frozenset[int]:
+        """Explanations of which the baseline leaves anything."""
+        return frozenset(i for i, _ in self._where)
+
+    def noise(self, kind: Kind, random: np.random.Generator, draws: int) -> Floats:
+        """What the baseline leaves (m, draws) of noise of one kind, a reading's standard deviation being one."""
+        found = kind.noise(random.standard_normal((len(self.observed), draws)))
+        if self.certified.size:
+            found += self.certified @ random.standard_normal((self.certified.shape[1], draws))
+        return self.rest(found)
+
+    @cached_property
+    def _noises(self) -> list[_Noise]:
+        found = []
+        for kind in self.kinds:
+            Q, R = np.linalg.qr(kind.white(self._reached))
+            log = float(np.log(kind.probability)) + kind.log_factor + kind.log_whitening - _log_diagonal(R)
+            rows = kind.whitening.T @ Q
+            if self.certified.size:
+                white = kind.white(self.certified)
+                white -= Q @ (Q.T @ white)
+                factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white)
+                log -= _log_diagonal(factor)
+                certified = np.linalg.solve(factor, white.T)
+                rows = np.hstack([rows, kind.whitening.T @ certified.T])
+            found.append(_Noise(kind.whitening, np.asarray(rows.T, dtype=np.float64), log))
+        return found
+
+    @cached_property
+    def _blocks(self) -> list[Floats]:
+        """Inner products (k, M, r, r) of each member's columns under each kind of noise, by group."""
+        stack, groups = self._stack
+        found = []
+        for group in groups:
+            columns = group.columns(stack)
+            each = columns.T.reshape(-1, group.r, len(stack))
+            blocks = np.empty((len(self._noises), len(each), group.r, group.r))
+            for block, noise in zip(blocks, self._noises, strict=True):
+                parts = np.array_split(columns, max(1, columns.shape[1] // _COLUMNS), axis=1)
+                other = np.hstack([noise(part) for part in parts]).T.reshape(each.shape)
+                block[:] = each @ other.transpose(0, 2, 1)
+            found.append(blocks)
+        return found
+
+    @cached_property
+    def _left_weighed(self) -> Floats:
+        """Precision times what the baseline leaves (k, m, 1), by kind of noise."""
+        return self._by_noise(self.left[:, None])
+
+    def _by_noise(self, columns: Floats) -> Floats:
+        """Precision times columns (m, b), by kind of noise (k, m, b)."""
+        return np.stack([noise(columns) for noise in self._noises])
+
+    @cached_property
+    def squares(self) -> Floats:
+        """Sum of squares (k,) of what the baseline leaves, mm², whitened by each kind of noise."""
+        return np.asarray(self._left_weighed[:, :, 0] @ self.left, dtype=np.float64)
+
+    @cached_property
+    def _weighed(self) -> dict[tuple[int, int], Floats]:
+        """Precision times the columns of members that were ever granted (k, m, r)."""
+        return {}
+
+    def over_sigma(self, squares: Floats) -> Floats:
+        """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape, from a table over ln(squares)."""
+        nodes, values = self._table
+        return np.interp(np.log(np.maximum(squares, 1e-300)), nodes, values)
+
+    @cached_property
+    def _table(self) -> tuple[Floats, Floats]:
+        nodes = np.linspace(-16.0, 8.0, 1500) + np.log(float(self.left @ self.left))
+        exponent = (
+            self.log_sigma - self.degrees_of_freedom * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
+        )
+        return nodes, np.asarray(special.logsumexp(exponent, axis=1), dtype=np.float64)
+
+    def noise_posterior(self) -> Floats:
+        """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline."""
+        log = np.stack([
+            noise.log + self.log_sigma - self.degrees_of_freedom * np.log(self.sigma)
+            - 0.5 * squares / self.sigma**2
+            for noise, squares in zip(self._noises, self.squares, strict=True)
+        ])  # fmt: skip
+        return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
+
+    def log_evidence(
+        self,
+        left: Floats | None = None,
+        granted: Sequence[Version] = (),
+        among: Container[int] | None = None,
+    ) -> tuple[Floats, Floats]:
+        """Log evidence (b,) of what is granted, and (c, b) of each explanation beside it.
+
+        Parameters
+        ----------
+        left : (m, b) data, by default the recording's.
+        granted : explanations taken for granted.
+        among : explanations that are wanted, by default all; of others the evidence may be minus infinity.
+        """
+        total = np.full((len(self.explanations), 1 if left is None else left.shape[1]), -np.inf)
+        for group, each in self.each(left, granted, among):
+            gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight[:, None]
+            chosen = group.explanation[group.first]
+            total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
+        return self.log_evidence_of(granted, left), total
+
+    def beside(
+        self, granted: Sequence[Version] = (), among: Container[int] | None = None
+    ) -> dict[int, tuple[float, Version]]:
+        """Log evidence of each explanation beside what is granted, at least of those wanted, and its best version."""
+        total = np.full(len(self.explanations), -np.inf)
+        most, best = total.copy(), {}
+        for group, cube in self.each(None, granted, among):
+            each = cube[:, :, 0]
+            gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight
+            chosen = group.explanation[group.first]
+            total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
+            largest = each.max(axis=1) + group.weight
+            better = np.maximum.reduceat(largest, group.first) > most[chosen]
+            order = np.lexsort((-largest, group.explanation))[group.first[better]]
+            for m, a in zip(order.tolist(), each[order].argmax(axis=1).tolist(), strict=True):
+                i = int(group.explanation[m])
+                most[i] = largest[m]
+                best[i] = Version(i, int(group.member[m]), float(group.amplitudes[m, a]))
+        return {i: (float(total[i]), version) for i, version in best.items()}
+
+    def best(self, left: Floats, explanations: Sequence[int]) -> list[Version]:
+        """Version with most evidence among some visible explanations, for each column of data (m, b)."""
+        found = [Version(0, 0, 0.0)] * left.shape[1]
+        most = np.full(left.shape[1], -np.inf)
+        for group, each in self.each(left, (), explanations):
+            weight = np.where(np.isin(group.explanation, explanations), group.weight, -np.inf)
+            flat = (each + weight[:, None, None]).reshape(-1, left.shape[1])
+            at = flat.argmax(axis=0)
+            for column in np.flatnonzero(flat.max(axis=0) > most):
+                m, a = divmod(int(at[column]), AMPLITUDES)
+                found[column] = Version(int(group.explanation[m]), int(group.member[m]), float(group.amplitudes[m, a]))
+                most[column] = flat[at[column], column]
+        return found
+
+    def log_evidence_of(self, granted: Sequence[Version], left: Floats | None = None) -> Floats:
+        """Log evidence (b,) of what is granted, at the size granted, for data (m, b)."""
+        known = self._beside(left, granted)
+        every = self.over_sigma(known.squares) + known.log[:, None]
+        return np.asarray(special.logsumexp(every, axis=0), dtype=np.float64)
+
+    def noise_probability(self, granted: Sequence[Version]) -> Floats:
+        """Probability (kinds,) of each kind of noise, given explanations at the sizes granted."""
+        known = self._beside(None, granted)
+        log = self.over_sigma(known.squares)[:, 0] + known.log
+        return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
+
+    def each(
+        self, data: Floats | None, granted: Sequence[Version], among: Container[int] | None = None
+    ) -> Iterator[tuple[Group, Floats]]:
+        """Log evidence (M, a, b) of members at every size beside what is granted, by groups; ``among`` are wanted at least."""
+        stack, groups = self._stack
+        known = self._beside(data, granted)
+        kinds, b = known.squares.shape
+        for group, blocks in zip(groups, self._blocks, strict=True):
+            part = group.part(among)
+            chosen = group.only(part)
+            if not len(chosen.start):
+                continue
+            seen = (chosen.columns(stack).T @ known.seen_by).reshape(len(chosen.start), group.r, kinds, -1)
+            total = np.empty((len(chosen.start), AMPLITUDES, b))
+            size = max(1, _BLOCK // (kinds * AMPLITUDES * b))
+            for begin in range(0, len(total), size):
+                some = slice(begin, begin + size)
+                total[some] = self._under(known, chosen.amplitudes[some], blocks[:, part][:, some], seen[some])
+            yield chosen, total
+
+    def _under(self, known: _Beside, amplitudes: Floats, blocks: Floats, seen: Floats) -> Floats:
+        """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise.
+
+        Parameters
+        ----------
+        amplitudes : (M, a) to try.
+        blocks : (k, M, r, r) their inner products.
+        seen : (M, r, k, b + g) theirs with the data and with what is granted.
+        """
+        b = known.squares.shape[1]
+        by_kind = seen.transpose(2, 0, 1, 3)
+        shown, hidden = by_kind[..., :b], by_kind[..., b:]
+        if hidden.shape[3]:
+            blocks = blocks - hidden @ hidden.swapaxes(2, 3)
+        if blocks.shape[3] == 1:
+            strengths = blocks[..., 0]
+        else:
+            strengths, turn = np.linalg.eigh(blocks)
+            shown = turn.swapaxes(2, 3) @ shown
+        variance = (amplitudes**2)[:, :, None]
+        ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
+        squares = known.squares[:, None, None, :] - (variance / (1 + ratio)) @ shown**2
+        log = self.over_sigma(squares)
+        log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
+        return np.asarray(np.logaddexp.reduce(log, axis=0), dtype=np.float64)
+
+    def _beside(self, data: Floats | None, granted: Sequence[Version]) -> _Beside:
+        """Data (m, b), the recording's by default, weighed by each kind of noise and what is granted."""
+        plain = self.left[:, None] if data is None else data
+        weighed = self._left_weighed if data is None else self._by_noise(data)
+        squares = np.einsum("mb,kmb->kb", plain, weighed)
+        log = np.array([noise.log for noise in self._noises])
+        if granted:
+            taken = np.hstack([version.amplitude * self._columns(version) for version in granted])
+            other = np.concatenate([v.amplitude * self._weighed_columns(v) for v in granted], axis=2)
+            factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ other)
+            rows = np.linalg.solve(factor, other.swapaxes(1, 2))
+            seen = rows @ plain
+            log = log - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+            squares = squares - np.sum(seen**2, axis=1)
+            weighed = np.concatenate([weighed - rows.swapaxes(1, 2) @ seen, rows.swapaxes(1, 2)], axis=2)
+        return _Beside(weighed.transpose(1, 0, 2).reshape(len(plain), -1), squares, log)
+
+    def _columns(self, version: Version) -> Floats:
+        return self._stack[0][:, self._where[version.explanation, version.member]]
+
+    def _weighed_columns(self, version: Version) -> Floats:
+        key = version.explanation, version.member
+        if key not in self._weighed:
+            self._weighed[key] = self._by_noise(self._columns(version))
+        return self._weighed[key]
+
+
+def _log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
+    return float(np.log(np.abs(np.diag(triangular))).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """Data beside what is granted, under each of k kinds of noise.
+
+    ``seen_by`` (m, k·(b + g)): of each kind Σ⁻¹·data and the rows of what is granted, side by side; ``squares`` (k, b)
+    dataᵀ·Σ⁻¹·data; ``log`` (k,) probability of the noise less that of its determinant.
+
+    With Σ = N + C·Cᵀ and rows = chol(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
+    """
+
+    seen_by: Floats
+    squares: Floats
+    log: Floats

@@ -1,0 +1,198 @@
+"""Rival explanations of what a model leaves, and those of them that are effects of the catalogue.
+
+Each is a set of columns that the observations would show, scaled so that coefficients of one are as large as physics (or,
+for the unknown, plausibility) allows; how much smaller they may be is left to the comparison.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.model import MeasurementModel
+from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.effect import FURTHER, Effect
+from cmm_uq.points import AXES, Floats, Points
+
+EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
+
+UNKNOWN_SD = 0.05
+"""mm, largest standard deviation of an unknown displacement."""
+
+_SHORTEST_PERIOD = 6.0
+"""mm."""
+
+_IDEALISED = ("straightness", "hysteresis", "rotation", "drift")
+"""Effects whose form along their axis, or in time, is the simplest of many that their mechanism can have."""
+
+_TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
+_ROUGH = 0.25
+"""Probability that such an effect has another form than the simplest."""
+
+_FURTHER = 0.1
+"""Weight of an effect that only some machines show, beside one that most do."""
+
+_MOST_PERIODS = 240
+_DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """One version of an explanation.
+
+    Parameters
+    ----------
+    columns : (m, r) mm.
+    shape : nonlinear parameter that they belong to.
+    weight : how probable, among the versions.
+    values : (p, r) mm, an unknown function where its covariate is given, for one unit of each coefficient.
+    rough : whether an effect has another form here than its own, though the same mechanism.
+    """
+
+    columns: Floats
+    shape: tuple[float, ...] = ()
+    weight: float = 1.0
+    values: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    rough: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A rival.
+
+    Parameters
+    ----------
+    name : the effect's name; for an unknown function what it depends on.
+    kind : ``effect``, ``several`` (known effects at once) or ``unknown``.
+    members : versions, as probable as their weights say.
+    covariate : (p,) what an unknown function depends on, of the points or of the observations.
+    covariate_name : its name in the recording.
+    mechanisms : effects whose forms an unknown function could have.
+    weight : how readily it is thought of, beside others of its kind.
+    """
+
+    name: str
+    kind: str
+    members: tuple[Member, ...]
+    covariate: Floats | None = None
+    covariate_name: str | None = None
+    mechanisms: tuple[str, ...] = ()
+    weight: float = 1.0
+
+    @property
+    def shaped(self) -> bool:
+        """Whether its versions differ in a nonlinear parameter."""
+        return bool(self.members[0].shape)
+
+
+def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
+    """Every effect of the catalogue that could act here and is not named in the model already.
+
+    Parameters
+    ----------
+    model : what is named, with its recording.
+    values : (k,) parameters about which it is linear.
+    named : effects to leave out.
+    """
+    points = model.artefact.points.at(model.placed(values))
+    found = []
+    for effect in EVERY.values():
+        if effect.name in named or any(column not in points.columns for column in effect.columns):
+            continue
+        try:
+            members = tuple(
+                Member(_seen(model, effect, points, shape, values), shape) for shape in shapes(effect, points)
+            )
+        except CmmUqError:  # the job does not give the travel that this effect needs
+            continue
+        if any(np.any(member.columns) for member in members):
+            members = (*members, *_roughly(model, effect, points, values))
+            weight = _FURTHER if effect.tier == FURTHER else 1.0
+            found.append(Explanation(effect.name, EFFECT, members, weight=weight))
+    return found
+
+
+def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
+    """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
+    mechanism, _, rest = effect.name.partition("_")
+    if mechanism not in _IDEALISED:
+        return
+    along = points.columns["time_s"] if mechanism == "drift" else points.readings[:, AXES.index(rest[0])]
+    span = float(np.ptp(along))
+    if span == 0:
+        return
+    u = (2 * (along - along.min()) / span - 1)[:, None, None]
+    forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
+    basis = effect.basis(points, ()) * np.array([c.prior_sd for c in effect.coefficients])
+    for s, t in forms:
+        columns = model.seen(basis * (1 + s * u + t * (1.5 * u**2 - 0.5)), values)
+        yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)
+
+
+def finer(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
+    """An explanation with some of its shapes divided: each gives way to five about it that share its weight."""
+    effect = EVERY[explanation.name]
+    points = model.artefact.points.at(model.placed(values))
+    shaped = [i for i, member in enumerate(explanation.members) if member.shape]
+    even = dict(zip(shaped, evenly(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True))
+    step = float(np.median(np.diff(np.sort(list(even.values())))))
+    kept = list(explanation.members)
+    for i in members:
+        kept[i] = replace(kept[i], weight=kept[i].weight / len(_DIVIDED))
+        for part in _DIVIDED:
+            if part:
+                shape = (float(unevenly(effect, np.array(even[i] + part * step))),)
+                kept.append(Member(_seen(model, effect, points, shape, values), shape, kept[i].weight))
+    return replace(explanation, members=tuple(kept))
+
+
+def evenly(effect: Effect, shape: Floats) -> Floats:
+    """An effect's nonlinear parameter on the scale on which it is tried evenly: frequency for a period, else its logarithm."""
+    return 1 / shape if _periodic(effect) else np.log(shape)
+
+
+def unevenly(effect: Effect, value: Floats) -> Floats:
+    """What :func:`evenly` was given."""
+    return 1 / value if _periodic(effect) else np.exp(value)
+
+
+def _periodic(effect: Effect) -> bool:
+    return effect.shape[0].name == "period_mm"
+
+
+def several(singles: Sequence[Explanation]) -> list[Explanation]:
+    """All known effects at once, each as large as the others in the observations.
+
+    It names none of them, but opens the gate to those that are visible together only.
+    """
+    columns = [e.members[0].columns for e in singles if not e.shaped]
+    if len(columns) < 2:
+        return []
+    together = np.hstack(columns)
+    rms = np.sqrt(np.mean(together**2, axis=0))
+    return [
+        Explanation("several effects together", SEVERAL, (Member(UNKNOWN_SD * together / np.where(rms > 0, rms, 1.0)),))
+    ]
+
+
+def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
+    """Values of an effect's nonlinear parameter to try: of a period, those that the readings can tell apart."""
+    if not effect.shape or not _periodic(effect):
+        yield from effect.trials()
+        return
+    readings = points.readings[:, AXES.index(effect.name[-1])]
+    span = float(np.ptp(readings))
+    if span <= 2 * _SHORTEST_PERIOD:
+        return
+    step = 0.35 / span
+    highest = min(1 / _SHORTEST_PERIOD, _MOST_PERIODS * step)
+    for frequency in np.arange(0.7 / span, highest, step):
+        yield (float(1 / frequency),)
+
+
+def _seen(model: MeasurementModel, effect: Effect, points: Points, shape: tuple[float, ...], values: Floats) -> Floats:
+    scale = np.array([c.prior_sd for c in effect.coefficients])
+    return model.seen(effect.basis(points, shape) * scale, values)

@@ -1,0 +1,83 @@
+"""Whether anything is missing: the evidence of something over nothing, and how often nothing shows as much."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import comb
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.diagnosis.comparison.combinations import EFFECTS
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
+from cmm_uq.diagnosis.comparison.stack import Version
+from cmm_uq.points import Floats
+
+SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}
+"""Probability, beforehand, of one effect of the catalogue, of several, and of the unknown; the rest is for nothing missing."""
+
+NOTHING = 1 - sum(SHARES.values())
+
+DRAWS = 200
+_TAIL = 0.8
+
+
+def log_prior(rivals: Sequence[Explanation]) -> Floats:
+    """Log probability, beforehand, of each rival alone (c,)."""
+    total = dict.fromkeys(SHARES, 0.0)
+    for e in rivals:
+        total[e.kind] += e.weight
+    return np.log([SHARES[e.kind] * e.weight / total[e.kind] for e in rivals])
+
+
+def gate(comparison: Comparison, seed: int) -> tuple[float, Floats]:
+    """Probability, under nothing, of as much evidence for something; and the unknown functions' largest under nothing."""
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
+    draws = np.empty((len(comparison.left), DRAWS))
+    sizes = comparison.sigma[comparison.noise_posterior().argmax(axis=1)]
+    probability = np.array([kind.probability for kind in comparison.kinds])
+    chosen = random.choice(len(sizes), DRAWS, p=probability / probability.sum())
+    for g in np.unique(chosen):
+        columns = np.flatnonzero(chosen == g)
+        draws[:, columns] = sizes[g] * comparison.noise(comparison.kinds[g], random, len(columns))
+    statistic, odds = statistic_of(comparison, np.column_stack([comparison.left, draws]))
+    unknowns = [i for i, e in enumerate(comparison.explanations) if e.kind == UNKNOWN]
+    maxima = odds[unknowns, 1:].max(axis=0) if unknowns else np.zeros(0)
+    return tail_probability(statistic[1:], float(statistic[0])), maxima
+
+
+def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
+    """Log odds (b,) of something for data (m', b): one explanation, or the best known effect with any other.
+
+    Also the log evidence (c, b) of each explanation over nothing.
+    """
+    nothing, something = comparison.log_evidence(data)
+    odds = something - nothing
+    log_odds = special.logsumexp(log_prior(comparison.explanations)[:, None] + odds, axis=0)
+    single = [
+        i
+        for i, e in enumerate(comparison.explanations)
+        if e.kind == EFFECT and e.weight == 1 and not e.shaped and i in comparison.visible
+    ]
+    if len(single) < 2:
+        return log_odds, odds
+    pair = np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(len(single), 2)) + np.log(NOTHING)
+    together: dict[Version, list[int]] = {}
+    for column, version in enumerate(comparison.best(data, single)):
+        together.setdefault(version, []).append(column)
+    for version, columns in together.items():
+        alone, both = comparison.log_evidence(data[:, columns], [version], single)
+        others = [i for i in single if i != version.explanation]
+        gain = special.logsumexp(both[others], axis=0) - alone + odds[version.explanation, columns]
+        log_odds[columns] = np.logaddexp(log_odds[columns], pair + gain)
+    return log_odds, odds
+
+
+def tail_probability(draws: Floats, value: float) -> float:
+    """Probability of reaching a value, from draws; beyond their upper fifth with an exponential tail."""
+    start = float(np.quantile(draws, _TAIL))
+    if value <= start:
+        return float((np.sum(draws >= value) + 1) / (len(draws) + 1))
+    beyond = draws[draws > start] - start
+    return float((1 - _TAIL) * np.exp(-(value - start) / beyond.mean()))

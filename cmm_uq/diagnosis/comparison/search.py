@@ -1,0 +1,246 @@
+"""The search for what was left out: a gate with a known false-alarm rate, then one explanation after the other.
+
+At every step all rivals compete: each effect of the catalogue, smooth functions that nobody knows, and nothing. The gate's
+statistic is the evidence of "something" over "nothing"; its distribution under nothing is drawn on the recording's own design.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.explanations import Explanation, finer, known, several
+from cmm_uq.diagnosis.comparison.gate import NOTHING, gate, log_prior
+from cmm_uq.diagnosis.comparison.stack import Version
+from cmm_uq.diagnosis.comparison.unknown_functions import unknown
+from cmm_uq.diagnosis.noise import sigma_grid
+from cmm_uq.diagnosis.recorded_noise import noise_kinds
+from cmm_uq.model import MeasurementModel
+from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.points import Floats
+
+_MISFIT = 20.0
+"""Largest misfit, over the noise, that is reckoned with when the noise is not stated."""
+
+ASSERTED = 0.5
+"""Probability from which an effect, or one of those that cannot be told from it, is asserted."""
+
+_MECHANISM = 0.2
+"""Probability from which an effect is asserted when all that is asked is whether it has its own form or any other."""
+
+_PROBABLE = 0.02
+"""Probability from which the period in a combination is refined."""
+
+NOT_TOLD_APART = 0.02
+"""Odds from which another effect in the place of one counts as not told apart from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Race:
+    """All rivals of one step.
+
+    Parameters
+    ----------
+    model, values : what is explained so far, and its estimate.
+    comparison : rivals.
+    log_odds : (c,) log evidence of each over nothing.
+    probability : (c,) of each explanation, nothing included in the race.
+    p_value : of "nothing is missing".
+    null_maximum : (draws,) largest log evidence of an unknown function over nothing, under nothing.
+    """
+
+    model: MeasurementModel
+    values: Floats
+    comparison: Comparison
+    log_odds: Floats
+    probability: Floats
+    p_value: float
+    null_maximum: Floats
+
+    @property
+    def explanations(self) -> Sequence[Explanation]:
+        """The rivals."""
+        return self.comparison.explanations
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search ends with.
+
+    Parameters
+    ----------
+    first : race before anything is found.
+    last : what is left after everything is, without rivals.
+    combinations : of explanations, with their probabilities; ``None`` while the gate is closed.
+    chosen : indices, in the first race, of the known effects that are found.
+    versions : of them, and of what is unknown besides, in the most probable combination.
+    model : the job's model with what was left out.
+    unexplained : probability that something unknown acts besides.
+    rough : of the effects found, those of which another form is more probable than their own.
+    """
+
+    first: Race
+    last: Comparison
+    combinations: Combinations | None
+    chosen: Key
+    versions: tuple[Version, ...]
+    model: MeasurementModel
+    unexplained: float
+    rough: Key = frozenset()
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of what was left out."""
+        return tuple(self.first.explanations[i].name for i in sorted(self.chosen))
+
+
+def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed: int) -> Found:
+    """Find what a model leaves out.
+
+    Parameters
+    ----------
+    model : what the job names, with its recording.
+    stated : standard uncertainty of a coordinate, mm, as the job states it.
+    alpha : false-alarm rate.
+    seed : of the null distribution.
+    """
+    first = race_of(model, stated, seed)
+    if first.p_value >= alpha:
+        return Found(first, first.comparison, None, frozenset(), (), model, 0.0)
+    combinations = explore(first.comparison)
+    if shapes := _shapes(combinations):
+        explanations = [
+            finer(first.model, first.values, e, shapes[i]) if i in shapes else e
+            for i, e in enumerate(first.explanations)
+        ]
+        first = replace(first, comparison=replace(first.comparison, explanations=explanations))
+        combinations = explore(first.comparison)
+    chosen = asserted(combinations)
+    versions = combinations.versions(chosen)
+    found = model if not chosen else _with(first, versions, chosen)
+    last = comparison_of(found, stated, ())
+    rough = frozenset(
+        i for i in chosen if _rough(first.comparison, versions, i) > ASSERTED or _less_than_function(combinations, i)
+    )
+    return Found(first, last, combinations, chosen, versions, found, combinations.unknown_beside(chosen), rough)
+
+
+def _rough(comparison: Comparison, versions: Sequence[Version], index: int) -> float:
+    """Probability that an effect, beside the others, has another form than its own."""
+    members = comparison.explanations[index].members
+    evidence = np.full(len(members), -np.inf)
+    for group, cube in comparison.each(None, [v for v in versions if v.explanation != index], (index,)):
+        evidence[group.member] = special.logsumexp(cube[:, :, 0], axis=1) + group.weight
+    weight = np.exp(evidence - special.logsumexp(evidence))
+    return float(weight[[member.rough for member in members]].sum())
+
+
+def _shapes(combinations: Combinations) -> dict[int, set[int]]:
+    """Members of the effects with a nonlinear parameter, by explanation, that probable combinations contain."""
+    found: dict[int, set[int]] = {}
+    for key, probability in combinations.probability.items():
+        for version in combinations.found[key].versions if probability > _PROBABLE else ():
+            if combinations.explanations[version.explanation].members[version.member].shape:
+                found.setdefault(version.explanation, set()).add(version.member)
+    return found
+
+
+def asserted(combinations: Combinations) -> Key:
+    """The most probable set of known effects, without those that something else could well be instead."""
+    chosen = max(combinations.of_effects, key=lambda key: combinations.of_effects[key])
+    doubtful = [i for i in chosen if combinations.of(i) < ASSERTED and with_rivals(combinations, chosen, i) < ASSERTED]
+    return (chosen - frozenset(doubtful)) | _of_any_form(combinations, chosen)
+
+
+def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
+    """Effects that are improbable only because an unknown function of the same mechanism describes them as well.
+
+    None that could stand in the place of one that is chosen: together they would determine nothing.
+    """
+    index, found = {e.name: i for i, e in enumerate(combinations.explanations)}, set()
+    instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
+    for j, function in enumerate(combinations.explanations):
+        for i in (index[name] for name in function.mechanisms if name in index):
+            if i in instead or combinations.of(i) < _MECHANISM:
+                continue
+            if sum(p for key, p in combinations.probability.items() if i in key or j in key) >= ASSERTED:
+                found.add(i)
+    return frozenset(found)
+
+
+def _less_than_function(combinations: Combinations, index: int) -> bool:
+    """Whether an effect is less probable than an unknown function of its mechanism: its form is not the effect's own."""
+    effect = combinations.explanations[index].name
+    return any(
+        combinations.of(j) > combinations.of(index)
+        for j, function in enumerate(combinations.explanations)
+        if effect in function.mechanisms
+    )
+
+
+def with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
+    """Probability of an effect or one that these data cannot tell from it."""
+    rivals = combinations.instead(chosen, index)
+    those = {index, *(i for i, odds in rivals.items() if odds > NOT_TOLD_APART)}
+    return float(sum(p for key, p in combinations.probability.items() if those & key))
+
+
+def race_of(model: MeasurementModel, stated: float | None, seed: int) -> Race:
+    """Let all rivals compete for what a model leaves; ``seed`` is that of the null distribution."""
+    values = model.estimate().least_squares.value
+    singles = known(model, values, tuple(effect.name for effect in model.effects))
+    rivals = singles + several(singles) + unknown(model, values)
+    comparison = comparison_of(model, stated, rivals)
+    nothing, something = comparison.log_evidence()
+    log_odds = something[:, 0] - nothing[0]
+    prior = log_prior(rivals)
+    log_total = special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
+    p_value, maxima = gate(comparison, seed)
+    return Race(model, values, comparison, log_odds, np.exp(prior + log_odds - log_total), p_value, maxima)
+
+
+def comparison_of(model: MeasurementModel, stated: float | None, rivals: Sequence[Explanation]) -> Comparison:
+    """Rivals, possibly none, against what a model leaves."""
+    estimate = model.estimate()
+    linear = estimate.linear
+    sigma_left = max(estimate.least_squares.sigma_of_residuals, 1e-6)
+    sigma, log_sigma = sigma_grid(stated, sigma_left)
+    held = _held(model)
+    rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
+    return Comparison(
+        rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.placing]) / linear.noise_scale[:, None],
+        noise_kinds(model), sigma, log_sigma, rivals, linear.noise_scale,
+        stated or sigma_left / _MISFIT, _certified(model, sigma_left),
+    )  # fmt: skip
+
+
+def _with(race: Race, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
+    """The race's model with known effects more, of the shapes that are most probable together."""
+    shapes, added = dict(race.model.shapes), []
+    for version in sorted(versions, key=lambda v: v.explanation):
+        if version.explanation in chosen:
+            explanation = race.explanations[version.explanation]
+            added.append(EVERY[explanation.name])
+            if added[-1].shape:
+                shapes[explanation.name] = explanation.members[version.member].shape
+    return replace(race.model, effects=(*race.model.effects, *added), shapes=shapes)
+
+
+def _certified(model: MeasurementModel, sigma: float) -> Floats:
+    """What the certificates of sizes leave open (m, c), for one standard deviation, in units of this noise."""
+    artefact = model.artefact
+    certified = np.array([size.certified for size in artefact.sizes], dtype=bool)
+    sds = np.array([size.sd for size in artefact.sizes])[certified]
+    change = artefact.size_change()[model.used][:, certified] * sds
+    return np.asarray(change / artefact.noise_scale[model.used, None] / sigma, dtype=np.float64)
+
+
+def _held(model: MeasurementModel) -> NDArray[np.bool_]:
+    """Which parameters of the linear model are sizes with a certificate; all others may take any value."""
+    return np.array([unknown.known for unknown in model.unknowns], dtype=bool)

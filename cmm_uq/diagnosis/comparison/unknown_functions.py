@@ -1,0 +1,205 @@
+"""Functions that nobody knows, as rivals of the known effects: smooth or with one jump, of whatever was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy import linalg
+
+from cmm_uq.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD, Explanation, Member
+from cmm_uq.model import MeasurementModel
+from cmm_uq.points import AXES, Floats, Points
+
+LENGTH_SCALES = (0.6, 0.25, 0.1)
+"""Of unknown smooth functions, in parts of the covariate's range."""
+
+_SPACE_LENGTHS = (0.5, 0.25)
+_DIRECTION_LENGTHS = (0.5, 0.25, 0.08)
+"""In parts of the diameter of a sphere of directions; the shortest lets neighbouring directions differ at will."""
+
+_LOBES = (2, 4, 5, 6, 7, 8, 9, 10)
+"""Undulations in a turn; three are an effect of the catalogue."""
+
+_SPACE_PLACES, _SPACE_RANK = 120, 40
+_MOST_STEPS = 40
+_MANY_DIRECTIONS, _SEEN = 12, 1e-6
+
+_PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")
+"""Beginnings of columns that belong to a point's place, or have functions of their own."""
+
+_SUDDEN = ("time_s", "row")
+"""Covariates of an observation at which an error may jump."""
+
+_MECHANISMS = {
+    a + b: (f"scale_{a}", f"periodic_scale_{a}") if a == b else (f"straightness_{a}_{b}",) for a in AXES for b in AXES
+} | {
+    "yx": ("straightness_y_x", "squareness_xy"),
+    "zy": ("straightness_z_y", "squareness_yz"),
+    "zx": ("straightness_z_x", "squareness_zx"),
+}
+"""Effects whose form an error along the second axis as a function of the first could have."""
+
+_KEPT = 1e-3
+_GRID = 60
+
+
+def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
+    """Functions that nobody knows, smooth or with one jump.
+
+    Errors along each axis of each reading and of the place, scales of time, and anything of each covariate of the
+    observations.
+    """
+    points = model.artefact.points.at(model.placed(values))
+    found = [*_of_readings(model, points, values), *_of_place(model, points, values), *_of_time(model, points, values)]
+    found += [*_of_direction(model), *_of_all_scales(model, points, values)]
+    for name, covariate in covariates(model).items():
+        functions = _functions(covariate) if name in _SUDDEN else ((f, 1.0) for f in smooth_functions(covariate))
+        members = tuple(Member(f, weight=weight, values=f) for f, weight in functions)
+        mechanisms = (name.replace("approach_", "hysteresis_"),) if name.startswith("approach_") else ()
+        found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, name, mechanisms))
+    return found
+
+
+def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """Errors along each axis as functions of each reading."""
+    for i, axis in enumerate(AXES):
+        readings = points.readings[:, i]
+        if np.ptp(readings) < 1.0:
+            continue
+        functions = list(_functions(readings))
+        for j, direction in enumerate(AXES):
+            members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
+            name = f"error along {direction.upper()} as a function of {axis.upper()}"
+            yield Explanation(name, UNKNOWN, members, readings, f"{axis}_mm", _MECHANISMS[axis + direction])
+
+
+def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """Errors along each axis as functions of the place in the volume."""
+    if np.sum(np.ptp(points.readings, axis=0) > 1.0) < 2:
+        return
+    factors = list(_smooth_in_space(points.readings))
+    for j, direction in enumerate(AXES):
+        members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
+        yield Explanation(f"error along {direction.upper()} as a function of the place", UNKNOWN, members)
+
+
+def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """Scales of each axis as functions of time."""
+    time = points.columns.get("time_s")
+    if time is None or len(np.unique(time)) < 3:
+        return
+    for i, axis in enumerate(AXES):
+        readings = points.readings[:, i]
+        half = 0.5 * float(np.ptp(readings))
+        if half < 1.0:
+            continue
+        lever = (readings / half)[:, None]
+        members = tuple(
+            Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in _functions(time)
+        )
+        name = f"scale of {axis.upper()} as a function of time"
+        yield Explanation(name, UNKNOWN, members, time, "time_s", (f"scale_{axis}",))
+
+
+def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:
+    """Anything of the direction in which points were probed, where there are many; and lobes about Z."""
+    among = directions(model)
+    if len(np.unique(np.round(among, 3), axis=0)) < _MANY_DIRECTIONS:
+        return
+    members = tuple(Member(factor) for factor in _smooth_in_space(among, _DIRECTION_LENGTHS))
+    yield Explanation("error as a function of the probing direction", UNKNOWN, members)
+    azimuth = np.arctan2(among[:, 1], among[:, 0])
+    waves = [UNKNOWN_SD * np.column_stack([np.cos(k * azimuth), np.sin(k * azimuth)]) for k in _LOBES]
+    members = tuple(Member(wave, values=wave) for wave in waves)
+    yield Explanation("error in lobes about Z", UNKNOWN, members, np.degrees(azimuth), "azimuth_deg")
+
+
+def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """One scale of all axes, about their zero or their middle, as a function of each further column."""
+    middle = 0.5 * (points.readings.min(axis=0) + points.readings.max(axis=0))
+    span = 0.5 * float(np.ptp(points.readings, axis=0).max())
+    levers = [(points.readings - about) / span for about in (np.zeros(3), middle)]
+    for name, column in points.columns.items():
+        if name.startswith(_PLACED) or len(np.unique(column)) < 3:
+            continue
+        members = tuple(
+            Member(model.seen(lever[:, :, None] * f[:, None, :], values), values=f)
+            for lever in levers
+            for f in smooth_functions(column)
+        )
+        yield Explanation(f"scale of all axes as a function of {name}", UNKNOWN, members, column, name)
+
+
+def directions(model: MeasurementModel) -> Floats:
+    """Unit vectors (m, 3) along which used observations see a point move; zero where they see differences of points."""
+    points = model.artefact.points
+    values = model.estimate().least_squares.value
+    seen = model.seen(np.broadcast_to(np.eye(3), (len(points), 3, 3)), values)
+    length = np.linalg.norm(seen, axis=1, keepdims=True)
+    return np.where(length > _SEEN, seen / np.maximum(length, _SEEN), 0.0)
+
+
+def _along(axis: int, factor: Floats) -> Floats:
+    displacement = np.zeros((len(factor), 3, factor.shape[1]))
+    displacement[:, axis] = factor
+    return displacement
+
+
+def covariates(model: MeasurementModel) -> dict[str, Floats]:
+    """What each used observation may depend on, (m,): direction, order, and the mean of every recorded column."""
+    points, artefact = model.artefact.points, model.artefact
+    found = {}
+    for name, values in points.columns.items():
+        found[name] = mean_of(model, values)
+    found["row"] = np.arange(len(artefact.measurement), dtype=np.float64)[model.used]
+    kept: dict[str, Floats] = {}
+    for name, values in found.items():
+        if len(np.unique(values)) < 3 or any(abs(np.corrcoef(values, other)[0, 1]) > 0.999 for other in kept.values()):
+            continue
+        kept[name] = values
+    return kept
+
+
+def mean_of(model: MeasurementModel, values: Floats) -> Floats:
+    """Mean of a column (n,) over the points of each used observation, (m,)."""
+    return np.asarray(values[model.artefact.rows].mean(axis=1)[model.used], dtype=np.float64)
+
+
+def _functions(covariate: Floats) -> Iterator[tuple[Floats, float]]:
+    """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps."""
+    for function in smooth_functions(covariate):
+        yield function, 1.0
+    distinct = np.unique(covariate)
+    gaps = np.diff(distinct)
+    parts = np.array_split(np.arange(len(gaps)), min(len(gaps), _MOST_STEPS))
+    widest = np.array([part[np.argmax(gaps[part])] for part in parts])
+    chosen = distinct[widest] + 0.5 * gaps[widest]
+    for place in chosen:
+        yield UNKNOWN_SD * np.where(covariate > place, 1.0, -1.0)[:, None], 1 / len(chosen)
+
+
+def smooth_functions(covariate: Floats) -> Iterator[Floats]:
+    """Factors (n, r), mm, of squared-exponential covariances over a covariate (Karhunen–Loève on a grid, Nyström beyond)."""
+    low, span = float(covariate.min()), float(np.ptp(covariate))
+    place = (covariate - low) / span
+    grid = np.linspace(0, 1, _GRID)
+    for length in LENGTH_SCALES:
+        kernel = np.exp(-0.5 * ((grid[:, None] - grid[None, :]) / length) ** 2)
+        eigenvalues, vectors = linalg.eigh(kernel)
+        keep = eigenvalues > _KEPT * eigenvalues[-1]
+        cross = np.exp(-0.5 * ((place[:, None] - grid[None, :]) / length) ** 2)
+        yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
+
+
+def _smooth_in_space(readings: Floats, lengths: tuple[float, ...] = _SPACE_LENGTHS) -> Iterator[Floats]:
+    """Factors (n, r), mm, of squared-exponential covariances over readings (n, 3) (Nyström on some of their places)."""
+    place = (readings - readings.min(axis=0)) / float(np.ptp(readings, axis=0).max())
+    distinct = np.unique(np.round(place, 6), axis=0)
+    some = distinct[np.unique(np.linspace(0, len(distinct) - 1, _SPACE_PLACES).round().astype(int))]
+    among, across = (np.sum((points[:, None] - some) ** 2, axis=2) for points in (some, place))
+    for length in lengths:
+        eigenvalues, vectors = linalg.eigh(np.exp(-0.5 * among / length**2))
+        keep = np.flatnonzero(eigenvalues > _KEPT * eigenvalues[-1])[-_SPACE_RANK:]
+        factor = np.exp(-0.5 * across / length**2) @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
+        yield UNKNOWN_SD * factor

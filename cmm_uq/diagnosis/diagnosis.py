@@ -1,0 +1,239 @@
+"""The diagnosis of a recording: whether something is missing, where, what, and whether modelling it predicts better."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, Found, Race, search, with_rivals
+from cmm_uq.diagnosis.held_out import Improvement, improvement
+from cmm_uq.diagnosis.joint import Joint, joint_posterior
+from cmm_uq.diagnosis.location import Place, located
+from cmm_uq.diagnosis.noise import Kind
+from cmm_uq.inference.least_squares import solve
+from cmm_uq.inference.linear_model import LinearModel
+from cmm_uq.inference.posterior import Posterior, Progress
+from cmm_uq.model import MeasurementModel
+from cmm_uq.points import Floats
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import MICROMETRE
+
+FALSE_ALARMS = 0.01
+"""Default rate at which a recording without any fault is found to have one."""
+
+_TOLD_APART = 0.95
+_UNKNOWN = 0.5
+_NOISE_KIND = 0.9
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """An effect that the model left out.
+
+    Parameters
+    ----------
+    effect, title : its name, and in words.
+    probability : among all rivals that could stand in its place, nothing and the unknown included.
+    parameters : reported parameters, from the joint posterior.
+    explained : part of the misfit's sum of squares that it takes away.
+    together : probability of it or one that these data cannot tell from it.
+    """
+
+    effect: str
+    title: str
+    probability: float
+    parameters: Mapping[str, Quantity]
+    explained: float
+    together: float
+
+
+@dataclass(frozen=True)
+class NoiseFound:
+    """What the noise is like once everything found is modelled; lengths in µm."""
+
+    coordinate: Quantity
+    placing: Quantity
+    correlated_in_time: bool
+    heavy_tails: bool
+    contradicts_stated: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """See the module's docstring.
+
+    Parameters
+    ----------
+    verdict : ``consistent``, ``explained``, ``partial`` or ``unexplained``.
+    p_value : of "nothing is missing".
+    alpha : false-alarm rate asked for.
+    where : most significant first.
+    effects : what is asserted, most probable first.
+    indistinguishable : groups of effects that this recording cannot tell apart.
+    rivals : every explanation of the first race with its probability, most probable first.
+    noise, improvement : see their classes.
+    before, after : the job's model, and with what was left out.
+    posterior : joint, of the model after.
+    """
+
+    verdict: str
+    p_value: float
+    alpha: float
+    where: tuple[Place, ...]
+    effects: tuple[LeftOut, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    rivals: tuple[tuple[str, float], ...]
+    noise: NoiseFound
+    improvement: Improvement
+    before: MeasurementModel
+    after: MeasurementModel
+    posterior: Posterior
+
+
+def diagnose(
+    model: MeasurementModel, *, stated_um: float | None, alpha: float, seed: int, progress: Progress | None = None
+) -> Diagnosis:
+    """Diagnose a recording.
+
+    Parameters
+    ----------
+    model : what the job names, without gross outliers.
+    stated_um : standard uncertainty of a coordinate that the job states.
+    alpha : false-alarm rate.
+    seed : of everything random.
+    """
+    stated = None if stated_um is None else stated_um * MICROMETRE
+    found = search(model, stated, alpha=alpha, seed=seed)
+    gain = improvement(model, found.model)
+    if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
+        found = replace(found, last=found.first.comparison, model=model, chosen=frozenset(), unexplained=1.0)
+        gain = improvement(model, model)
+    noise = _noise(found.last, stated)
+    known = None if stated is None else noise.coordinate.value * MICROMETRE
+    joint = joint_posterior(found, known, seed, progress)
+    after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
+    return Diagnosis(
+        _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha), _left_out(found, joint),
+        _indistinguishable(found), _rivals(found.first), noise, gain, model, after, joint.posterior,
+    )  # fmt: skip
+
+
+def _verdict(found: Found, alpha: float) -> str:
+    if found.first.p_value >= alpha:
+        return "consistent"
+    if not found.effects:
+        return "unexplained"
+    return "partial" if found.rough or found.unexplained > _UNKNOWN else "explained"
+
+
+def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
+    index = {found.first.explanations[i].name: i for i in found.chosen}
+    posterior = joint.posterior
+    column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
+    linear, first = found.model.estimate().linear, _squares(found.first.model.estimate().linear, ())
+    total = first - _squares(linear, ())
+    listed = []
+    for effect in (e for e in found.model.effects if e.name in found.effects):
+        draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
+        reported = effect.to_reported(draws, joint.shapes.get(effect.name, np.zeros((len(draws), 0))))
+        units = {parameter.name: parameter.unit for parameter in effect.reported}
+        share = (_squares(linear, [column[effect.name, c.name] for c in effect.coefficients]) - first + total) / first
+        parameters = {
+            name: Quantity.of_draws(_unwrapped(values) if name == "phase_rad" else values, units[name])
+            for name, values in reported.items()
+        }
+        probability = together = 0.0
+        if found.combinations is not None:
+            probability = found.combinations.of(index[effect.name])
+            together = with_rivals(found.combinations, found.chosen, index[effect.name])
+        explained = share if total > 0 else 0.0
+        listed.append(LeftOut(effect.name, effect.title, probability, parameters, explained, together))
+    return tuple(sorted(listed, key=lambda item: -item.probability))
+
+
+def _unwrapped(phase: Floats) -> Floats:
+    """Phases within half a turn of their circular mean, so that they have a mean and an interval."""
+    middle = float(np.angle(np.mean(np.exp(1j * phase))))
+    return np.asarray(middle + np.angle(np.exp(1j * (phase - middle))), dtype=np.float64)
+
+
+def _squares(linear: LinearModel, without: Sequence[int]) -> float:
+    """Sum of squared residuals, in units of the noise scale, when some parameters are left out."""
+    kept = [i for i in range(len(linear.unknowns)) if i not in without]
+    return float(np.sum(solve(linear.only(kept)).residuals ** 2))
+
+
+def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
+    if found.combinations is None:
+        return ()
+    names, groups = [e.name for e in found.first.explanations], []
+    for i in sorted(found.chosen):
+        odds = found.combinations.instead(found.chosen, i)
+        rivals = sorted((r for r in odds if odds[r] > NOT_TOLD_APART), key=lambda r: -odds[r])
+        if rivals and found.combinations.of(i) < _TOLD_APART:
+            groups.append((names[i], *(names[r] for r in rivals)))
+    return tuple(groups)
+
+
+def _rivals(race: Race) -> tuple[tuple[str, float], ...]:
+    order = np.argsort(-race.probability)
+    return tuple((race.explanations[i].name, float(race.probability[i])) for i in order[:12])
+
+
+def _noise(comparison: Comparison, stated: float | None) -> NoiseFound:
+    """Posterior of the noise, given what is modelled; a kind is named when it has nine parts of ten."""
+    weight = comparison.noise_posterior()
+    sigma = comparison.sigma / MICROMETRE
+    sizes = np.array([kind.size if kind.name == "placing" else 0.0 for kind in comparison.kinds])
+    probability = _probabilities(comparison.kinds, weight)
+    placing = np.outer(sizes, sigma)
+    coordinate = _summary(np.broadcast_to(sigma, weight.shape), weight)
+    return NoiseFound(
+        coordinate,
+        _summary(placing, weight),
+        probability.get("correlated", 0.0) > _NOISE_KIND,
+        probability.get("tails", 0.0) > _NOISE_KIND or _heavy(comparison),
+        stated is not None
+        and _contradicts(stated, comparison.squares[int(weight.sum(axis=1).argmax())], comparison.degrees_of_freedom),
+    )
+
+
+def _probabilities(kinds: Sequence[Kind], weight: Floats) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for kind, part in zip(kinds, weight.sum(axis=1), strict=True):
+        total[kind.name] = total.get(kind.name, 0.0) + float(part)
+    return total
+
+
+def _summary(values: Floats, weight: Floats) -> Quantity:
+    flat, w = values.ravel(), weight.ravel()
+    mean = float(w @ flat)
+    order = np.argsort(flat)
+    cumulative = np.cumsum(w[order])
+    low, high = (float(flat[order][min(int(np.searchsorted(cumulative, q)), len(flat) - 1)]) for q in (0.025, 0.975))
+    return Quantity(
+        mean, float(np.sqrt(max(float(w @ (flat - mean) ** 2), 0.0))), (min(low, mean), max(high, mean)), "µm"
+    )
+
+
+def _heavy(comparison: Comparison) -> bool:
+    """Whether Student's t with four degrees of freedom describes the residuals e⁴ times better than a normal."""
+    z = comparison.left
+    deviation = float(z.std())
+    if len(z) < 15 or deviation == 0:
+        return False
+    z = z / deviation
+    scales = np.geomspace(0.3, 1.2, 40)
+    t = np.outer(1 / scales, z)
+    log_t = (special.gammaln(2.5) - special.gammaln(2) - 0.5 * np.log(4 * np.pi) - 2.5 * np.log1p(t**2 / 4)).sum(axis=1)
+    return bool((log_t - len(z) * np.log(scales)).max() - (-0.5 * len(z) * (np.log(2 * np.pi) + 1)) > 4.0)
+
+
+def _contradicts(stated: float, squares: float, count: int) -> bool:
+    """Two-sided χ² test of the stated noise at 1 %."""
+    p = float(special.chdtrc(count, squares / stated**2))
+    return min(p, 1 - p) < 0.005

@@ -1,0 +1,127 @@
+"""Whether what was found predicts placings, or points, that the fit has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.inference.posterior import Density
+from cmm_uq.model import MeasurementModel
+from cmm_uq.points import Floats
+from cmm_uq.units import MICROMETRE
+
+FOLDS = 10
+
+_SINGULAR = 1e-9
+"""Part of the largest singular value below which another counts as zero."""
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """Before and after, on the recording itself and on held-out placings.
+
+    Parameters
+    ----------
+    rms_before_um, rms_after_um : residual rms of the observations.
+    heldout_rms_before_um, heldout_rms_after_um : of predictions of what was left out of the fit.
+    elpd_gain, elpd_gain_se : gain in expected log predictive density, and its standard error over what was held out.
+    unseen : what was held out.
+    """
+
+    rms_before_um: float
+    rms_after_um: float
+    heldout_rms_before_um: float
+    heldout_rms_after_um: float
+    elpd_gain: float
+    elpd_gain_se: float
+    unseen: str = "placings"
+
+
+def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvement:
+    """Compare two models of one recording by cross-validation over its placings, or the points of few placings.
+
+    Repeats are left out together. The predictive density is normal, with the noise of each model's own fit.
+    """
+    groups, unseen = _groups(before)
+    rms = [_rms(model.estimate().least_squares.residuals) for model in (before, after)]
+    if before.effects == after.effects:
+        held = _held_out(before, groups)[0]
+        return Improvement(rms[0], rms[1], held, held, 0.0, 0.0, unseen)
+    first, second = _held_out(before, groups), _held_out(after, groups)
+    gain = second[1] - first[1]
+    se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0
+    return Improvement(rms[0], rms[1], first[0], second[0], float(gain.sum()), se, unseen)
+
+
+def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float, Floats]:
+    """Rms of predictions, µm, and log predictive density of each fold.
+
+    What a placing leaves open is taken from its other points, where there are some, and else is no part of the prediction.
+    """
+    estimate = model.estimate()
+    linear = estimate.linear
+    sigma = max(estimate.least_squares.sigma_of_residuals, 1e-7)
+    errors, densities = [], []
+    scale = linear.noise_scale[:, None]
+    every = np.hstack([linear.observed[:, None], linear.design]) / scale
+    placing = linear.placing / scale
+    for out in _folds(groups):
+        train = replace(
+            linear, observed=linear.observed[~out], design=linear.design[~out], placing=linear.placing[~out],
+            noise_scale=linear.noise_scale[~out], sigma=sigma,
+        )  # fmt: skip
+        mean, covariance, _ = Density(train).conditional(float(np.log(sigma)))
+        known = placing[out] @ np.linalg.pinv(placing[~out], rcond=_SINGULAR)
+        Q = _complement(placing[out] @ _free(placing[~out]))
+        left = Q.T @ (every[out] - known @ every[~out])
+        error, A = left[:, 0] - left[:, 1:] @ mean, left[:, 1:]
+        told = Q.T @ known
+        spread = sigma**2 * (np.eye(Q.shape[1]) + told @ told.T) + A @ covariance @ A.T
+        errors.append(error * linear.noise_scale[out].mean())
+        factor = np.linalg.cholesky(spread)
+        white = np.linalg.solve(factor, error)
+        densities.append(-0.5 * white @ white - np.log(np.diag(factor)).sum() - 0.5 * len(error) * np.log(2 * np.pi))
+    return _rms(np.concatenate(errors)), np.array(densities)
+
+
+def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], str]:
+    """What is left out together, and what it is: placings; of few placings their points. Each with its repeats.
+
+    Without one of a few placings the rest would often determine nothing: a gauge on seven lines has one along Y.
+    """
+    artefact, used = model.artefact, model.used
+    placing = artefact.measurement[used]
+    if len(np.unique(placing)) >= FOLDS:
+        return placing, "placings"
+    key = np.column_stack([placing, artefact.points.point[artefact.rows[:, 0]][used]])
+    return np.unique(key, axis=0, return_inverse=True)[1].ravel(), "points"
+
+
+def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
+    groups = np.unique(group)
+    count = FOLDS if len(groups) > 40 else len(groups)
+    for k in range(count):
+        yield np.isin(group, groups[k::count])
+
+
+def _free(columns: Floats) -> Floats:
+    """Orthonormal basis (q, r) of what columns (m, q) leave open of their coefficients."""
+    if not columns.size:
+        return np.eye(columns.shape[1])
+    _, s, V = np.linalg.svd(columns)
+    return V[int(np.sum(s > _SINGULAR * max(float(s[0]), 1e-300))) :].T
+
+
+def _complement(columns: Floats) -> Floats:
+    """Orthonormal basis of what columns (m, q) do not reach, (m, m − rank)."""
+    if not columns.shape[1]:
+        return np.eye(len(columns))
+    U, s, _ = np.linalg.svd(columns, full_matrices=True)
+    return U[:, int(np.sum(s > _SINGULAR * max(float(s[0]), 1e-300))) :]
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)) / MICROMETRE) if len(values) else 0.0

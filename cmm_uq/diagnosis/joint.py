@@ -1,0 +1,85 @@
+"""The joint posterior of what the job names and what it left out, under the noise that was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.diagnosis.comparison.explanations import evenly, unevenly
+from cmm_uq.diagnosis.comparison.search import Found
+from cmm_uq.diagnosis.noise import Kind
+from cmm_uq.inference.posterior import Posterior, Progress, sample
+from cmm_uq.inference.shaped import Shaped, sample_shaped
+from cmm_uq.model import MeasurementModel
+from cmm_uq.physics.effect import Effect
+from cmm_uq.points import Floats
+
+_FINER = 12
+"""Nodes of a shape between two of the search's."""
+
+_IMPROBABLE = 12.0
+"""Shapes less probable than the best by this, in logarithm, are not followed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A posterior and the draws (N, s) of each effect's shape, by its name."""
+
+    posterior: Posterior
+    shapes: dict[str, Floats]
+
+
+def joint_posterior(found: Found, sigma: float | None, seed: int, progress: Progress | None = None) -> Joint:
+    """Sample everything at once.
+
+    Parameters
+    ----------
+    found : by the search.
+    sigma : standard uncertainty of a coordinate, mm; ``None`` when it is to be estimated here.
+    seed : of the draws.
+    progress : told the part done.
+    """
+    model = replace(found.model, sigma=sigma)
+    estimate = model.estimate()
+    linear, white = estimate.linear.uncorrelated(_noise(found).white)
+    new = [e for e in model.effects if e.shape and e.name in found.effects]
+    if not new:
+        return Joint(sample(linear, seed, progress), {})
+    values = estimate.least_squares.value
+    shaped = [_shaped(found, model, effect, values) for effect in new]
+    shaped = [replace(some, table=np.stack([white(columns) for columns in some.table])) for some in shaped]
+    posterior = sample_shaped(linear, shaped, seed, progress)
+    return Joint(posterior, {e.name: posterior.shapes[:, j : j + 1] for j, e in enumerate(new)})
+
+
+def _noise(found: Found) -> Kind:
+    """That is most probable once everything found is modelled."""
+    weight = found.last.noise_posterior().sum(axis=1)
+    return found.last.kinds[int(np.argmax(weight))]
+
+
+def _shaped(found: Found, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:
+    """An effect's columns on a fine grid of its shape, wherever the search found some probability."""
+    points = model.artefact.points.at(model.placed(values))
+    nodes = _nodes(found, effect)
+    table = np.stack([model.seen(effect.basis(points, (float(shape),)), values) for shape in nodes])
+    keys = [unknown.key for unknown in model.unknowns]
+    return Shaped([keys.index((effect.name, c.name)) for c in effect.coefficients], nodes, table)
+
+
+def _nodes(found: Found, effect: Effect) -> Floats:
+    comparison = found.first.comparison
+    index = next(i for i in found.chosen if found.first.explanations[i].name == effect.name)
+    granted = [v for v in found.versions if v.explanation != index]
+    ((group, cube),) = comparison.each(None, granted, (index,))
+    even = evenly(effect, np.array([found.first.explanations[index].members[m].shape[0] for m in group.member]))
+    evidence = special.logsumexp(cube[:, :, 0], axis=1)
+    step = float(np.median(np.diff(np.sort(even)))) if len(even) > 1 else 0.1 * abs(float(even[0]))
+    likely = even[evidence > evidence.max() - _IMPROBABLE]
+    offsets = np.arange(-_FINER, _FINER + 1) / _FINER
+    fine = np.unique(np.round((likely[:, None] + step * offsets).ravel() / step * _FINER)) * step / _FINER
+    (shape,) = effect.shape
+    low, high = np.sort(evenly(effect, np.array([shape.low, shape.high])))
+    return np.sort(unevenly(effect, np.unique(np.clip(fine, low, high))))

@@ -1,0 +1,89 @@
+"""A diagnosis in words that a service technician acts on."""
+
+from __future__ import annotations
+
+from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
+from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.result import Diagnosed
+from cmm_uq.documents.wording import expanded, probability
+
+CAUSES = {
+    "scale": "the scale or its compensation: check the linear compensation of this axis",
+    "squareness": "the axes are not square: adjust the guideways or the squareness in the compensation",
+    "straightness": "a bowed guideway: check straightness and its compensation",
+    "rotation": "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation",
+    "periodic_scale": "an error that repeats with the period: scale interpolation, leadscrew or rack",
+    "hysteresis": "backlash or friction in this drive: the reading depends on the side it is reached from",
+    "thermal_scale": "the scale expands and its temperature is not, or wrongly, compensated",
+    "thermal_artefact": "the artefact expands and its temperature is not, or wrongly, compensated",
+    "thermal_gradient": "the table bends: top and bottom differ in temperature",
+    "drift": "the axis drifts with time: warm-up, or the room's temperature",
+    "artefact_sag": "the artefact sags or its supports are not at the right points",
+    "probe_radius": "the effective stylus radius is wrong: qualify the probe again",
+    "probe_lobing": "the probe's pre-travel has three lobes: qualify it in more directions",
+}
+"""What to look for, by the beginning of the effect's name; the longest that fits counts."""
+
+_SAME = 0.01
+"""Difference of two probabilities that is not worth telling."""
+
+VERDICTS = {
+    "consistent": "The recording agrees with the model that the job names.",
+    "explained": "The recording does not agree with the model that the job names; what was left out is found.",
+    "partial": "Something that was left out is found, but structure remains that no known effect accounts for.",
+    "unexplained": "The recording does not agree with the model that the job names, and no known effect accounts for it.",
+}
+
+
+def lines(found: Diagnosed) -> list[str]:
+    """Verdict and everything that follows from it, a sentence or two each."""
+    d = found.diagnosis
+    told = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
+    told += [f"Cannot be told apart by this recording: {', '.join(group)}." for group in d.indistinguishable]
+    told += [f"To part {' and '.join(s.separates)}: {s.what}" for s in found.suggestions]
+    return told + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
+
+
+def cause_of(effect: str) -> str:
+    """What a technician looks for."""
+    fitting = [name for name in CAUSES if effect.startswith(name)]
+    return CAUSES[max(fitting, key=len)] if fitting else ""
+
+
+def sentence(item: LeftOut, gain: Improvement) -> str:
+    """One left-out effect: size, cause, what it explains, and what was held out says."""
+    alone = len(item.parameters) == 1
+    parameters = {name: q.times(1e6, "10⁻⁶/K") if q.unit == "1/K" else q for name, q in item.parameters.items()}
+    sizes = [(name, *expanded(quantity), quantity) for name, quantity in parameters.items()]
+    words = [
+        f"{'' if alone else f'{name} = '}{value} ± {U}\u00a0{quantity.unit} (k\u00a0=\u00a0{k})"
+        if quantity.u > 0
+        else f"{name} = {quantity.value:.4g}\u00a0{quantity.unit}"
+        for name, value, U, k, quantity in sizes
+    ]
+    alike = item.together > item.probability + _SAME
+    together = f" ({probability(item.together)} of it or one that cannot be told from it)" if alike else ""
+    return (
+        f"{item.title}: {', '.join(words)}. What it points to: {cause_of(item.effect)}. "
+        f"Probability {probability(item.probability)}{together}; explains {100 * item.explained:.0f}\u00a0% of the misfit; "
+        f"on {gain.unseen} that the fit had not seen the rms falls from "
+        f"{gain.heldout_rms_before_um:.1f} to {gain.heldout_rms_after_um:.1f}\u00a0µm."
+    )
+
+
+def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[str, ...]:
+    """What the noise is like."""
+    noise = diagnosis.noise
+    low, high = noise.coordinate.interval95
+    texts = [
+        f"Standard uncertainty of a coordinate {noise.coordinate.value:.2g} µm (95 % interval {low:.2g} to {high:.2g} µm)."
+    ]
+    if noise.contradicts_stated and stated_um is not None:
+        texts.append(f"This contradicts the stated {stated_um:g} µm.")
+    if noise.placing.value > 0.3 * noise.coordinate.value:
+        texts.append(f"Each placing is off by about {noise.placing.value:.2g} µm that its repeats share.")
+    if noise.correlated_in_time:
+        texts.append("Neighbouring readings are correlated in time.")
+    if noise.heavy_tails:
+        texts.append("The scatter has heavier tails than a normal distribution.")
+    return tuple(texts)

@@ -1,0 +1,135 @@
+"""A document as PDF/A-3a and PDF/UA-1: for the archive, for screen readers, with its files inside.
+
+What it looks like is in ``templates/document.typ``. The text goes to Typst as data and is never read as its markup. Only
+the fonts inside the typst wheel are used, so that the file looks the same from every machine; where they lack a
+character (Chinese, Japanese and Korean names), the machine's own fonts are asked, and what these lack too is shown as □,
+with a line that says so.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import PurePosixPath
+from typing import Any
+
+from cmm_uq.documents.document import Document
+from cmm_uq.documents.plot_style import COLOURS
+from cmm_uq.documents.templates import template_folder
+from cmm_uq.errors import CmmUqError
+
+EPOCH = "1970-01-01"
+"""Date of a PDF whose document has none: the clock is never read, so the same document gives the same bytes."""
+
+_TYPES = {
+    ".csv": "text/csv",
+    ".html": "text/html",
+    ".json": "application/json",
+    ".pdf": "application/pdf",
+    ".toml": "application/toml",
+    ".txt": "text/plain",
+    ".xml": "application/xml",
+}
+
+
+def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
+    """The document as PDF, with files embedded.
+
+    Parameters
+    ----------
+    attachments : by name, what is embedded byte for byte: ``.json`` and ``.xml`` files as *data* of the document, others
+        as its *source* (the relationships of ISO 19005-3).
+
+    Raises
+    ------
+    CmmUqError : Typst refuses the document, and what it says.
+    """
+    content = {
+        "document": document.as_data(),
+        "colour": COLOURS,
+        "date": document.date.isoformat() if document.date else EPOCH,
+        "attachments": [_attachment(name, data) for name, data in attachments.items()],
+        "missing": "",
+    }
+    return _with_fallback(content)
+
+
+def _attachment(name: str, data: bytes) -> dict[str, Any]:
+    suffix = PurePosixPath(name).suffix.lower()
+    outcome = suffix in {".json", ".xml"}
+    try:
+        body: str | list[int] = data.decode("utf-8")
+    except UnicodeDecodeError:
+        body = list(data)
+    return {
+        "name": name,
+        "data": body,
+        "relationship": "data" if outcome else "source",
+        "type": _TYPES.get(suffix, "application/octet-stream"),
+        "description": f"{'Results in machine-readable form' if outcome else 'Input of this document'}: {name}",
+    }
+
+
+def _with_fallback(content: dict[str, Any]) -> bytes:
+    """Compile with the embedded fonts; then with the machine's too; then without the characters that both lack."""
+    from typst import TypstError
+
+    try:
+        return _compile(content, system_fonts=False)
+    except TypstError as error:
+        if not _missing(error):
+            raise _refused(error) from error
+    try:
+        return _compile(content, system_fonts=True)
+    except TypstError as error:
+        missing = _missing(error)
+        if not missing:
+            raise _refused(error) from error
+    try:
+        return _compile(_without(content, missing), system_fonts=True)
+    except TypstError as error:
+        raise _refused(error) from error
+
+
+def _compile(content: Mapping[str, Any], *, system_fonts: bool) -> bytes:
+    import typst
+
+    return typst.compile(
+        (template_folder() / "document.typ").read_bytes(),
+        font_paths=typst.Fonts(include_system_fonts=system_fonts),
+        ignore_system_fonts=not system_fonts,
+        sys_inputs={"input": json.dumps(content)},
+        pdf_standards=["a-3a", "ua-1"],
+        timestamp=0,
+    )
+
+
+def _missing(error: Any) -> list[str]:
+    """Characters that no font had or PDF/A forbids; Typst names all at once, each in quotes or as its code."""
+    texts = re.findall(r'(?:the text|codepoint) `"(.+?)"`', error.diagnostic)
+    plain = (re.sub(r"\\u\{([0-9a-f]+)\}", lambda code: chr(int(code[1], 16)), text) for text in texts)
+    return sorted({character for text in plain for character in text})
+
+
+def _without(content: dict[str, Any], missing: list[str]) -> dict[str, Any]:
+    """The content with □ for every missing character, and their codes for the line that says so."""
+    table = str.maketrans(dict.fromkeys(missing, "□"))
+
+    def shown(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: shown(item) for key, item in value.items()}
+        if isinstance(value, list):
+            return [shown(item) for item in value]
+        return value.translate(table) if isinstance(value, str) else value
+
+    codes = ", ".join(f"U+{ord(character):04X}" for character in missing)
+    return {**content, "document": shown(content["document"]), "missing": codes}
+
+
+def _refused(error: Any) -> CmmUqError:
+    hints = "; ".join(error.hints)
+    return CmmUqError(
+        f"the PDF could not be made: {error.message}{f' ({hints})' if hints else ''}",
+        fix="The HTML view has the same content; please report this with the job that caused it",
+    )

@@ -1,0 +1,173 @@
+"""Pictures of placings for the operator, and of what a better plan gains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cmm_uq.documents.document import Plot
+from cmm_uq.documents.plot_style import ACCENT, INK, MUTED, RULE, TINY, WIDTH_MM, as_svg, dots, house_style, new_figure
+from cmm_uq.planning.placing import Placing
+from cmm_uq.points import AXES, Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+A_ROW = 3
+"""Pictures side by side."""
+
+_DEPTH = 0.5 * np.array([np.cos(np.radians(38.0)), np.sin(np.radians(38.0))])
+"""How the y axis runs into the picture."""
+
+_TEXT_MM = 15.0
+
+
+def placing_pictures(placings: Sequence[Placing], box: Floats, first: int) -> list[Plot]:
+    """Placings in the machine's volume seen from the front, three in a row.
+
+    Parameters
+    ----------
+    placings : to be drawn.
+    box : (3, 2) volume, scale readings, mm.
+    first : number of the first of them.
+    """
+    rows = [placings[i : i + A_ROW] for i in range(0, len(placings), A_ROW)]
+    return [_row(row, box, first + A_ROW * i) for i, row in enumerate(rows)]
+
+
+def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
+    corners = _seen(np.array(list(product(*box))))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    span = 1.22 * (high - low)
+    width = WIDTH_MM / A_ROW
+    height = min(width * float(span[1] / span[0]), 75.0) + _TEXT_MM
+    with house_style():
+        figure = new_figure(height)
+        for i, placing in enumerate(placings):
+            ax = figure.add_axes((i / A_ROW, 0.0, 1 / A_ROW, 1 - _TEXT_MM / height))
+            _draw(ax, placing, box)
+            middle = 0.5 * (low + high)
+            ax.set(xlim=middle[0] + np.array([-0.5, 0.5]) * span[0], ylim=middle[1] + np.array([-0.5, 0.5]) * span[1])
+            ax.set_aspect("equal")
+            ax.axis("off")
+            left = i / A_ROW + 0.008
+            figure.text(left, 1 - 4.5 / height, f"{first + i}", fontsize=10, color=ACCENT, fontweight="bold")
+            figure.text(left + 0.035, 1 - 4.5 / height, placing.title, fontsize=7.5, color=INK, fontweight="bold")
+            figure.text(left, 1 - 9.5 / height, placing.ends, fontsize=TINY, color=MUTED)
+        last = first + len(placings) - 1
+        numbers = f"Placing {first}" if last == first else f"Placings {first} to {last}"
+        told = "; ".join(f"{first + i}: {p.title}, {p.ends} mm" for i, p in enumerate(placings))
+        return Plot(
+            f"{numbers}: scale readings in mm; ○ is the first point, dashed lines drop to the table.",
+            told,
+            as_svg(figure),
+        )
+
+
+def _seen(xyz: Floats) -> Floats:
+    """Points (n, 3) as drawn (n, 2): x to the right, z up, y into the picture."""
+    return np.asarray(xyz[:, [0, 2]] + xyz[:, 1:2] * _DEPTH)
+
+
+def _draw(ax: Axes, placing: Placing, box: Floats) -> None:
+    _frame(ax, box)
+    readings = placing.points.readings[placing.points.repeat == placing.points.repeat.min()]
+    floor = readings.copy()
+    floor[:, 2] = box[2, 0]
+    outline = _outline(readings)
+    _line(ax, floor[outline], RULE, 2.0)
+    for row in outline[:-1] if len(outline) > 2 else outline:
+        _line(ax, np.vstack([readings[row], floor[row]]), MUTED, 0.5, dashed=True)
+    _line(ax, readings[outline], ACCENT, 1.6)
+    seen = _seen(readings)
+    dots(ax, seen[:, 0], seen[:, 1], 4.6 if len(readings) <= 3 else 2.2, ACCENT, zorder=5)
+    dots(ax, seen[:1, 0], seen[:1, 1], 6.0, ACCENT, hollow=True, zorder=6)
+
+
+def _frame(ax: Axes, box: Floats) -> None:
+    """Edges of the volume, those behind lighter, and the names of the axes."""
+    x, y, z = box
+    floor = np.array(
+        [[x[0], y[0], z[0]], [x[1], y[0], z[0]], [x[1], y[1], z[0]], [x[0], y[1], z[0]], [x[0], y[0], z[0]]]
+    )
+    polygon = _seen(floor)
+    ax.fill(polygon[:, 0], polygon[:, 1], color="#f4f7f8", zorder=0)
+    _line(ax, floor, MUTED, 0.6)
+    _line(ax, floor + np.array([0.0, 0.0, z[1] - z[0]]), RULE, 0.6)
+    for i in range(4):
+        _line(ax, np.vstack([floor[i], floor[i] + [0.0, 0.0, z[1] - z[0]]]), RULE, 0.6)
+    reach = 0.04 * (x[1] - x[0])
+    at = _seen(np.array([[x.mean(), y[0], z[0]], [x[1], y.mean(), z[0]], [x[0], y[0], z.mean()]]))
+    for (across, up), name, shift in zip(at, AXES, ((0.0, -1.6), (1.4, -1.0), (-1.4, 0.0)), strict=True):
+        ax.text(across + shift[0] * reach, up + shift[1] * reach, name.upper(), fontsize=TINY, color=MUTED, ha="center",
+                va="center")  # fmt: skip
+
+
+def _outline(readings: Floats) -> list[int]:
+    """Rows to join: along a line from end to end, about a surface through its outermost points."""
+    if len(readings) == 1:
+        return [0, 0]
+    about = readings - readings.mean(axis=0)
+    _, size, axes = np.linalg.svd(about, full_matrices=False)
+    if len(size) < 2 or size[1] < 1e-3 * size[0]:
+        along = about @ axes[0]
+        return [int(np.argmin(along)), int(np.argmax(along))]
+    from scipy.spatial import ConvexHull
+
+    hull = [int(row) for row in ConvexHull(about @ axes[:2].T).vertices]
+    return [*hull, hull[0]]
+
+
+def _line(ax: Axes, xyz: Floats, colour: str, width: float, *, dashed: bool = False) -> None:
+    seen = _seen(xyz)
+    ax.plot(seen[:, 0], seen[:, 1], lw=width, color=colour, ls=(0, (3, 2)) if dashed else "-", zorder=2)
+
+
+def gain_plot(
+    labels: Sequence[str], before: Sequence[float | None], after: Sequence[float | None], *, names: tuple[str, str],
+    quantity: str,
+) -> Plot:  # fmt: skip
+    """Before and after for each effect, over the larger of the two; what has no finite value stands at the right edge.
+
+    Parameters
+    ----------
+    labels : of the effects.
+    before, after : smaller is better; ``None`` for infinitely large.
+    names : of the two plans.
+    quantity : what is drawn.
+    """
+    figures = [[v if v is not None and np.isfinite(v) else np.inf for v in series] for series in (before, after)]
+    pairs = np.array(figures).T
+    finite_best = np.where(np.isfinite(pairs), pairs, 0.0).max(axis=1)
+    whole = np.where(finite_best > 0, finite_best, 1.0)
+    ratio = pairs / whole[:, None]
+    shown = np.where(np.isfinite(ratio), ratio, 1.3)
+    height = 20.0 + 5.2 * len(labels)
+    with house_style():
+        figure = new_figure(height)
+        ax = figure.subplots()
+        figure.subplots_adjust(left=0.36, right=0.98, bottom=11 / height, top=1 - 8 / height)
+        y = np.arange(len(labels), dtype=np.float64)[::-1]
+        for i, row in enumerate(y):
+            ax.plot(shown[i], [row, row], color=RULE, lw=2.2, solid_capstyle="butt", zorder=1)
+        dots(ax, shown[:, 0], y, 5.0, MUTED, hollow=True)
+        dots(ax, shown[:, 1], y, 5.0, ACCENT, zorder=4)
+        ax.set_yticks(y, labels)
+        ax.set(xlim=(0.0, 1.38), ylim=(-0.7, len(labels) - 0.3))
+        ax.set_xticks([0, 0.25, 0.5, 0.75, 1.0, 1.3], ["0", "¼", "½", "¾", "1", "not at all"])
+        ax.grid(axis="x")
+        ax.set_xlabel(f"{quantity}, over the larger of the two")
+        figure.text(0.36, 1 - 4.5 / height, f"○ {names[0]}", color=MUTED, fontsize=8)
+        figure.text(0.66, 1 - 4.5 / height, f"● {names[1]}", color=ACCENT, fontsize=8, fontweight="bold")
+        told = "; ".join(
+            f"{label}: {_figure(a)} before, {_figure(b)} after"
+            for label, a, b in zip(labels, before, after, strict=True)
+        )
+        return Plot(f"{quantity} with {names[0]} and with {names[1]}.", told, as_svg(figure))
+
+
+def _figure(value: float | None) -> str:
+    return "not at all" if value is None or not np.isfinite(value) else f"{value:.2g}"

@@ -1,0 +1,34 @@
+"""The picture that every artefact shares: what the model leaves unexplained, where it lies in the machine's volume."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.documents.document import Plot
+from cmm_uq.documents.plots import volume_plot
+from cmm_uq.documents.result import Result
+from cmm_uq.units import MICROMETRE
+
+
+def residual_volume(result: Result, what: str) -> Plot:
+    """Residuals of observations of one point each, or of pairs of points (drawn as bars), over the scale readings.
+
+    Parameters
+    ----------
+    what : the points in words, as ``faces``.
+    """
+    artefact, residuals = result.artefact, result.residuals / MICROMETRE
+    readings, travel = artefact.points.readings, artefact.points.machine.travel_mm
+    ends = readings[artefact.rows]
+    return volume_plot(
+        ends[:, 0], residuals, end_mm=ends[:, -1] if ends.shape[1] > 1 else None,
+        travel_mm=travel if np.all(np.isfinite(travel)) else None,
+        caption="Residuals after the fitted model in the machine's volume (scale readings).",
+        alternative=f"Three projections of the {what}; residuals of {residuals.min():.1f} to {residuals.max():.1f} µm.",
+    )  # fmt: skip
+
+
+def flagged(result: Result) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Observations (m,) of measurements that the screening found odd."""
+    odd = {m for finding in result.findings for m in finding.measurements}
+    return np.isin(result.artefact.measurement, list(odd))

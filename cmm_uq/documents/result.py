@@ -1,0 +1,143 @@
+"""What an analysis finds: the object that certificates and results.json are written from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from cmm_uq.conformity.consequences import Consequences
+from cmm_uq.conformity.standards import Statement
+from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.inference.least_squares import LeastSquares
+from cmm_uq.inference.posterior import Posterior
+from cmm_uq.jobs.job import Job
+from cmm_uq.model import Estimate, MeasurementModel
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.planning.suggestion import Suggestion
+from cmm_uq.points import Floats
+from cmm_uq.screening.screened import Finding
+from cmm_uq.uncertainty.quantity import Quantity
+
+LACK_OF_FIT = 0.01
+"""Probability below which the residuals are held to contradict the stated noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Standard uncertainty of one recorded coordinate.
+
+    Parameters
+    ----------
+    coordinate : as used, µm; from the residuals unless the job states it.
+    stated_um : what the job states, if anything.
+    p_value : of the residuals' sum of squares under the stated noise (χ² test), if it is stated.
+    """
+
+    coordinate: Quantity
+    stated_um: float | None
+    p_value: float | None
+
+    @property
+    def contradicts_stated(self) -> bool:
+        """Whether the residuals are larger than the stated noise allows; they were then used instead of it."""
+        return self.p_value is not None and self.p_value < LACK_OF_FIT
+
+
+@dataclass(frozen=True)
+class Influence:
+    """What the estimates would be without a measurement that the screening found odd but the estimates use.
+
+    Parameters
+    ----------
+    measurement : that would be left out.
+    residual_sd_um : residual standard deviation without it; ``None`` without degrees of freedom.
+    largest_change : of an estimate, in units of its standard uncertainty.
+    parameter : key of that estimate.
+    """
+
+    measurement: int
+    residual_sd_um: float | None
+    largest_change: float
+    parameter: tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """A job with its diagnosis.
+
+    Parameters
+    ----------
+    job, findings : what was read, and what the screening found.
+    diagnosis : what is missing.
+    suggestions : what to measure next.
+    consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
+    """
+
+    job: Job
+    findings: tuple[Finding, ...]
+    diagnosis: Diagnosis
+    suggestions: tuple[Suggestion, ...]
+    consequences: Consequences | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """All that is known of a job after its analysis.
+
+    Parameters
+    ----------
+    job, model : what was analysed.
+    findings : of the screening.
+    influences : of findings whose measurements are used all the same.
+    estimate : least squares.
+    posterior : draws.
+    parameters : reported parameters of each effect, by effect and name.
+    sizes : of the artefact, by name.
+    noise : of a coordinate.
+    accuracy : figures of the lengths, by name; empty for artefacts without lengths.
+    statements : of conformity, in the job's order.
+    diagnosed : what the job's model leaves out, if anything.
+    """
+
+    job: Job
+    model: MeasurementModel
+    findings: tuple[Finding, ...]
+    influences: tuple[Influence, ...]
+    estimate: Estimate
+    posterior: Posterior
+    parameters: Mapping[str, Mapping[str, Quantity]]
+    sizes: Mapping[str, Quantity]
+    noise: Noise
+    accuracy: Mapping[str, Quantity]
+    statements: tuple[Statement, ...]
+    diagnosed: Diagnosed
+
+    @property
+    def artefact(self) -> Artefact:
+        """The artefact with its recording."""
+        return self.model.artefact
+
+    @property
+    def least_squares(self) -> LeastSquares:
+        """The least-squares estimate."""
+        return self.estimate.least_squares
+
+    @cached_property
+    def residuals(self) -> Floats:
+        """What the posterior mean leaves unexplained of every observation, used or not, (m,) mm."""
+        return self.model.residuals(self.posterior.draws.mean(axis=0))
+
+    @cached_property
+    def undetermined(self) -> tuple[tuple[tuple[str, str], ...], ...]:
+        """Keys of the parameters in each combination that the recording leaves free."""
+        ls = self.least_squares
+        return tuple(
+            tuple(u.key for u, part in zip(ls.unknowns, column, strict=True) if part) for column in ls.null_space.T
+        )
+
+    def prior_share(self, key: tuple[str, str]) -> float:
+        """How much of a parameter's variance is left of the prior's: 0 all from the recording, 1 all assumed."""
+        i = [u.key for u in self.posterior.unknowns].index(key)
+        prior = self.posterior.unknowns[i].prior_sd
+        return float(min(1.0, self.posterior.covariance[i, i] / prior**2)) if prior > 0 else 1.0

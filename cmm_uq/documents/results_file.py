@@ -1,0 +1,196 @@
+"""results.json: what other programs read of a result."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cmm_uq import __version__
+from cmm_uq.conformity.decision import rule_name
+from cmm_uq.conformity.standards import Statement
+from cmm_uq.diagnosis.diagnosis import LeftOut
+from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.result import Diagnosed, Result
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.reading import sha256
+from cmm_uq.screening.screened import Finding
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import MICROMETRE
+
+SCHEMA = "cmm-uq/results/1"
+
+
+def head(job: Job, schema: str = SCHEMA) -> dict[str, Any]:
+    """What every results.json begins with: the schema, the program, and which job with which inputs of which origin."""
+    facts = job.facts.job
+    derived = facts.derived_from
+    return {
+        "schema": schema,
+        "software": {"name": "cmm-uq", "version": __version__},
+        "job": {
+            "id": facts.id,
+            "origin": facts.origin,
+            **({"derived_from": derived.model_dump()} if derived else {}),
+            **({"altered": list(job.altered)} if job.altered else {}),
+            "inputs_sha256": sha256(job.inputs),
+        },
+    }
+
+
+def results(result: Result) -> dict[str, Any]:
+    """A result as plain data, in the layout of the schema ``cmm-uq/results/1``."""
+    return {
+        **head(result.job),
+        "estimates": {effect: _quantities(values) for effect, values in result.parameters.items()},
+        "artefact": _quantities(result.sizes),
+        "noise": {
+            "stated_coordinate_um": result.noise.stated_um,
+            "coordinate_um": quantity_data(result.noise.coordinate),
+            "p_value": result.noise.p_value,
+            "contradicts_stated": result.noise.contradicts_stated,
+        },
+        "sampling": _sampling(result),
+        "least_squares": _least_squares(result),
+        "identifiability": _identifiability(result),
+        "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
+        "accuracy_uncertainty": {name: quantity_data(quantity) for name, quantity in result.accuracy.items()},
+        "conformity": [_statement(statement) for statement in result.statements],
+        "diagnosis": diagnosis_data(result.diagnosed),
+        "screening": [finding_data(finding, result.job.facts.recording.file) for finding in result.findings],
+    }
+
+
+def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
+    """The ``diagnosis`` part."""
+    d, changes = found.diagnosis, found.consequences
+    return {
+        "verdict": d.verdict,
+        "p_value": d.p_value,
+        "where": [
+            {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,
+             "amplitude_um": place.amplitude_um, "what": place.what}
+            for place in d.where
+        ],
+        "effects": [effect_data(item, d.improvement) for item in d.effects],
+        "indistinguishable": [list(group) for group in d.indistinguishable],
+        "suggested_measurements": [
+            {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions, "odds": s.odds}
+            for s in found.suggestions
+        ],
+        "noise": {
+            "stated_coordinate_um": found.job.facts.recording.u_coordinate_um,
+            "coordinate_um": quantity_data(d.noise.coordinate), "placing_um": quantity_data(d.noise.placing),
+            "correlated_in_time": d.noise.correlated_in_time, "heavy_tails": d.noise.heavy_tails,
+            "contradicts_stated": d.noise.contradicts_stated,
+        },
+        "screening": [finding_data(f, found.job.facts.recording.file) for f in found.findings],
+        "improvement": improvement_data(d.improvement),
+        "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
+        "corrected": None if changes is None else {
+            "accuracy": {
+                name: {"before": quantity_data(a), "after": quantity_data(b)} for name, (a, b) in changes.figures.items()
+            },
+            "conformity": [{"before": _statement(a), "after": _statement(b)} for a, b in changes.statements],
+        },
+    }  # fmt: skip
+
+
+def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
+    """One effect that was left out."""
+    return {
+        "effect": item.effect, "probability": item.probability, "probability_together": item.together,
+        "explained": item.explained, "parameters": _quantities(item.parameters), "words": sentence(item, gain),
+    }  # fmt: skip
+
+
+def improvement_data(gain: Improvement) -> dict[str, Any]:
+    """Before and after."""
+    return {
+        "rms_before_um": gain.rms_before_um, "rms_after_um": gain.rms_after_um,
+        "heldout_rms_before_um": gain.heldout_rms_before_um, "heldout_rms_after_um": gain.heldout_rms_after_um,
+        "elpd_gain": gain.elpd_gain, "elpd_gain_se": gain.elpd_gain_se,
+    }  # fmt: skip
+
+
+def as_json(data: Mapping[str, Any]) -> bytes:
+    """Plain data as UTF-8 JSON with finite numbers of ten digits, so that the last bits of rounding do not show."""
+    return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def quantity_data(quantity: Quantity) -> dict[str, Any]:
+    """Value, standard uncertainty and 95 % interval."""
+    return {"value": quantity.value, "u": quantity.u, "interval95": list(quantity.interval95)}
+
+
+def _quantities(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
+    return {name: quantity_data(quantity) for name, quantity in quantities.items()}
+
+
+def _sampling(result: Result) -> dict[str, Any]:
+    posterior = result.posterior
+    return {
+        "sampler": posterior.sampler, "seed": posterior.seed, "draws": len(posterior.draws),
+        "ess_min": posterior.ess_min, "rhat_max": posterior.rhat_max, "steps": posterior.steps,
+        "autocorrelation_time": posterior.autocorrelation_time, "converged": posterior.converged,
+    }  # fmt: skip
+
+
+def _least_squares(result: Result) -> dict[str, Any]:
+    ls = result.least_squares
+    estimates: dict[str, dict[str, Any]] = {}
+    for i, unknown in enumerate(ls.unknowns):
+        owner, name = unknown.key
+        known = bool(ls.determined[i])
+        estimates.setdefault(owner, {})[name] = {
+            "value": float(ls.value[i]) if known else None,
+            "u": float(np.sqrt(ls.covariance[i, i])) if known else None,
+        }
+    return {
+        "estimates": estimates,
+        "observations": len(ls.residuals),
+        "degrees_of_freedom": ls.degrees_of_freedom,
+        "residual_rms_um": None if ls.residual_sd is None else ls.residual_sd / MICROMETRE,
+    }
+
+
+def _identifiability(result: Result) -> dict[str, Any]:
+    ls = result.least_squares
+    return {
+        "parameters": int(ls.rank + ls.null_space.shape[1]),
+        "rank": ls.rank,
+        "condition_number": ls.condition if np.isfinite(ls.condition) else None,
+        "undetermined": [
+            {f"{u.key[0]}.{u.key[1]}": float(part) for u, part in zip(ls.unknowns, column, strict=True) if part}
+            for column in ls.null_space.T
+        ],
+        "prior_share": {f"{u.key[0]}.{u.key[1]}": result.prior_share(u.key) for u in ls.unknowns},
+    }
+
+
+def _statement(statement: Statement) -> dict[str, Any]:
+    return {
+        "standard": statement.facts.standard, "quantity": statement.quantity, "value_um": statement.value_um,
+        "limit_um": statement.limit_um, "u_um": statement.u_um, "rule": rule_name(statement.facts.rule),
+        "guard_band_um": statement.decision.guard_band, "decision": statement.decision.outcome,
+        "probability_conforming": statement.decision.probability_conforming, "remarks": list(statement.remarks),
+    }  # fmt: skip
+
+
+def finding_data(finding: Finding, file: str) -> dict[str, Any]:
+    """One finding of the screening."""
+    return {
+        "kind": finding.kind, "rows": [str(m) for m in finding.measurements], "lines": list(finding.lines),
+        "file": file, "why": finding.why, "set_aside": finding.set_aside,
+    }  # fmt: skip
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_rounded(item) for item in value]
+    return float(f"{value:.10g}") if isinstance(value, float) else value

@@ -1,0 +1,1 @@
+"""Ballbar: two balls a fixed distance apart."""

@@ -1,0 +1,1 @@
+"""Bryan gauge: a bar whose one ball stays on the table."""

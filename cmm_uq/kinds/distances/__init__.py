@@ -1,0 +1,1 @@
+"""Distances between two balls: what a ballbar and a Bryan gauge share."""

@@ -1,0 +1,98 @@
+"""The adjustment that the machine needs, and the distance equations as a second way to it (US 4,437,151)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.artefacts.distance_equations import DistanceSolution
+from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import expanded
+from cmm_uq.kinds.distances.adjustment import ADJUSTMENTS, ANGLES
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
+
+FACTORS = tuple(ADJUSTMENTS)
+"""Order of the six factors, scales first."""
+
+
+def section(result: Result, second_way: DistanceSolution | str, *remarks: str) -> Section:
+    """What to turn or enter, by the fitted model; beside it the six factors by the distance equations.
+
+    Parameters
+    ----------
+    second_way : solution of equation 100, or why there is none.
+    remarks : on the second way.
+    """
+    blocks = [*_adjustments(result), *_second_way(result, second_way, remarks)]
+    return Section("The adjustment that the machine needs", tuple(blocks))
+
+
+def _adjustments(result: Result) -> list[Block]:
+    free = _free(result)
+    rows = []
+    for effect, adjustment in ADJUSTMENTS.items():
+        if effect not in result.parameters or effect in free:
+            continue
+        quantity = next(iter(result.parameters[effect].values()))
+        low, high = sorted(adjustment.sign * end for end in quantity.interval95)
+        setting = Quantity(adjustment.sign * quantity.value, quantity.u, (low, high), quantity.unit)
+        value, U, _ = expanded(setting)
+        needed = "" if low <= 0 <= high else "yes"
+        rows.append(
+            (adjustment.what, value, U, quantity.unit, _at_full_travel(result, adjustment.axis, setting), needed)
+        )
+    if not rows:
+        return []
+    columns = (
+        Column("Adjustment", numeric=False), Column("Figure"), Column("U"), Column("Unit", numeric=False),
+        Column("Over the travel", "µm"), Column("Beyond doubt", numeric=False),
+    )  # fmt: skip
+    notes = (
+        "X stays; Y is turned square to X, then Z to both. Turns are right-handed about the named axis.",
+        "Beyond doubt: the 95 % interval does not contain zero. Over the travel: what the adjustment moves at its far end.",
+    )
+    return [Table("What to turn and what to enter", columns, tuple(rows), notes)]
+
+
+def _free(result: Result) -> set[str]:
+    """Effects that the recording does not determine by themselves."""
+    return {effect for combination in result.undetermined for effect, _ in combination}
+
+
+def _at_full_travel(result: Result, axis: str, setting: Quantity) -> str:
+    low, high = result.artefact.points.machine.travel_mm["xyz".index(axis)]
+    if not np.isfinite(high - low):
+        return ""
+    factor = (PPM if setting.unit == "ppm" else ARCSECOND) * float(high - low) / MICROMETRE
+    return rounded(setting.value * factor, max(abs(setting.u * factor), 1e-3))[0]
+
+
+def _second_way(result: Result, solution: DistanceSolution | str, remarks: tuple[str, ...]) -> list[Block]:
+    if isinstance(solution, str):
+        return [Paragraph(f"The distance equations (US 4,437,151) have no solution here. {solution}", tone="note")]
+    values, free = [*solution.scales_ppm, *solution.squareness_arcsec], _free(result)
+    rows = []
+    for i, effect in enumerate(FACTORS):
+        unit = "ppm" if i < 3 else "″"
+        value, u = (
+            rounded(float(values[i]), float(2 * solution.u[i])) if solution.u[i] > 0 else (f"{values[i]:.4g}", "")
+        )
+        name = f"Scale error of {effect[-1].upper()}" if i < 3 else f"Angle {ANGLES[effect]} − 90°"
+        model = result.parameters.get(effect)
+        beside = "" if model is None else expanded(next(iter(model.values())))[0]
+        beside = "not determined" if effect in free else beside
+        rows.append((name, value, u, beside, unit))
+    columns = (
+        Column("Factor", numeric=False), Column("Distance equations"), Column("U"), Column("Fitted model"),
+        Column("Unit", numeric=False),
+    )  # fmt: skip
+    e = ", ".join(f"e{i} = {v:.3e}".replace("-", "−") for i, v in enumerate(solution.e, 1))
+    sd = f"{solution.residual_sd / MICROMETRE:.3g} µm"
+    notes = (
+        f"US 4,437,151, equations 100 and 102 to 107, solved by QR: {e}; residual standard deviation {sd}.",
+        "U (k = 2) from the residuals alone; the artefact's length is taken as known.",
+        *remarks,
+    )
+    return [Table("The six factors by the distance equations, a second way", columns, tuple(rows), notes)]

@@ -1,0 +1,1 @@
+"""The machine's error maps as a recording: taken at several temperatures, compared with each other."""

@@ -1,0 +1,86 @@
+"""A job whose recording is the machine's error maps, carried from data to diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.posterior import Progress
+from cmm_uq.jobs.job import Job
+from cmm_uq.kinds.error_maps.columns import columns_of
+from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.physics.error_map import ErrorMap, parse_error_map
+from cmm_uq.screening.screened import Finding
+
+WHERE = "job.toml [machine] error_map"
+
+
+@dataclass(frozen=True, eq=False)
+class MapsDiagnosed:
+    """A job of error maps with its diagnosis.
+
+    Parameters
+    ----------
+    job : what was read.
+    findings : what is odd among the maps' figures.
+    diagnosis : what changes with temperature, and which maps contradict the others.
+    """
+
+    job: Job
+    findings: tuple[Finding, ...]
+    diagnosis: MapsDiagnosis
+
+
+def maps_of(job: Job) -> list[ErrorMap]:
+    """The error maps that a job names, with its squareness.
+
+    Raises
+    ------
+    CmmUqError : there is none, or one that is no error map.
+    """
+    machine, maps = job.facts.machine, []
+    if not machine.error_map:
+        raise CmmUqError("the job has no error map", where=WHERE,
+                         fix='Name it: error_map = [ { file = "map.csv", temperature_c = 20.0 } ]')  # fmt: skip
+    for given in machine.error_map:
+        found = parse_error_map(job.inputs[given.file], str(job.folder / given.file), temperature=given.temperature_c)
+        square = machine.squareness_arcsec
+        maps.append(found.with_squareness_arcsec(square.xy, square.yz, square.zx) if square else found)
+    return maps
+
+
+def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> MapsDiagnosed:
+    """Diagnose a set of error maps.
+
+    Parameters
+    ----------
+    job : of kind ``error_map``; ``[model] effects`` names thermal expansions that the machine is known to have.
+    seed : of everything random.
+    alpha : rate of false alarms.
+    progress : told the part done.
+
+    Raises
+    ------
+    CmmUqError : fewer than two maps, maps that have nothing in common, or what such a job cannot have.
+    """
+    maps = maps_of(job)
+    if len(maps) < 2:
+        raise CmmUqError("one error map has nothing to be compared with", where=WHERE,
+                         fix="Name two or more maps of the machine; with three it shows which of them differs")  # fmt: skip
+    acting = effects(job.facts.model.effects, where="job.toml [model] effects")
+    for effect in acting:
+        if effect.columns and not effect.name.startswith("thermal_scale_"):
+            raise CmmUqError(f"{effect.name} needs {', '.join(effect.columns)}, which error maps do not have",
+                             where="job.toml [model] effects", fix="Leave it out")  # fmt: skip
+    if job.facts.conformity:
+        raise CmmUqError("error maps are diagnosed, no standard here decides on them",
+                         where="job.toml [[conformity]]", fix="Leave it out")  # fmt: skip
+    columns, findings = columns_of(maps)
+    if not columns:
+        why = "; ".join(finding.why for finding in findings)
+        raise CmmUqError(f"the error maps have nothing in common to compare: {why}", where=WHERE,
+                         fix="Map the same errors at the same positions each time")  # fmt: skip
+    named = [effect.name for effect in acting]
+    found = diagnose_maps(columns, named, alpha=alpha, seed=seed, progress=progress)
+    return MapsDiagnosed(job, tuple(findings), found)

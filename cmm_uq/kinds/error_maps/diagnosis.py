@@ -1,0 +1,201 @@
+"""The diagnosis of a set of error maps: what changes with temperature, and which maps contradict the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.diagnosis.diagnosis import LeftOut
+from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.diagnosis.location import region_of
+from cmm_uq.inference.posterior import Posterior, Progress
+from cmm_uq.kinds.error_maps.columns import MapColumn, turned
+from cmm_uq.kinds.error_maps.fit import expansion, function, held_out, noise_of, residual
+from cmm_uq.kinds.error_maps.search import ColumnRace, Rival, race_of
+from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.points import Floats
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import MICROMETRE
+
+_WELL_KNOWN = 0.95
+"""Probability from which no other explanation is named beside one."""
+
+_NAMED = 0.05
+"""Probability from which another explanation is named."""
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """How the maps of one error differ beyond any known effect.
+
+    Parameters
+    ----------
+    column : the error.
+    rival : the explanation in words, with the map that differs if one does.
+    probability : of it.
+    instead : others that could stand in its place.
+    region : of the position, mm, where it exceeds half its largest value.
+    p_value : of "these maps differ by noise alone", corrected for all errors that were compared.
+    amplitude : largest value, in the column's unit.
+    curve : position in mm, difference and its standard uncertainty in the column's unit, each (p,).
+    turned : whether the map would agree if its sign were turned.
+    """
+
+    column: MapColumn
+    rival: Rival
+    probability: float
+    instead: tuple[str, ...]
+    region: tuple[float, float]
+    p_value: float
+    amplitude: float
+    curve: tuple[Floats, Floats, Floats]
+    turned: bool
+
+    @property
+    def amplitude_um(self) -> float:
+        """Largest value in µm; of a rotation at a lever of one metre."""
+        return self.amplitude * self.column.unit[1] / MICROMETRE
+
+
+@dataclass(frozen=True, eq=False)
+class MapsDiagnosis:
+    """See the module's docstring.
+
+    Parameters
+    ----------
+    verdict : ``consistent``, ``explained``, ``partial`` or ``unexplained``.
+    p_value, alpha : of "the maps differ by noise alone", and the rate of false alarms asked for.
+    races : every error that was compared.
+    effects : what is asserted, most probable first; ``explained`` is the part of how the maps of this error differ.
+    differences : beyond them, the most significant first.
+    displacement, rotation : noise of a reading, µm and ″; ``None`` where no such error was compared.
+    improvement : parts of the travel predicted from the rest; a rotation counts as µm at one metre.
+    posteriors : of the effects asserted.
+    """
+
+    verdict: str
+    p_value: float
+    alpha: float
+    races: tuple[ColumnRace, ...]
+    effects: tuple[LeftOut, ...]
+    differences: tuple[Difference, ...]
+    displacement: Quantity | None
+    rotation: Quantity | None
+    improvement: Improvement
+    posteriors: tuple[Posterior, ...]
+
+    @property
+    def sampler(self) -> str | None:
+        """Program and version; ``None`` where nothing had to be sampled."""
+        return self.posteriors[0].sampler if self.posteriors else None
+
+    def p_of(self, race: ColumnRace) -> float:
+        """Of "these maps differ by noise alone" for one error, corrected for all that were compared."""
+        return min(1.0, len(self.races) * race.p_value)
+
+
+def diagnose_maps(
+    columns: Sequence[MapColumn],
+    named: Sequence[str],
+    *,
+    alpha: float,
+    seed: int,
+    progress: Progress | None = None,
+) -> MapsDiagnosis:
+    """Diagnose what error maps of one machine have in common and where they differ.
+
+    Parameters
+    ----------
+    columns : errors of carriages in every map.
+    named : effects that the job names.
+    alpha : false-alarm rate over all columns.
+    seed : of everything random.
+    progress : told the part done.
+    """
+    races, effects, differences, posteriors = [], [], [], []
+    for i, column in enumerate(columns):
+        race = race_of(column, named, seed)
+        races.append(race)
+        p_value = len(columns) * race.p_value
+        if p_value < alpha:
+            if found := _effect(race):
+                effects.append(found[0])
+                posteriors.append(found[1])
+            differences += [_difference(race, index, p_value) for index in race.unknown]
+        if progress:
+            progress((i + 1) / len(columns))
+    p_value = min([1.0, *(len(races) * race.p_value for race in races)])
+    verdict = "consistent" if p_value >= alpha else "unexplained" if not effects else "explained"
+    if verdict == "explained" and differences:
+        verdict = "partial"
+    return MapsDiagnosis(
+        verdict, p_value, alpha, tuple(races), tuple(sorted(effects, key=lambda e: -e.probability)),
+        tuple(sorted(differences, key=lambda d: -d.amplitude_um)), _noise(races, alpha, rotations=False),
+        _noise(races, alpha, rotations=True), _improvement(races, alpha), tuple(posteriors),
+    )  # fmt: skip
+
+
+def _effect(race: ColumnRace) -> tuple[LeftOut, Posterior] | None:
+    """An effect that the maps of a column show: probable, not zero, and better at predicting what was held out."""
+    if race.effect is None:
+        return None
+    without = [v for v in race.versions if v.explanation != race.effect]
+    gain = held_out(race, race.versions)[1] - held_out(race, without)[1]
+    posterior = expansion(race, race.effect)
+    effect = EVERY[str(race.rivals[race.effect].effect)]
+    reported = effect.to_reported(posterior.draws, np.zeros((len(posterior.draws), 0)))
+    units = {parameter.name: parameter.unit for parameter in effect.reported}
+    parameters = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
+    sure = all(q.interval95[0] > 0 or q.interval95[1] < 0 for q in parameters.values())
+    if not sure or gain.sum() <= np.sqrt(len(gain)) * gain.std(ddof=1):
+        return None
+    every, rest, left = (float(np.sum(residual(race, some) ** 2)) for some in ((), without, race.versions))
+    probability = race.combinations.of(race.effect)
+    return LeftOut(effect.name, effect.title, probability, parameters, (rest - left) / every, probability), posterior
+
+
+def _difference(race: ColumnRace, index: int, p_value: float) -> Difference:
+    column, rival = race.column, race.rivals[index]
+    value, u = function(race, index)
+    unit = column.unit[1]
+    probability = race.combinations.of(index)
+    others = race.instead(_NAMED) if probability < _WELL_KNOWN else ()
+    instead = tuple(race.rivals[i].name for i in others)
+    return Difference(
+        column, rival, probability, instead, region_of(column.positions, value), p_value,
+        float(np.abs(value).max()) / unit, (column.positions, value / unit, u / unit),
+        rival.map is not None and turned(column, rival.map),
+    )  # fmt: skip
+
+
+def _improvement(races: Sequence[ColumnRace], alpha: float) -> Improvement:
+    """Over all columns, with what was found in those that differ."""
+    rms: list[list[Floats]] = [[], [], [], []]
+    gains = [np.zeros(0)]
+    for race in races:
+        versions = race.versions if len(races) * race.p_value < alpha else ()
+        early, late = held_out(race, ()), held_out(race, versions)
+        for place, values in zip(rms, (residual(race, ()), residual(race, versions), early[0], late[0]), strict=True):
+            place.append(values)
+        gains.append(late[1] - early[1])
+    gain = np.concatenate(gains)
+    left, modelled, before_um, after_um = (
+        float(np.sqrt(np.mean(np.concatenate(v) ** 2))) / MICROMETRE if v else 0.0 for v in rms
+    )
+    se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0
+    return Improvement(left, modelled, before_um, after_um, float(gain.sum()), se, "parts of the travel")
+
+
+def _noise(races: Sequence[ColumnRace], alpha: float, *, rotations: bool) -> Quantity | None:
+    """Root mean square, over the columns, of the noise of a reading once everything found is modelled."""
+    chosen = [race for race in races if (race.column.component >= 3) == rotations]
+    if not chosen:
+        return None
+    unit, factor = chosen[0].column.unit
+    found = [noise_of(race, race.versions if len(races) * race.p_value < alpha else ()) for race in chosen]
+    variances, freedoms = np.array(found).T
+    value = float(np.sqrt(variances.mean())) / factor
+    u = value * float(np.sqrt(np.sum(variances**2 / (2 * freedoms)))) / float(variances.sum())
+    return Quantity(value, u, (max(value - 1.96 * u, 0.0), value + 1.96 * u), unit)

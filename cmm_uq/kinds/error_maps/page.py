@@ -1,0 +1,151 @@
+"""The diagnosis of error maps as a document, and its results.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cmm_uq import __version__
+from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.plots import curve_with_band
+from cmm_uq.documents.results_file import effect_data, finding_data, head, improvement_data, quantity_data
+from cmm_uq.documents.wording import probability
+from cmm_uq.documents.working_page import working_page
+from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
+from cmm_uq.kinds.error_maps.diagnosis import Difference
+from cmm_uq.kinds.error_maps.search import ColumnRace
+from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
+
+_PICTURES = 3
+
+
+def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
+    """results.json of a diagnosis of error maps."""
+    d, noise = found.diagnosis, found.diagnosis.displacement
+    nothing = {"value": None, "u": None, "interval95": None}
+    return {
+        **head(found.job),
+        "sampling": {
+            "sampler": d.sampler, "seed": seed,
+            "ess_min": min((p.ess_min for p in d.posteriors), default=None),
+            "rhat_max": max((p.rhat_max for p in d.posteriors), default=None),
+            "converged": all(p.converged for p in d.posteriors),
+        },
+        "diagnosis": {
+            "verdict": d.verdict,
+            "p_value": d.p_value,
+            "where": [
+                {"covariate": f"{item.column.axis}_mm", "region": list(item.region), "p_value": min(1.0, item.p_value),
+                 "amplitude_um": item.amplitude_um, "what": item.rival.name, "probability": item.probability,
+                 "instead": list(item.instead), "sign_turned": item.turned}
+                for item in d.differences
+            ],
+            "effects": [effect_data(item, d.improvement) for item in d.effects],
+            "indistinguishable": [],
+            "suggested_measurements": [
+                {"separates": list(names), "what": what, "repetitions": 1, "odds": None} for names, what in next_words(d)
+            ],
+            "noise": {
+                "stated_coordinate_um": None,
+                "coordinate_um": nothing if noise is None else quantity_data(noise),
+                "rotation_arcsec": nothing if d.rotation is None else quantity_data(d.rotation),
+                "placing_um": nothing, "correlated_in_time": False, "heavy_tails": False, "contradicts_stated": False,
+            },
+            "screening": [finding_data(finding, "") for finding in found.findings],
+            "improvement": improvement_data(d.improvement),
+            "compared": [
+                {"what": race.column.title, "positions": len(race.column.positions),
+                 "temperatures_c": race.column.temperatures.tolist(), "p_value": d.p_of(race),
+                 "explanations": [
+                     {"together": [race.rivals[i].name for i in key], "probability": p}
+                     for key, p in sorted(race.combinations.probability.items(), key=lambda item: -item[1])[:6]
+                 ]}
+                for race in d.races
+            ],
+        },
+    }  # fmt: skip
+
+
+def maps_document(found: MapsDiagnosed, seed: int) -> Document:
+    """The page of a diagnosis of error maps."""
+    facts, d = found.job.facts, found.diagnosis
+    maps = "\n".join(f"{given.file}, {given.temperature_c:g} °C" for given in facts.machine.error_map)
+    sections = (
+        Section("What makes the maps differ", _told(found)),
+        Section("Before and after", (_before_after(found),)),
+        Section("Errors compared", (_compared(found),)),
+        Section("Noise", tuple(Paragraph(text) for text in noise_words(d))),
+        Section("What to measure next", tuple(Paragraph(what) for _, what in next_words(d))),
+    )
+    return working_page(
+        facts, "Diagnosis of error maps", facts.job.date.isoformat(),
+        particulars=(
+            Facts((("Verdict", d.verdict), ("p-value of “the maps differ by noise alone”", f"{d.p_value:.2g}"),
+                   ("False-alarm rate", f"{100 * d.alpha:g} %"))),
+            Facts((("Machine", facts.machine.name), ("Error maps", maps),
+                   ("Effects that the job names", ", ".join(facts.model.effects) or "none"))),
+        ),
+        warnings=(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
+        sections=sections,
+        produced_by=", ".join(filter(None, (f"cmm-uq {__version__}", d.sampler, f"seed {seed}"))),
+    )  # fmt: skip
+
+
+def _told(found: MapsDiagnosed) -> tuple[Block, ...]:
+    d = found.diagnosis
+    blocks: list[Block] = [Paragraph(VERDICTS[d.verdict])]
+    blocks += [Paragraph(sentence(item, d.improvement)) for item in d.effects]
+    for i, difference in enumerate(d.differences):
+        blocks.append(Paragraph(difference_words(difference)))
+        if i < _PICTURES:
+            blocks.append(_picture(difference))
+    return tuple(blocks)
+
+
+def _picture(difference: Difference) -> Block:
+    x, y, u = difference.curve
+    unit = difference.column.unit[0]
+    return curve_with_band(
+        x, y, 2 * u, x_label=f"{difference.column.axis.upper()} / mm", y_label=f"Difference / {unit}",
+        caption=f"{difference.rival.name[0].upper()}{difference.rival.name[1:]}: the difference, with U (k = 2).",
+        alternative=f"A function with a largest value of {difference.amplitude:.3g} {unit}.",
+    )  # fmt: skip
+
+
+def _before_after(found: MapsDiagnosed) -> Table:
+    gain = found.diagnosis.improvement
+    rows = (
+        ("Rms of how the maps differ", f"{gain.rms_before_um:.2f}", f"{gain.rms_after_um:.2f}", "µm"),
+        ("Rms on held-out parts of the travel", f"{gain.heldout_rms_before_um:.2f}", f"{gain.heldout_rms_after_um:.2f}",
+         "µm"),
+        ("Gain in log predictive density", "", f"{gain.elpd_gain:.1f} ± {gain.elpd_gain_se:.1f}", ""),
+    )  # fmt: skip
+    heads = (Column("Quantity", numeric=False), Column("Before"), Column("After"), Column("Unit", numeric=False))
+    note = (
+        "A fifth of the travel at a time is predicted from the rest. Rotations count at a lever of one metre; ± is one "
+        "standard error."
+    )
+    return Table("Improvement", heads, rows, (note,))
+
+
+def _compared(found: MapsDiagnosed) -> Table:
+    d = found.diagnosis
+    rows = tuple(
+        (race.column.title, f"{len(race.column.values)}", f"{len(race.column.positions)}", f"{d.p_of(race):.2g}",
+         *_most_probable(race))
+        for race in d.races
+    )  # fmt: skip
+    heads = (Column("Error", numeric=False), Column("Maps"), Column("Positions"), Column("p"),
+             Column("Most probable explanation", numeric=False), Column("Probability"))  # fmt: skip
+    note = "p is corrected for having looked at all of them. Each error is a free function of position that the maps share."
+    return Table("What was compared", heads, rows, (note,))
+
+
+def _most_probable(race: ColumnRace) -> tuple[str, str]:
+    names = [_short(race, i) for i in sorted(race.best)]
+    return ", ".join(names) or "noise", probability(race.combinations.probability[race.best])
+
+
+def _short(race: ColumnRace, index: int) -> str:
+    rival = race.rivals[index]
+    return rival.name if rival.effect else rival.name.removeprefix(race.column.title).strip(" ,")

@@ -1,0 +1,1 @@
+"""Lengths along lines: what step gauges and gauge blocks share."""

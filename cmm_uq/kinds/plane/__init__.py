@@ -1,0 +1,1 @@
+"""Plane surface, probed with a radius that is to be known."""

@@ -1,0 +1,1 @@
+"""Ball plate or hole plate."""

@@ -1,0 +1,1 @@
+"""An axis calibrated by an artefact that is read in shifted places."""

@@ -1,0 +1,85 @@
+"""results.json of a shift job: the curve with its uncertainty, the scale, and what the shifts leave open."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from cmm_uq.documents.results_file import head
+from cmm_uq.inference.ensembles import Chains
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult
+from cmm_uq.kinds.shift_axis.curve import Curve
+from cmm_uq.points import Floats
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import MICROMETRE
+
+
+def shift_results(result: ShiftResult) -> dict[str, Any]:
+    """A result as plain data, in the layout of the schema ``cmm-uq/results/1``; no diagnosis, no accuracy of lengths."""
+    job, estimate = result.job, result.estimate
+    axis = result.axis
+    estimates = {f"linearity_{axis}": {"peak_to_valley_um": quantity_data(result.linearity)}}
+    if result.scale is not None:
+        estimates[f"scale_{axis}"] = {"ppm": quantity_data(result.scale)}
+    before, after = estimate.residuals
+    return {
+        **head(job),
+        "estimates": estimates,
+        "noise": {
+            "stated_coordinate_um": job.facts.recording.u_coordinate_um,
+            "coordinate_um": quantity_data(result.repeatability),
+        },
+        "sampling": sampling_data(estimate.chains, estimate.seed, len(estimate.sigma)),
+        "curves": {f"linearity_{axis}": curve_data(estimate.curve, MICROMETRE, "um")},
+        "integrations": {
+            method: {"position_mm": curve.position.tolist(), "error_um": _um(curve.error), "u_um": _um(curve.u)}
+            for method, curve in result.integrated.items()
+        },
+        "artefact": {"point": estimate.series.numbers.tolist(),
+                     "distance_mm": estimate.artefact.mean(axis=0).tolist() if estimate.scale_known else None,
+                     "u_um": _um(estimate.artefact.std(axis=0, ddof=1)) if estimate.scale_known else None},
+        "identifiability": {
+            "scale_determined": estimate.scale_known,
+            "period_not_seen_mm": result.undetermined.period,
+            "patterns_not_seen": [
+                {"position_mm": estimate.series.positions.tolist(), "weight": pattern.tolist()}
+                for pattern in result.undetermined.patterns.T
+            ],
+        },
+        "improvement": {"rms_before_um": rms_um(before), "rms_after_um": rms_um(after)},
+        "conformity": [],
+    }  # fmt: skip
+
+
+def quantity_data(quantity: Quantity) -> dict[str, Any]:
+    """Value, u and interval of a quantity; its unit is in the key that it stands under."""
+    return {key: value for key, value in asdict(quantity).items() if key != "unit"}
+
+
+def sampling_data(chains: Chains, seed: int, draws: int) -> dict[str, Any]:
+    """How the sampling went."""
+    return {
+        "sampler": chains.sampler, "seed": seed, "draws": draws, "ess_min": chains.ess_min, "rhat_max": chains.rhat_max,
+        "steps": chains.steps, "autocorrelation_time": chains.autocorrelation_time, "converged": chains.converged,
+    }  # fmt: skip
+
+
+def curve_data(curve: Curve, unit: float, suffix: str) -> dict[str, Any]:
+    """A curve with its uncertainty, in a unit with that suffix."""
+    low, high = curve.interval95
+    return {
+        "position_mm": curve.position.tolist(), f"error_{suffix}": (curve.error / unit).tolist(),
+        f"u_{suffix}": (curve.u / unit).tolist(),
+        f"interval95_{suffix}": [(low / unit).tolist(), (high / unit).tolist()],
+        "simultaneous_factor95": curve.simultaneous_factor,
+    }  # fmt: skip
+
+
+def rms_um(values: Floats) -> float:
+    """Root mean square of mm, in µm."""
+    return float((values**2).mean() ** 0.5) / MICROMETRE
+
+
+def _um(values: Floats) -> list[float]:
+    found: list[float] = (values / MICROMETRE).tolist()
+    return found

@@ -1,0 +1,1 @@
+"""Two axes calibrated by a plate that is shifted and turned."""

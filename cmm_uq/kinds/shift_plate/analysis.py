@@ -1,0 +1,112 @@
+"""A plate shifted and turned in a plane, carried from data to result: read, check, fit all placings, make the table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.inference.posterior import Progress
+from cmm_uq.jobs.job import Job, KnownLength
+from cmm_uq.kinds.shift_axis.analysis import check_facts, check_known, known_points
+from cmm_uq.kinds.shift_axis.curve import Curve
+from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate, placed_plate
+from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
+from cmm_uq.kinds.shifting.correction_table import plane_correction_table
+from cmm_uq.physics.error_map import ErrorMap
+from cmm_uq.points import AXES
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneShiftResult:
+    """All that is known of a plate's placings after their analysis."""
+
+    job: Job
+    estimate: PlaneEstimate
+
+    @property
+    def plane(self) -> str:
+        """That was calibrated: xy, yz or zx."""
+        return self.estimate.plate.plane
+
+    @cached_property
+    def curves(self) -> dict[str, Curve]:
+        """Linearity and straightness by their names in results.json, mm."""
+        a, b = (AXES[axis] for axis in self.estimate.plate.axes)
+        names = (f"linearity_{a}", f"linearity_{b}", f"straightness_{a}_{b}", f"straightness_{b}_{a}")
+        return dict(zip(names, (*self.estimate.linearity, *self.estimate.straightness), strict=True))
+
+    @cached_property
+    def rotations(self) -> dict[str, Curve]:
+        """Rotation of each carriage that carries the other axis, by name, rad."""
+        normal = AXES[3 - sum(self.estimate.plate.axes)]
+        return {f"rotation_{AXES[axis]}_{normal}": curve for axis, curve in self.estimate.rotations.items()}
+
+    @cached_property
+    def scalars(self) -> dict[str, dict[str, Quantity]]:
+        """Squareness, scales and sizes of the curves, by name and parameter; what is not determined is left out."""
+        free, found = self.estimate.free.names, {}
+        square = f"squareness_{self.plane}"
+        if square not in free:
+            found[square] = {"angle_arcsec": Quantity.of_draws(self.estimate.squareness / ARCSECOND, "″")}
+        axes = [AXES[axis] for axis in self.estimate.plate.axes]
+        for axis, draws in zip(axes, self.estimate.scales, strict=True):
+            if f"scale_{axis}" not in free:
+                found[f"scale_{axis}"] = {"ppm": Quantity.of_draws(draws / PPM, "ppm")}
+        if (f"scale_{axes[0]}", f"scale_{axes[1]}") in self.estimate.free.combinations:
+            difference = self.estimate.scales[1] - self.estimate.scales[0]
+            found[f"scale_{axes[1]}_minus_{axes[0]}"] = {"ppm": Quantity.of_draws(difference / PPM, "ppm")}
+        for name, curve in self.curves.items():
+            if name not in free:
+                draws = curve.draws
+                if name.startswith("linearity"):  # its own end line is the scale, stated by itself
+                    part = (curve.position - curve.position[0]) / np.ptp(curve.position)
+                    draws = draws - draws[:, -1:] * part
+                value = float(np.ptp(draws.mean(axis=0))) / MICROMETRE
+                found[name] = {
+                    "peak_to_valley_um": Quantity.of_draws(np.ptp(draws, axis=1) / MICROMETRE, "µm", value)
+                }  # fmt: skip
+        return found
+
+    @property
+    def repeatability(self) -> Quantity:
+        """Standard uncertainty of one coordinate of one reading, µm."""
+        return Quantity.of_draws(self.estimate.sigma / MICROMETRE, "µm")
+
+    @cached_property
+    def table(self) -> ErrorMap:
+        """The correction table."""
+        return plane_correction_table(self.estimate, self.job.points.machine)
+
+
+def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) -> PlaneShiftResult:
+    """Analyse a shift job with a plate in a plane.
+
+    Parameters
+    ----------
+    job : as read; ``[artefact] plane`` says which plane.
+    seed : of everything random; the same seed gives the same result.
+    progress : told the part of the sampling done, from 0 to 1.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be analysed as it stands.
+    """
+    check_facts(job)
+    facts, stated = job.facts.artefact, job.facts.recording.u_coordinate_um
+    plate = placed_plate(job.points, str(facts.plane), job.recording_path)
+    known = None if facts.known is None else _known(facts.known, plate)
+    sigma = None if stated is None else stated * MICROMETRE
+    return PlaneShiftResult(
+        job, estimate_plane(plate, known, chain=job.facts.machine.chain, sigma=sigma, seed=seed, progress=progress)
+    )
+
+
+def _known(given: KnownLength, plate: PlacedPlate) -> KnownSpan:
+    first, last = known_points(given, plate.numbers)
+    check_known(given, float(np.linalg.norm(plate.balls[last] - plate.balls[first])))
+    return KnownSpan(first, last, given.length_mm, given.u_um * MICROMETRE)

@@ -1,0 +1,49 @@
+"""results.json of a plate shifted and turned in a plane: curves, scales, squareness, the plate, and what stays open."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cmm_uq.documents.results_file import head
+from cmm_uq.kinds.shift_axis.results import curve_data, quantity_data, rms_um, sampling_data
+from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
+from cmm_uq.points import AXES
+from cmm_uq.units import ARCSECOND, MICROMETRE
+
+
+def plane_shift_results(result: PlaneShiftResult) -> dict[str, Any]:
+    """A result as plain data, in the layout of the schema ``cmm-uq/results/1``; no diagnosis, no accuracy of lengths."""
+    job, estimate = result.job, result.estimate
+    plate, free = estimate.plate, estimate.free
+    before, after = estimate.residuals
+    balls, u = estimate.balls.mean(axis=0), estimate.balls.std(axis=0, ddof=1) / MICROMETRE
+    return {
+        **head(job),
+        "estimates": {
+            name: {parameter: quantity_data(q) for parameter, q in parameters.items()}
+            for name, parameters in result.scalars.items()
+        },
+        "noise": {
+            "stated_coordinate_um": job.facts.recording.u_coordinate_um,
+            "coordinate_um": quantity_data(result.repeatability),
+        },
+        "sampling": sampling_data(estimate.chains, estimate.seed, len(estimate.sigma)),
+        "curves": {
+            **{name: curve_data(curve, MICROMETRE, "um") for name, curve in result.curves.items()},
+            **{name: curve_data(curve, ARCSECOND, "arcsec") for name, curve in result.rotations.items()},
+        },
+        "artefact": {
+            "point": plate.numbers.tolist(), "first_mm": balls[:, 0].tolist(), "second_mm": balls[:, 1].tolist(),
+            "u_first_um": u[:, 0].tolist(), "u_second_um": u[:, 1].tolist(), "size_determined": free.size_known,
+        },
+        "placings": [
+            {"measurement": int(number), "turned_deg": float(turn), "middle_mm": middle.tolist()}
+            for number, turn, middle in zip(plate.placings, plate.turned_deg, plate.middles, strict=True)
+        ],
+        "identifiability": {
+            "not_determined": [list(combination) for combination in free.combinations],
+            "period_not_seen_mm": {AXES[axis]: p for axis, p in zip(plate.axes, free.periods, strict=True)},
+        },
+        "improvement": {"rms_before_um": rms_um(before), "rms_after_um": rms_um(after)},
+        "conformity": [],
+    }  # fmt: skip

@@ -1,0 +1,1 @@
+"""Test sphere, probed all around."""

@@ -1,0 +1,1 @@
+"""Triangle of gauge blocks and cylinders."""

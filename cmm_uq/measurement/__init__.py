@@ -1,7 +1,0 @@
-"""One model of a measurement, forward and inverse: the simulator draws from exactly what the estimator fits."""
-
-from __future__ import annotations
-
-from cmm_uq.measurement.model import Estimate, MeasurementModel, Noise
-
-__all__ = ["Estimate", "MeasurementModel", "Noise"]

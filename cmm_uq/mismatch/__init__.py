@@ -1,1 +1,0 @@
-"""Where a recording and its model differ: screening before anything is fitted, and outliers after."""

@@ -1,0 +1,7 @@
+"""One model of a measurement, forward and inverse: the simulator draws from exactly what the estimator fits."""
+
+from __future__ import annotations
+
+from cmm_uq.model.measurement import Estimate, MeasurementModel, Noise
+
+__all__ = ["Estimate", "MeasurementModel", "Noise"]

@@ -1,0 +1,209 @@
+"""Effects, an artefact and a recording, joined into one model.
+
+Forward: an artefact of given sizes stands where the recording says, and the machine's errors turn its true points into
+indicated ones. Inverse: the difference between the indicated points of the recording and of that forward model, seen along
+the directions in which the artefact speaks, is linear in the parameters, and least squares iterates on it (Gauss–Newton).
+
+The design is taken at the points of the *artefact*, not at the recorded ones. With recorded lengths the columns of the
+three scale errors would add up to the observation itself, a careless fit would be perfect and wrong; with the artefact's
+own length they add up to the column of that length, and an uncalibrated bar shows its free scale as an exact null space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.least_squares import LeastSquares, solve
+from cmm_uq.inference.linear_model import LinearModel, Unknown
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.physics.effect import Effect
+from cmm_uq.points import Floats
+
+ARTEFACT = "artefact"
+"""First part of the key of a size of the artefact."""
+
+_NO_MACHINE = 1000.0
+"""mm."""
+
+_SIZE_SCALE = 0.1
+"""mm, a typical deviation of an artefact from its nominal size; only scales columns."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Least squares at convergence, and the linear model about it.
+
+    Attributes
+    ----------
+    least_squares : the estimate.
+    linear : the model, linear about the estimate, whose posterior may be sampled.
+    """
+
+    least_squares: LeastSquares
+    linear: LinearModel
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of a coordinate, mm: of each reading, and of each placing (which its repeats share)."""
+
+    coordinate: float = 0.0
+    placing: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementModel:
+    """Effects acting on the points of an artefact.
+
+    Parameters
+    ----------
+    artefact : with its recording.
+    effects : what acts.
+    sigma : standard uncertainty of one recorded coordinate, mm; ``None`` when it is to be estimated.
+    used : (m,) which observations to use; all by default.
+    shapes : nonlinear parameters, held, of the effects that have some, by the effect's name.
+
+    Raises
+    ------
+    CmmUqError : the nonlinear parameter of an effect is not given.
+    """
+
+    artefact: Artefact
+    effects: tuple[Effect, ...]
+    sigma: float | None = None
+    used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not len(self.used):
+            object.__setattr__(self, "used", np.ones(len(self.artefact.noise_scale), dtype=bool))
+        for effect in self.effects:
+            if effect.shape and effect.name not in self.shapes:
+                raise CmmUqError(
+                    f"{effect.name} has the nonlinear parameter {effect.shape[0].name}, which a report does not estimate",
+                    where="job.toml [model] effects", fix="Leave it out",
+                )  # fmt: skip
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Coefficients of the effects, in order, then the artefact's sizes."""
+        coefficients = tuple(
+            Unknown((effect.name, c.name), c.unit, 0.0, c.prior_sd, c.prior_sd)
+            for effect in self.effects
+            for c in effect.coefficients
+        )
+        sizes = tuple(
+            Unknown((ARTEFACT, size.name), size.unit, size.nominal, size.sd, _SIZE_SCALE, size.certified)
+            for size in self.artefact.sizes
+        )
+        return coefficients + sizes
+
+    def errors(self, xyz: Floats, coefficients: Floats) -> Floats:
+        """Errors e (n, 3), mm, of points indicated at ``xyz``."""
+        return np.asarray(self._basis(xyz) @ coefficients, dtype=np.float64)
+
+    def indicated(self, true_xyz: Floats, coefficients: Floats) -> Floats:
+        """What the machine indicates at true points (n, 3): solves indicated + e(indicated) = true to below 0.01 nm.
+
+        Raises
+        ------
+        CmmUqError : the errors are so large that no indication belongs to a true point.
+        """
+        indicated = true_xyz.copy()
+        for _ in range(12):
+            change = true_xyz - self.errors(indicated, coefficients) - indicated
+            indicated += change
+            largest = np.abs(change).max(initial=0.0)
+            if largest < 1e-8:
+                break
+            if not largest < _NO_MACHINE:
+                raise CmmUqError(
+                    f"errors that would explain this recording exceed {_NO_MACHINE:g} mm: they are no machine's",
+                    where="the recording", fix="Look for a wrong unit, exchanged columns or points of different places",
+                )  # fmt: skip
+        return indicated
+
+    def predicted(self, values: Floats) -> Floats:
+        """Indicated points (n, 3) that parameters (k,) predict for this recording's placings, without noise."""
+        return self.indicated(self.placed(values), self._split(values)[0])
+
+    def estimate(self) -> Estimate:
+        """Iterate least squares until the estimates stand still.
+
+        Raises
+        ------
+        CmmUqError : the recording has too few observations.
+        """
+        return self._estimate
+
+    @cached_property
+    def _estimate(self) -> Estimate:
+        values = np.array([u.prior_mean for u in self.unknowns])
+        for _ in range(10):
+            linear = self.linearised(values)
+            result = solve(linear)
+            scale = np.array([u.scale for u in self.unknowns])
+            change = np.abs(result.value - values) / scale
+            values = result.value
+            if change.max(initial=0.0) < 1e-9:
+                break
+        return Estimate(result, linear)
+
+    def linearised(self, values: Floats) -> LinearModel:
+        """The model about parameters (k,): ``observed`` is what they leave unexplained plus what they explain."""
+        artefact, used = self.artefact, self.used
+        coefficients, _ = self._split(values)
+        xyz, true = artefact.points.xyz, self.placed(values)
+        unexplained = artefact.project(true, (xyz - self.indicated(true, coefficients))[:, :, None])[:, 0]
+        design = np.hstack([-artefact.project(true, self._basis(true)), artefact.size_change()])
+        return LinearModel(
+            (unexplained + design @ values)[used], design[used], self.unknowns,
+            artefact.placing(true)[used], artefact.noise_scale[used], self.sigma,
+        )  # fmt: skip
+
+    def seen(self, displacement: Floats, values: Floats) -> Floats:
+        """What used observations show, (m, k) in mm, of an error e of the points (n, 3, k) that ``values`` do not contain."""
+        return -self.artefact.project(self.placed(values), displacement)[self.used]
+
+    def placed(self, values: Floats) -> Floats:
+        """Points (n, 3), mm, of the artefact where parameters (k,) say that the recording found it."""
+        coefficients, sizes = self._split(values)
+        xyz = self.artefact.points.xyz
+        return self.artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
+
+    def residuals(self, values: Floats) -> Floats:
+        """Unexplained part of every observation, used or not, (m,) mm."""
+        xyz = self.artefact.points.xyz
+        predicted = self.predicted(values)
+        return self.artefact.project(predicted, (xyz - predicted)[:, :, None])[:, 0]
+
+    def simulate(self, coefficients: Floats, sizes: Floats, noise: Noise, random: np.random.Generator) -> Floats:
+        """Indicated points (n, 3), mm, of a recording with the placings of this one, errors and noise drawn anew.
+
+        Parameters
+        ----------
+        coefficients : (k,) of the effects, in order.
+        sizes : (s,) true sizes of the artefact, mm.
+        noise : standard deviations.
+        random : their source.
+        """
+        points = self.artefact.points
+        _, placing = np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)
+        offsets = noise.placing * random.standard_normal((placing.max() + 1, 3))
+        scatter = noise.coordinate * random.standard_normal(points.xyz.shape)
+        return self.predicted(np.concatenate([coefficients, sizes])) + offsets[placing.ravel()] + scatter
+
+    def _basis(self, xyz: Floats) -> Floats:
+        points = self.artefact.points.at(xyz)
+        bases = [effect.basis(points, self.shapes.get(effect.name, ())) for effect in self.effects]
+        return np.concatenate(bases, axis=2) if bases else np.zeros((len(points), 3, 0))
+
+    def _split(self, values: Floats) -> tuple[Floats, Floats]:
+        k = len(values) - len(self.artefact.sizes)
+        return values[:k], values[k:]

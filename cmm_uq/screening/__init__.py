@@ -1,0 +1,1 @@
+"""What a recording shows before anything is fitted: damaged rows, exchanged points, gross outliers after."""

@@ -1,0 +1,254 @@
+"""Screening of a recording: damaged coordinates, wrong units, slipped or stuck columns, copies, gross outliers.
+
+What is found is reported as what it is, never silently dropped or mended. Damage of a whole column, and of a column that the
+model uses, is refused; single damaged rows and columns that nothing needs are left out; the rest is used as it stands. Each
+finding says which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, special
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.linear_model import LinearModel
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.screening.columns import SENSORS, about_whole_column, column_findings
+from cmm_uq.screening.coordinates import coordinate_findings
+from cmm_uq.screening.finding import Finding, finding, span
+from cmm_uq.screening.search import outside_travel
+from cmm_uq.screening.shape import shape_of
+
+__all__ = ["Finding", "Screened", "gross_outliers", "impossible_values", "repeated_figures", "screen", "screened"]
+
+GROSS = 1e-3
+"""Probability, over all observations together, that noise alone makes one look like an outlier."""
+
+_UNIT_LENGTH = 0.02
+_REFUSED_WHOLE = ("unit", "sign", "shifted column")
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A recording that may be fitted, and what screening found in it.
+
+    Parameters
+    ----------
+    points : without the rows and columns that are left out.
+    findings : all of them.
+    """
+
+    points: Points
+    findings: tuple[Finding, ...]
+
+
+def screened(
+    points: Points, facts: ArtefactFacts, *, needed: Collection[str], set_aside: Collection[int], where: str
+) -> Screened:
+    """A recording without what cannot be used, and all that is odd in it; before an artefact is made of it.
+
+    Parameters
+    ----------
+    points : the recording as read.
+    facts : what the job says of the artefact.
+    needed : columns that the model uses.
+    set_aside : measurements that the job leaves out of the estimates.
+    where : the recording's name, for messages.
+
+    Raises
+    ------
+    CmmUqError : a damage of the whole recording, of a whole column, or of one that the model uses.
+    """
+    shape = shape_of(facts, points)
+    damaged = coordinate_findings(points, facts, shape, set_aside, where) if shape else []
+    odd = screen(points, needed=needed, set_aside=set_aside, where=where, kind=facts.kind)
+    if shape and shape.together:
+        damaged = [_reversal(found, points, needed) for found in damaged]
+    findings = (*damaged, *(_left_out(f) for f in odd if not _told(f, damaged)))
+    lost = sorted({row for found in findings for row in found.rows})
+    kept = points.select(np.delete(np.arange(len(points)), lost)) if lost else points
+    gone = {found.column for found in findings if found.set_aside and found.column in SENSORS}
+    kept = replace(kept, columns={name: values for name, values in kept.columns.items() if name not in gone})
+    return Screened(kept, findings)
+
+
+def screen(
+    points: Points, *, needed: Collection[str], set_aside: Collection[int], where: str, kind: str = ""
+) -> tuple[Finding, ...]:
+    """All that is odd in a recording without regard to its artefact's shape.
+
+    Parameters
+    ----------
+    points : the recording.
+    needed : columns that the model uses.
+    set_aside : measurements that the job leaves out of the estimates.
+    where : the recording's name, for messages.
+    kind : of artefact.
+
+    Raises
+    ------
+    CmmUqError : a whole column in another unit or place, or a value that the model uses cannot be.
+    """
+    impossible = impossible_values(points, kind)
+    for found in impossible:
+        if found.column in needed:
+            raise CmmUqError(found.why, where=_place(where, found),
+                             fix="The model uses this column: mend it, or leave out the effect that needs it")  # fmt: skip
+        if found.kind in _REFUSED_WHOLE and about_whole_column(found, points):
+            raise CmmUqError(found.why, where=_place(where, found), fix="Mend the column, or remove it")
+    odd = (*impossible, *repeated_figures(points))
+    return tuple(replace(f, set_aside=f.measurements[-1] in set_aside) for f in odd)
+
+
+def impossible_values(points: Points, kind: str = "") -> list[Finding]:
+    """Values that cannot be: one finding a column, and one an axis whose readings leave the machine's travel."""
+    found = column_findings(points, kind)
+    if all(f"n{a}" in points.columns for a in AXES):
+        norm = np.linalg.norm([points.columns[f"n{a}"] for a in AXES], axis=0)
+        if np.any(rows := np.abs(norm - 1) > _UNIT_LENGTH):
+            found.append(finding("impossible", points, rows, "the normal nx, ny, nz has no unit length", "nx"))
+    outside = outside_travel(points)
+    for i, axis in enumerate(AXES):
+        if np.any(rows := outside[:, i]):
+            low, high = points.machine.travel_mm[i]
+            why = (
+                f"scale readings of {axis.upper()} ({axis}_mm + origin) of {span(points.readings[rows, i])} mm lie outside "
+                f"the travel {low:g} to {high:g} mm{_hint(points, i)}"
+            )
+            found.append(finding("impossible", points, rows, why, f"{axis}_mm"))
+    return found
+
+
+def repeated_figures(points: Points) -> list[Finding]:
+    """Measurements whose coordinates repeat, digit for digit, those of another measurement; runs of them as one block."""
+    first: dict[bytes, int] = {}
+    copies: list[tuple[int, int]] = []
+    for group in range(int(points.group.max()) + 1):
+        figures = points.xyz[points.group == group]
+        key = figures[np.lexsort(figures.T)].tobytes()
+        if key not in first:
+            first[key] = group
+        elif _measurement(points, first[key]) != _measurement(points, group):
+            copies.append((first[key], group))
+    return [_copied(points, run) for run in _runs(copies)]
+
+
+def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64]) -> list[tuple[int, float]]:
+    """Observations (index, times of their standard deviation) that noise would hardly ever put so far off.
+
+    Externally studentised residuals against their t distribution, the probability multiplied by the number of
+    observations (Bonferroni; Barnett & Lewis 1994, 8.2); the worst is taken out and the rest tested again, up to a tenth
+    of the recording.
+    """
+    reduced = linear.reduced
+    keep = np.ones(len(reduced.observed), dtype=bool)
+    found: list[tuple[int, float]] = []
+    scale = np.array([u.scale for u in linear.unknowns])
+    for _ in range(max(1, len(keep) // 10)):
+        U, s, _ = linalg.svd(reduced.design[keep] * scale, full_matrices=False)
+        U = U[:, s > 1e-9 * s[0]] if s.size else U
+        dof = reduced.count - (~keep).sum() - U.shape[1] - 1
+        if dof < 3:
+            break
+        residual = reduced.observed[keep] - U @ (U.T @ reduced.observed[keep])
+        free = np.maximum(1 - np.einsum("ij,ij->i", U, U), 1e-12)
+        rest = np.maximum(residual @ residual - residual**2 / free, 0.0)
+        with np.errstate(divide="ignore"):
+            t = np.where(rest > 0, np.abs(residual) / np.sqrt(free * rest / dof), 0.0)
+        worst = int(np.argmax(t))
+        if 2 * special.stdtr(dof, -t[worst]) * len(measurement) > GROSS:
+            break
+        index = int(np.flatnonzero(keep)[worst])
+        found.append((index, float(t[worst])))
+        keep[index] = False
+    return found
+
+
+def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
+    originals, later = zip(*run, strict=True)
+    both = np.isin(points.group, (*originals, *later))
+    if len(run) == 1:
+        a, b = _measurement(points, originals[0]), _measurement(points, later[0])
+        why = f"measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement"
+        return finding("duplicate", points, both, why)
+    ends = [_measurement(points, group) for group in (later[0], later[-1], originals[0], originals[-1])]
+    why = (
+        "measurements {} to {} repeat the coordinates of measurements {} to {} to the last digit: a block ".format(
+            *ends
+        )
+        + "pasted twice, whose copies say nothing: remove them, or record what was measured"
+    )
+    rows = tuple(np.flatnonzero(np.isin(points.group, later)).tolist())
+    return replace(finding("repeated block", points, both, why), rows=rows)
+
+
+def _runs(copies: Sequence[tuple[int, int]]) -> list[list[tuple[int, int]]]:
+    """Copies in runs whose originals and copies both follow each other."""
+    runs: list[list[tuple[int, int]]] = []
+    for a, b in copies:
+        if runs and runs[-1][-1] == (a - 1, b - 1):
+            runs[-1].append((a, b))
+        else:
+            runs.append([(a, b)])
+    return runs
+
+
+def _measurement(points: Points, group: int) -> int:
+    return int(points.measurement[np.argmax(points.group == group)])
+
+
+def _reversal(found: Finding, points: Points, needed: Collection[str]) -> Finding:
+    """A bar numbered the other way round is left out where the model uses what was recorded beside each ball."""
+    if found.kind != "swapped" or found.rows:
+        return found
+    rows = np.flatnonzero(np.isin(points.lines, found.lines)) if len(points.lines) else np.zeros(0, dtype=np.int64)
+    differing = [
+        name
+        for name in needed
+        for group in np.unique(points.group[rows])
+        if np.ptp(points.column(name)[points.group == group]) > 0
+    ]
+    if not differing:
+        return found
+    why = f"{found.why}; the model uses {differing[0]}: number the balls as in the other repeats"
+    return replace(found, set_aside=True, rows=tuple(rows.tolist()), why=why)
+
+
+def _left_out(found: Finding) -> Finding:
+    """Copies of a block are left out, and columns of sensors that cannot be trusted."""
+    return replace(found, set_aside=found.set_aside or bool(found.rows) or found.column in SENSORS)
+
+
+def _told(found: Finding, damaged: Sequence[Finding]) -> bool:
+    """Whether a reading outside the travel is told already as what it is."""
+    lines = {line for other in damaged for line in other.lines}
+    return found.kind == "impossible" and found.column in ("x_mm", "y_mm", "z_mm") and set(found.lines) <= lines
+
+
+def _hint(points: Points, axis: int) -> str:
+    """What would bring most readings of an axis inside: the origin, a sign, another axis."""
+    if outside_travel(points)[:, axis].mean() < 0.5:
+        return ""
+    low, high = points.machine.travel_mm[axis]
+
+    def inside(readings: Floats) -> bool:
+        return bool(np.mean((readings >= low) & (readings <= high)) > 0.95)
+
+    origin = points.machine.origin_mm
+    hints = [f"{AXES[axis]}_mm with the wrong sign"] if inside(origin[axis] - points.xyz[:, axis]) else []
+    hints += [
+        f"{AXES[axis]}_mm exchanged with {AXES[j]}_mm"
+        for j in range(3)
+        if j != axis and inside(origin[axis] + points.xyz[:, j])
+    ]
+    return f": look for {', or '.join(['a missing origin_mm', *hints])}"
+
+
+def _place(where: str, found: Finding) -> str:
+    line = f" line {found.lines[0]}" if found.lines else ""
+    return f"{where}{line}, column {found.column}"

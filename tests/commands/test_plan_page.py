@@ -1,0 +1,84 @@
+"""The page of a plan says in words what the design leaves free, and draws what it plans."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.commands.plan_page import plan_document, plan_results
+from cmm_uq.commands.plan_words import combination
+from cmm_uq.commands.planning import Plan, make_plan
+from cmm_uq.documents.html import render_html
+from cmm_uq.documents.plan_picture import gain_plot, placing_pictures
+from cmm_uq.documents.results_file import as_json
+from cmm_uq.jobs.reading import read_job
+from cmm_uq.planning.ready import ready_plan
+from tests.commands.test_planning import JOB, SIX
+from tests.planning.plans import EVERY_KIND, setting
+
+
+def plan_of(folder: Path, plan: str, length: str = "400.0") -> Plan:
+    text = JOB.format(plan=plan, effects=SIX, length=length)
+    if not length:
+        text = text.replace("length_mm = \nu_um = 0.5\n", "")
+    (folder / "job.toml").write_text(text, encoding="utf-8")
+    return make_plan(read_job(folder, recorded=False), power=False)
+
+
+def test_a_free_scale_is_said_in_words(tmp_path: Path) -> None:
+    plan = plan_of(tmp_path, "length_mm = 400.0", length="")
+    page = render_html(plan_document(plan))
+    assert "Scale error of X, Y and Z together, with the artefact&#39;s own length" in page
+    assert "Not determined by these placings" in page
+
+
+@pytest.mark.parametrize(("parts", "said"), [
+    ({("scale_x", "ppm"): 1.0, ("artefact_sag", "um"): -2.5}, "Scale error of X and Sag of the artefact together"),
+    ({("squareness_yz", "angle_arcsec"): 1.0}, "Squareness Y–Z: nothing shows of it"),
+    ({("artefact", "length_mm"): 1.0}, "The artefact's own length"),
+    ({("artefact", "block_12_mm"): 1.0, ("scale_x", "ppm"): 1.0, ("artefact", "block_23_mm"): 1.0},
+     "Scale error of X, with the artefact's own dimensions"),
+])  # fmt: skip
+def test_combinations_in_words(parts: dict[tuple[str, str], float], said: str) -> None:
+    assert combination(parts) == said
+
+
+@pytest.mark.parametrize("kind", EVERY_KIND)
+def test_every_artefact_has_a_picture_of_each_placing(kind: str) -> None:
+    facts, wishes = EVERY_KIND[kind]
+    chosen = setting(facts, named=(), **wishes)
+    _, placings = ready_plan(chosen)
+    plots = placing_pictures(placings, chosen.volume.box, 1)
+    assert len(plots) == -(-len(placings) // 3)
+    svg = "".join(plot.svg for plot in plots)
+    for number, placing in enumerate(placings, 1):
+        assert re.search(rf">\s*{number}\s*<", svg)
+        assert placing.ends in svg
+
+
+def test_what_has_no_end_stands_at_the_edge() -> None:
+    plot = gain_plot(["A", "B"], [2.0, None], [1.0, np.inf], names=("before", "after"), quantity="Uncertainty")
+    assert "A: 2 before, 1 after" in plot.alternative
+    assert "B: not at all before, not at all after" in plot.alternative
+    assert "nan" not in plot.svg
+
+
+def test_a_shift_job_says_what_no_reading_shows() -> None:
+    from tests.conftest import ROOT
+
+    plan = make_plan(read_job(ROOT / "examples" / "shift-simulated", recorded=False), power=False)
+    assert "No reading shows: errors that repeat every 10 mm" in render_html(plan_document(plan))
+
+
+def test_conditions_that_are_not_met_are_a_warning(tmp_path: Path) -> None:
+    plan = plan_of(tmp_path, "budget_min = 60")
+    assert "Not met: at most 60 min: 120 min." in plan_document(plan).warnings
+
+
+def test_results_hold_finite_numbers_only(tmp_path: Path) -> None:
+    data = plan_results(plan_of(tmp_path, "length_mm = 400.0", length=""))
+    assert b"NaN" not in as_json(data)
+    assert {p["u"] for p in data["start"]["determined"] if p["status"] == "free"} == {None}

@@ -1,0 +1,64 @@
+"""Functions that nobody knows: that they reach what they should, by construction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.commands.diagnosing import screened_model
+from cmm_uq.diagnosis.comparison.explanations import Explanation
+from cmm_uq.diagnosis.comparison.unknown_functions import directions, unknown
+from cmm_uq.jobs.reading import read_job
+from cmm_uq.points import Floats
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+
+
+def reached(explanation: Explanation, what: Floats) -> float:
+    """Largest part of a function's sum of squares that a version reaches."""
+    parts = []
+    for member in explanation.members:
+        Q = np.linalg.qr(member.columns)[0]
+        parts.append(float(np.sum((Q.T @ what) ** 2) / np.sum(what**2)))
+    return max(parts)
+
+
+@pytest.fixture(scope="module")
+def of_sphere() -> tuple[dict[str, Explanation], Floats]:
+    model, _ = screened_model(read_job(EXAMPLES / "sphere-simulated"))
+    found = unknown(model, model.estimate().least_squares.value)
+    return {e.name: e for e in found}, directions(model)
+
+
+@pytest.mark.parametrize("count", [2, 5, 7])
+def test_lobes_of_a_probe_are_among_them_whatever_their_number_and_phase(
+    of_sphere: tuple[dict[str, Explanation], Floats], count: int
+) -> None:
+    found, normals = of_sphere
+    lobes = np.cos(count * np.arctan2(normals[:, 1], normals[:, 0]) + 0.4)
+    assert reached(found["error in lobes about Z"], lobes) == pytest.approx(1.0)
+
+
+def test_neighbouring_directions_of_probing_may_differ_at_will(
+    of_sphere: tuple[dict[str, Explanation], Floats],
+) -> None:
+    found, normals = of_sphere
+    distinct, which = np.unique(np.round(normals, 6), axis=0, return_inverse=True)
+    at_will = np.random.default_rng(1).standard_normal(len(distinct))[which.ravel()]
+    assert reached(found["error as a function of the probing direction"], at_will) > 0.9
+
+
+def test_a_scale_may_depend_on_a_column_about_the_middle_of_the_volume() -> None:
+    job = read_job(EXAMPLES / "step-gauge-simulated")
+    load = 5 + 0.5 * np.arange(len(job.points)) % 37
+    model, _ = screened_model(replace(job, points=replace(job.points, columns={**job.points.columns, "load_kg": load})))
+    values = model.estimate().least_squares.value
+    points = model.artefact.points.at(model.placed(values))
+    found = {e.name: e for e in unknown(model, values)}
+    middle = 0.5 * (points.readings.min(axis=0) + points.readings.max(axis=0))
+    u = (load - load.mean()) / np.ptp(load)
+    what = model.seen(((1 + u - u**2)[:, None] * (points.readings - middle))[:, :, None], values)[:, 0]
+    assert reached(found["scale of all axes as a function of load_kg"], what) > 0.999

@@ -1,0 +1,70 @@
+"""Predicted power of the diagnosis, against recordings that are simulated and searched one by one."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from scipy import stats
+
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.diagnosis.comparison.search import race_of
+from cmm_uq.diagnosis.power import POWER, Power, powers, without_fault
+from cmm_uq.model import MeasurementModel, Noise
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning.placing import joined
+from cmm_uq.planning.ready import ready_plan
+from tests.planning.plans import GAUGE, setting
+
+ALPHA = 0.01
+SETTING = setting(GAUGE, length_mm=820.0, repeats=1)
+POINTS = joined(ready_plan(SETTING)[1])
+
+
+@cache
+def predicted() -> dict[str, Power]:
+    model = without_fault(GAUGE, SETTING.model(POINTS), SETTING.sigma, 0)
+    rivals = effects(("rotation_y_y", "rotation_x_y", "rotation_y_x", "rotation_z_z"))
+    found = powers(model, rivals, stated=SETTING.sigma, sigma=SETTING.sigma, alpha=ALPHA, seed=0)
+    return {power.effect: power for power in found}
+
+
+def test_power_grows_with_the_effect_and_naming_needs_more_than_detection() -> None:
+    power = predicted()["rotation_y_y"]
+    assert power.detectable is not None
+    assert power.identifiable is not None
+    assert power.detectable <= power.identifiable
+    curve = [power.detected(part * power.detectable) for part in (0.3, 0.7, 1.0, 1.3, 2.0)]
+    assert curve == sorted(curve)
+    assert curve[2] >= POWER
+    assert np.all(power.named_at >= power.detected_at)
+
+
+def test_an_effect_that_moves_no_face_is_never_found() -> None:
+    """The ram turning about its own axis leaves the tip at its end where it is."""
+    power = predicted()["rotation_z_z"]
+    assert power.detectable is None
+    assert power.detected(1e3) == 0.0
+
+
+def test_twins_are_detected_and_never_named() -> None:
+    """On lines through one middle the pitch of X and the roll of Y bend the space diagonals alike."""
+    for name in ("rotation_x_y", "rotation_y_x"):
+        assert predicted()[name].detectable is not None
+        assert predicted()[name].identifiable is None
+        assert not np.isfinite(predicted()[name].named_at).any()
+
+
+def test_the_gate_opens_as_often_as_predicted() -> None:
+    """Ten simulated recordings: the count lies within the central 99.9 % of the predicted binomial."""
+    power = predicted()["rotation_y_y"]
+    assert power.detectable is not None
+    acting = MeasurementModel(artefact_of(GAUGE, POINTS), effects(("rotation_y_y",)))
+    random = np.random.default_rng(12)
+    alarms = 0
+    for _ in range(10):
+        sizes = np.array([size.nominal + size.sd * random.standard_normal() for size in acting.artefact.sizes])
+        xyz = acting.simulate(np.array([power.detectable]), sizes, Noise(SETTING.sigma), random)
+        alarms += race_of(SETTING.model(POINTS.at(xyz)), SETTING.sigma, 0).p_value < ALPHA
+    low, high = stats.binom.interval(0.999, 10, power.detected(power.detectable))
+    assert low <= alarms <= high

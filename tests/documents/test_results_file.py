@@ -1,0 +1,80 @@
+"""results.json keeps its layout and is the same on every run."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cmm_uq.commands.analysis import analyse
+from cmm_uq.documents.results_file import as_json, results
+from tests.conftest import ROOT
+
+
+@pytest.fixture(scope="module", params=["iota-1102-20C", "iota-1102-20C-compensated"])
+def data(request: pytest.FixtureRequest) -> dict[str, Any]:
+    return dict(json.loads(as_json(results(analyse(ROOT / "examples" / request.param)))))
+
+
+def test_every_estimate_has_value_uncertainty_and_interval(data: dict[str, Any]) -> None:
+    assert data["schema"] == "cmm-uq/results/1"
+    assert len(data["estimates"]) == 6
+    for parameters in (*data["estimates"].values(), data["artefact"]):
+        for quantity in parameters.values():
+            low, high = quantity["interval95"]
+            assert low < quantity["value"] < high
+            assert quantity["u"] > 0
+
+
+def test_sampling_is_documented(data: dict[str, Any]) -> None:
+    sampling = data["sampling"]
+    assert sampling["sampler"].startswith("emcee ")
+    assert sampling["converged"] is True
+    assert sampling["ess_min"] >= 1000
+    assert sampling["rhat_max"] < 1.01
+
+
+def test_inputs_are_identified(data: dict[str, Any]) -> None:
+    assert data["job"]["inputs_sha256"].keys() == {"job.toml", "ballbar.csv"}
+
+
+def test_the_screening_names_measurements_and_file(data: dict[str, Any]) -> None:
+    (finding,) = data["screening"]
+    assert (finding["kind"], finding["rows"], finding["file"]) == ("duplicate", ["14", "18"], "ballbar.csv")
+
+
+def test_the_diagnosis_is_part_of_the_working_file(data: dict[str, Any]) -> None:
+    diagnosis = data["diagnosis"]
+    assert diagnosis["verdict"] == "consistent"
+    assert diagnosis["effects"] == []
+    assert diagnosis["screening"] == data["screening"]
+
+
+def test_an_undetermined_parameter_has_no_least_squares_value(data: dict[str, Any]) -> None:
+    free = data["identifiability"]["undetermined"]
+    scale = data["least_squares"]["estimates"]["scale_x"]["ppm"]
+    if data["job"]["id"].endswith("-compensated"):
+        assert free[0].keys() == {"scale_x.ppm", "scale_y.ppm", "scale_z.ppm", "artefact.length_mm"}
+        assert scale == {"value": None, "u": None}
+    else:
+        assert free == []
+        assert scale["u"] > 0
+
+
+def test_it_keeps_the_published_contract(data: dict[str, Any], tmp_path: Path) -> None:
+    checker = ROOT.parent / "shared" / "check_results.py"
+    if not checker.is_file():
+        pytest.skip("the contract's own checker is not beside the project")
+    file = tmp_path / "results.json"
+    file.write_bytes(as_json(data))
+    done = subprocess.run([sys.executable, checker, file], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_numbers_that_json_cannot_carry_are_refused() -> None:
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        as_json({"value": float("nan")})

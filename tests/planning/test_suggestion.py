@@ -1,0 +1,111 @@
+"""A suggested placing parts what the recording could not, by as much as it says."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model import MeasurementModel, Noise
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning import patterns
+from cmm_uq.planning.placing import Placing, along, joined
+from cmm_uq.planning.ready import ready_plan
+from cmm_uq.planning.suggestion import ODDS, suggestions
+from cmm_uq.points import Points
+from tests.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting
+
+SIGMA = 1e-3
+
+
+def diagnosed(
+    facts: ArtefactFacts, placings: tuple[Placing, ...], true: str, size: float, group: tuple[str, ...],
+    named: tuple[str, ...] = SIX,
+) -> Any:  # fmt: skip
+    """What suggestions read of a diagnosis: a recording with one effect, and the group that it could be."""
+    points = joined(placings)
+    acting = MeasurementModel(artefact_of(facts, points), effects((true,)))
+    sizes = np.array([s.nominal for s in acting.artefact.sizes])
+    xyz = acting.simulate(np.array([size]), sizes, Noise(SIGMA), np.random.default_rng(3))
+    after = MeasurementModel(artefact_of(facts, points.at(xyz)), effects((*named, true)), SIGMA)
+    return SimpleNamespace(after=after, indistinguishable=(group,))
+
+
+def log_odds(found: Any, facts: ArtefactFacts, what: str, repetitions: int, pair: tuple[str, str], true: str) -> float:
+    """Half the χ² by which the false one of a pair fits worse, recording and further bars together, without noise."""
+    ends = [
+        np.array([float(v.replace("−", "-")) for v in part.split(")")[0].split(", ")]) for part in what.split("(")[1:3]
+    ]
+    points = found.after.artefact.points
+    bar = np.array(ends) - points.machine.origin_mm
+    number = int(points.measurement.max()) + 1
+    n = 2 * repetitions
+    more = Points(
+        np.vstack([points.xyz, np.tile(bar, (repetitions, 1))]), np.append(points.measurement, np.full(n, number)),
+        np.append(points.point, np.tile([1, 2], repetitions)),
+        np.append(points.repeat, np.repeat(np.arange(1, repetitions + 1), 2)), points.machine,
+    )  # fmt: skip
+    acting = MeasurementModel(artefact_of(facts, more), effects((true,)))
+    others = tuple(e for e in found.after.effects if e.name not in pair)
+    fitted = MeasurementModel(found.after.artefact, (*others, *effects((true,))), SIGMA).estimate().least_squares
+    size = next(v for u, v in zip(fitted.unknowns, fitted.value, strict=True) if u.key[0] == true)
+    exact = more.at(acting.predicted(np.array([size, facts.length_mm or 0.0])))
+    other = pair[1] if pair[0] == true else pair[0]
+    model = MeasurementModel(artefact_of(facts, exact), (*others, *effects((other,))), SIGMA)
+    linear, rest = model.estimate().linear, model.estimate().least_squares.residuals
+    return float(0.5 * np.sum((rest / linear.noise_scale / SIGMA) ** 2))
+
+
+def test_the_odds_of_a_further_bar_are_those_of_a_fit_to_it() -> None:
+    """Bars in one plane of constant y: the yaw of X looks like its scale. Independently of the suggestion, the true effect
+    is put in without noise, and the false one fitted to the recording and the further bars together.
+    """
+    chosen = setting(BALLBAR, repeats=1)
+    bar = patterns.ballbar(BALLBAR, chosen.plan)
+    placings = tuple(
+        chosen.volume.set_up(bar, along(np.array([np.cos(t), 0.0, np.sin(t)])), (x, 0.3, z), "in the plane")
+        for t in (0.0, 0.5, 1.0, 1.5, 2.0, 2.6) for x in (0.2, 0.8) for z in (0.3, 0.6)
+    )  # fmt: skip
+    pair, named = ("rotation_x_z", "scale_x"), ("scale_z", "squareness_zx")
+    found = diagnosed(BALLBAR, placings, "rotation_x_z", 60.0, pair, named)
+    (suggestion,) = suggestions(found, BALLBAR)
+    assert suggestion.separates == pair
+    assert suggestion.odds >= ODDS
+    least = min(log_odds(found, BALLBAR, suggestion.what, suggestion.repetitions, pair, true) for true in pair)
+    assert np.log(suggestion.odds) == pytest.approx(min(least, 50.0), rel=0.02)
+
+
+def test_a_gauge_on_seven_lines_is_told_where_to_lay_an_eighth() -> None:
+    placings = ready_plan(setting(GAUGE, length_mm=820.0))[1]
+    pair = ("rotation_x_y", "rotation_y_x")
+    found = diagnosed(GAUGE, placings, "rotation_x_y", 8.0, pair)
+    (suggestion,) = suggestions(found, GAUGE)
+    assert suggestion.what.startswith("Place the step gauge at (")
+    assert "1 : 1 without it" in suggestion.what
+    assert suggestion.odds >= ODDS
+
+
+@pytest.mark.parametrize(("kind", "true", "rival"), [
+    ("plate", "rotation_y_z", "rotation_z_z"),
+    ("bryan", "straightness_x_z", "rotation_x_y"),
+    ("triangle", "straightness_x_z", "straightness_y_z"),
+])  # fmt: skip
+def test_every_artefact_is_asked_for_a_placing_or_has_none(kind: str, true: str, rival: str) -> None:
+    facts, wishes = EVERY_KIND[kind]
+    facts = facts.model_copy(update={"length_mm": 300.0, "u_um": 0.5}) if kind == "bryan" else facts
+    placings = ready_plan(setting(facts, **wishes))[1]
+    found = diagnosed(facts, placings, true, 20.0, (true, rival))
+    for suggestion in suggestions(found, facts):
+        assert suggestion.odds >= ODDS
+        assert 1 <= suggestion.repetitions <= 30
+
+
+def test_what_is_told_apart_needs_no_further_placing() -> None:
+    placings = ready_plan(setting(BALLBAR))[1]
+    found = diagnosed(BALLBAR, placings, "rotation_y_x", 12.0, ())
+    found.indistinguishable = ()
+    assert suggestions(found, BALLBAR) == ()
