@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq import __version__
 from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.certificate.diagnosis_words import VERDICTS, noise_words, sentence
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.plots import curve_with_band, length_plot
+from cmm_uq.certificate.program import program, software
 from cmm_uq.certificate.results_file import SCHEMA, diagnosis_data
 from cmm_uq.certificate.wording import expanded, probability
 from cmm_uq.certificate.working_page import working_page
@@ -24,7 +24,7 @@ def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
     posterior = found.diagnosis.posterior
     return {
         "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
+        "software": software(),
         "job": {"id": found.job.facts.job.id, "inputs_sha256": sha256(found.job.inputs)},
         "sampling": {
             "sampler": posterior.sampler, "seed": posterior.seed, "ess_min": posterior.ess_min,
@@ -47,7 +47,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
         ),
         warnings=(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
         sections=diagnosis_sections(found),
-        produced_by=f"cmm-uq {__version__}, {d.posterior.sampler}, seed {d.posterior.seed}",
+        produced_by=f"{program()}, {d.posterior.sampler}, seed {d.posterior.seed}",
     )  # fmt: skip
 
 

@@ -7,23 +7,6 @@ from cmm_uq.certificate.wording import expanded, probability
 from cmm_uq.mismatch.diagnosis import Diagnosis, LeftOut
 from cmm_uq.mismatch.held_out import Improvement
 
-CAUSES = {
-    "scale": "the scale or its compensation: check the linear compensation of this axis",
-    "squareness": "the axes are not square: adjust the guideways or the squareness in the compensation",
-    "straightness": "a bowed guideway: check straightness and its compensation",
-    "rotation": "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation",
-    "periodic_scale": "an error that repeats with the period: scale interpolation, leadscrew or rack",
-    "hysteresis": "backlash or friction in this drive: the reading depends on the side it is reached from",
-    "thermal_scale": "the scale expands and its temperature is not, or wrongly, compensated",
-    "thermal_artefact": "the artefact expands and its temperature is not, or wrongly, compensated",
-    "thermal_gradient": "the table bends: top and bottom differ in temperature",
-    "drift": "the axis drifts with time: warm-up, or the room's temperature",
-    "artefact_sag": "the artefact sags or its supports are not at the right points",
-    "probe_radius": "the effective stylus radius is wrong: qualify the probe again",
-    "probe_lobing": "the probe's pre-travel has three lobes: qualify it in more directions",
-}
-"""What to look for, by the beginning of the effect's name; the longest that fits counts."""
-
 _SAME = 0.01
 """Difference of two probabilities that is not worth telling."""
 
@@ -44,12 +27,6 @@ def lines(found: Diagnosed) -> list[str]:
     return told + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
 
 
-def cause_of(effect: str) -> str:
-    """What a technician looks for."""
-    fitting = [name for name in CAUSES if effect.startswith(name)]
-    return CAUSES[max(fitting, key=len)] if fitting else ""
-
-
 def sentence(item: LeftOut, gain: Improvement) -> str:
     """One left-out effect: size, cause, what it explains, and what was held out says."""
     alone = len(item.parameters) == 1
@@ -64,7 +41,7 @@ def sentence(item: LeftOut, gain: Improvement) -> str:
     alike = item.together > item.probability + _SAME
     together = f" ({probability(item.together)} of it or one that cannot be told from it)" if alike else ""
     return (
-        f"{item.title}: {', '.join(words)}. What it points to: {cause_of(item.effect)}. "
+        f"{item.title}: {', '.join(words)}. What it points to: {item.points_to}. "
         f"Probability {probability(item.probability)}{together}; explains {100 * item.explained:.0f}\u00a0% of the misfit; "
         f"on {gain.unseen} that the fit had not seen the rms falls from "
         f"{gain.heldout_rms_before_um:.1f} to {gain.heldout_rms_after_um:.1f}\u00a0µm."

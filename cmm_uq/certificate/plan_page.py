@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from cmm_uq import __version__
 from cmm_uq.analysis.planning import RECORDED, Outlook, Plan
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.plan_picture import gain_plot, placing_pictures
@@ -21,6 +20,7 @@ from cmm_uq.certificate.plan_words import (
     title_of,
     unit_of,
 )
+from cmm_uq.certificate.program import program, software
 from cmm_uq.certificate.working_page import working_page
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS
@@ -38,7 +38,7 @@ def plan_results(plan: Plan) -> dict[str, Any]:
     }  # fmt: skip
     return {
         "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
+        "software": software(),
         "job": {"id": plan.job.facts.job.id, "inputs_sha256": sha256(plan.job.inputs)},
         "noise": {"coordinate_um": plan.setting.sigma / MICROMETRE, "stated": plan.setting.stated is not None},
         "start": {"name": plan.name, "placings": len(plan.start.placings), **_outlook_data(plan.start)},
@@ -98,7 +98,7 @@ def plan_document(plan: Plan) -> Document:
         warnings=_warnings(plan),
         sections=_sections(plan),
         attachments=("plan.csv", "results.json") if plan.to_measure else ("results.json",),
-        produced_by=f"cmm-uq {__version__}",
+        produced_by=program(),
         end="End of plan",
     )  # fmt: skip
 

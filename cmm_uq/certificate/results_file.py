@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq import __version__
 from cmm_uq.analysis.result import Diagnosed, Result
 from cmm_uq.certificate.diagnosis_words import sentence
+from cmm_uq.certificate.program import software
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import Statement
@@ -28,7 +28,7 @@ def results(result: Result) -> dict[str, Any]:
     job = result.job
     return {
         "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
+        "software": software(),
         "job": {"id": job.facts.job.id, "inputs_sha256": sha256(job.inputs)},
         "estimates": {effect: _quantities(values) for effect, values in result.parameters.items()},
         "artefact": _quantities(result.sizes),

@@ -11,6 +11,7 @@ from cmm_uq.certificate.results_file import SCHEMA
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.inference.ensembles import Chains
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats
 from cmm_uq.selfcalibration.curve import Curve
 from cmm_uq.units import MICROMETRE
@@ -22,7 +23,7 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
     axis = result.axis
     estimates = {f"linearity_{axis}": {"peak_to_valley_um": quantity_data(result.linearity)}}
     if result.scale is not None:
-        estimates[f"scale_{axis}"] = {"ppm": quantity_data(result.scale)}
+        estimates[SCALE[axis].name] = {"ppm": quantity_data(result.scale)}
     before, after = estimate.residuals
     return {
         "schema": SCHEMA,

@@ -13,7 +13,7 @@ from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section,
 from cmm_uq.certificate.plots import length_plot
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.errors import CmmUqError
-from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import ARCSECOND, MICROMETRE
@@ -93,7 +93,7 @@ def _two_ways(result: Result, triangle: Triangle) -> list[Block]:
         if name in result.parameters:
             quantity = next(iter(result.parameters[name].values()))
             fitted = ("not determined", "") if name in free else expanded(quantity)[:2]
-        effect = EVERY[name]
+        effect = every()[name]
         rows.append((effect.title, value, U, *fitted, effect.reported[0].unit))
     columns = (
         Column("Parameter", numeric=False), Column("Equations"), Column("U"), Column("Fitted model"), Column("U"),

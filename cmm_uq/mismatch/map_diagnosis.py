@@ -15,7 +15,7 @@ from cmm_uq.mismatch.location import region_of
 from cmm_uq.mismatch.map_columns import MapColumn, turned
 from cmm_uq.mismatch.map_fit import expansion, function, held_out, noise_of, residual
 from cmm_uq.mismatch.map_search import ColumnRace, Rival, race_of
-from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 
@@ -144,16 +144,19 @@ def _effect(race: ColumnRace) -> tuple[LeftOut, Posterior] | None:
     without = [v for v in race.versions if v.explanation != race.effect]
     gain = held_out(race, race.versions)[1] - held_out(race, without)[1]
     posterior = expansion(race, race.effect)
-    effect = EVERY[str(race.rivals[race.effect].effect)]
+    effect = every()[str(race.rivals[race.effect].effect)]
     reported = effect.to_reported(posterior.draws, np.zeros((len(posterior.draws), 0)))
     units = {parameter.name: parameter.unit for parameter in effect.reported}
     parameters = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
     sure = all(q.interval95[0] > 0 or q.interval95[1] < 0 for q in parameters.values())
     if not sure or gain.sum() <= np.sqrt(len(gain)) * gain.std(ddof=1):
         return None
-    every, rest, left = (float(np.sum(residual(race, some) ** 2)) for some in ((), without, race.versions))
+    whole, rest, left = (float(np.sum(residual(race, some) ** 2)) for some in ((), without, race.versions))
     probability = race.combinations.of(race.effect)
-    return LeftOut(effect.name, effect.title, probability, parameters, (rest - left) / every, probability), posterior
+    found = LeftOut(
+        effect.name, effect.title, probability, parameters, (rest - left) / whole, probability, effect.points_to
+    )  # fmt: skip
+    return found, posterior
 
 
 def _difference(race: ColumnRace, index: int, p_value: float) -> Difference:

@@ -22,7 +22,7 @@ from cmm_uq.mismatch.map_columns import MapColumn, roughness
 from cmm_uq.mismatch.noise import kinds, tails
 from cmm_uq.mismatch.stack import Version
 from cmm_uq.mismatch.unknown_functions import smooth_functions
-from cmm_uq.physics.thermal import EXPANSION
+from cmm_uq.physics.thermal import EXPANSION, SCALE_EXPANSION
 from cmm_uq.points import Floats
 from cmm_uq.units import REFERENCE_TEMPERATURE
 
@@ -177,7 +177,7 @@ def race_of(column: MapColumn, named: Sequence[str], seed: int) -> ColumnRace:
     functions = tuple(smooth_functions(place))
     changes = float(np.ptp(temperatures)) > 0
     if column.is_scale and changes:
-        effect = f"thermal_scale_{column.axis}"
+        effect = SCALE_EXPANSION[column.axis].name
         excess = temperatures - REFERENCE_TEMPERATURE
         expansion = Rival(effect, excess, (EXPANSION.prior_sd * place[:, None],), effect=effect)
         (granted if effect in named else rivals).append(expansion)

@@ -23,7 +23,7 @@ from cmm_uq.measurement import MeasurementModel
 from cmm_uq.measurement.model import ARTEFACT
 from cmm_uq.mismatch.diagnosis import Diagnosis
 from cmm_uq.mismatch.explanations import shapes
-from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.catalogue import every
 from cmm_uq.planning.candidates import like
 from cmm_uq.planning.information import certified, gram, scales, shared
 from cmm_uq.planning.placing import Pattern, Placing, appended
@@ -100,10 +100,10 @@ def _with_all(after: MeasurementModel, names: Sequence[str]) -> MeasurementModel
     """The model with every effect of every pair, periods as found or the longest."""
     shape = dict(after.shapes)
     for name in names:
-        if EVERY[name].shape and name not in shape:
-            shape[name] = next(iter(shapes(EVERY[name], after.artefact.points)))
+        if every()[name].shape and name not in shape:
+            shape[name] = next(iter(shapes(every()[name], after.artefact.points)))
     others = tuple(effect for effect in after.effects if effect.name not in names)
-    return replace(after, effects=(*others, *(EVERY[name] for name in names)), shapes=shape)
+    return replace(after, effects=(*others, *(every()[name] for name in names)), shapes=shape)
 
 
 def _candidates(artefact: Artefact, plan: PlanFacts) -> tuple[Placing, ...]:
@@ -166,7 +166,7 @@ def _best(
 def _size(after: MeasurementModel, name: str, pair: tuple[str, str]) -> Floats:
     """Size at which one effect of a pair, without the other, explains the recording, over its prior standard deviation."""
     others = tuple(effect for effect in after.effects if effect.name not in pair)
-    effect = EVERY[name]
+    effect = every()[name]
     shape = dict(after.shapes)
     if effect.shape and name not in shape:
         shape[name] = next(iter(shapes(effect, after.artefact.points)))

@@ -13,6 +13,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.ensembles import Chains, Progress
+from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import AXES, Floats
 from cmm_uq.selfcalibration.curve import Curve
 from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
@@ -88,7 +89,7 @@ class PlaneEstimate:
         x, values, _ = self._on(which)
         values = values + self.coefficients.columns[:, which : which + 1] * (x - x[0])
         values -= values[:, :1]
-        if f"scale_{AXES[self.plate.axes[which]]}" in self.free.names:
+        if SCALE[AXES[self.plate.axes[which]]].name in self.free.names:
             values -= self.scales[which][:, None] * (x - x[0])
         return Curve(x, values)
 

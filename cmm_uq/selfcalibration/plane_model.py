@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.physics.kinematics import carried_offset
+from cmm_uq.physics.rigid_body import ROTATION, STRAIGHTNESS
 from cmm_uq.points import AXES, Floats
 from cmm_uq.selfcalibration.integration_uncertainty import KnownSpan
 from cmm_uq.selfcalibration.placed_plate import PlacedPlate, rotations
@@ -155,11 +156,11 @@ def _functions(plate: PlacedPlate, turning: tuple[int, ...], chain: str) -> tupl
     a, b = AXES[i], AXES[j]
     shown = [
         (i, f"linearity_{a}", first, _TYPICAL), (j, f"linearity_{b}", second, _TYPICAL),
-        (i, f"straightness_{a}_{b}", second, _TYPICAL), (j, f"straightness_{b}_{a}", first, _TYPICAL),
+        (i, STRAIGHTNESS[a, b].name, second, _TYPICAL), (j, STRAIGHTNESS[b, a].name, first, _TYPICAL),
     ]  # fmt: skip
     for axis in turning:
         offset = carried_offset(AXES[axis], plate.reading - plate.middle, chain=chain)[:, [i, j]]
-        shown.append((axis, f"rotation_{AXES[axis]}_{AXES[3 - i - j]}", np.r_[offset[:, 1], -offset[:, 0]],
+        shown.append((axis, ROTATION[AXES[axis], AXES[3 - i - j]].name, np.r_[offset[:, 1], -offset[:, 0]],
                       _TYPICAL_ROTATION))  # fmt: skip
     return tuple(
         SmoothFunction(
