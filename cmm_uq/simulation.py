@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq import __version__
 from cmm_uq.analysis.refusals import refuse
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.artefacts.artefact import Artefact
+from cmm_uq.certificate.program import program
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import content_of, read_job
@@ -70,7 +70,7 @@ def write_simulation(job: Path, truth: Path, out: Path, *, seed: int | None = No
     if out.resolve() == read.folder.resolve():
         raise CmmUqError("is the job that is simulated from", where=str(out), fix="Choose another --out")
     points = simulate(read, drawn, seed=seed)
-    note = f"# simulated by cmm-uq {__version__}, seed {drawn.seed if seed is None else seed}, from truth.toml\n"
+    note = f"# simulated by {program(drawn.effects)}, seed {drawn.seed if seed is None else seed}, from truth.toml\n"
     contents = {
         **read.inputs,
         read.facts.recording.file: note.encode() + recording(points),

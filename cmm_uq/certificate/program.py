@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from cmm_uq import __version__
@@ -16,7 +17,7 @@ def software() -> dict[str, Any]:
     return {"name": NAME, "version": __version__, **({"plugins": taking_part} if taking_part else {})}
 
 
-def program() -> str:
-    """The same in words: ``cmm-uq 1.0`` or ``cmm-uq 1.0 with outside-effects 0.1``."""
-    taking_part = " and ".join(f"{package} {version}" for package, version in plugins().items())
+def program(effects: Iterable[str] | None = None) -> str:
+    """The same in words: ``cmm-uq 1.0`` or ``cmm-uq 1.0 with outside-effects 0.1``; of the effects named only, if any are."""
+    taking_part = " and ".join(f"{package} {version}" for package, version in plugins(effects).items())
     return f"{NAME} {__version__}{f' with {taking_part}' if taking_part else ''}"

@@ -8,7 +8,7 @@ them and have them estimated like the others; a diagnosis thinks of them less re
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -61,9 +61,11 @@ def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, 
     return tuple(found)
 
 
-def plugins() -> dict[str, str]:
-    """Version of every package whose effects are in the catalogue here, by the package's name."""
-    return {plugin.package: plugin.version for plugin in _outside(tuple(sys.path)).values()}
+def plugins(names: Iterable[str] | None = None) -> dict[str, str]:
+    """Version of every package whose effects are in the catalogue here, or of those with effects named, by its name."""
+    outside = _outside(tuple(sys.path))
+    asked = outside.keys() if names is None else outside.keys() & set(names)
+    return {plugin.package: plugin.version for name, plugin in outside.items() if name in asked}
 
 
 # What is installed follows from where packages are looked for, so that is the key.

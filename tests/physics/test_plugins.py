@@ -114,7 +114,9 @@ def test_two_packages_with_one_name_are_refused_with_both(offer: Offer) -> None:
 ])  # fmt: skip
 def test_a_broken_package_is_named_with_its_effect(offer: Offer, code: str, where: str | None, said: str) -> None:
     offer(code, where=where)
-    with pytest.raises(BrokenPluginError, match=r"package other-effects 2\.1: the effect 'made_up'.*uninstall") as refused:
+    with pytest.raises(
+        BrokenPluginError, match=r"package other-effects 2\.1: the effect 'made_up'.*uninstall"
+    ) as refused:
         every()
     assert said in str(refused.value)
 
