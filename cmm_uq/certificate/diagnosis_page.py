@@ -59,7 +59,7 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
         Section("Before and after", _before_after(found)),
         Section("What a correction would change", _consequences(found)),
         Section("Where the mismatch lives", _where(found)),
-        Section("Rival explanations", (_rivals(found),)),
+        Section("Candidate explanations", (_rivals(found),)),
         Section("Noise", tuple(Paragraph(text) for text in noise)),
         Section("What to measure next", tuple(
             Paragraph(f"{' and '.join(s.separates)}: {s.what}") for s in found.suggestions
@@ -164,7 +164,7 @@ def _where(found: Diagnosed) -> tuple[Block, ...]:
     )  # fmt: skip
     if not rows:
         return ()
-    heads = (Column("Unknown function", numeric=False), Column("Covariate", numeric=False), Column("Region"),
+    heads = (Column("Nonparametric term", numeric=False), Column("Covariate", numeric=False), Column("Region"),
              Column("Amplitude", "µm"), Column("p"))  # fmt: skip
     first = found.diagnosis.where[0]
     x, y, u = first.curve
@@ -183,4 +183,4 @@ def _where(found: Diagnosed) -> tuple[Block, ...]:
 def _rivals(found: Diagnosed) -> Table:
     rows = tuple((name, probability(p)) for name, p in found.diagnosis.rivals)
     heads = (Column("Explanation", numeric=False), Column("Probability"))
-    return Table("First race: one explanation alone", heads, rows, ("Nothing missing has the rest.",))
+    return Table("Model comparison: one explanation alone", heads, rows, ("Nothing missing has the rest.",))

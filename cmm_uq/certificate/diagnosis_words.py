@@ -21,10 +21,10 @@ VERDICTS = {
 def lines(found: Diagnosed) -> list[str]:
     """Verdict and everything that follows from it, a sentence or two each."""
     d = found.diagnosis
-    told = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
-    told += [f"Cannot be told apart by this recording: {', '.join(group)}." for group in d.indistinguishable]
-    told += [f"To part {' and '.join(s.separates)}: {s.what}" for s in found.suggestions]
-    return told + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
+    said = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
+    said += [f"Cannot be told apart by this recording: {', '.join(group)}." for group in d.indistinguishable]
+    said += [f"To part {' and '.join(s.separates)}: {s.what}" for s in found.suggestions]
+    return said + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
 
 
 def sentence(item: LeftOut, gain: Improvement) -> str:
@@ -58,7 +58,7 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[str, ...
     if noise.contradicts_stated and stated_um is not None:
         texts.append(f"This contradicts the stated {stated_um:g} µm.")
     if noise.placing.value > 0.3 * noise.coordinate.value:
-        texts.append(f"Each placing is off by about {noise.placing.value:.2g} µm that its repeats share.")
+        texts.append(f"Each set-up is off by about {noise.placing.value:.2g} µm that its repeats share.")
     if noise.correlated_in_time:
         texts.append("Neighbouring readings are correlated in time.")
     if noise.heavy_tails:

@@ -18,7 +18,7 @@ from cmm_uq.mismatch.held_out import Improvement, improvement
 from cmm_uq.mismatch.joint import Joint, joint_posterior
 from cmm_uq.mismatch.location import Place, located
 from cmm_uq.mismatch.noise import Kind
-from cmm_uq.mismatch.search import NOT_TOLD_APART, Found, Race, search, with_rivals
+from cmm_uq.mismatch.search import NOT_TOLD_APART, Found, ModelComparison, search, with_rivals
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 
@@ -183,9 +183,9 @@ def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
     return tuple(groups)
 
 
-def _rivals(race: Race) -> tuple[tuple[str, float], ...]:
-    order = np.argsort(-race.probability)
-    return tuple((race.explanations[i].name, float(race.probability[i])) for i in order[:12])
+def _rivals(compared: ModelComparison) -> tuple[tuple[str, float], ...]:
+    order = np.argsort(-compared.probability)
+    return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
 
 
 def _noise(comparison: Comparison, stated: float | None) -> NoiseFound:

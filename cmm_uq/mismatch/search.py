@@ -17,7 +17,7 @@ from cmm_uq.measurement import MeasurementModel
 from cmm_uq.mismatch.combinations import Combinations, Key, explore
 from cmm_uq.mismatch.evidence import Comparison
 from cmm_uq.mismatch.explanations import Explanation, finer, known, several
-from cmm_uq.mismatch.gate import NOTHING, gate, log_prior
+from cmm_uq.mismatch.gate import NOTHING, lack_of_fit, log_prior
 from cmm_uq.mismatch.noise import sigma_grid
 from cmm_uq.mismatch.recorded_noise import noise_kinds
 from cmm_uq.mismatch.stack import Version
@@ -42,7 +42,7 @@ NOT_TOLD_APART = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Race:
+class ModelComparison:
     """The candidates that a model's misfit is compared with.
 
     Parameters
@@ -85,7 +85,7 @@ class Found:
     rough : of the effects found, those of which another form is more probable than their own.
     """
 
-    first: Race
+    first: ModelComparison
     last: Comparison
     combinations: Combinations | None
     chosen: Key
@@ -110,7 +110,7 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     alpha : false-alarm rate.
     seed : of the null distribution.
     """
-    first = race_of(model, stated, seed)
+    first = model_comparison(model, stated, seed)
     if first.p_value >= alpha:
         return Found(first, first.comparison, None, frozenset(), (), model, 0.0)
     combinations = explore(first.comparison)
@@ -191,21 +191,21 @@ def with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
     return float(sum(p for key, p in combinations.probability.items() if those & key))
 
 
-def race_of(model: MeasurementModel, stated: float | None, seed: int) -> Race:
+def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -> ModelComparison:
     """Compare all candidates for what a model leaves; ``seed`` is that of the null distribution."""
     values = model.estimate().least_squares.value
     singles = known(model, values, tuple(effect.name for effect in model.effects))
-    rivals = singles + several(singles) + unknown(model, values)
-    comparison = comparison_of(model, stated, rivals)
+    candidates = singles + several(singles) + unknown(model, values)
+    comparison = comparison_of(model, stated, candidates)
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]
-    prior = log_prior(rivals)
+    prior = log_prior(candidates)
     log_total = special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
-    p_value, maxima = gate(comparison, seed)
-    return Race(model, values, comparison, log_odds, np.exp(prior + log_odds - log_total), p_value, maxima)
+    p_value, maxima = lack_of_fit(comparison, seed)
+    return ModelComparison(model, values, comparison, log_odds, np.exp(prior + log_odds - log_total), p_value, maxima)
 
 
-def comparison_of(model: MeasurementModel, stated: float | None, rivals: Sequence[Explanation]) -> Comparison:
+def comparison_of(model: MeasurementModel, stated: float | None, candidates: Sequence[Explanation]) -> Comparison:
     """Candidates, possibly none, against what a model leaves."""
     estimate = model.estimate()
     linear = estimate.linear
@@ -215,21 +215,21 @@ def comparison_of(model: MeasurementModel, stated: float | None, rivals: Sequenc
     rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
     return Comparison(
         rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.placing]) / linear.noise_scale[:, None],
-        noise_kinds(model), sigma, log_sigma, rivals, linear.noise_scale,
+        noise_kinds(model), sigma, log_sigma, candidates, linear.noise_scale,
         stated or sigma_left / _MISFIT, _certified(model, sigma_left),
     )  # fmt: skip
 
 
-def _with(race: Race, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
+def _with(compared: ModelComparison, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
     """The model with known effects more, of the shapes that are most probable together."""
-    shapes, added = dict(race.model.shapes), []
+    shapes, added = dict(compared.model.shapes), []
     for version in sorted(versions, key=lambda v: v.explanation):
         if version.explanation in chosen:
-            explanation = race.explanations[version.explanation]
+            explanation = compared.explanations[version.explanation]
             added.append(every()[explanation.name])
             if added[-1].shape:
                 shapes[explanation.name] = explanation.members[version.member].shape
-    return replace(race.model, effects=(*race.model.effects, *added), shapes=shapes)
+    return replace(compared.model, effects=(*compared.model.effects, *added), shapes=shapes)
 
 
 def _certified(model: MeasurementModel, sigma: float) -> Floats:

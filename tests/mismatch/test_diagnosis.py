@@ -14,7 +14,7 @@ from cmm_uq.jobs.reading import read_job
 from cmm_uq.measurement import MeasurementModel, Noise
 from cmm_uq.mismatch.diagnosis import Diagnosis, diagnose
 from cmm_uq.mismatch.held_out import improvement
-from cmm_uq.mismatch.search import race_of
+from cmm_uq.mismatch.search import model_comparison
 from cmm_uq.mismatch.suggestion import suggestions
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine, Points
@@ -120,7 +120,7 @@ def test_false_alarms_are_as_frequent_as_the_p_value_says() -> None:
             empty.simulate(np.zeros(0), np.array([400.0]), Noise(1e-3), np.random.default_rng(1000 + seed))
         )
         stated = 1e-3 if seed % 2 else None
-        values.append(race_of(MeasurementModel(Ballbar(bar_facts(), drawn), effects(SIX)), stated, 0).p_value)
+        values.append(model_comparison(MeasurementModel(Ballbar(bar_facts(), drawn), effects(SIX)), stated, 0).p_value)
     assert stats.kstest(values, "uniform").pvalue > 1e-3
     assert sum(value < 0.01 for value in values) <= 4
 

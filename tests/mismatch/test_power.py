@@ -10,7 +10,7 @@ from scipy import stats
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.measurement import MeasurementModel, Noise
 from cmm_uq.mismatch.power import POWER, Power, powers, without_fault
-from cmm_uq.mismatch.search import race_of
+from cmm_uq.mismatch.search import model_comparison
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning.placing import joined
 from cmm_uq.planning.ready import ready_plan
@@ -65,6 +65,6 @@ def test_the_gate_opens_as_often_as_predicted() -> None:
     for _ in range(10):
         sizes = np.array([size.nominal + size.sd * random.standard_normal() for size in acting.artefact.sizes])
         xyz = acting.simulate(np.array([power.detectable]), sizes, Noise(SETTING.sigma), random)
-        alarms += race_of(SETTING.model(POINTS.at(xyz)), SETTING.sigma, 0).p_value < ALPHA
+        alarms += model_comparison(SETTING.model(POINTS.at(xyz)), SETTING.sigma, 0).p_value < ALPHA
     low, high = stats.binom.interval(0.999, 10, power.detected(power.detectable))
     assert low <= alarms <= high
