@@ -15,7 +15,7 @@ from cmm_uq.mismatch.location import region_of
 from cmm_uq.mismatch.map_columns import MapColumn, turned
 from cmm_uq.mismatch.map_fit import expansion, function, held_out, noise_of, residual
 from cmm_uq.mismatch.map_search import ColumnComparison, Rival, column_comparison
-from cmm_uq.physics.catalogue import every
+from cmm_uq.physics.catalogue import effects as effects_named
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 
@@ -144,7 +144,7 @@ def _effect(compared: ColumnComparison) -> tuple[LeftOut, Posterior] | None:
     without = [v for v in compared.versions if v.explanation != compared.effect]
     gain = held_out(compared, compared.versions)[1] - held_out(compared, without)[1]
     posterior = expansion(compared, compared.effect)
-    effect = every()[str(compared.rivals[compared.effect].effect)]
+    (effect,) = effects_named((str(compared.rivals[compared.effect].effect),))
     reported = effect.to_reported(posterior.draws, np.zeros((len(posterior.draws), 0)))
     units = {parameter.name: parameter.unit for parameter in effect.reported}
     parameters = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
