@@ -3,8 +3,8 @@
 A step gauge on the seven lines of ISO 10360-2 leaves some causes identical. The plan is given one placing more, the one that
 parts them best. Of every cause that the diagnosis should then name in 80 of 100 recordings, recordings are simulated point by
 point in both plans, under a truth that is sealed by a hash before any is diagnosed, and searched as ``cmm-uq diagnose``
-searches them. *Detected*: the gate opens at 1 %. *Named*: that cause and no other is asserted, and none is said to be as
-possible. Both rates stand beside what was predicted for each plan.
+searches them. *Detected*: the lack-of-fit test rejects at 1 %. *Named*: that cause and no other is asserted, and none is said
+to be as possible. Both rates stand beside what was predicted for each plan.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def predicted(setting, placings, rivals):
 
 
 def searched(setting, points, effect, amplitude, seed):
-    """Whether the gate opens, whether the effect alone is asserted, and whether what was found could be fitted."""
+    """Whether the test rejects, whether the effect alone is asserted, and whether what was found could be fitted."""
     random = np.random.default_rng(seed)
     acting = MeasurementModel(artefact_of(setting.artefact, points), (effect,))
     sizes = np.array([

@@ -13,6 +13,7 @@ from cmm_uq.documents.corner import corner_plot
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
 from cmm_uq.documents.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
 from cmm_uq.documents.origin import CERTIFICATE, came_about
+from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.warning import warnings
 from cmm_uq.documents.wording import expanded, listed, probability, title_of, units_of
@@ -69,16 +70,18 @@ def certificate(result: Result | ShiftResult | PlaneShiftResult) -> Document:
     if result.job.facts.job.diagnosis_on_certificate:
         sections += diagnosis_sections(result.diagnosed)
     sections += [_posterior(result), _method(result)]
-    return _document(result.job, sections, warnings(result), result.posterior.sampler, result.posterior.seed)
+    produced_by = f"{program()}, {result.posterior.sampler}, seed {result.posterior.seed}"
+    return _document(result.job, sections, warnings(result), produced_by)
 
 
 def _shifted(result: ShiftResult | PlaneShiftResult, sections: list[Section], told: tuple[str, ...]) -> Document:
     """With the correction table among the attachments."""
-    document = _document(result.job, sections, told, result.estimate.chains.sampler, result.estimate.seed)
+    produced_by = f"cmm-uq {__version__}, {result.estimate.chains.sampler}, seed {result.estimate.seed}"
+    document = _document(result.job, sections, told, produced_by)
     return replace(document, attachments=(*document.attachments, shift_section.table_file(result.job)))
 
 
-def _document(job: Job, sections: list[Section], told: tuple[str, ...], sampler: str, seed: int) -> Document:
+def _document(job: Job, sections: list[Section], told: tuple[str, ...], produced_by: str) -> Document:
     """Sections and warnings between what every certificate has."""
     facts = job.facts
     return Document(
@@ -94,7 +97,7 @@ def _document(job: Job, sections: list[Section], told: tuple[str, ...], sampler:
         if facts.laboratory.signatory
         else (),
         attachments=(*job.inputs, "results.json"),
-        produced_by=f"cmm-uq {__version__}, {sampler}, seed {seed}",
+        produced_by=produced_by,
         date=facts.job.issued or facts.job.date,
     )
 

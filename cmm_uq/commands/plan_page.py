@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from cmm_uq import __version__
 from cmm_uq.commands.plan_words import (
     CRITERIA,
     STATUS,
@@ -23,6 +22,7 @@ from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.diagnosis.power import POWER, SIZES
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.plan_picture import gain_plot, placing_pictures
+from cmm_uq.documents.program import program
 from cmm_uq.documents.results_file import head
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.units import MICROMETRE
@@ -96,7 +96,7 @@ def plan_document(plan: Plan) -> Document:
         warnings=_warnings(plan),
         sections=_sections(plan),
         attachments=("plan.csv", "results.json") if plan.to_measure else ("results.json",),
-        produced_by=f"cmm-uq {__version__}",
+        produced_by=program(),
         end="End of plan",
     )  # fmt: skip
 

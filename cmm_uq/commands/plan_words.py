@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from cmm_uq.commands.planning import RECORDED, Plan
 from cmm_uq.documents.wording import listed
 from cmm_uq.model.measurement import ARTEFACT
-from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.catalogue import every
 from cmm_uq.planning.identifiability import Determined, Identifiability
 from cmm_uq.units import MICROMETRE
 
@@ -23,7 +23,7 @@ CRITERIA = {
 
 def title_of(name: str) -> str:
     """An effect in words."""
-    return EVERY[name].title if name in EVERY else name
+    return every()[name].title if name in every() else name
 
 
 def combination(parts: Mapping[tuple[str, str], float]) -> str:
@@ -60,7 +60,7 @@ def named(parameter: Determined) -> str:
     owner, name = parameter.unknown.key
     if owner == ARTEFACT:
         return f"Artefact, {name.removesuffix('_mm').replace('_', ' ')}"
-    effect = EVERY[owner]
+    effect = every()[owner]
     return effect.title if len(effect.coefficients) == 1 else f"{effect.title}, {name}"
 
 
@@ -71,7 +71,7 @@ def pairs(found: Identifiability) -> list[str]:
         joined = [group for group in groups if first in group or second in group]
         merged = {first, second}.union(*joined)
         groups = [group for group in groups if group not in joined] + [merged]
-    return [listed([title_of(name) for name in EVERY if name in group]) for group in groups]
+    return [listed([title_of(name) for name in every() if name in group]) for group in groups]
 
 
 def absorbed(found: Identifiability) -> list[str]:

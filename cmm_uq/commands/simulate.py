@@ -11,8 +11,9 @@ import numpy as np
 
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.commands.refusals import refuse
+from cmm_uq.documents.program import program
 from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.jobs.derived_job import PROGRAM, derived_toml
+from cmm_uq.jobs.derived_job import derived_toml
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import first_line
 from cmm_uq.jobs.reading import content_of, read_job
@@ -81,7 +82,7 @@ def write_simulation(
         how = f", seed {drawn.seed if seed is None else seed}, from {TRUTH}"
         files = {
             **{name: data for name, data in read.inputs.items() if name != "job.toml"},
-            read.facts.recording.file: first_line("simulate", PROGRAM, how).encode() + recording(points),
+            read.facts.recording.file: first_line("simulate", program(drawn.effects), how).encode() + recording(points),
             TRUTH: content,
         }
         return place.write({"job.toml": derived_toml(read, "simulate", files), **files})

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.diagnosis.comparison.evidence import Comparison
-from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, Found, Race, search, with_rivals
+from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, Found, ModelComparison, search, with_rivals
 from cmm_uq.diagnosis.held_out import Improvement, improvement
 from cmm_uq.diagnosis.joint import Joint, joint_posterior
 from cmm_uq.diagnosis.location import Place, located
@@ -37,10 +37,11 @@ class LeftOut:
     Parameters
     ----------
     effect, title : its name, and in words.
-    probability : among all rivals that could stand in its place, nothing and the unknown included.
+    probability : among all candidates that could stand in its place, nothing and nonparametric terms included.
     parameters : reported parameters, from the joint posterior.
     explained : part of the misfit's sum of squares that it takes away.
     together : probability of it or one that these data cannot tell from it.
+    points_to : what a technician should look at.
     """
 
     effect: str
@@ -49,6 +50,7 @@ class LeftOut:
     parameters: Mapping[str, Quantity]
     explained: float
     together: float
+    points_to: str
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class Diagnosis:
     where : most significant first.
     effects : what is asserted, most probable first.
     indistinguishable : groups of effects that this recording cannot tell apart.
-    rivals : every explanation of the first race with its probability, most probable first.
+    rivals : every candidate by itself with its probability, most probable first.
     noise, improvement : see their classes.
     before, after : the job's model, and with what was left out.
     posterior : joint, of the model after.
@@ -151,7 +153,9 @@ def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
             probability = found.combinations.of(index[effect.name])
             together = with_rivals(found.combinations, found.chosen, index[effect.name])
         explained = share if total > 0 else 0.0
-        listed.append(LeftOut(effect.name, effect.title, probability, parameters, explained, together))
+        listed.append(
+            LeftOut(effect.name, effect.title, probability, parameters, explained, together, effect.points_to)
+        )
     return tuple(sorted(listed, key=lambda item: -item.probability))
 
 
@@ -179,9 +183,9 @@ def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
     return tuple(groups)
 
 
-def _rivals(race: Race) -> tuple[tuple[str, float], ...]:
-    order = np.argsort(-race.probability)
-    return tuple((race.explanations[i].name, float(race.probability[i])) for i in order[:12])
+def _rivals(compared: ModelComparison) -> tuple[tuple[str, float], ...]:
+    order = np.argsort(-compared.probability)
+    return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
 
 
 def _noise(comparison: Comparison, stated: float | None) -> NoiseFound:

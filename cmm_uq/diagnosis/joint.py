@@ -72,8 +72,8 @@ def _shaped(found: Found, model: MeasurementModel, effect: Effect, values: Float
 def _nodes(found: Found, effect: Effect) -> Floats:
     comparison = found.first.comparison
     index = next(i for i in found.chosen if found.first.explanations[i].name == effect.name)
-    granted = [v for v in found.versions if v.explanation != index]
-    ((group, cube),) = comparison.each(None, granted, (index,))
+    given = [v for v in found.versions if v.explanation != index]
+    ((group, cube),) = comparison.each(None, given, (index,))
     even = evenly(effect, np.array([found.first.explanations[index].members[m].shape[0] for m in group.member]))
     evidence = special.logsumexp(cube[:, :, 0], axis=1)
     step = float(np.median(np.diff(np.sort(even)))) if len(even) > 1 else 0.1 * abs(float(even[0]))

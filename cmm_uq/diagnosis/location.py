@@ -9,7 +9,7 @@ from scipy import special
 
 from cmm_uq.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.diagnosis.comparison.gate import tail_probability
-from cmm_uq.diagnosis.comparison.search import Race
+from cmm_uq.diagnosis.comparison.search import ModelComparison
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.points import Floats, Ints
 from cmm_uq.units import MICROMETRE
@@ -40,35 +40,35 @@ class Place:
     curve: tuple[Floats, Floats, Floats]
 
 
-def located(race: Race, alpha: float) -> tuple[Place, ...]:
+def located(compared: ModelComparison, alpha: float) -> tuple[Place, ...]:
     """Every covariate of which a function is significant at ``alpha``, the most significant first."""
-    if race.p_value >= alpha:
+    if compared.p_value >= alpha:
         return ()
     found = []
-    unknowns = {i for i, e in enumerate(race.explanations) if e.kind == UNKNOWN}
-    for i, (_, version) in race.comparison.beside((), unknowns).items():
-        explanation = race.explanations[i]
+    unknowns = {i for i, e in enumerate(compared.explanations) if e.kind == UNKNOWN}
+    for i, (_, version) in compared.comparison.beside((), unknowns).items():
+        explanation = compared.explanations[i]
         if i not in unknowns:
             continue
         name, covariate = explanation.covariate_name, explanation.covariate
-        p_value = tail_probability(race.null_maximum, float(race.log_odds[i]))
+        p_value = tail_probability(compared.null_maximum, float(compared.log_odds[i]))
         if name is None or covariate is None or p_value >= alpha:
             continue
         x, order = np.unique(covariate, return_index=True)
         values = explanation.members[version.member].values
-        y, u = _function(race, version, x, values[order])
-        region = region_of(x, y) if values.shape[1] > 1 else _jump(race, i, x, order)
+        y, u = _function(compared, version, x, values[order])
+        region = region_of(x, y) if values.shape[1] > 1 else _jump(compared, i, x, order)
         curve = (x, y / MICROMETRE, u / MICROMETRE)
         found.append(Place(name, region, p_value, float(np.abs(y).max()) / MICROMETRE, explanation.name, curve))
     return tuple(sorted(found, key=lambda place: place.p_value))
 
 
-def _function(race: Race, version: Version, x: Floats, values: Floats) -> tuple[Floats, Floats]:
+def _function(compared: ModelComparison, version: Version, x: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Best linear estimate of an unknown function and its standard uncertainty, mm, each (p,).
 
     A constant or a line that no observation shows, or that the baseline absorbs, is no part of the function.
     """
-    comparison, member = race.comparison, race.explanations[version.explanation].members[version.member]
+    comparison, member = compared.comparison, compared.explanations[version.explanation].members[version.member]
     columns = member.columns / comparison.noise_scale[:, None]
     left = comparison.rest(columns)
     least = comparison.left - left @ np.linalg.lstsq(left, comparison.left, rcond=None)[0]
@@ -86,11 +86,11 @@ def _function(race: Race, version: Version, x: Floats, values: Floats) -> tuple[
     return estimate, np.sqrt(np.einsum("pi,ij,pj->p", values, covariance, values))
 
 
-def _jump(race: Race, index: int, x: Floats, order: Ints) -> tuple[float, float]:
+def _jump(compared: ModelComparison, index: int, x: Floats, order: Ints) -> tuple[float, float]:
     """Range of the sorted covariate that holds a step with 95 % probability."""
-    members = race.explanations[index].members
+    members = compared.explanations[index].members
     evidence = np.full(len(members), -np.inf)
-    for group, cube in race.comparison.each(None, (), (index,)):
+    for group, cube in compared.comparison.each(None, (), (index,)):
         if group.r == 1:
             evidence[group.member] = special.logsumexp(cube[:, :, 0], axis=1)
     probability = np.exp(evidence - special.logsumexp(evidence))

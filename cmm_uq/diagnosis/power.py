@@ -1,10 +1,10 @@
 """How large an effect must be for the diagnosis to find it, and to call it by its name.
 
 Nothing is approximated but the noise, which is white: recordings are drawn on the plan's own design, and the search's own
-statistic, with its own rivals, priors and false-alarm rate, decides on each. What it sees of a draw is a quadratic form, so
-that a recording costs some milliseconds. *Detected*: the gate opens. *Named*: besides, the true effect alone is more probable
-than any other known effect alone and than none, and so much that no other is said to be as possible
-(:data:`~cmm_uq.diagnosis.comparison.search.NOT_TOLD_APART`): with twins that nobody can tell apart, a lucky guess is no name.
+statistic, with its own candidates, priors and false-alarm rate, decides on each. What it sees of a draw is a quadratic form,
+so that a recording costs some milliseconds. *Detected*: the lack-of-fit test rejects. *Named*: besides, the true effect alone
+is more probable than any other known effect alone and than none, and so much that no other is said to be as possible
+(:data:`~cmm_uq.diagnosis.comparison.search.NOT_TOLD_APART`): with twins that nothing tells apart, a lucky guess is no name.
 
 (Baarda 1968 and Teunissen 2018 call these sizes minimal detectable and minimal identifiable bias.)
 """
@@ -23,7 +23,7 @@ from cmm_uq.diagnosis.comparison.combinations import Prior
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN
 from cmm_uq.diagnosis.comparison.gate import DRAWS, statistic_of
-from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, race_of
+from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.effect import Effect
@@ -35,7 +35,7 @@ SIZES = np.array([3.0, 3.7, 4.4, 5.1, 6.0, 7.5, 12.0, 30.0])
 """Sizes of an effect that are tried: its rms in all observations together, what is fitted projected out, over the noise."""
 
 _LARGER = np.array([1.0, 1.3])
-"""Noise as it looks, over what it is, at which the gate's threshold is found."""
+"""Noise as it looks, over what it is, at which the threshold of the test is found."""
 
 _TAIL = 0.2
 _CERTAIN = float(np.log(0.95 / 0.05))
@@ -67,7 +67,7 @@ class Power:
     named_at: Floats
 
     def detected(self, amplitude: float) -> float:
-        """Probability that an effect of this amplitude, in its unit, opens the gate."""
+        """Probability that an effect of this amplitude, in its unit, is detected."""
         return float(np.mean(self.detected_at <= abs(amplitude) * self.per_unit))
 
     def named(self, amplitude: float) -> float:
@@ -115,16 +115,16 @@ def powers(
     ----------
     model : what the job names, of a recording without fault.
     effects : linear ones.
-    stated : standard uncertainty of a coordinate that the diagnosis would be told, mm.
+    stated : standard uncertainty of a coordinate that the job would state, mm.
     sigma : that it truly has, mm.
     alpha : false-alarm rate.
-    seed : of the draws; the gate's own are those of seed 0 (:func:`~cmm_uq.diagnosis.comparison.search.search`).
+    seed : of the draws; those of the test itself are of seed 0 (:func:`~cmm_uq.diagnosis.comparison.search.search`).
     draws : recordings drawn of each effect and size.
     """
-    race = race_of(model, stated, 0)
-    rule = _Rule(race.comparison, sigma, alpha)
+    compared = model_comparison(model, stated, 0)
+    rule = _Rule(compared.comparison, sigma, alpha)
     for effect in effects:
-        yield _power(rule, model, race.values, effect, seed, draws)
+        yield _power(rule, model, compared.values, effect, seed, draws)
 
 
 def _power(rule: _Rule, model: MeasurementModel, values: Floats, effect: Effect, seed: int, draws: int) -> Power:
@@ -175,9 +175,9 @@ class _Rule:
 
     @cached_property
     def _thresholds(self) -> Floats:
-        """(t,) statistic at which the gate opens when the noise looks :data:`_LARGER` times what it is.
+        """(t,) statistic at which the test rejects when the noise looks :data:`_LARGER` times what it is.
 
-        The gate draws "nothing is missing" at the noise that fits the recording best, and a fault makes that larger. Its tail
+        The test draws "nothing is missing" at the noise that fits the recording best, and a fault makes that larger. Its tail
         is that of :func:`~cmm_uq.diagnosis.comparison.search.tail_probability`.
         """
         comparison = self.comparison
@@ -198,7 +198,7 @@ class _Rule:
         return np.array(found)
 
     def threshold(self, data: Floats) -> Floats:
-        """(b,) statistic at which the gate opens for data (m, b)."""
+        """(b,) statistic at which the test rejects for data (m, b)."""
         comparison = self.comparison
         squares = np.append(np.sum(data**2, axis=0), float(comparison.left @ comparison.left))
         log = comparison.log_sigma - comparison.degrees_of_freedom * np.log(comparison.sigma)
@@ -234,7 +234,7 @@ class _Rule:
         return np.array([prior.log([i]) for i in range(len(self.comparison.explanations))])
 
     def __call__(self, data: Floats, true: int) -> tuple[Floats, Floats]:
-        """By how much the statistic (b,) passes the gate, and the true effect what would let others stand beside it."""
+        """By how much the statistic (b,) passes the threshold, and the true effect what would let others stand beside it."""
         statistic, odds = statistic_of(self.comparison, data)
         weight = odds + self._priors[:, None]
         kinds = np.array([explanation.kind for explanation in self.comparison.explanations])

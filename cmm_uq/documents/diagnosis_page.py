@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq import __version__
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.documents.diagnosis_words import VERDICTS, noise_words, sentence
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.origin import came_about
 from cmm_uq.documents.plots import curve_with_band, length_plot
+from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.results_file import diagnosis_data, head
 from cmm_uq.documents.wording import expanded, probability
@@ -45,7 +45,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
         ),
         warnings=(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
         sections=diagnosis_sections(found),
-        produced_by=f"cmm-uq {__version__}, {d.posterior.sampler}, seed {d.posterior.seed}",
+        produced_by=f"{program()}, {d.posterior.sampler}, seed {d.posterior.seed}",
     )  # fmt: skip
 
 
@@ -57,7 +57,7 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
         Section("Before and after", _before_after(found)),
         Section("What a correction would change", _consequences(found)),
         Section("Where the mismatch lives", _where(found)),
-        Section("Rival explanations", (_rivals(found),)),
+        Section("Candidate explanations", (_rivals(found),)),
         Section("Noise", tuple(Paragraph(text) for text in noise)),
         Section("What to measure next", tuple(
             Paragraph(f"{' and '.join(s.separates)}: {s.what}") for s in found.suggestions
@@ -162,7 +162,7 @@ def _where(found: Diagnosed) -> tuple[Block, ...]:
     )  # fmt: skip
     if not rows:
         return ()
-    heads = (Column("Unknown function", numeric=False), Column("Covariate", numeric=False), Column("Region"),
+    heads = (Column("Nonparametric term", numeric=False), Column("Covariate", numeric=False), Column("Region"),
              Column("Amplitude", "µm"), Column("p"))  # fmt: skip
     first = found.diagnosis.where[0]
     x, y, u = first.curve
@@ -181,4 +181,4 @@ def _where(found: Diagnosed) -> tuple[Block, ...]:
 def _rivals(found: Diagnosed) -> Table:
     rows = tuple((name, probability(p)) for name, p in found.diagnosis.rivals)
     heads = (Column("Explanation", numeric=False), Column("Probability"))
-    return Table("First race: one explanation alone", heads, rows, ("Nothing missing has the rest.",))
+    return Table("Model comparison: one explanation alone", heads, rows, ("Nothing missing has the rest.",))

@@ -7,23 +7,6 @@ from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.wording import expanded, probability
 
-CAUSES = {
-    "scale": "the scale or its compensation: check the linear compensation of this axis",
-    "squareness": "the axes are not square: adjust the guideways or the squareness in the compensation",
-    "straightness": "a bowed guideway: check straightness and its compensation",
-    "rotation": "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation",
-    "periodic_scale": "an error that repeats with the period: scale interpolation, leadscrew or rack",
-    "hysteresis": "backlash or friction in this drive: the reading depends on the side it is reached from",
-    "thermal_scale": "the scale expands and its temperature is not, or wrongly, compensated",
-    "thermal_artefact": "the artefact expands and its temperature is not, or wrongly, compensated",
-    "thermal_gradient": "the table bends: top and bottom differ in temperature",
-    "drift": "the axis drifts with time: warm-up, or the room's temperature",
-    "artefact_sag": "the artefact sags or its supports are not at the right points",
-    "probe_radius": "the effective stylus radius is wrong: qualify the probe again",
-    "probe_lobing": "the probe's pre-travel has three lobes: qualify it in more directions",
-}
-"""What to look for, by the beginning of the effect's name; the longest that fits counts."""
-
 _SAME = 0.01
 """Difference of two probabilities that is not worth telling."""
 
@@ -38,16 +21,10 @@ VERDICTS = {
 def lines(found: Diagnosed) -> list[str]:
     """Verdict and everything that follows from it, a sentence or two each."""
     d = found.diagnosis
-    told = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
-    told += [f"Cannot be told apart by this recording: {', '.join(group)}." for group in d.indistinguishable]
-    told += [f"To part {' and '.join(s.separates)}: {s.what}" for s in found.suggestions]
-    return told + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
-
-
-def cause_of(effect: str) -> str:
-    """What a technician looks for."""
-    fitting = [name for name in CAUSES if effect.startswith(name)]
-    return CAUSES[max(fitting, key=len)] if fitting else ""
+    said = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
+    said += [f"Cannot be told apart by this recording: {', '.join(group)}." for group in d.indistinguishable]
+    said += [f"To part {' and '.join(s.separates)}: {s.what}" for s in found.suggestions]
+    return said + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
 
 
 def sentence(item: LeftOut, gain: Improvement) -> str:
@@ -64,7 +41,7 @@ def sentence(item: LeftOut, gain: Improvement) -> str:
     alike = item.together > item.probability + _SAME
     together = f" ({probability(item.together)} of it or one that cannot be told from it)" if alike else ""
     return (
-        f"{item.title}: {', '.join(words)}. What it points to: {cause_of(item.effect)}. "
+        f"{item.title}: {', '.join(words)}. What it points to: {item.points_to}. "
         f"Probability {probability(item.probability)}{together}; explains {100 * item.explained:.0f}\u00a0% of the misfit; "
         f"on {gain.unseen} that the fit had not seen the rms falls from "
         f"{gain.heldout_rms_before_um:.1f} to {gain.heldout_rms_after_um:.1f}\u00a0µm."
@@ -81,7 +58,7 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[str, ...
     if noise.contradicts_stated and stated_um is not None:
         texts.append(f"This contradicts the stated {stated_um:g} µm.")
     if noise.placing.value > 0.3 * noise.coordinate.value:
-        texts.append(f"Each placing is off by about {noise.placing.value:.2g} µm that its repeats share.")
+        texts.append(f"Each set-up is off by about {noise.placing.value:.2g} µm that its repeats share.")
     if noise.correlated_in_time:
         texts.append("Neighbouring readings are correlated in time.")
     if noise.heavy_tails:

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq import __version__
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.standards import Statement
 from cmm_uq.diagnosis.diagnosis import LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.program import software
 from cmm_uq.documents.result import Diagnosed, Result
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
@@ -24,13 +24,20 @@ from cmm_uq.units import MICROMETRE
 SCHEMA = "cmm-uq/results/1"
 
 
-def head(job: Job, schema: str = SCHEMA) -> dict[str, Any]:
-    """What every results.json begins with: the schema, the program, and which job with which inputs of which origin."""
+def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, Any]:
+    """What every results.json begins with: the schema, the program, and which job with which inputs of which origin.
+
+    Parameters
+    ----------
+    job : that was asked for.
+    schema : of the file.
+    effects : whether effects took part, and with them the packages that bring some.
+    """
     facts = job.facts.job
     derived = facts.derived_from
     return {
         "schema": schema,
-        "software": {"name": "cmm-uq", "version": __version__},
+        "software": software(effects=effects),
         "job": {
             "id": facts.id,
             "origin": facts.origin,

@@ -1,22 +1,26 @@
 """Every effect by its name.
 
 ``CATALOGUE`` holds the effects that every job file may count on. ``FURTHER`` holds rarer ones: a job may name them, simulate
-them and have them estimated like the others; whether they are thought of unasked is for the diagnosis to decide.
+them and have them estimated like the others; a diagnosis thinks of them less readily. Other packages add theirs
+(:mod:`cmm_uq.physics.plugins`); :func:`every` has them all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from types import MappingProxyType
 
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.physics import drives, probing, reversal, rigid_body, scales, scanning, stylus, thermal, warming
 from cmm_uq.physics.effect import Effect
+from cmm_uq.physics.plugins import Plugin, offered
 
 CATALOGUE = MappingProxyType(
     {effect.name: effect for effect in (*rigid_body.EFFECTS, *drives.EFFECTS, *thermal.EFFECTS, *probing.EFFECTS)}
 )
-"""Effects by name."""
+"""Built-in effects by name."""
 
 FURTHER = MappingProxyType(
     {
@@ -24,22 +28,53 @@ FURTHER = MappingProxyType(
         for effect in (*reversal.EFFECTS, *scales.EFFECTS, *warming.EFFECTS, *stylus.EFFECTS, *scanning.EFFECTS)
     }
 )
-"""Further effects by name."""
+"""Further built-in effects by name."""
 
 EVERY = MappingProxyType({**CATALOGUE, **FURTHER})
-"""All of them by name."""
+"""All built-in effects by name."""
 
 
-def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, ...]:
-    """The named effects, in order.
+def every() -> Mapping[str, Effect]:
+    """All effects by name, the built-in ones first, then those of other packages in the order of their names.
 
     Raises
     ------
-    CmmUqError : a name is unknown or stands twice.
+    CmmUqError : two packages offer the same name, or an effect of one is broken.
     """
+    return _every(tuple(sys.path))
+
+
+def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, ...]:
+    """The named effects, in order. Of other packages only those named are imported.
+
+    Raises
+    ------
+    CmmUqError : a name is unknown, stands twice or is offered twice, or the effect is broken.
+    """
+    outside, found = _outside(tuple(sys.path)), list[Effect]()
     for i, name in enumerate(names):
-        if name not in EVERY:
-            raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, EVERY))
+        if name not in EVERY and name not in outside:
+            raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, {*EVERY, *outside}))
         if name in names[:i]:
             raise CmmUqError(f"the effect {name!r} is named twice", where=where, fix="Name it once")
-    return tuple(EVERY[name] for name in names)
+        found.append(EVERY[name] if name in EVERY else outside[name].effect)
+    return tuple(found)
+
+
+def plugins(names: Iterable[str] | None = None) -> dict[str, str]:
+    """Version of every package whose effects are in the catalogue here, or of those with effects named, by its name."""
+    outside = _outside(tuple(sys.path))
+    asked = outside.keys() if names is None else outside.keys() & set(names)
+    return {plugin.package: plugin.version for name, plugin in outside.items() if name in asked}
+
+
+# What is installed follows from where packages are looked for, so that is the key.
+@lru_cache(maxsize=4)
+def _outside(path: tuple[str, ...]) -> Mapping[str, Plugin]:
+    return offered(EVERY)
+
+
+@lru_cache(maxsize=4)
+def _every(path: tuple[str, ...]) -> Mapping[str, Effect]:
+    outside = {name: plugin.effect for name, plugin in _outside(path).items()}
+    return MappingProxyType({**EVERY, **outside})

@@ -6,22 +6,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmm_uq.physics.effect import Effect, Harmonic, Parameter, Shape, along
+from cmm_uq.physics.effect import Effect, Harmonic, Nonparametric, Parameter, Shape, along
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import HOUR, MICROMETRE
 
 
 class PeriodicScale(Harmonic):
-    """Periodic error of a scale, leadscrew or rack: e_a = A·sin(2π a/λ + φ)."""
+    """Periodic error of a scale, leadscrew or rack."""
+
+    formula = "e_a = A·sin(2π a/λ + φ)"
+    mechanism = "scale"
+    points_to = "an error that repeats with the period: scale interpolation, leadscrew or rack"
 
     amplitude = Parameter("amplitude_um", "µm", 10.0)
     coefficients = (Parameter("cosine_um", "µm", 10.0), Parameter("sine_um", "µm", 10.0))
-    shape = (Shape("period_mm", "mm", 0.5, 1000.0),)
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"periodic_scale_{axis}"
         self.title = f"Periodic scale error of {axis.upper()}"
+        self.shape = (Shape("period_mm", "mm", 0.5, 1000.0, period_along=axis),)
+        self.imitated_by = (Nonparametric(f"{axis}_mm", axis),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
@@ -33,7 +38,11 @@ class PeriodicScale(Harmonic):
 
 
 class Hysteresis(Effect):
-    """Different readings from either side: e_a = ½·gap·approach_a."""
+    """Different readings from either side."""
+
+    formula = "e_a = ½·gap·approach_a"
+    mechanism = "drive"
+    points_to = "backlash or friction in this drive: the reading depends on the side it is reached from"
 
     coefficients = (Parameter("gap_um", "µm", 30.0),)
 
@@ -42,6 +51,8 @@ class Hysteresis(Effect):
         self.name = f"hysteresis_{axis}"
         self.title = f"Hysteresis of {axis.upper()}"
         self.columns = (f"approach_{axis}",)
+        self.idealised_over = axis
+        self.imitated_by = (Nonparametric(f"approach_{axis}"),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -49,10 +60,15 @@ class Hysteresis(Effect):
 
 
 class Drift(Effect):
-    """Drift of an axis with time: e_a = v · time."""
+    """Drift of an axis with time."""
+
+    formula = "e_a = v · time"
+    mechanism = "temperature"
+    points_to = "the axis drifts with time: warm-up, or the room's temperature"
 
     coefficients = (Parameter("um_per_h", "µm/h", 10.0),)
     columns = ("time_s",)
+    idealised_over = "time_s"
 
     def __init__(self, axis: str) -> None:
         self.axis = axis

@@ -21,6 +21,9 @@ from cmm_uq.points import Floats, Points
 CONTRACT, FURTHER = "contract", "further"
 """Tiers: effects that every job file may count on, and rarer ones that only some machines and recordings show."""
 
+PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1}
+"""How readily an effect of a tier is thought of, beside others: a judgement of how many machines show it."""
+
 TRIALS = 7
 
 
@@ -42,12 +45,32 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Shape:
-    """A nonlinear parameter: it shapes the basis, and lies between two bounds (uniform in its logarithm)."""
+    """A nonlinear parameter: it shapes the basis, and lies between two bounds (uniform in its logarithm).
+
+    ``period_along`` is the axis (x, y, z) of whose reading it is a period, if it is one.
+    """
 
     name: str
     unit: str
     low: float
     high: float
+    period_along: str | None = None
+
+
+@dataclass(frozen=True)
+class Nonparametric:
+    """A function of no particular form, as a diagnosis fits one: what it is a function of, and what it changes.
+
+    Parameters
+    ----------
+    of : the covariate: a reading (``x_mm``) or a column (``time_s``).
+    along : axis along which it displaces points; ``None`` for a term of the observations themselves.
+    scale : whether the displacement grows in proportion to the reading of that axis.
+    """
+
+    of: str
+    along: str | None = None
+    scale: bool = False
 
 
 class Effect(ABC):
@@ -57,18 +80,33 @@ class Effect(ABC):
     ----------
     name : as in ``[model] effects``.
     title : in words, for certificates.
+    formula : e with its sign, for documents; a and b are the axes in the name.
+    mechanism : where the cause lies, in a word: scale, drive, guideway, frame, temperature, probe, controller, artefact, ….
+    points_to : what a service technician should look at, to follow "What it points to:"; without a full stop.
     coefficients : what enters e linearly, k of them.
     shape : what shapes the basis, if anything.
     columns : columns that the recording must have.
     tier : ``contract`` or ``further``: how readily it is to be thought of.
+    idealised_over : axis, or column, over which its form is the simplest of many that its mechanism can have, if it is that.
+    imitated_by : nonparametric terms that could pass for it.
     """
 
     name: str
     title: str
+    formula: str
+    mechanism: str
+    points_to: str
     coefficients: tuple[Parameter, ...]
     shape: tuple[Shape, ...] = ()
     columns: tuple[str, ...] = ()
     tier: str = CONTRACT
+    idealised_over: str | None = None
+    imitated_by: tuple[Nonparametric, ...] = ()
+
+    @property
+    def prior_weight(self) -> float:
+        """How readily it is thought of in a diagnosis, beside others."""
+        return PRIOR_WEIGHT[self.tier]
 
     @abstractmethod
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:

@@ -17,10 +17,13 @@ def normals_of(points: Points) -> Floats:
 
 
 class ProbeRadius(Effect):
-    """Error of the effective stylus radius: true surface point = indicated + r·n."""
+    """Error of the effective stylus radius."""
 
     name = "probe_radius"
     title = "Effective stylus radius"
+    formula = "true surface point = indicated + r·n"
+    mechanism = "probe"
+    points_to = "the effective stylus radius is wrong: qualify the probe again"
     coefficients = (Parameter("um", "µm", 10.0),)
     columns = ("nx", "ny", "nz")
 
@@ -30,10 +33,13 @@ class ProbeRadius(Effect):
 
 
 class ProbeLobing(Harmonic):
-    """Three-lobed pre-travel: true surface point = indicated + A·cos(3θ + φ)·n with θ = atan2(ny, nx)."""
+    """Three-lobed pre-travel."""
 
     name = "probe_lobing"
     title = "Lobing of the probe"
+    formula = "true surface point = indicated + A·cos(3θ + φ)·n, θ = atan2(ny, nx)"
+    mechanism = "probe"
+    points_to = "the probe's pre-travel has three lobes: qualify it in more directions"
     amplitude = Parameter("amplitude_um", "µm", 5.0)
     coefficients = (Parameter("cosine_um", "µm", 5.0), Parameter("sine_um", "µm", 5.0))
     columns = ("nx", "ny", "nz")
@@ -47,7 +53,7 @@ class ProbeLobing(Harmonic):
 
 
 class ArtefactSag(Effect):
-    """Bar shortened by its own weight: true length = length − s·cos²(elevation above the table).
+    """Bar shortened by its own weight.
 
     As a displacement it draws the points apart along the bar, in proportion to their place on it, to where they would lie
     without sag.
@@ -55,6 +61,9 @@ class ArtefactSag(Effect):
 
     name = "artefact_sag"
     title = "Sag of the artefact"
+    formula = "true length = length − s·cos²(elevation above the table)"
+    mechanism = "artefact"
+    points_to = "the artefact sags or its supports are not at the right points"
     coefficients = (Parameter("um", "µm", 10.0),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:

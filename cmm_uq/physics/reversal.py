@@ -19,11 +19,13 @@ _MILLISECOND = 1e-3
 
 
 class Play(Effect):
-    """Lateral play: carriage a steps sideways along b when it turns round: e_b = ½·gap·approach_a.
+    """Lateral play: carriage a steps sideways along b when it turns round.
 
     Worn or badly set bearings of the guideway. Along its own direction the same is hysteresis.
     """
 
+    formula = "e_b = ½·gap·approach_a"
+    mechanism = "guideway"
     coefficients = (Parameter("gap_um", "µm", 10.0),)
     tier = FURTHER
 
@@ -31,6 +33,10 @@ class Play(Effect):
         self.axis, self.direction = axis, direction
         self.name = f"play_{axis}_{direction}"
         self.title = f"Lateral play of {axis.upper()} along {direction.upper()}"
+        self.points_to = (
+            f"play across the guideway of {axis.upper()}: check wear, preload and air gap of the bearings that hold the "
+            f"carriage along {direction.upper()}"
+        )
         self.columns = (f"approach_{axis}",)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -39,11 +45,13 @@ class Play(Effect):
 
 
 class YawPlay(Effect):
-    """Carriage a yaws when it turns round: ε_z = ½·angle·approach_a, which moves the ram by ε × what carriage a carries.
+    """Carriage a yaws when it turns round, and moves the ram by what it carries.
 
     A bridge that is driven at one leg, or a drive that is not in line with friction and mass.
     """
 
+    formula = "e = ε × what carriage a carries, ε_z = ½·angle·approach_a"
+    mechanism = "guideway"
     coefficients = (Parameter("angle_arcsec", "″", 2.0),)
     tier = FURTHER
 
@@ -51,6 +59,10 @@ class YawPlay(Effect):
         self.axis = axis
         self.name = f"yaw_play_{axis}"
         self.title = f"Yaw of carriage {axis.upper()} at reversal"
+        self.points_to = (
+            f"carriage {axis.upper()} yaws when it turns round: check the side bearings of its guideway, and where its drive "
+            "takes hold beside its middle"
+        )
         self.columns = (f"approach_{axis}",)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -59,11 +71,13 @@ class YawPlay(Effect):
 
 
 class WindUp(Effect):
-    """Hysteresis that grows along the travel: e_a = ½·w·approach_a·(a − middle of the travel).
+    """Hysteresis that grows along the travel.
 
     A leadscrew or belt that winds up between motor and carriage, or is worn at one end ("unequal backlash").
     """
 
+    formula = "e_a = ½·w·approach_a·(a − middle of the travel)"
+    mechanism = "drive"
     coefficients = (Parameter("um_per_m", "µm/m", 20.0),)
     tier = FURTHER
 
@@ -71,6 +85,10 @@ class WindUp(Effect):
         self.axis = axis
         self.name = f"windup_{axis}"
         self.title = f"Wind-up of the drive of {axis.upper()}"
+        self.points_to = (
+            f"the drive of {axis.upper()} winds up, or is worn more at one end of the travel: check leadscrew, belt or rack, "
+            "its tension and its end bearings"
+        )
         self.columns = (f"approach_{axis}",)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -81,20 +99,25 @@ class WindUp(Effect):
 
 
 class SpeedLag(Effect):
-    """Scale and trigger read at different moments: e_a = lag·speed along a, in the sense of travel.
+    """Scale and trigger read at different moments.
 
     A positive lag: the scale was read before the probe was where it triggered. Speed along a is the recorded speed times
     the direction of travel.
     """
 
+    formula = "e_a = lag·speed along a, in the sense of travel"
+    mechanism = "controller"
     coefficients = (Parameter("lag_ms", "ms", 1.0),)
-
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"speed_lag_{axis}"
         self.title = f"Lag of {axis.upper()} in proportion to speed"
+        self.points_to = (
+            f"the scale of {axis.upper()} and the trigger are read at different moments: check how the controller latches "
+            "this scale, and probe more slowly until then"
+        )
         self.columns = ("speed_mm_s", *(f"approach_{a}" for a in AXES))
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:

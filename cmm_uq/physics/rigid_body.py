@@ -6,17 +6,22 @@ A rotation of a carriage acts on all that it carries, so its lever arm comes fro
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.physics.effect import Effect, Parameter, along
+from cmm_uq.physics.effect import Effect, Nonparametric, Parameter, along
 from cmm_uq.physics.kinematics import Chain, carried_offset
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, PPM
 
 
 class Scale(Effect):
-    """Linear scale error: e_a = s · a."""
+    """Linear scale error."""
+
+    formula = "e_a = s · a"
+    mechanism = "scale"
+    points_to = "the scale or its compensation: check the linear compensation of this axis"
 
     coefficients = (Parameter("ppm", "ppm", 300.0),)
 
@@ -24,6 +29,7 @@ class Scale(Effect):
         self.axis = axis
         self.name = f"scale_{axis}"
         self.title = f"Scale error of {axis.upper()}"
+        self.imitated_by = (Nonparametric(f"{axis}_mm", axis), Nonparametric("time_s", axis, scale=True))
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -31,7 +37,11 @@ class Scale(Effect):
 
 
 class Squareness(Effect):
-    """Squareness of two axes: xy: e_x = −S·y; yz: e_y = −S·z; zx: e_x = −S·z."""
+    """Squareness of two axes: their angle less 90°."""
+
+    formula = "xy: e_x = −S·y; yz: e_y = −S·z; zx: e_x = −S·z"
+    mechanism = "frame"
+    points_to = "the axes are not square: adjust the guideways or the squareness in the compensation"
 
     coefficients = (Parameter("angle_arcsec", "″", 500.0),)
 
@@ -39,6 +49,7 @@ class Squareness(Effect):
         self.moved, self.lever = moved, lever
         self.name = f"squareness_{plane}"
         self.title = f"Squareness {plane[0].upper()}–{plane[1].upper()}"
+        self.imitated_by = (Nonparametric(f"{lever}_mm", moved),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -46,7 +57,11 @@ class Squareness(Effect):
 
 
 class Straightness(Effect):
-    """Straightness of carriage a along b as one bow: e_b = bow · (1 − (2(a − a0)/T − 1)²), T the travel from a0."""
+    """Straightness of carriage a along b as one bow over the travel T from a0."""
+
+    formula = "e_b = bow · (1 − (2(a − a0)/T − 1)²)"
+    mechanism = "guideway"
+    points_to = "a bowed guideway: check straightness and its compensation"
 
     coefficients = (Parameter("bow_um", "µm", 50.0),)
 
@@ -54,6 +69,8 @@ class Straightness(Effect):
         self.axis, self.direction = axis, direction
         self.name = f"straightness_{axis}_{direction}"
         self.title = f"Straightness of {axis.upper()} along {direction.upper()}"
+        self.idealised_over = axis
+        self.imitated_by = (Nonparametric(f"{axis}_mm", direction),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -63,7 +80,11 @@ class Straightness(Effect):
 
 
 class Rotation(Effect):
-    """Carriage a turns about b in proportion to its travel, ε = r·(a − a0): roll, pitch or yaw."""
+    """Carriage a turns about b in proportion to its travel from a0: roll, pitch or yaw."""
+
+    formula = "e = ε × what carriage a carries, ε_b = r·(a − a0)"
+    mechanism = "guideway"
+    points_to = "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation"
 
     coefficients = (Parameter("arcsec_per_m", "″/m", 60.0),)
 
@@ -71,6 +92,7 @@ class Rotation(Effect):
         self.axis, self.about = axis, about
         self.name = f"rotation_{axis}_{about}"
         self.title = f"Rotation of carriage {axis.upper()} about {about.upper()}"
+        self.idealised_over = axis
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -90,11 +112,23 @@ def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
     return np.cross(rotation, carried)[:, :, None]
 
 
+SCALE = MappingProxyType({a: Scale(a) for a in AXES})
+"""By axis."""
+
+SQUARENESS = MappingProxyType(
+    {"xy": Squareness("xy", "x", "y"), "yz": Squareness("yz", "y", "z"), "zx": Squareness("zx", "x", "z")}
+)
+"""By plane."""
+
+STRAIGHTNESS = MappingProxyType({(a, b): Straightness(a, b) for a in AXES for b in AXES if a != b})
+"""By carriage and direction."""
+
+ROTATION = MappingProxyType({(a, b): Rotation(a, b) for a in AXES for b in AXES})
+"""By carriage and the axis about which it turns."""
+
 EFFECTS: tuple[Effect, ...] = (
-    *(Scale(a) for a in AXES),
-    Squareness("xy", "x", "y"),
-    Squareness("yz", "y", "z"),
-    Squareness("zx", "x", "z"),
-    *(Straightness(a, b) for a in AXES for b in AXES if a != b),
-    *(Rotation(a, b) for a in AXES for b in AXES),
+    *SCALE.values(),
+    *SQUARENESS.values(),
+    *STRAIGHTNESS.values(),
+    *ROTATION.values(),
 )

@@ -23,11 +23,13 @@ _STANDARD = (REFERENCE_TEMPERATURE, 101325.0, 50.0)
 
 
 class ScaleCurvature(Effect):
-    """Position error of second order: e_a = bow·(1 − (2(a − a0)/T − 1)²), T the travel from a0.
+    """Position error of second order, over the travel T from a0.
 
     A scale clamped at both ends, a tape that is stretched unevenly, a rack of two pieces.
     """
 
+    formula = "e_a = bow·(1 − (2(a − a0)/T − 1)²)"
+    mechanism = "scale"
     coefficients = (Parameter("bow_um", "µm", 10.0),)
     tier = FURTHER
 
@@ -35,6 +37,10 @@ class ScaleCurvature(Effect):
         self.axis = axis
         self.name = f"scale_curvature_{axis}"
         self.title = f"Curvature of the scale of {axis.upper()}"
+        self.points_to = (
+            f"the scale of {axis.upper()} is stretched unevenly: check how its ends are clamped and its joints, and "
+            "compensate position by a table, which one factor cannot replace"
+        )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -44,11 +50,13 @@ class ScaleCurvature(Effect):
 
 
 class AirScale(Effect):
-    """A laser scale whose wavelength is not corrected for air: e_a = −part·(n − n₀)·a, n₀ at 20 °C, 1013.25 hPa, 50 %.
+    """A laser scale whose wavelength is not corrected for air; n₀ at 20 °C, 1013.25 hPa, 50 %.
 
     Part 1 is no correction at all. About −1 ppm/K, +0.27 ppm/hPa, −0.01 ppm/% in n (Harris 2004 section 3.3).
     """
 
+    formula = "e_a = −part·(n − n₀)·a"
+    mechanism = "scale"
     coefficients = (Parameter("part", "1", 1.0),)
     columns = AIR
     tier = FURTHER
@@ -57,6 +65,10 @@ class AirScale(Effect):
         self.axis = axis
         self.name = f"air_scale_{axis}"
         self.title = f"Refractive index of air on the laser scale of {axis.upper()}"
+        self.points_to = (
+            f"the laser of {axis.upper()} is not, or wrongly, corrected for air: check its sensors of air temperature, "
+            "pressure and humidity, and that the compensation uses them"
+        )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -64,11 +76,13 @@ class AirScale(Effect):
 
 
 class DeadPath(Effect):
-    """Dead path of a laser scale: e_a = −d·(n − n at the first point), d the path that the zero of the scale leaves out.
+    """Dead path of a laser scale: the path d that the zero of the scale leaves out.
 
     The air between interferometer and zero changes its optical length while nothing moves.
     """
 
+    formula = "e_a = −d·(n − n at the first point)"
+    mechanism = "scale"
     coefficients = (Parameter("path_mm", "mm", 300.0),)
     columns = AIR
     tier = FURTHER
@@ -77,6 +91,10 @@ class DeadPath(Effect):
         self.axis = axis
         self.name = f"dead_path_{axis}"
         self.title = f"Dead path of the laser scale of {axis.upper()}"
+        self.points_to = (
+            f"the dead path of the laser of {axis.upper()} is not compensated: enter it in the compensation, or zero the axis "
+            "close to the interferometer"
+        )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

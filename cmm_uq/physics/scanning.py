@@ -18,13 +18,19 @@ from cmm_uq.units import MICROMETRE
 
 
 class DigitizerOffset(Effect):
-    """Digitizer misaligned in its scan plane: e = du·u + dv·v, which turns with the pose.
+    """Digitizer misaligned in its scan plane, which turns with the pose.
 
     An alignment on the reference sphere that was off by [du dv], or a mount that has moved since (Harris 2004 eq. 14–25).
     """
 
     name = "digitizer_offset"
     title = "Alignment of the digitizer"
+    formula = "e = du·u + dv·v"
+    mechanism = "digitizer"
+    points_to = (
+        "the digitizer is out of alignment, or has moved in its mount: tighten the mount and align it on the reference sphere "
+        "again, in every pose"
+    )
     coefficients = (Parameter("u_um", "µm", 20.0), Parameter("v_um", "µm", 20.0))
     columns = ("gamma_deg",)
     tier = FURTHER
@@ -35,10 +41,13 @@ class DigitizerOffset(Effect):
 
 
 class DigitizerDepth(Effect):
-    """Error in proportion to scan depth: e = k·depth·v, the depth from the column ``depth_mm`` (Feng 2001, Xi 2001)."""
+    """Error in proportion to scan depth, from the column ``depth_mm`` (Feng 2001, Xi 2001)."""
 
     name = "digitizer_depth"
     title = "Depth bias of the digitizer"
+    formula = "e = k·depth·v"
+    mechanism = "digitizer"
+    points_to = "the digitizer's depth scale is wrong: calibrate it over its range, and scan in its middle until then"
     coefficients = (Parameter("um_per_mm", "µm/mm", 1.0),)
     columns = ("gamma_deg", "depth_mm")
     tier = FURTHER
@@ -49,13 +58,19 @@ class DigitizerDepth(Effect):
 
 
 class DigitizerIncidence(Effect):
-    """Error in proportion to the angles between beam and normal: e = (kᵢ·incident + kₚ·projected)·v (Feng 2001, Xi 2001).
+    """Error in proportion to the angles between beam and normal (Feng 2001, Xi 2001).
 
     The incident angle lies in the scan plane, the projected one across it.
     """
 
     name = "digitizer_incidence"
     title = "Incidence of the digitizer's light"
+    formula = "e = (kᵢ·incident + kₚ·projected)·v"
+    mechanism = "digitizer"
+    points_to = (
+        "the digitizer errs where its light meets the surface askew: turn it square to the surface, or correct its readings "
+        "for the angle"
+    )
     coefficients = (Parameter("incident_um_per_deg", "µm/°", 1.0), Parameter("projected_um_per_deg", "µm/°", 1.0))
     columns = ("gamma_deg", "nx", "ny", "nz")
     tier = FURTHER

@@ -23,13 +23,19 @@ _MILLISECOND = 1e-3
 
 
 class PreTravel(Effect):
-    """Pre-travel, or a wrong stylus radius, where only the direction of travel is known: e = −amount·travel.
+    """Pre-travel, or a wrong stylus radius, where only the direction of travel is known.
 
     The same gap on every axis, unlike hysteresis, whose axes differ. Travel is a unit vector against the normal.
     """
 
     name = "pre_travel"
     title = "Pre-travel of the probe"
+    formula = "e = −amount·travel"
+    mechanism = "probe"
+    points_to = (
+        "the probe's pre-travel or the stylus radius is wrong by as much in every direction: qualify the probe again, with "
+        "the speed and the force of the measurement"
+    )
     coefficients = (Parameter("um", "µm", 10.0),)
     columns = tuple(f"approach_{a}" for a in AXES)
     tier = FURTHER
@@ -40,13 +46,19 @@ class PreTravel(Effect):
 
 
 class ProbeAxial(Effect):
-    """Deflection along the stylus unlike that across it: e = amount·(n·t)·t, t along the stylus (the ram without tip columns).
+    """Deflection along the stylus unlike that across it; t is along the stylus (the ram without tip columns).
 
     A kinematic probe head triggers at once along its axis and late across it.
     """
 
     name = "probe_axial"
     title = "Deflection of the probe along its axis"
+    formula = "e = amount·(n·t)·t"
+    mechanism = "probe"
+    points_to = (
+        "the probe gives way differently along the stylus and across it: qualify it with points along the stylus too, and "
+        "check its trigger force"
+    )
     coefficients = (Parameter("um", "µm", 5.0),)
     columns = ("nx", "ny", "nz")
     tier = FURTHER
@@ -59,13 +71,19 @@ class ProbeAxial(Effect):
 
 
 class StylusBending(Effect):
-    """Bending of the stylus: e = amount·(L/100 mm)³·(n − (n·t)t), L its length from the tip columns.
+    """Bending of the stylus t, whose length L follows from the tip columns.
 
     A cantilever under the probing force gives way by F·L³/(3·E·I).
     """
 
     name = "stylus_bending"
     title = "Bending of the stylus"
+    formula = "e = amount·(L/100 mm)³·(n − (n·t)t)"
+    mechanism = "probe"
+    points_to = (
+        "the stylus bends under the probing force: take a shorter or stiffer one, or a lower force, and qualify each stylus "
+        "by itself"
+    )
     coefficients = (Parameter("um", "µm", 5.0),)
     columns = ("nx", "ny", "nz", *_TIPS)
     tier = FURTHER
@@ -80,10 +98,16 @@ class StylusBending(Effect):
 
 
 class TriggerDelay(Effect):
-    """Delay between contact and reading: e = delay·speed·n."""
+    """Delay between contact and reading."""
 
     name = "trigger_delay"
     title = "Delay of the probe's trigger"
+    formula = "e = delay·speed·n"
+    mechanism = "controller"
+    points_to = (
+        "the trigger reaches the controller late: check the probe's interface and cable, and qualify the probe at the speed "
+        "of the measurement"
+    )
     coefficients = (Parameter("delay_ms", "ms", 1.0),)
     columns = ("nx", "ny", "nz", "speed_mm_s")
     tier = FURTHER

@@ -7,6 +7,7 @@ thermal expansion zero here.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import MappingProxyType
 
 from cmm_uq.physics.effect import Effect, Parameter, along
 from cmm_uq.physics.rigid_body import turned
@@ -18,7 +19,11 @@ EXPANSION = Parameter("cte_per_k", "1/K", 12e-6)
 
 
 class ThermalScale(Effect):
-    """Expansion of a scale: e_a = α·(temp_a − 20 °C)·a."""
+    """Expansion of a scale."""
+
+    formula = "e_a = α·(temp_a − 20 °C)·a"
+    mechanism = "temperature"
+    points_to = "the scale expands and its temperature is not, or wrongly, compensated"
 
     coefficients = (EXPANSION,)
 
@@ -35,13 +40,16 @@ class ThermalScale(Effect):
 
 
 class ThermalArtefact(Effect):
-    """Expansion of the artefact: length = length at 20 °C · (1 + α·(temp_artefact − 20 °C)).
+    """Expansion of the artefact.
 
     As a displacement it draws the points together about their middle to where they would lie at 20 °C.
     """
 
     name = "thermal_artefact"
     title = "Thermal expansion of the artefact"
+    formula = "length = length at 20 °C · (1 + α·(temp_artefact − 20 °C))"
+    mechanism = "artefact"
+    points_to = "the artefact expands and its temperature is not, or wrongly, compensated"
     coefficients = (EXPANSION,)
     columns = ("temp_artefact_c",)
 
@@ -52,10 +60,13 @@ class ThermalArtefact(Effect):
 
 
 class ThermalGradient(Effect):
-    """Table bent by a gradient: carriage x turns about y by ε = k·(temp_table_top − temp_table_bottom)·(x − x0)."""
+    """Table bent by a gradient: carriage x turns about y."""
 
     name = "thermal_gradient"
     title = "Bending by the temperature gradient in the table"
+    formula = "e = ε × what carriage x carries, ε_y = k·(temp_table_top − temp_table_bottom)·(x − x0)"
+    mechanism = "temperature"
+    points_to = "the table bends: top and bottom differ in temperature"
     coefficients = (Parameter("arcsec_per_m_k", "″/(m·K)", 20.0),)
     columns = ("temp_table_top_c", "temp_table_bottom_c")
 
@@ -67,4 +78,7 @@ class ThermalGradient(Effect):
         return turned(points, "x", "y", angle)
 
 
-EFFECTS: tuple[Effect, ...] = (*(ThermalScale(a) for a in AXES), ThermalArtefact(), ThermalGradient())
+SCALE_EXPANSION = MappingProxyType({a: ThermalScale(a) for a in AXES})
+"""By axis."""
+
+EFFECTS: tuple[Effect, ...] = (*SCALE_EXPANSION.values(), ThermalArtefact(), ThermalGradient())

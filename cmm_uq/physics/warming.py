@@ -24,7 +24,10 @@ LAG = Shape("lag_h", "h", 0.05, 5.0)
 
 
 class ScaleDrift(Effect):
-    """A scale that grows with time: e_a = r·time·a. A room or a machine that warms steadily."""
+    """A scale that grows with time. A room or a machine that warms steadily."""
+
+    formula = "e_a = r·time·a"
+    mechanism = "temperature"
 
     coefficients = (Parameter("ppm_per_h", "ppm/h", 5.0),)
     columns = ("time_s",)
@@ -34,6 +37,10 @@ class ScaleDrift(Effect):
         self.axis = axis
         self.name = f"scale_drift_{axis}"
         self.title = f"Scale of {axis.upper()} growing with time"
+        self.points_to = (
+            f"the scale of {axis.upper()} changes steadily while the machine or the room warms or cools: measure in thermal "
+            "equilibrium, and check the temperature compensation of this scale"
+        )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -42,7 +49,10 @@ class ScaleDrift(Effect):
 
 
 class Settling(Effect):
-    """Drift that settles: e_a = A·(1 − exp(−time/τ)). What follows switching on, or a door left open."""
+    """Drift that settles. What follows switching on, or a door left open."""
+
+    formula = "e_a = A·(1 − exp(−time/τ))"
+    mechanism = "temperature"
 
     coefficients = (Parameter("um", "µm", 20.0),)
     shape = (SETTLING,)
@@ -53,6 +63,10 @@ class Settling(Effect):
         self.axis = axis
         self.name = f"settling_{axis}"
         self.title = f"Settling of {axis.upper()}"
+        self.points_to = (
+            f"the zero of {axis.upper()} moves and comes to rest: let machine, probe and artefact settle longer after "
+            "switching on, setting up or an open door"
+        )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -60,7 +74,10 @@ class Settling(Effect):
 
 
 class ScaleSettling(Effect):
-    """A scale that settles: e_a = s·(1 − exp(−time/τ))·a. An axis warmed by its motor, an air supply that was switched on."""
+    """A scale that settles. An axis warmed by its motor, an air supply that was switched on."""
+
+    formula = "e_a = s·(1 − exp(−time/τ))·a"
+    mechanism = "temperature"
 
     coefficients = (Parameter("ppm", "ppm", 20.0),)
     shape = (SETTLING,)
@@ -71,6 +88,10 @@ class ScaleSettling(Effect):
         self.axis = axis
         self.name = f"scale_settling_{axis}"
         self.title = f"Scale of {axis.upper()} settling"
+        self.points_to = (
+            f"the scale of {axis.upper()} takes on another temperature and comes to rest: move the axis to warm it up before "
+            "measuring, and look at what heats or cools it, its motor or the air supply"
+        )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -78,11 +99,13 @@ class ScaleSettling(Effect):
 
 
 class ThermalSquareness(Effect):
-    """Squareness that changes with temperature: S = k·(mean of temp_x, temp_y, temp_z − 20 °C), signs as for squareness.
+    """Squareness that changes with temperature.
 
     A frame of two materials. Harris 2004 table 7 looked for it, and found XY free of it and YZ, ZX by up to 4″/K.
     """
 
+    formula = "as of squareness, with S = k·(mean of temp_x, temp_y, temp_z − 20 °C)"
+    mechanism = "temperature"
     coefficients = (Parameter("arcsec_per_k", "″/K", 4.0),)
     columns = tuple(f"temp_{a}_c" for a in AXES)
     tier = FURTHER
@@ -91,6 +114,10 @@ class ThermalSquareness(Effect):
         self.moved, self.lever = moved, lever
         self.name = f"thermal_squareness_{plane}"
         self.title = f"Squareness {plane[0].upper()}–{plane[1].upper()} with temperature"
+        self.points_to = (
+            f"the angle between {plane[0].upper()} and {plane[1].upper()} follows the temperature of the frame: keep the "
+            "machine at the temperature of its calibration, or compensate squareness by temperature"
+        )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -99,18 +126,21 @@ class ThermalSquareness(Effect):
 
 
 class CarriageGradient(Effect):
-    """A carriage bent by a gradient across it: carriage a turns about b by ε = k·(difference)·(a − a0).
+    """A carriage bent by a gradient across it: bridge: y turns about x; ram: z turns about y.
 
     As the table under ``thermal_gradient``: the bridge between its upper and lower side, the ram between front and back.
     """
 
+    formula = "e = ε × what carriage a carries, ε_b = k·(difference)·(a − a0)"
+    mechanism = "temperature"
     coefficients = (Parameter("arcsec_per_m_k", "″/(m·K)", 20.0),)
     tier = FURTHER
 
-    def __init__(self, what: str, axis: str, about: str, columns: tuple[str, str]) -> None:
+    def __init__(self, what: str, axis: str, about: str, columns: tuple[str, str], points_to: str) -> None:
         self.axis, self.about = axis, about
         self.name = f"thermal_gradient_{what}"
         self.title = f"Bending by the temperature gradient in the {what}"
+        self.points_to = points_to
         self.columns = columns
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -122,7 +152,7 @@ class CarriageGradient(Effect):
 
 
 class ArtefactLag(Effect):
-    """Artefact behind its thermometer: longer by α·(T′ − temp_artefact)·length, with τ·dT′/dt = temp_artefact − T′.
+    """Artefact behind its thermometer.
 
     It stands beside the artefact's expansion (stated, or ``thermal_artefact``), which follows the thermometer. T′ begins at
     the first recorded temperature, and temperatures between two records lie on a line.
@@ -130,6 +160,12 @@ class ArtefactLag(Effect):
 
     name = "artefact_lag"
     title = "Artefact lagging behind its thermometer"
+    formula = "longer by α·(T′ − temp_artefact)·length, τ·dT′/dt = temp_artefact − T′"
+    mechanism = "artefact"
+    points_to = (
+        "the artefact takes on the temperature later than its thermometer: let it soak longer, and fix the thermometer to its "
+        "body"
+    )
     coefficients = (EXPANSION,)
     shape = (LAG,)
     columns = ("temp_artefact_c", "time_s")
@@ -168,7 +204,19 @@ EFFECTS: tuple[Effect, ...] = (
     ThermalSquareness("xy", "x", "y"),
     ThermalSquareness("yz", "y", "z"),
     ThermalSquareness("zx", "x", "z"),
-    CarriageGradient("bridge", "y", "x", ("temp_bridge_top_c", "temp_bridge_bottom_c")),
-    CarriageGradient("ram", "z", "y", ("temp_ram_front_c", "temp_ram_back_c")),
+    CarriageGradient(
+        "bridge",
+        "y",
+        "x",
+        ("temp_bridge_top_c", "temp_bridge_bottom_c"),
+        "the bridge bends: its upper and lower side differ in temperature, look for warm air, lamps or a draught above it",
+    ),
+    CarriageGradient(
+        "ram",
+        "z",
+        "y",
+        ("temp_ram_front_c", "temp_ram_back_c"),
+        "the ram bends: its front and back differ in temperature, look for a motor, a lamp, sun or a draught at one side",
+    ),
     ArtefactLag(),
 )

@@ -9,8 +9,8 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import WITH_REFERENCES, ArtefactFacts, Job
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.model import MeasurementModel
-from cmm_uq.physics.catalogue import CATALOGUE, effects
-from cmm_uq.physics.effect import Effect
+from cmm_uq.physics.catalogue import effects, every
+from cmm_uq.physics.effect import CONTRACT, Effect
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Machine, Points
 from cmm_uq.units import MICROMETRE
@@ -80,7 +80,7 @@ class Setting:
         return MeasurementModel(artefact_of(self.artefact, points), (*self.named, *also), self.sigma)
 
     def rivals(self, points: Points) -> tuple[Effect, ...]:
-        """Effects that the job does not name: those that the plan lists, else all of the catalogue that could act here.
+        """Effects that the job does not name: those that the plan lists, else all of the first tier that could act here.
 
         Effects with a nonlinear parameter are left out: how well one is seen depends on its value.
 
@@ -99,8 +99,9 @@ class Setting:
             return tuple(effect for effect in chosen if effect.name not in named and not effect.shape)
         return tuple(
             effect
-            for effect in CATALOGUE.values()
-            if effect.name not in named
+            for effect in every().values()
+            if effect.tier == CONTRACT
+            and effect.name not in named
             and not effect.shape
             and all(column in points.columns for column in effect.columns)
         )

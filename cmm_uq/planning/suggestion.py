@@ -23,7 +23,7 @@ from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.measurement import ARTEFACT
-from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.catalogue import every
 from cmm_uq.planning.candidates import like
 from cmm_uq.planning.information import certified, gram, scales, shared
 from cmm_uq.planning.placing import Pattern, Placing, appended
@@ -58,7 +58,7 @@ class Suggestion:
 
 
 @dataclass(frozen=True, eq=False)
-class _Told:
+class _Information:
     """Information of the recording (k, k), of each candidate (c, k, k) and of certificates (k, k).
 
     ``names`` (k,) says whose rows they are, ``fitted`` which of them the diagnosis fits beside any pair.
@@ -89,10 +89,10 @@ def suggestions(diagnosis: Diagnosis, facts: ArtefactFacts, plan: PlanFacts | No
         facts = facts.model_copy(update={"length_mm": artefact.sizes[0].nominal})
     try:
         places = _candidates(artefact, plan or PlanFacts(margin_mm=0.0))
-        told = _told(diagnosis.after, model, facts, places)
+        known = _information(diagnosis.after, model, facts, places)
     except CmmUqError:  # nowhere else to put it
         return ()
-    found = [_best(diagnosis.after, told, places, artefact.title.lower(), pair) for pair in pairs]
+    found = [_best(diagnosis.after, known, places, artefact.title.lower(), pair) for pair in pairs]
     return tuple(suggestion for suggestion in found if suggestion is not None)
 
 
@@ -100,10 +100,10 @@ def _with_all(after: MeasurementModel, names: Sequence[str]) -> MeasurementModel
     """The model with every effect of every pair, periods as found or the longest."""
     shape = dict(after.shapes)
     for name in names:
-        if EVERY[name].shape and name not in shape:
-            shape[name] = next(iter(shapes(EVERY[name], after.artefact.points)))
+        if every()[name].shape and name not in shape:
+            shape[name] = next(iter(shapes(every()[name], after.artefact.points)))
     others = tuple(effect for effect in after.effects if effect.name not in names)
-    return replace(after, effects=(*others, *(EVERY[name] for name in names)), shapes=shape)
+    return replace(after, effects=(*others, *(every()[name] for name in names)), shapes=shape)
 
 
 def _candidates(artefact: Artefact, plan: PlanFacts) -> tuple[Placing, ...]:
@@ -122,7 +122,9 @@ def _candidates(artefact: Artefact, plan: PlanFacts) -> tuple[Placing, ...]:
     return like(pattern, artefact.kind, volume, attitude, _CANDIDATES)
 
 
-def _told(after: MeasurementModel, model: MeasurementModel, facts: ArtefactFacts, places: Sequence[Placing]) -> _Told:
+def _information(
+    after: MeasurementModel, model: MeasurementModel, facts: ArtefactFacts, places: Sequence[Placing]
+) -> _Information:
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     names = tuple(unknown.key[0] for unknown in model.unknowns)
     fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
@@ -131,7 +133,7 @@ def _told(after: MeasurementModel, model: MeasurementModel, facts: ArtefactFacts
         whole = shared(MeasurementModel(artefact_of(facts, every), model.effects, model.sigma, shapes=model.shapes))
         count = len(whole.each) - len(places)
         more = len(whole.prior) - len(names)
-        return _Told(
+        return _Information(
             (*names, *[ARTEFACT] * more), fitted, whole.each[:count].sum(axis=0), whole.each[count:], whole.prior
         )
     each = [
@@ -140,16 +142,16 @@ def _told(after: MeasurementModel, model: MeasurementModel, facts: ArtefactFacts
         )
         for place in places
     ]
-    return _Told(names, fitted, gram(model, values), np.stack(each), certified(model.unknowns))
+    return _Information(names, fitted, gram(model, values), np.stack(each), certified(model.unknowns))
 
 
 def _best(
-    after: MeasurementModel, told: _Told, places: Sequence[Placing], title: str, pair: tuple[str, str]
+    after: MeasurementModel, known: _Information, places: Sequence[Placing], title: str, pair: tuple[str, str]
 ) -> Suggestion | None:
     sizes = {name: _size(after, name, pair) for name in pair}
-    before = float(_expected(told, told.recorded[None], pair, sizes)[0])
+    before = float(_expected(known, known.recorded[None], pair, sizes)[0])
     for repetitions in range(1, _MOST + 1):
-        log_odds = _expected(told, told.recorded + repetitions * told.each, pair, sizes)
+        log_odds = _expected(known, known.recorded + repetitions * known.each, pair, sizes)
         best = int(np.argmax(log_odds))
         if log_odds[best] >= np.log(ODDS):
             odds = float(np.exp(min(log_odds[best], 50.0)))
@@ -166,7 +168,7 @@ def _best(
 def _size(after: MeasurementModel, name: str, pair: tuple[str, str]) -> Floats:
     """Size at which one effect of a pair, without the other, explains the recording, over its prior standard deviation."""
     others = tuple(effect for effect in after.effects if effect.name not in pair)
-    effect = EVERY[name]
+    effect = every()[name]
     shape = dict(after.shapes)
     if effect.shape and name not in shape:
         shape[name] = next(iter(shapes(effect, after.artefact.points)))
@@ -175,13 +177,13 @@ def _size(after: MeasurementModel, name: str, pair: tuple[str, str]) -> Floats:
     return np.asarray([v for v, u in zip(value, model.unknowns, strict=True) if u.key[0] == name], dtype=np.float64)
 
 
-def _expected(told: _Told, information: Floats, pair: tuple[str, str], sizes: Mapping[str, Floats]) -> Floats:
+def _expected(known: _Information, information: Floats, pair: tuple[str, str], sizes: Mapping[str, Floats]) -> Floats:
     """Expected log odds (c,) of the true one of a pair over the other, the less of the two, everything else fitted."""
-    both = {name: [i for i, owner in enumerate(told.names) if owner == name] for name in pair}
-    rest = [i for i, owner in enumerate(told.names) if owner in told.fitted and owner not in pair]
+    both = {name: [i for i, owner in enumerate(known.names) if owner == name] for name in pair}
+    rest = [i for i, owner in enumerate(known.names) if owner in known.fitted and owner not in pair]
     found = []
     for true, other in (pair, pair[::-1]):
-        left = left_of(information + told.prior, both[true], [*rest, *both[other]])
+        left = left_of(information + known.prior, both[true], [*rest, *both[other]])
         found.append(0.5 * np.einsum("i,cij,j->c", sizes[true], left, sizes[true]))
     return np.asarray(np.minimum(found[0], found[1]), dtype=np.float64)
 

@@ -10,7 +10,7 @@ from scipy import stats
 
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.commands.diagnosing import diagnose_job
-from cmm_uq.diagnosis.comparison.search import race_of
+from cmm_uq.diagnosis.comparison.search import model_comparison
 from cmm_uq.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.diagnosis.held_out import improvement
 from cmm_uq.jobs.reading import read_job
@@ -120,7 +120,7 @@ def test_false_alarms_are_as_frequent_as_the_p_value_says() -> None:
             empty.simulate(np.zeros(0), np.array([400.0]), Noise(1e-3), np.random.default_rng(1000 + seed))
         )
         stated = 1e-3 if seed % 2 else None
-        values.append(race_of(MeasurementModel(Ballbar(bar_facts(), drawn), effects(SIX)), stated, 0).p_value)
+        values.append(model_comparison(MeasurementModel(Ballbar(bar_facts(), drawn), effects(SIX)), stated, 0).p_value)
     assert stats.kstest(values, "uniform").pvalue > 1e-3
     assert sum(value < 0.01 for value in values) <= 4
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.diagnosis.comparison.search import race_of
+from cmm_uq.diagnosis.comparison.search import model_comparison
 from cmm_uq.diagnosis.power import POWER, Power, powers, without_fault
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
@@ -65,6 +65,6 @@ def test_the_gate_opens_as_often_as_predicted() -> None:
     for _ in range(10):
         sizes = np.array([size.nominal + size.sd * random.standard_normal() for size in acting.artefact.sizes])
         xyz = acting.simulate(np.array([power.detectable]), sizes, Noise(SETTING.sigma), random)
-        alarms += race_of(SETTING.model(POINTS.at(xyz)), SETTING.sigma, 0).p_value < ALPHA
+        alarms += model_comparison(SETTING.model(POINTS.at(xyz)), SETTING.sigma, 0).p_value < ALPHA
     low, high = stats.binom.interval(0.999, 10, power.detected(power.detectable))
     assert low <= alarms <= high

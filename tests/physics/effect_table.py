@@ -99,7 +99,7 @@ def row(family: list[Effect], artefacts: dict[str, Artefact]) -> str:
     columns = ", ".join(f"`{c}`" for c in dict.fromkeys(c for e in family for c in e.columns)) or "–"
     seen = [kind for kind, artefact in artefacts.items() if any(seen_by(e, artefact) for e in family)]
     names = ", ".join(f"`{e.name}`" for e in family)
-    return f"| {names} | {summary} | {parameters} | {columns} | {', '.join(seen)} |"
+    return f"| {names} | {summary} | {effect.formula} | {parameters} | {columns} | {', '.join(seen)} |"
 
 
 def parameter(given: Parameter | Shape) -> str:
@@ -110,14 +110,26 @@ def parameter(given: Parameter | Shape) -> str:
 
 
 def table() -> str:
-    """Both tiers."""
+    """Both tiers, and what every effect points to."""
     artefacts = {kind: recorded(kind) for kind in EXAMPLES}
     parts = []
     for title, tier in (("Effects of every job", dict(CATALOGUE)), ("Further effects", dict(FURTHER))):
         rows = [row(family, artefacts) for family in families(tier)]
-        head = "| effect | what it does | parameters, prior | columns | seen by |\n| --- | --- | --- | --- | --- |"
+        head = "| effect | what it does | formula | parameters, prior | columns | seen by |\n|" + 6 * " --- |"
         parts.append(f"## {title}\n\n{head}\n" + "\n".join(rows))
+    head = "| effect | cause in | what it points to |\n| --- | --- | --- |"
+    parts.append(
+        "## What each points to\n\n" + "\n".join([head, *(line for f in families(dict(EVERY)) for line in causes(f))])
+    )
     return "\n\n".join(parts)
+
+
+def causes(family: list[Effect]) -> list[str]:
+    """Lines of what the effects of a class point to, one for each text."""
+    said: dict[str, list[str]] = {}
+    for effect in family:
+        said.setdefault(effect.points_to, []).append(f"`{effect.name}`")
+    return [f"| {', '.join(names)} | {family[0].mechanism} | {text} |" for text, names in said.items()]
 
 
 def main() -> None:

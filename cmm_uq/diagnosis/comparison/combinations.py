@@ -22,7 +22,7 @@ EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
 """Probability, beforehand, of none, one, two, three and four known effects that the job does not name."""
 
 UNKNOWNS = (0.85, 0.12, 0.03)
-"""Of none, one and two smooth functions that nobody knows."""
+"""Of none, one and two nonparametric terms."""
 
 WINDOW = 7.0
 """A combination less probable than one of its parts by more than this, in logarithm, is not followed."""

@@ -1,11 +1,11 @@
-"""Marginal likelihoods of rival explanations, alone and together, in closed form.
+"""Marginal likelihoods of candidate explanations, alone and together, in closed form.
 
 Everything enters linearly with a normal prior whose standard deviation is a multiple of the noise, so that the evidence of
 explanations depends on the data through one quadratic form; its integral over the noise is tabulated once, and the multiples
 are summed over a grid. What the job's model could absorb is projected out.
 
-Explanations that are *granted* join the covariance of the noise, at a given size. So the evidence of one more explanation
-beside them needs nothing but the inner products of all columns, which are computed once.
+Explanations that the evidence is conditional on, the *given* ones, join the covariance of the noise, each at a fixed size. So
+the evidence of one more explanation beside them needs nothing but the inner products of all columns, which are computed once.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Comparison:
     baseline : (m, p) columns over their noise scale that may take any coefficient.
     kinds : of noise.
     sigma, log_sigma : (s,) grid of the noise, mm, and its log probability.
-    explanations : rivals; columns in mm.
+    explanations : candidates; columns in mm.
     noise_scale : (m,).
     least_noise : mm, the least that the noise may be; with it the largest coefficients are as large as physics allows.
     certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
@@ -168,7 +168,7 @@ class Comparison:
 
     @cached_property
     def _weighed(self) -> dict[tuple[int, int], Floats]:
-        """Precision times the columns of members that were ever granted (k, m, r)."""
+        """Precision times the columns of members that were ever given (k, m, r)."""
         return {}
 
     def over_sigma(self, squares: Floats) -> Floats:
@@ -196,31 +196,31 @@ class Comparison:
     def log_evidence(
         self,
         left: Floats | None = None,
-        granted: Sequence[Version] = (),
+        given: Sequence[Version] = (),
         among: Container[int] | None = None,
     ) -> tuple[Floats, Floats]:
-        """Log evidence (b,) of what is granted, and (c, b) of each explanation beside it.
+        """Log evidence (b,) of what is given, and (c, b) of each explanation beside it.
 
         Parameters
         ----------
         left : (m, b) data, by default the recording's.
-        granted : explanations taken for granted.
+        given : explanations that it is conditional on.
         among : explanations that are wanted, by default all; of others the evidence may be minus infinity.
         """
         total = np.full((len(self.explanations), 1 if left is None else left.shape[1]), -np.inf)
-        for group, each in self.each(left, granted, among):
+        for group, each in self.each(left, given, among):
             gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight[:, None]
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
-        return self.log_evidence_of(granted, left), total
+        return self.log_evidence_of(given, left), total
 
     def beside(
-        self, granted: Sequence[Version] = (), among: Container[int] | None = None
+        self, given: Sequence[Version] = (), among: Container[int] | None = None
     ) -> dict[int, tuple[float, Version]]:
-        """Log evidence of each explanation beside what is granted, at least of those wanted, and its best version."""
+        """Log evidence of each explanation beside what is given, at least of those wanted, and its best version."""
         total = np.full(len(self.explanations), -np.inf)
         most, best = total.copy(), {}
-        for group, cube in self.each(None, granted, among):
+        for group, cube in self.each(None, given, among):
             each = cube[:, :, 0]
             gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight
             chosen = group.explanation[group.first]
@@ -248,24 +248,24 @@ class Comparison:
                 most[column] = flat[at[column], column]
         return found
 
-    def log_evidence_of(self, granted: Sequence[Version], left: Floats | None = None) -> Floats:
-        """Log evidence (b,) of what is granted, at the size granted, for data (m, b)."""
-        known = self._beside(left, granted)
+    def log_evidence_of(self, given: Sequence[Version], left: Floats | None = None) -> Floats:
+        """Log evidence (b,) of what is given, at its size, for data (m, b)."""
+        known = self._beside(left, given)
         every = self.over_sigma(known.squares) + known.log[:, None]
         return np.asarray(special.logsumexp(every, axis=0), dtype=np.float64)
 
-    def noise_probability(self, granted: Sequence[Version]) -> Floats:
-        """Probability (kinds,) of each kind of noise, given explanations at the sizes granted."""
-        known = self._beside(None, granted)
+    def noise_probability(self, given: Sequence[Version]) -> Floats:
+        """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
+        known = self._beside(None, given)
         log = self.over_sigma(known.squares)[:, 0] + known.log
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
     def each(
-        self, data: Floats | None, granted: Sequence[Version], among: Container[int] | None = None
+        self, data: Floats | None, given: Sequence[Version], among: Container[int] | None = None
     ) -> Iterator[tuple[Group, Floats]]:
-        """Log evidence (M, a, b) of members at every size beside what is granted, by groups; ``among`` are wanted at least."""
+        """Log evidence (M, a, b) of members at every size beside what is given, by groups; ``among`` are wanted at least."""
         stack, groups = self._stack
-        known = self._beside(data, granted)
+        known = self._beside(data, given)
         kinds, b = known.squares.shape
         for group, blocks in zip(groups, self._blocks, strict=True):
             part = group.part(among)
@@ -287,7 +287,7 @@ class Comparison:
         ----------
         amplitudes : (M, a) to try.
         blocks : (k, M, r, r) their inner products.
-        seen : (M, r, k, b + g) theirs with the data and with what is granted.
+        seen : (M, r, k, b + g) theirs with the data and with what is given.
         """
         b = known.squares.shape[1]
         by_kind = seen.transpose(2, 0, 1, 3)
@@ -306,15 +306,15 @@ class Comparison:
         log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
         return np.asarray(np.logaddexp.reduce(log, axis=0), dtype=np.float64)
 
-    def _beside(self, data: Floats | None, granted: Sequence[Version]) -> _Beside:
-        """Data (m, b), the recording's by default, weighed by each kind of noise and what is granted."""
+    def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
+        """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
         plain = self.left[:, None] if data is None else data
         weighed = self._left_weighed if data is None else self._by_noise(data)
         squares = np.einsum("mb,kmb->kb", plain, weighed)
         log = np.array([noise.log for noise in self._noises])
-        if granted:
-            taken = np.hstack([version.amplitude * self._columns(version) for version in granted])
-            other = np.concatenate([v.amplitude * self._weighed_columns(v) for v in granted], axis=2)
+        if given:
+            taken = np.hstack([version.amplitude * self._columns(version) for version in given])
+            other = np.concatenate([v.amplitude * self._weighed_columns(v) for v in given], axis=2)
             factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ other)
             rows = np.linalg.solve(factor, other.swapaxes(1, 2))
             seen = rows @ plain
@@ -339,9 +339,9 @@ def _log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """Data beside what is granted, under each of k kinds of noise.
+    """Data beside what is given, under each of k kinds of noise.
 
-    ``seen_by`` (m, k·(b + g)): of each kind Σ⁻¹·data and the rows of what is granted, side by side; ``squares`` (k, b)
+    ``seen_by`` (m, k·(b + g)): of each kind Σ⁻¹·data and the rows of what is given, side by side; ``squares`` (k, b)
     dataᵀ·Σ⁻¹·data; ``log`` (k,) probability of the noise less that of its determinant.
 
     With Σ = N + C·Cᵀ and rows = chol(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.

@@ -1,7 +1,7 @@
-"""Rival explanations of what a model leaves, and those of them that are effects of the catalogue.
+"""Candidate explanations of what a model leaves, and those of them that are effects of the catalogue.
 
 Each is a set of columns that the observations would show, scaled so that coefficients of one are as large as physics (or,
-for the unknown, plausibility) allows; how much smaller they may be is left to the comparison.
+for a nonparametric term, plausibility) allows; how much smaller they may be is left to the comparison.
 """
 
 from __future__ import annotations
@@ -13,27 +13,22 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.model import MeasurementModel
-from cmm_uq.physics.catalogue import EVERY
-from cmm_uq.physics.effect import FURTHER, Effect
+from cmm_uq.physics.catalogue import every
+from cmm_uq.physics.effect import Effect, Nonparametric
+from cmm_uq.physics.plugins import BrokenPluginError
 from cmm_uq.points import AXES, Floats, Points
 
 EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
 
 UNKNOWN_SD = 0.05
-"""mm, largest standard deviation of an unknown displacement."""
+"""mm, largest standard deviation of a nonparametric displacement."""
 
 _SHORTEST_PERIOD = 6.0
 """mm."""
 
-_IDEALISED = ("straightness", "hysteresis", "rotation", "drift")
-"""Effects whose form along their axis, or in time, is the simplest of many that their mechanism can have."""
-
 _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
 _ROUGH = 0.25
-"""Probability that such an effect has another form than the simplest."""
-
-_FURTHER = 0.1
-"""Weight of an effect that only some machines show, beside one that most do."""
+"""Probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest."""
 
 _MOST_PERIODS = 240
 _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
@@ -48,7 +43,7 @@ class Member:
     columns : (m, r) mm.
     shape : nonlinear parameter that they belong to.
     weight : how probable, among the versions.
-    values : (p, r) mm, an unknown function where its covariate is given, for one unit of each coefficient.
+    values : (p, r) mm, a nonparametric function where its covariate is given, for one unit of each coefficient.
     rough : whether an effect has another form here than its own, though the same mechanism.
     """
 
@@ -61,16 +56,17 @@ class Member:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A rival.
+    """A candidate.
 
     Parameters
     ----------
-    name : the effect's name; for an unknown function what it depends on.
-    kind : ``effect``, ``several`` (known effects at once) or ``unknown``.
+    name : the effect's name; for a nonparametric term what it depends on.
+    kind : ``effect``, ``several`` (known effects at once) or ``unknown`` (a nonparametric term).
     members : versions, as probable as their weights say.
-    covariate : (p,) what an unknown function depends on, of the points or of the observations.
+    covariate : (p,) what a nonparametric term depends on, of the points or of the observations.
     covariate_name : its name in the recording.
-    mechanisms : effects whose forms an unknown function could have.
+    term : of a nonparametric one that effects may be imitated by.
+    imitated_by : of an effect.
     weight : how readily it is thought of, beside others of its kind.
     """
 
@@ -79,13 +75,18 @@ class Explanation:
     members: tuple[Member, ...]
     covariate: Floats | None = None
     covariate_name: str | None = None
-    mechanisms: tuple[str, ...] = ()
+    term: Nonparametric | None = None
+    imitated_by: tuple[Nonparametric, ...] = ()
     weight: float = 1.0
 
     @property
     def shaped(self) -> bool:
         """Whether its versions differ in a nonlinear parameter."""
         return bool(self.members[0].shape)
+
+    def could_be(self, effect: Explanation) -> bool:
+        """Whether this nonparametric term could have the form of an effect."""
+        return self.term is not None and self.term in effect.imitated_by
 
 
 def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
@@ -99,28 +100,30 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
     """
     points = model.artefact.points.at(model.placed(values))
     found = []
-    for effect in EVERY.values():
+    for effect in every().values():
         if effect.name in named or any(column not in points.columns for column in effect.columns):
             continue
         try:
             members = tuple(
                 Member(_seen(model, effect, points, shape, values), shape) for shape in shapes(effect, points)
             )
+        except BrokenPluginError:
+            raise
         except CmmUqError:  # the job does not give the travel that this effect needs
             continue
         if any(np.any(member.columns) for member in members):
             members = (*members, *_roughly(model, effect, points, values))
-            weight = _FURTHER if effect.tier == FURTHER else 1.0
-            found.append(Explanation(effect.name, EFFECT, members, weight=weight))
+            weight = effect.prior_weight
+            found.append(Explanation(effect.name, EFFECT, members, imitated_by=effect.imitated_by, weight=weight))
     return found
 
 
 def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
     """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
-    mechanism, _, rest = effect.name.partition("_")
-    if mechanism not in _IDEALISED:
+    over = effect.idealised_over
+    if over is None:
         return
-    along = points.columns["time_s"] if mechanism == "drift" else points.readings[:, AXES.index(rest[0])]
+    along = points.readings[:, AXES.index(over)] if over in AXES else points.column(over)
     span = float(np.ptp(along))
     if span == 0:
         return
@@ -134,7 +137,7 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
 
 def finer(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
     """An explanation with some of its shapes divided: each gives way to five about it that share its weight."""
-    effect = EVERY[explanation.name]
+    effect = every()[explanation.name]
     points = model.artefact.points.at(model.placed(values))
     shaped = [i for i, member in enumerate(explanation.members) if member.shape]
     even = dict(zip(shaped, evenly(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True))
@@ -151,22 +154,18 @@ def finer(model: MeasurementModel, values: Floats, explanation: Explanation, mem
 
 def evenly(effect: Effect, shape: Floats) -> Floats:
     """An effect's nonlinear parameter on the scale on which it is tried evenly: frequency for a period, else its logarithm."""
-    return 1 / shape if _periodic(effect) else np.log(shape)
+    return 1 / shape if effect.shape[0].period_along else np.log(shape)
 
 
 def unevenly(effect: Effect, value: Floats) -> Floats:
     """What :func:`evenly` was given."""
-    return 1 / value if _periodic(effect) else np.exp(value)
-
-
-def _periodic(effect: Effect) -> bool:
-    return effect.shape[0].name == "period_mm"
+    return 1 / value if effect.shape[0].period_along else np.exp(value)
 
 
 def several(singles: Sequence[Explanation]) -> list[Explanation]:
     """All known effects at once, each as large as the others in the observations.
 
-    It names none of them, but opens the gate to those that are visible together only.
+    It names none of them, but lets the lack-of-fit test see those that are visible together only.
     """
     columns = [e.members[0].columns for e in singles if not e.shaped]
     if len(columns) < 2:
@@ -180,10 +179,11 @@ def several(singles: Sequence[Explanation]) -> list[Explanation]:
 
 def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
     """Values of an effect's nonlinear parameter to try: of a period, those that the readings can tell apart."""
-    if not effect.shape or not _periodic(effect):
+    axis = effect.shape[0].period_along if effect.shape else None
+    if axis is None:
         yield from effect.trials()
         return
-    readings = points.readings[:, AXES.index(effect.name[-1])]
+    readings = points.readings[:, AXES.index(axis)]
     span = float(np.ptp(readings))
     if span <= 2 * _SHORTEST_PERIOD:
         return

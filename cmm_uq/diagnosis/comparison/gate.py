@@ -23,16 +23,16 @@ DRAWS = 200
 _TAIL = 0.8
 
 
-def log_prior(rivals: Sequence[Explanation]) -> Floats:
-    """Log probability, beforehand, of each rival alone (c,)."""
+def log_prior(candidates: Sequence[Explanation]) -> Floats:
+    """Log probability, beforehand, of each candidate alone (c,)."""
     total = dict.fromkeys(SHARES, 0.0)
-    for e in rivals:
+    for e in candidates:
         total[e.kind] += e.weight
-    return np.log([SHARES[e.kind] * e.weight / total[e.kind] for e in rivals])
+    return np.log([SHARES[e.kind] * e.weight / total[e.kind] for e in candidates])
 
 
-def gate(comparison: Comparison, seed: int) -> tuple[float, Floats]:
-    """Probability, under nothing, of as much evidence for something; and the unknown functions' largest under nothing."""
+def lack_of_fit(comparison: Comparison, seed: int) -> tuple[float, Floats]:
+    """Probability, under nothing, of as much evidence for something; and the largest of a nonparametric term under nothing."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
     draws = np.empty((len(comparison.left), DRAWS))
     sizes = comparison.sigma[comparison.noise_posterior().argmax(axis=1)]

@@ -1,7 +1,7 @@
-"""The search for what was left out: a gate with a known false-alarm rate, then one explanation after the other.
+"""The search for what was left out: a lack-of-fit test with a known false-alarm rate, then a comparison of combinations.
 
-At every step all rivals compete: each effect of the catalogue, smooth functions that nobody knows, and nothing. The gate's
-statistic is the evidence of "something" over "nothing"; its distribution under nothing is drawn on the recording's own design.
+The candidates are each effect of the catalogue, nonparametric terms, and nothing. The test statistic is the evidence of
+"something" over "nothing"; its distribution under nothing is drawn on the recording's own design.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from scipy import special
 from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import Explanation, finer, known, several
-from cmm_uq.diagnosis.comparison.gate import NOTHING, gate, log_prior
+from cmm_uq.diagnosis.comparison.gate import NOTHING, lack_of_fit, log_prior
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.diagnosis.comparison.unknown_functions import unknown
 from cmm_uq.diagnosis.noise import sigma_grid
 from cmm_uq.diagnosis.recorded_noise import noise_kinds
 from cmm_uq.model import MeasurementModel
-from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 
 _MISFIT = 20.0
@@ -42,17 +42,17 @@ NOT_TOLD_APART = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Race:
-    """All rivals of one step.
+class ModelComparison:
+    """The candidates that a model's misfit is compared with.
 
     Parameters
     ----------
     model, values : what is explained so far, and its estimate.
-    comparison : rivals.
+    comparison : candidates.
     log_odds : (c,) log evidence of each over nothing.
-    probability : (c,) of each explanation, nothing included in the race.
+    probability : (c,) of each explanation, nothing included in the comparison.
     p_value : of "nothing is missing".
-    null_maximum : (draws,) largest log evidence of an unknown function over nothing, under nothing.
+    null_maximum : (draws,) largest log evidence of a nonparametric term over nothing, under nothing.
     """
 
     model: MeasurementModel
@@ -65,7 +65,7 @@ class Race:
 
     @property
     def explanations(self) -> Sequence[Explanation]:
-        """The rivals."""
+        """The candidates."""
         return self.comparison.explanations
 
 
@@ -75,17 +75,17 @@ class Found:
 
     Parameters
     ----------
-    first : race before anything is found.
-    last : what is left after everything is, without rivals.
-    combinations : of explanations, with their probabilities; ``None`` while the gate is closed.
-    chosen : indices, in the first race, of the known effects that are found.
+    first : comparison before anything is found.
+    last : what is left after everything is, without candidates.
+    combinations : of explanations, with their probabilities; ``None`` where the lack-of-fit test does not reject.
+    chosen : indices, among the candidates, of the known effects that are found.
     versions : of them, and of what is unknown besides, in the most probable combination.
     model : the job's model with what was left out.
     unexplained : probability that something unknown acts besides.
     rough : of the effects found, those of which another form is more probable than their own.
     """
 
-    first: Race
+    first: ModelComparison
     last: Comparison
     combinations: Combinations | None
     chosen: Key
@@ -110,7 +110,7 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     alpha : false-alarm rate.
     seed : of the null distribution.
     """
-    first = race_of(model, stated, seed)
+    first = model_comparison(model, stated, seed)
     if first.p_value >= alpha:
         return Found(first, first.comparison, None, frozenset(), (), model, 0.0)
     combinations = explore(first.comparison)
@@ -159,15 +159,15 @@ def asserted(combinations: Combinations) -> Key:
 
 
 def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
-    """Effects that are improbable only because an unknown function of the same mechanism describes them as well.
+    """Effects that are improbable only because a nonparametric term, which could be the same, describes them as well.
 
     None that could stand in the place of one that is chosen: together they would determine nothing.
     """
-    index, found = {e.name: i for i, e in enumerate(combinations.explanations)}, set()
+    found = set()
     instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
     for j, function in enumerate(combinations.explanations):
-        for i in (index[name] for name in function.mechanisms if name in index):
-            if i in instead or combinations.of(i) < _MECHANISM:
+        for i, effect in enumerate(combinations.explanations):
+            if not function.could_be(effect) or i in instead or combinations.of(i) < _MECHANISM:
                 continue
             if sum(p for key, p in combinations.probability.items() if i in key or j in key) >= ASSERTED:
                 found.add(i)
@@ -175,12 +175,12 @@ def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
 
 
 def _less_than_function(combinations: Combinations, index: int) -> bool:
-    """Whether an effect is less probable than an unknown function of its mechanism: its form is not the effect's own."""
-    effect = combinations.explanations[index].name
+    """Whether an effect is less probable than a nonparametric term that could be it: its form is not the effect's own."""
+    effect = combinations.explanations[index]
     return any(
         combinations.of(j) > combinations.of(index)
         for j, function in enumerate(combinations.explanations)
-        if effect in function.mechanisms
+        if function.could_be(effect)
     )
 
 
@@ -191,22 +191,22 @@ def with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
     return float(sum(p for key, p in combinations.probability.items() if those & key))
 
 
-def race_of(model: MeasurementModel, stated: float | None, seed: int) -> Race:
-    """Let all rivals compete for what a model leaves; ``seed`` is that of the null distribution."""
+def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -> ModelComparison:
+    """Compare all candidates for what a model leaves; ``seed`` is that of the null distribution."""
     values = model.estimate().least_squares.value
     singles = known(model, values, tuple(effect.name for effect in model.effects))
-    rivals = singles + several(singles) + unknown(model, values)
-    comparison = comparison_of(model, stated, rivals)
+    candidates = singles + several(singles) + unknown(model, values)
+    comparison = comparison_of(model, stated, candidates)
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]
-    prior = log_prior(rivals)
+    prior = log_prior(candidates)
     log_total = special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
-    p_value, maxima = gate(comparison, seed)
-    return Race(model, values, comparison, log_odds, np.exp(prior + log_odds - log_total), p_value, maxima)
+    p_value, maxima = lack_of_fit(comparison, seed)
+    return ModelComparison(model, values, comparison, log_odds, np.exp(prior + log_odds - log_total), p_value, maxima)
 
 
-def comparison_of(model: MeasurementModel, stated: float | None, rivals: Sequence[Explanation]) -> Comparison:
-    """Rivals, possibly none, against what a model leaves."""
+def comparison_of(model: MeasurementModel, stated: float | None, candidates: Sequence[Explanation]) -> Comparison:
+    """Candidates, possibly none, against what a model leaves."""
     estimate = model.estimate()
     linear = estimate.linear
     sigma_left = max(estimate.least_squares.sigma_of_residuals, 1e-6)
@@ -215,21 +215,21 @@ def comparison_of(model: MeasurementModel, stated: float | None, rivals: Sequenc
     rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
     return Comparison(
         rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.placing]) / linear.noise_scale[:, None],
-        noise_kinds(model), sigma, log_sigma, rivals, linear.noise_scale,
+        noise_kinds(model), sigma, log_sigma, candidates, linear.noise_scale,
         stated or sigma_left / _MISFIT, _certified(model, sigma_left),
     )  # fmt: skip
 
 
-def _with(race: Race, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
-    """The race's model with known effects more, of the shapes that are most probable together."""
-    shapes, added = dict(race.model.shapes), []
+def _with(compared: ModelComparison, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
+    """The model with known effects more, of the shapes that are most probable together."""
+    shapes, added = dict(compared.model.shapes), []
     for version in sorted(versions, key=lambda v: v.explanation):
         if version.explanation in chosen:
-            explanation = race.explanations[version.explanation]
-            added.append(EVERY[explanation.name])
+            explanation = compared.explanations[version.explanation]
+            added.append(every()[explanation.name])
             if added[-1].shape:
                 shapes[explanation.name] = explanation.members[version.member].shape
-    return replace(race.model, effects=(*race.model.effects, *added), shapes=shapes)
+    return replace(compared.model, effects=(*compared.model.effects, *added), shapes=shapes)
 
 
 def _certified(model: MeasurementModel, sigma: float) -> Floats:

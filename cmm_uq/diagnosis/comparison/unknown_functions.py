@@ -1,4 +1,4 @@
-"""Functions that nobody knows, as rivals of the known effects: smooth or with one jump, of whatever was recorded."""
+"""Nonparametric terms as candidates beside the known effects: smooth or with one jump, of whatever was recorded."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from scipy import linalg
 
 from cmm_uq.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD, Explanation, Member
 from cmm_uq.model import MeasurementModel
+from cmm_uq.physics.effect import Nonparametric
 from cmm_uq.points import AXES, Floats, Points
 
 LENGTH_SCALES = (0.6, 0.25, 0.1)
-"""Of unknown smooth functions, in parts of the covariate's range."""
+"""Of smooth functions, in parts of the covariate's range."""
 
 _SPACE_LENGTHS = (0.5, 0.25)
 _DIRECTION_LENGTHS = (0.5, 0.25, 0.08)
@@ -31,21 +32,12 @@ _PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")
 _SUDDEN = ("time_s", "row")
 """Covariates of an observation at which an error may jump."""
 
-_MECHANISMS = {
-    a + b: (f"scale_{a}", f"periodic_scale_{a}") if a == b else (f"straightness_{a}_{b}",) for a in AXES for b in AXES
-} | {
-    "yx": ("straightness_y_x", "squareness_xy"),
-    "zy": ("straightness_z_y", "squareness_yz"),
-    "zx": ("straightness_z_x", "squareness_zx"),
-}
-"""Effects whose form an error along the second axis as a function of the first could have."""
-
 _KEPT = 1e-3
 _GRID = 60
 
 
 def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
-    """Functions that nobody knows, smooth or with one jump.
+    """Nonparametric terms, smooth or with one jump.
 
     Errors along each axis of each reading and of the place, scales of time, and anything of each covariate of the
     observations.
@@ -56,8 +48,8 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
     for name, covariate in covariates(model).items():
         functions = _functions(covariate) if name in _SUDDEN else ((f, 1.0) for f in smooth_functions(covariate))
         members = tuple(Member(f, weight=weight, values=f) for f, weight in functions)
-        mechanisms = (name.replace("approach_", "hysteresis_"),) if name.startswith("approach_") else ()
-        found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, name, mechanisms))
+        term = Nonparametric(name)
+        found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, name, term))
     return found
 
 
@@ -71,7 +63,8 @@ def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Ite
         for j, direction in enumerate(AXES):
             members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
             name = f"error along {direction.upper()} as a function of {axis.upper()}"
-            yield Explanation(name, UNKNOWN, members, readings, f"{axis}_mm", _MECHANISMS[axis + direction])
+            term = Nonparametric(f"{axis}_mm", direction)
+            yield Explanation(name, UNKNOWN, members, readings, term.of, term)
 
 
 def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
@@ -99,7 +92,7 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
             Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in _functions(time)
         )
         name = f"scale of {axis.upper()} as a function of time"
-        yield Explanation(name, UNKNOWN, members, time, "time_s", (f"scale_{axis}",))
+        yield Explanation(name, UNKNOWN, members, time, "time_s", Nonparametric("time_s", axis, scale=True))
 
 
 def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:

@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from cmm_uq.physics.rigid_body import SCALE, SQUARENESS
+
 
 @dataclass(frozen=True)
 class Adjustment:
@@ -33,16 +35,18 @@ ADJUSTMENTS: Mapping[str, Adjustment] = MappingProxyType(
     {
         adjustment.effect: adjustment
         for adjustment in (
-            Adjustment("scale_x", "Scale of X: lengthen what it reads by", 1.0, "x"),
-            Adjustment("scale_y", "Scale of Y: lengthen what it reads by", 1.0, "y"),
-            Adjustment("scale_z", "Scale of Z: lengthen what it reads by", 1.0, "z"),
-            Adjustment("squareness_xy", "Guide of Y: turn about +Z by", -1.0, "y"),
-            Adjustment("squareness_yz", "Guide of Z: turn about +X by", -1.0, "z"),
-            Adjustment("squareness_zx", "Guide of Z: turn about +Y by", 1.0, "z"),
+            Adjustment(SCALE["x"].name, "Scale of X: lengthen what it reads by", 1.0, "x"),
+            Adjustment(SCALE["y"].name, "Scale of Y: lengthen what it reads by", 1.0, "y"),
+            Adjustment(SCALE["z"].name, "Scale of Z: lengthen what it reads by", 1.0, "z"),
+            Adjustment(SQUARENESS["xy"].name, "Guide of Y: turn about +Z by", -1.0, "y"),
+            Adjustment(SQUARENESS["yz"].name, "Guide of Z: turn about +X by", -1.0, "z"),
+            Adjustment(SQUARENESS["zx"].name, "Guide of Z: turn about +Y by", 1.0, "z"),
         )
     }
 )
 """What takes away each of the six factors; right-handed turns."""
 
-ANGLES: Mapping[str, str] = MappingProxyType({"squareness_xy": "X–Y", "squareness_yz": "Y–Z", "squareness_zx": "Z–X"})
+ANGLES: Mapping[str, str] = MappingProxyType(
+    {effect.name: "–".join(plane.upper()) for plane, effect in SQUARENESS.items()}
+)
 """Angle between two axes that is 90° plus the squareness error."""

@@ -11,6 +11,7 @@ from cmm_uq.kinds.error_maps.columns import columns_of
 from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.physics.error_map import ErrorMap, parse_error_map
+from cmm_uq.physics.thermal import ThermalScale
 from cmm_uq.screening.screened import Finding
 
 WHERE = "job.toml [machine] error_map"
@@ -70,7 +71,7 @@ def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress
                          fix="Name two or more maps of the machine; with three it shows which of them differs")  # fmt: skip
     acting = effects(job.facts.model.effects, where="job.toml [model] effects")
     for effect in acting:
-        if effect.columns and not effect.name.startswith("thermal_scale_"):
+        if effect.columns and not isinstance(effect, ThermalScale):
             raise CmmUqError(f"{effect.name} needs {', '.join(effect.columns)}, which error maps do not have",
                              where="job.toml [model] effects", fix="Leave it out")  # fmt: skip
     if job.facts.conformity:

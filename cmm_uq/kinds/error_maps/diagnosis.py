@@ -13,8 +13,8 @@ from cmm_uq.diagnosis.location import region_of
 from cmm_uq.inference.posterior import Posterior, Progress
 from cmm_uq.kinds.error_maps.columns import MapColumn, turned
 from cmm_uq.kinds.error_maps.fit import expansion, function, held_out, noise_of, residual
-from cmm_uq.kinds.error_maps.search import ColumnRace, Rival, race_of
-from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.kinds.error_maps.search import ColumnComparison, Rival, column_comparison
+from cmm_uq.physics.catalogue import effects as effects_named
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -67,7 +67,7 @@ class MapsDiagnosis:
     ----------
     verdict : ``consistent``, ``explained``, ``partial`` or ``unexplained``.
     p_value, alpha : of "the maps differ by noise alone", and the rate of false alarms asked for.
-    races : every error that was compared.
+    comparisons : every error that was compared.
     effects : what is asserted, most probable first; ``explained`` is the part of how the maps of this error differ.
     differences : beyond them, the most significant first.
     displacement, rotation : noise of a reading, µm and ″; ``None`` where no such error was compared.
@@ -78,7 +78,7 @@ class MapsDiagnosis:
     verdict: str
     p_value: float
     alpha: float
-    races: tuple[ColumnRace, ...]
+    comparisons: tuple[ColumnComparison, ...]
     effects: tuple[LeftOut, ...]
     differences: tuple[Difference, ...]
     displacement: Quantity | None
@@ -91,9 +91,9 @@ class MapsDiagnosis:
         """Program and version; ``None`` where nothing had to be sampled."""
         return self.posteriors[0].sampler if self.posteriors else None
 
-    def p_of(self, race: ColumnRace) -> float:
+    def p_of(self, compared: ColumnComparison) -> float:
         """Of "these maps differ by noise alone" for one error, corrected for all that were compared."""
-        return min(1.0, len(self.races) * race.p_value)
+        return min(1.0, len(self.comparisons) * compared.p_value)
 
 
 def diagnose_maps(
@@ -114,55 +114,58 @@ def diagnose_maps(
     seed : of everything random.
     progress : told the part done.
     """
-    races, effects, differences, posteriors = [], [], [], []
+    comparisons, effects, differences, posteriors = [], [], [], []
     for i, column in enumerate(columns):
-        race = race_of(column, named, seed)
-        races.append(race)
-        p_value = len(columns) * race.p_value
+        compared = column_comparison(column, named, seed)
+        comparisons.append(compared)
+        p_value = len(columns) * compared.p_value
         if p_value < alpha:
-            if found := _effect(race):
+            if found := _effect(compared):
                 effects.append(found[0])
                 posteriors.append(found[1])
-            differences += [_difference(race, index, p_value) for index in race.unknown]
+            differences += [_difference(compared, index, p_value) for index in compared.unknown]
         if progress:
             progress((i + 1) / len(columns))
-    p_value = min([1.0, *(len(races) * race.p_value for race in races)])
+    p_value = min([1.0, *(len(comparisons) * compared.p_value for compared in comparisons)])
     verdict = "consistent" if p_value >= alpha else "unexplained" if not effects else "explained"
     if verdict == "explained" and differences:
         verdict = "partial"
     return MapsDiagnosis(
-        verdict, p_value, alpha, tuple(races), tuple(sorted(effects, key=lambda e: -e.probability)),
-        tuple(sorted(differences, key=lambda d: -d.amplitude_um)), _noise(races, alpha, rotations=False),
-        _noise(races, alpha, rotations=True), _improvement(races, alpha), tuple(posteriors),
+        verdict, p_value, alpha, tuple(comparisons), tuple(sorted(effects, key=lambda e: -e.probability)),
+        tuple(sorted(differences, key=lambda d: -d.amplitude_um)), _noise(comparisons, alpha, rotations=False),
+        _noise(comparisons, alpha, rotations=True), _improvement(comparisons, alpha), tuple(posteriors),
     )  # fmt: skip
 
 
-def _effect(race: ColumnRace) -> tuple[LeftOut, Posterior] | None:
+def _effect(compared: ColumnComparison) -> tuple[LeftOut, Posterior] | None:
     """An effect that the maps of a column show: probable, not zero, and better at predicting what was held out."""
-    if race.effect is None:
+    if compared.effect is None:
         return None
-    without = [v for v in race.versions if v.explanation != race.effect]
-    gain = held_out(race, race.versions)[1] - held_out(race, without)[1]
-    posterior = expansion(race, race.effect)
-    effect = EVERY[str(race.rivals[race.effect].effect)]
+    without = [v for v in compared.versions if v.explanation != compared.effect]
+    gain = held_out(compared, compared.versions)[1] - held_out(compared, without)[1]
+    posterior = expansion(compared, compared.effect)
+    (effect,) = effects_named((str(compared.rivals[compared.effect].effect),))
     reported = effect.to_reported(posterior.draws, np.zeros((len(posterior.draws), 0)))
     units = {parameter.name: parameter.unit for parameter in effect.reported}
     parameters = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
     sure = all(q.interval95[0] > 0 or q.interval95[1] < 0 for q in parameters.values())
     if not sure or gain.sum() <= np.sqrt(len(gain)) * gain.std(ddof=1):
         return None
-    every, rest, left = (float(np.sum(residual(race, some) ** 2)) for some in ((), without, race.versions))
-    probability = race.combinations.of(race.effect)
-    return LeftOut(effect.name, effect.title, probability, parameters, (rest - left) / every, probability), posterior
+    whole, rest, left = (float(np.sum(residual(compared, some) ** 2)) for some in ((), without, compared.versions))
+    probability = compared.combinations.of(compared.effect)
+    found = LeftOut(
+        effect.name, effect.title, probability, parameters, (rest - left) / whole, probability, effect.points_to
+    )  # fmt: skip
+    return found, posterior
 
 
-def _difference(race: ColumnRace, index: int, p_value: float) -> Difference:
-    column, rival = race.column, race.rivals[index]
-    value, u = function(race, index)
+def _difference(compared: ColumnComparison, index: int, p_value: float) -> Difference:
+    column, rival = compared.column, compared.rivals[index]
+    value, u = function(compared, index)
     unit = column.unit[1]
-    probability = race.combinations.of(index)
-    others = race.instead(_NAMED) if probability < _WELL_KNOWN else ()
-    instead = tuple(race.rivals[i].name for i in others)
+    probability = compared.combinations.of(index)
+    others = compared.instead(_NAMED) if probability < _WELL_KNOWN else ()
+    instead = tuple(compared.rivals[i].name for i in others)
     return Difference(
         column, rival, probability, instead, region_of(column.positions, value), p_value,
         float(np.abs(value).max()) / unit, (column.positions, value / unit, u / unit),
@@ -170,14 +173,16 @@ def _difference(race: ColumnRace, index: int, p_value: float) -> Difference:
     )  # fmt: skip
 
 
-def _improvement(races: Sequence[ColumnRace], alpha: float) -> Improvement:
+def _improvement(comparisons: Sequence[ColumnComparison], alpha: float) -> Improvement:
     """Over all columns, with what was found in those that differ."""
     rms: list[list[Floats]] = [[], [], [], []]
     gains = [np.zeros(0)]
-    for race in races:
-        versions = race.versions if len(races) * race.p_value < alpha else ()
-        early, late = held_out(race, ()), held_out(race, versions)
-        for place, values in zip(rms, (residual(race, ()), residual(race, versions), early[0], late[0]), strict=True):
+    for compared in comparisons:
+        versions = compared.versions if len(comparisons) * compared.p_value < alpha else ()
+        early, late = held_out(compared, ()), held_out(compared, versions)
+        for place, values in zip(
+            rms, (residual(compared, ()), residual(compared, versions), early[0], late[0]), strict=True
+        ):
             place.append(values)
         gains.append(late[1] - early[1])
     gain = np.concatenate(gains)
@@ -188,13 +193,16 @@ def _improvement(races: Sequence[ColumnRace], alpha: float) -> Improvement:
     return Improvement(left, modelled, before_um, after_um, float(gain.sum()), se, "parts of the travel")
 
 
-def _noise(races: Sequence[ColumnRace], alpha: float, *, rotations: bool) -> Quantity | None:
+def _noise(comparisons: Sequence[ColumnComparison], alpha: float, *, rotations: bool) -> Quantity | None:
     """Root mean square, over the columns, of the noise of a reading once everything found is modelled."""
-    chosen = [race for race in races if (race.column.component >= 3) == rotations]
+    chosen = [compared for compared in comparisons if (compared.column.component >= 3) == rotations]
     if not chosen:
         return None
     unit, factor = chosen[0].column.unit
-    found = [noise_of(race, race.versions if len(races) * race.p_value < alpha else ()) for race in chosen]
+    found = [
+        noise_of(compared, compared.versions if len(comparisons) * compared.p_value < alpha else ())
+        for compared in chosen
+    ]
     variances, freedoms = np.array(found).T
     value = float(np.sqrt(variances.mean())) / factor
     u = value * float(np.sqrt(np.sum(variances**2 / (2 * freedoms)))) / float(variances.sum())

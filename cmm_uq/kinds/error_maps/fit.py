@@ -1,4 +1,4 @@
-"""What follows from a race: how the maps differ, what is left, what held-out parts say, how large an effect is."""
+"""What follows from a compared: how the maps differ, what is left, what held-out parts say, how large an effect is."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.inference.posterior import Posterior, sample
-from cmm_uq.kinds.error_maps.search import ColumnRace
+from cmm_uq.kinds.error_maps.search import ColumnComparison
 from cmm_uq.physics.thermal import EXPANSION
 from cmm_uq.points import Floats
 
@@ -27,50 +27,52 @@ _FOLLOWED = 0.05
 """Probability of a combination, and of a kind of noise, from which it counts for the expansion's distribution."""
 
 
-def function(race: ColumnRace, index: int) -> tuple[Floats, Floats]:
+def function(compared: ColumnComparison, index: int) -> tuple[Floats, Floats]:
     """An unknown function of the best combination at the positions, and its standard uncertainty, mm, each (p,).
 
     A straightness is about its best line; anything else is zero where a map begins, nearest to the origin.
     """
-    columns, spread = _granted(race, race.versions)
-    sigma = _sigma(race, race.versions, race.observed, np.arange(len(race.observed)))
+    columns, spread = _given(compared, compared.versions)
+    sigma = _sigma(compared, compared.versions, compared.observed, np.arange(len(compared.observed)))
     precision = columns.T @ columns / sigma**2 + np.diag(1 / (spread * sigma) ** 2)
     covariance = np.linalg.inv(precision)
-    mean = covariance @ (columns.T @ race.comparison.rest(race.observed[:, None])[:, 0]) / sigma**2
+    mean = covariance @ (columns.T @ compared.comparison.rest(compared.observed[:, None])[:, 0]) / sigma**2
     begin = 0
-    for version in race.versions:
-        values = race.comparison.explanations[version.explanation].members[version.member].values
+    for version in compared.versions:
+        values = compared.comparison.explanations[version.explanation].members[version.member].values
         if version.explanation == index:
             break
         begin += values.shape[1]
     part = slice(begin, begin + values.shape[1])
-    if race.column.is_straightness:
-        place = race.column.positions - race.column.positions.mean()
+    if compared.column.is_straightness:
+        place = compared.column.positions - compared.column.positions.mean()
         lines = np.column_stack([np.ones_like(place), place])
         values = values - lines @ np.linalg.lstsq(lines, values, rcond=None)[0]
     else:
-        values = values - values[np.argmin(np.abs(race.column.positions))]
+        values = values - values[np.argmin(np.abs(compared.column.positions))]
     return values @ mean[part], np.sqrt(np.einsum("pi,ij,pj->p", values, covariance[part, part], values))
 
 
-def held_out(race: ColumnRace, versions: Sequence[Version]) -> tuple[Floats, Floats]:
+def held_out(compared: ColumnComparison, versions: Sequence[Version]) -> tuple[Floats, Floats]:
     """Errors (m,), mm, of predictions of parts of the travel from the rest, and log predictive densities (blocks,)."""
-    p = len(race.column.positions)
-    block = np.tile(np.arange(p) * min(BLOCKS, p // 2) // p, len(race.observed) // p)
-    errors, densities = np.zeros(len(race.observed)), []
-    columns, spread = race.columns_of(versions)
-    covariance = np.eye(len(race.observed)) + (columns * spread**2) @ columns.T
+    p = len(compared.column.positions)
+    block = np.tile(np.arange(p) * min(BLOCKS, p // 2) // p, len(compared.observed) // p)
+    errors, densities = np.zeros(len(compared.observed)), []
+    columns, spread = compared.columns_of(versions)
+    covariance = np.eye(len(compared.observed)) + (columns * spread**2) @ columns.T
     for k in np.unique(block):
         out, kept = block == k, block != k
-        sigma = _sigma(race, versions, race.observed, np.flatnonzero(kept))
+        sigma = _sigma(compared, versions, compared.observed, np.flatnonzero(kept))
         factor = linalg.cho_factor(covariance[np.ix_(kept, kept)])
         across = linalg.cho_solve(factor, covariance[np.ix_(kept, out)]).T
-        known = race.baseline[kept]
+        known = compared.baseline[kept]
         weighed = linalg.cho_solve(factor, known)
         free = np.linalg.pinv(known.T @ weighed, rcond=1e-10, hermitian=True)
-        level = free @ (weighed.T @ race.observed[kept])
-        error = race.observed[out] - race.baseline[out] @ level - across @ (race.observed[kept] - known @ level)
-        open_to = race.baseline[out] - across @ known
+        level = free @ (weighed.T @ compared.observed[kept])
+        error = (
+            compared.observed[out] - compared.baseline[out] @ level - across @ (compared.observed[kept] - known @ level)
+        )
+        open_to = compared.baseline[out] - across @ known
         spread_out = covariance[np.ix_(out, out)] - across @ covariance[np.ix_(kept, out)] + open_to @ free @ open_to.T
         lower = sigma * np.linalg.cholesky(spread_out)
         white = np.linalg.solve(lower, error)
@@ -79,60 +81,62 @@ def held_out(race: ColumnRace, versions: Sequence[Version]) -> tuple[Floats, Flo
     return errors, np.array(densities)
 
 
-def residual(race: ColumnRace, versions: Sequence[Version]) -> Floats:
+def residual(compared: ColumnComparison, versions: Sequence[Version]) -> Floats:
     """What is left of the observations (m,), mm."""
     if not versions:
-        return race.comparison.rest(race.observed[:, None])[:, 0]
-    columns, spread = _granted(race, versions)
-    left = race.comparison.rest(race.observed[:, None])[:, 0]
+        return compared.comparison.rest(compared.observed[:, None])[:, 0]
+    columns, spread = _given(compared, versions)
+    left = compared.comparison.rest(compared.observed[:, None])[:, 0]
     mean = np.linalg.solve(columns.T @ columns + np.diag(1 / spread**2), columns.T @ left)
     return left - columns @ mean
 
 
-def noise_of(race: ColumnRace, versions: Sequence[Version]) -> tuple[float, int]:
-    """Variance of a reading once versions are granted, mm², and its degrees of freedom."""
-    every = np.arange(len(race.observed))
-    return _sigma(race, versions, race.observed, every) ** 2, race.comparison.degrees_of_freedom
+def noise_of(compared: ColumnComparison, versions: Sequence[Version]) -> tuple[float, int]:
+    """Variance of a reading once versions are given, mm², and its degrees of freedom."""
+    every = np.arange(len(compared.observed))
+    return _sigma(compared, versions, compared.observed, every) ** 2, compared.comparison.degrees_of_freedom
 
 
-def expansion(race: ColumnRace, index: int) -> Posterior:
+def expansion(compared: ColumnComparison, index: int) -> Posterior:
     """Posterior of an effect's coefficient, sampled; rivals and kinds of noise count by their probability."""
-    rival, draws, weights = race.rivals[index], [], []
+    rival, draws, weights = compared.rivals[index], [], []
     (function,) = rival.functions
     unknown = Unknown((str(rival.effect), EXPANSION.name), EXPANSION.unit, 0.0, EXPANSION.prior_sd, EXPANSION.prior_sd)
     linear = LinearModel(
-        race.observed, race.seen(rival.over_maps, function) / EXPANSION.prior_sd, (unknown,), race.baseline,
-        np.ones(len(race.observed)), None,
+        compared.observed, compared.seen(rival.over_maps, function) / EXPANSION.prior_sd, (unknown,), compared.baseline,
+        np.ones(len(compared.observed)), None,
     )  # fmt: skip
-    for key, probability in race.combinations.probability.items():
+    for key, probability in compared.combinations.probability.items():
         if index not in key or probability < _FOLLOWED:
             continue
-        versions = race.combinations.found[key].versions
-        for kind, share in zip(race.comparison.kinds, race.comparison.noise_probability(versions), strict=True):
+        versions = compared.combinations.found[key].versions
+        for kind, share in zip(compared.comparison.kinds, compared.comparison.noise_probability(versions), strict=True):
             if share > _FOLLOWED:
-                white, _ = linear.uncorrelated(_whitening(race, kind, versions, index))
-                draws.append(sample(white, race.seed))
+                white, _ = linear.uncorrelated(_whitening(compared, kind, versions, index))
+                draws.append(sample(white, compared.seed))
                 weights.append(probability * share)
     return mixed(draws, np.array(weights) / sum(weights))
 
 
-def _whitening(race: ColumnRace, kind: Kind, versions: Sequence[Version], index: int) -> Callable[[Floats], Floats]:
-    """What whitens noise of one kind together with the granted rivals but one."""
-    columns, spread = race.columns_of([v for v in versions if v.explanation != index])
-    factor = kind.noise(np.eye(len(race.observed)))
+def _whitening(
+    compared: ColumnComparison, kind: Kind, versions: Sequence[Version], index: int
+) -> Callable[[Floats], Floats]:
+    """What whitens noise of one kind together with the given rivals but one."""
+    columns, spread = compared.columns_of([v for v in versions if v.explanation != index])
+    factor = kind.noise(np.eye(len(compared.observed)))
     lower = np.linalg.cholesky(factor @ factor.T + (columns * spread**2) @ columns.T)
     return lambda some: np.asarray(linalg.solve_triangular(lower, some, lower=True), dtype=np.float64)
 
 
-def _granted(race: ColumnRace, versions: Sequence[Version]) -> tuple[Floats, Floats]:
-    columns, spread = race.columns_of(versions)
-    return race.comparison.rest(columns), spread
+def _given(compared: ColumnComparison, versions: Sequence[Version]) -> tuple[Floats, Floats]:
+    columns, spread = compared.columns_of(versions)
+    return compared.comparison.rest(columns), spread
 
 
-def _sigma(race: ColumnRace, versions: Sequence[Version], observed: Floats, rows: NDArray[np.intp]) -> float:
-    """Noise of some rows, mm, once versions are granted."""
-    columns, spread = race.columns_of(versions)
-    Q = linalg.orth(race.baseline[rows] / np.linalg.norm(race.baseline[rows], axis=0).clip(1e-300))
+def _sigma(compared: ColumnComparison, versions: Sequence[Version], observed: Floats, rows: NDArray[np.intp]) -> float:
+    """Noise of some rows, mm, once versions are given."""
+    columns, spread = compared.columns_of(versions)
+    Q = linalg.orth(compared.baseline[rows] / np.linalg.norm(compared.baseline[rows], axis=0).clip(1e-300))
     left, columns = observed[rows] - Q @ (Q.T @ observed[rows]), columns[rows] - Q @ (Q.T @ columns[rows])
     covariance = np.eye(len(rows)) + (columns * spread**2) @ columns.T
     squares = float(left @ linalg.solve(covariance, left, assume_a="pos"))

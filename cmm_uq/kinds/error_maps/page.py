@@ -13,7 +13,7 @@ from cmm_uq.documents.wording import probability
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.kinds.error_maps.diagnosis import Difference
-from cmm_uq.kinds.error_maps.search import ColumnRace
+from cmm_uq.kinds.error_maps.search import ColumnComparison
 from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
 
 _PICTURES = 3
@@ -24,7 +24,7 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
     d, noise = found.diagnosis, found.diagnosis.displacement
     nothing = {"value": None, "u": None, "interval95": None}
     return {
-        **head(found.job),
+        **head(found.job, effects=False),
         "sampling": {
             "sampler": d.sampler, "seed": seed,
             "ess_min": min((p.ess_min for p in d.posteriors), default=None),
@@ -54,13 +54,13 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
             "screening": [finding_data(finding, "") for finding in found.findings],
             "improvement": improvement_data(d.improvement),
             "compared": [
-                {"what": race.column.title, "positions": len(race.column.positions),
-                 "temperatures_c": race.column.temperatures.tolist(), "p_value": d.p_of(race),
+                {"what": compared.column.title, "positions": len(compared.column.positions),
+                 "temperatures_c": compared.column.temperatures.tolist(), "p_value": d.p_of(compared),
                  "explanations": [
-                     {"together": [race.rivals[i].name for i in key], "probability": p}
-                     for key, p in sorted(race.combinations.probability.items(), key=lambda item: -item[1])[:6]
+                     {"together": [compared.rivals[i].name for i in key], "probability": p}
+                     for key, p in sorted(compared.combinations.probability.items(), key=lambda item: -item[1])[:6]
                  ]}
-                for race in d.races
+                for compared in d.comparisons
             ],
         },
     }  # fmt: skip
@@ -131,9 +131,9 @@ def _before_after(found: MapsDiagnosed) -> Table:
 def _compared(found: MapsDiagnosed) -> Table:
     d = found.diagnosis
     rows = tuple(
-        (race.column.title, f"{len(race.column.values)}", f"{len(race.column.positions)}", f"{d.p_of(race):.2g}",
-         *_most_probable(race))
-        for race in d.races
+        (compared.column.title, f"{len(compared.column.values)}", f"{len(compared.column.positions)}",
+         f"{d.p_of(compared):.2g}", *_most_probable(compared))
+        for compared in d.comparisons
     )  # fmt: skip
     heads = (Column("Error", numeric=False), Column("Maps"), Column("Positions"), Column("p"),
              Column("Most probable explanation", numeric=False), Column("Probability"))  # fmt: skip
@@ -141,11 +141,11 @@ def _compared(found: MapsDiagnosed) -> Table:
     return Table("What was compared", heads, rows, (note,))
 
 
-def _most_probable(race: ColumnRace) -> tuple[str, str]:
-    names = [_short(race, i) for i in sorted(race.best)]
-    return ", ".join(names) or "noise", probability(race.combinations.probability[race.best])
+def _most_probable(compared: ColumnComparison) -> tuple[str, str]:
+    names = [_short(compared, i) for i in sorted(compared.best)]
+    return ", ".join(names) or "noise", probability(compared.combinations.probability[compared.best])
 
 
-def _short(race: ColumnRace, index: int) -> str:
-    rival = race.rivals[index]
-    return rival.name if rival.effect else rival.name.removeprefix(race.column.title).strip(" ,")
+def _short(compared: ColumnComparison, index: int) -> str:
+    rival = compared.rivals[index]
+    return rival.name if rival.effect else rival.name.removeprefix(compared.column.title).strip(" ,")

@@ -17,12 +17,12 @@ from scipy import linalg
 from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.diagnosis.comparison.gate import gate
+from cmm_uq.diagnosis.comparison.gate import lack_of_fit
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.diagnosis.comparison.unknown_functions import smooth_functions
 from cmm_uq.diagnosis.noise import kinds, tails
 from cmm_uq.kinds.error_maps.columns import MapColumn, roughness
-from cmm_uq.physics.thermal import EXPANSION
+from cmm_uq.physics.thermal import EXPANSION, SCALE_EXPANSION
 from cmm_uq.points import Floats
 from cmm_uq.units import REFERENCE_TEMPERATURE
 
@@ -49,7 +49,7 @@ class Rival:
 
 
 @dataclass(frozen=True, eq=False)
-class ColumnRace:
+class ColumnComparison:
     """One column with the rivals for how its maps differ.
 
     The observations are the k − 1 orthonormal contrasts between the maps at each position: the function that they share is
@@ -59,13 +59,13 @@ class ColumnRace:
     ----------
     column : what is compared.
     rivals : that compete for how the maps differ.
-    granted : what the job knows of how they differ; of any size.
+    given : what the job knows of how they differ; of any size.
     seed : of the null distribution and the draws.
     """
 
     column: MapColumn
     rivals: tuple[Rival, ...]
-    granted: tuple[Rival, ...]
+    given: tuple[Rival, ...]
     seed: int
 
     @cached_property
@@ -90,7 +90,7 @@ class ColumnRace:
         columns = [self.seen(one, np.ones((len(place), 1))) for one in maps]
         if self.column.is_straightness:
             columns += [self.seen(one, place[:, None]) for one in maps]
-        return np.hstack([*columns, *(self.seen(rival.over_maps, rival.functions[0]) for rival in self.granted)])
+        return np.hstack([*columns, *(self.seen(rival.over_maps, rival.functions[0]) for rival in self.given)])
 
     @cached_property
     def comparison(self) -> Comparison:
@@ -120,7 +120,7 @@ class ColumnRace:
     @cached_property
     def p_value(self) -> float:
         """Of "these maps differ by noise alone"."""
-        return gate(self.comparison, self.seed)[0]
+        return lack_of_fit(self.comparison, self.seed)[0]
 
     @cached_property
     def combinations(self) -> Combinations:
@@ -163,7 +163,7 @@ class ColumnRace:
         return np.hstack([np.zeros((len(self.observed), 0)), *columns]), np.concatenate([np.zeros(0), *spread])
 
 
-def race_of(column: MapColumn, named: Sequence[str], seed: int) -> ColumnRace:
+def column_comparison(column: MapColumn, named: Sequence[str], seed: int) -> ColumnComparison:
     """The rivals for how the maps of a column differ.
 
     Parameters
@@ -172,15 +172,15 @@ def race_of(column: MapColumn, named: Sequence[str], seed: int) -> ColumnRace:
     seed : of everything random.
     """
     rivals: list[Rival] = []
-    granted: list[Rival] = []
+    given: list[Rival] = []
     place, temperatures = column.positions, column.temperatures
     functions = tuple(smooth_functions(place))
     changes = float(np.ptp(temperatures)) > 0
     if column.is_scale and changes:
-        effect = f"thermal_scale_{column.axis}"
+        effect = SCALE_EXPANSION[column.axis].name
         excess = temperatures - REFERENCE_TEMPERATURE
         expansion = Rival(effect, excess, (EXPANSION.prior_sd * place[:, None],), effect=effect)
-        (granted if effect in named else rivals).append(expansion)
+        (given if effect in named else rivals).append(expansion)
     if len(temperatures) == 2:
         rivals.append(Rival(f"{column.title}, difference of the two maps", np.array([-0.5, 0.5]), functions))
     else:
@@ -189,4 +189,4 @@ def race_of(column: MapColumn, named: Sequence[str], seed: int) -> ColumnRace:
             rivals.append(Rival(f"{column.title}, in proportion to the temperature", share, functions))
         for k, one in enumerate(np.eye(len(temperatures))):
             rivals.append(Rival(f"{column.title} in the map at {temperatures[k]:g} °C", one, functions, map=k))
-    return ColumnRace(column, tuple(rivals), tuple(granted), seed)
+    return ColumnComparison(column, tuple(rivals), tuple(given), seed)

@@ -18,10 +18,10 @@ VERDICTS = {
 def lines(found: MapsDiagnosed) -> list[str]:
     """Verdict and everything that follows from it, a sentence or two each."""
     d = found.diagnosis
-    told = [VERDICTS[d.verdict]]
-    told += [sentence(item, d.improvement) for item in d.effects]
-    told += [difference_words(difference) for difference in d.differences]
-    return [*told, *noise_words(d), *(what for _, what in next_words(d))]
+    said = [VERDICTS[d.verdict]]
+    said += [sentence(item, d.improvement) for item in d.effects]
+    said += [difference_words(difference) for difference in d.differences]
+    return [*said, *noise_words(d), *(what for _, what in next_words(d))]
 
 
 def difference_words(difference: Difference) -> str:

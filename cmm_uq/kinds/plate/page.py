@@ -11,6 +11,7 @@ from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.vector_plot import vector_plot
 from cmm_uq.documents.wording import expanded
+from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
@@ -49,7 +50,7 @@ def _confounded(result: Result) -> list[Block]:
         "changed since. Errors of machine and plate that were there on both dates cancel, as long as the plate stood in the "
         "same places."
     ]
-    scales = [name for name in ("scale_x", "scale_y", "scale_z") if name in result.parameters]
+    scales = [effect.name for effect in SCALE.values() if effect.name in result.parameters]
     if scales:
         columns = {unknown.key[0]: i for i, unknown in enumerate(result.posterior.unknowns)}
         draws = result.posterior.draws[:, [columns[name] for name in scales]].mean(axis=1)

@@ -9,6 +9,7 @@ from cmm_uq.documents.results_file import head
 from cmm_uq.inference.ensembles import Chains
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shift_axis.curve import Curve
+from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -20,10 +21,10 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
     axis = result.axis
     estimates = {f"linearity_{axis}": {"peak_to_valley_um": quantity_data(result.linearity)}}
     if result.scale is not None:
-        estimates[f"scale_{axis}"] = {"ppm": quantity_data(result.scale)}
+        estimates[SCALE[axis].name] = {"ppm": quantity_data(result.scale)}
     before, after = estimate.residuals
     return {
-        **head(job),
+        **head(job, effects=False),
         "estimates": estimates,
         "noise": {
             "stated_coordinate_um": job.facts.recording.u_coordinate_um,

@@ -16,6 +16,7 @@ from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate, placed_plate
 from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
 from cmm_uq.kinds.shifting.correction_table import plane_correction_table
 from cmm_uq.physics.error_map import ErrorMap
+from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.points import AXES
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
@@ -37,29 +38,29 @@ class PlaneShiftResult:
     def curves(self) -> dict[str, Curve]:
         """Linearity and straightness by their names in results.json, mm."""
         a, b = (AXES[axis] for axis in self.estimate.plate.axes)
-        names = (f"linearity_{a}", f"linearity_{b}", f"straightness_{a}_{b}", f"straightness_{b}_{a}")
+        names = (f"linearity_{a}", f"linearity_{b}", STRAIGHTNESS[a, b].name, STRAIGHTNESS[b, a].name)
         return dict(zip(names, (*self.estimate.linearity, *self.estimate.straightness), strict=True))
 
     @cached_property
     def rotations(self) -> dict[str, Curve]:
         """Rotation of each carriage that carries the other axis, by name, rad."""
         normal = AXES[3 - sum(self.estimate.plate.axes)]
-        return {f"rotation_{AXES[axis]}_{normal}": curve for axis, curve in self.estimate.rotations.items()}
+        return {ROTATION[AXES[axis], normal].name: curve for axis, curve in self.estimate.rotations.items()}
 
     @cached_property
     def scalars(self) -> dict[str, dict[str, Quantity]]:
         """Squareness, scales and sizes of the curves, by name and parameter; what is not determined is left out."""
         free, found = self.estimate.free.names, {}
-        square = f"squareness_{self.plane}"
+        square = SQUARENESS[self.plane].name
         if square not in free:
             found[square] = {"angle_arcsec": Quantity.of_draws(self.estimate.squareness / ARCSECOND, "″")}
         axes = [AXES[axis] for axis in self.estimate.plate.axes]
         for axis, draws in zip(axes, self.estimate.scales, strict=True):
-            if f"scale_{axis}" not in free:
-                found[f"scale_{axis}"] = {"ppm": Quantity.of_draws(draws / PPM, "ppm")}
-        if (f"scale_{axes[0]}", f"scale_{axes[1]}") in self.estimate.free.combinations:
+            if SCALE[axis].name not in free:
+                found[SCALE[axis].name] = {"ppm": Quantity.of_draws(draws / PPM, "ppm")}
+        if (SCALE[axes[0]].name, SCALE[axes[1]].name) in self.estimate.free.combinations:
             difference = self.estimate.scales[1] - self.estimate.scales[0]
-            found[f"scale_{axes[1]}_minus_{axes[0]}"] = {"ppm": Quantity.of_draws(difference / PPM, "ppm")}
+            found[f"{SCALE[axes[1]].name}_minus_{axes[0]}"] = {"ppm": Quantity.of_draws(difference / PPM, "ppm")}
         for name, curve in self.curves.items():
             if name not in free:
                 draws = curve.draws

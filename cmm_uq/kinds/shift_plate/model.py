@@ -22,6 +22,7 @@ from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate, rotations
 from cmm_uq.kinds.shifting.smooth_function import SmoothFunction
 from cmm_uq.kinds.shifting.smooth_model import SmoothModel
 from cmm_uq.physics.kinematics import carried_offset
+from cmm_uq.physics.rigid_body import ROTATION, STRAIGHTNESS
 from cmm_uq.points import AXES, Floats
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
 
@@ -155,11 +156,11 @@ def _functions(plate: PlacedPlate, turning: tuple[int, ...], chain: str) -> tupl
     a, b = AXES[i], AXES[j]
     shown = [
         (i, f"linearity_{a}", first, _TYPICAL), (j, f"linearity_{b}", second, _TYPICAL),
-        (i, f"straightness_{a}_{b}", second, _TYPICAL), (j, f"straightness_{b}_{a}", first, _TYPICAL),
+        (i, STRAIGHTNESS[a, b].name, second, _TYPICAL), (j, STRAIGHTNESS[b, a].name, first, _TYPICAL),
     ]  # fmt: skip
     for axis in turning:
         offset = carried_offset(AXES[axis], plate.reading - plate.middle, chain=chain)[:, [i, j]]
-        shown.append((axis, f"rotation_{AXES[axis]}_{AXES[3 - i - j]}", np.r_[offset[:, 1], -offset[:, 0]],
+        shown.append((axis, ROTATION[AXES[axis], AXES[3 - i - j]].name, np.r_[offset[:, 1], -offset[:, 0]],
                       _TYPICAL_ROTATION))  # fmt: skip
     return tuple(
         SmoothFunction(

@@ -67,8 +67,8 @@ def _quantities(result: PlaneShiftResult) -> list[tuple[str, str, str, str, str]
 
 def _words(name: str, parameter: str) -> str:
     if "_minus_" in name:
-        one, other = name.removeprefix("scale_").upper().split("_MINUS_")
-        return f"Scale of {one} minus scale of {other}"
+        one, _, other = name.partition("_minus_")
+        return f"Scale of {one[-1].upper()} minus scale of {other.upper()}"
     words = title(name)
     return f"{words[0].upper()}{words[1:]}{', peak to valley' if parameter == 'peak_to_valley_um' else ''}"
 
@@ -147,13 +147,13 @@ def _open(result: PlaneShiftResult) -> Section:
         words = listed([title(name) for name in combination])
         texts.append(f"{words[0].upper()}{words[1:]} can change {'together ' if len(combination) > 1 else ''}without "
                      "changing any reading.")  # fmt: skip
-    if any(name.startswith("squareness") for name in free.names):
+    if not free.square_known:
         texts.append(
             "A plate that is only shifted shears and stretches as the machine does: a placing turned by 90° parts them."
         )
     if not free.size_known:
         texts.append("The common scale of both axes needs one known length between two balls.")
-    if any(name.startswith("straightness") for name in free.names):
+    if not free.straight_known:
         texts.append(
             "An axis that bends as it turns looks like a placing that is turned: shift along the other axis too, or turn the "
             "plate by 180°."
@@ -205,7 +205,7 @@ def _plate(result: PlaneShiftResult) -> Section:
     if facts.certificate is not None:
         rows.append(("Its certificate", f"{facts.certificate.number} {facts.certificate.laboratory}".strip()))
     blocks: list[Block] = [Facts(tuple((label, value) for label, value in rows if value))]
-    if not any(name.startswith("squareness") for name in estimate.free.names):
+    if estimate.free.square_known:
         mean, u = estimate.balls.mean(axis=0), estimate.balls.std(axis=0, ddof=1)
         cells = tuple(
             (str(number), *(text for x, s in zip(place, spread, strict=True) for text in _coordinate(x, s)))

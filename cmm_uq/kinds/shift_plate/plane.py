@@ -19,6 +19,7 @@ from cmm_uq.kinds.shift_plate.model import PlaneModel, plane_model
 from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate
 from cmm_uq.kinds.shift_plate.undetermined import FreeInPlane, free_in_plane
 from cmm_uq.kinds.shifting.smooth_model import Coefficients, sampled
+from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import AXES, Floats
 
 _FINE = 41
@@ -88,7 +89,7 @@ class PlaneEstimate:
         x, values, _ = self._on(which)
         values = values + self.coefficients.columns[:, which : which + 1] * (x - x[0])
         values -= values[:, :1]
-        if f"scale_{AXES[self.plate.axes[which]]}" in self.free.names:
+        if SCALE[AXES[self.plate.axes[which]]].name in self.free.names:
             values -= self.scales[which][:, None] * (x - x[0])
         return Curve(x, values)
 

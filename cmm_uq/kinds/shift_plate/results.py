@@ -18,7 +18,7 @@ def plane_shift_results(result: PlaneShiftResult) -> dict[str, Any]:
     before, after = estimate.residuals
     balls, u = estimate.balls.mean(axis=0), estimate.balls.std(axis=0, ddof=1) / MICROMETRE
     return {
-        **head(job),
+        **head(job, effects=False),
         "estimates": {
             name: {parameter: quantity_data(q) for parameter, q in parameters.items()}
             for name, parameters in result.scalars.items()

@@ -15,12 +15,21 @@ from scipy import linalg
 from cmm_uq.kinds.shift_axis.undetermined import common_period
 from cmm_uq.kinds.shift_plate.model import PlaneModel
 from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate
+from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.points import AXES, Floats
 
 _ALIKE = 0.02
 """What changes the readings by less than this part of its own size is not determined by them."""
 _SQUARE_DEG = 5.0
 """Placings turned by less than this against each other are shifts of each other."""
+
+_TITLES = {
+    **{effect.name: f"scale of {a.upper()}" for a, effect in SCALE.items()},
+    **{effect.name: f"squareness {'–'.join(plane.upper())}" for plane, effect in SQUARENESS.items()},
+    **{effect.name: f"straightness of {a.upper()} along {b.upper()}" for (a, b), effect in STRAIGHTNESS.items()},
+    **{effect.name: f"rotation of {a.upper()} about {b.upper()}" for (a, b), effect in ROTATION.items()},
+    **{f"linearity_{a}": f"linearity of {a.upper()}" for a in AXES},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +54,17 @@ class FreeInPlane:
     @property
     def size_known(self) -> bool:
         """Whether both scales are determined."""
-        return not any(name.startswith("scale_") for name in self.names)
+        return self.names.isdisjoint(effect.name for effect in SCALE.values())
+
+    @property
+    def square_known(self) -> bool:
+        """Whether the squareness is determined."""
+        return self.names.isdisjoint(effect.name for effect in SQUARENESS.values())
+
+    @property
+    def straight_known(self) -> bool:
+        """Whether both straightnesses are determined."""
+        return self.names.isdisjoint(effect.name for effect in STRAIGHTNESS.values())
 
 
 def free_in_plane(plate: PlacedPlate, model: PlaneModel) -> FreeInPlane:
@@ -60,7 +79,7 @@ def free_in_plane(plate: PlacedPlate, model: PlaneModel) -> FreeInPlane:
 
 def _low_order(plate: PlacedPlate, model: PlaneModel) -> tuple[list[str], Floats]:
     """Names, and change of the readings (2n, ·), of scales, squareness, and a bow or slope of each function."""
-    names = [*(f"scale_{AXES[a]}" for a in plate.axes), f"squareness_{plate.plane}"]
+    names = [*(SCALE[AXES[a]].name for a in plate.axes), SQUARENESS[plate.plane].name]
     effects = [*model.smooth.columns.T[:3]]
     for index, f in enumerate(model.smooth.functions):
         place = (2 * f.position - f.low - f.high) / f.range
@@ -102,11 +121,5 @@ def _period(shifts: Floats) -> float | None:
 
 
 def title(name: str) -> str:
-    """A name in words: ``straightness_x_y`` is the straightness of X along Y."""
-    kind, *axes = name.split("_")
-    upper = [a.upper() for a in axes]
-    if kind == "squareness":
-        return f"squareness {upper[0][0]}–{upper[0][1]}"
-    if kind in ("straightness", "rotation"):
-        return f"{kind} of {upper[0]} {'along' if kind == 'straightness' else 'about'} {upper[1]}"
-    return f"{kind} of {upper[0]}"
+    """A name in words, as of an effect: ``straightness_x_y`` is the straightness of X along Y."""
+    return _TITLES[name]

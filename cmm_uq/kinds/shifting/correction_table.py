@@ -11,6 +11,7 @@ from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.kinds.shift_plate.plane import PlaneEstimate
 from cmm_uq.physics.error_map import AxisErrors, ErrorMap, write_error_map
 from cmm_uq.physics.kinematics import carried_offset
+from cmm_uq.physics.rigid_body import SQUARENESS
 from cmm_uq.points import AXES, Floats, Machine
 from cmm_uq.units import ARCSECOND, MICROMETRE
 
@@ -55,7 +56,7 @@ def plane_correction_table(estimate: PlaneEstimate, machine: Machine) -> ErrorMa
             errors[:, axes[1]] -= arm[0] * turn
             errors[:, 3 + normal] = turn
         found[axis] = x, errors
-    if f"squareness_{estimate.plate.plane}" not in estimate.free.names:
+    if SQUARENESS[estimate.plate.plane].name not in estimate.free.names:
         y, errors = found[axes[1]]
         errors[:, axes[0]] -= estimate.squareness.mean() * (y - y[0])
     return _error_map(found, machine)

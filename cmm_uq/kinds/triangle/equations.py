@@ -21,6 +21,7 @@ from cmm_uq.artefacts.triangle_placings import PLANES
 from cmm_uq.artefacts.triangle_standard import SIDES_OF_DIMENSIONS, corners
 from cmm_uq.errors import CmmUqError
 from cmm_uq.model.placings import Placings
+from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS
 from cmm_uq.points import AXES, Floats
 from cmm_uq.units import ARCSECOND, METRE, PPM
 
@@ -30,10 +31,7 @@ _ANOTHER_PLACE = 20.0
 
 _X, _, _Z, _TIP_X, _TIP_Y, _ = range(6)
 
-ANGLES = ("squareness_xy", "squareness_yz", "squareness_zx")
-PARAMETERS = (
-    "scale_x", "scale_y", "scale_z", *ANGLES, *(f"rotation_{a}_{b}" for a in AXES for b in AXES),
-)  # fmt: skip
+PARAMETERS = tuple(effect.name for family in (SCALE, SQUARENESS, ROTATION) for effect in family.values())
 """What the equations give, by the names of the effects, in their units (ppm, ″, ″/m)."""
 
 

@@ -13,7 +13,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.triangle.equations import PARAMETERS, solve_equations
-from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import ARCSECOND, MICROMETRE
@@ -93,7 +93,7 @@ def _two_ways(result: Result, triangle: Triangle) -> list[Block]:
         if name in result.parameters:
             quantity = next(iter(result.parameters[name].values()))
             fitted = ("not determined", "") if name in free else expanded(quantity)[:2]
-        effect = EVERY[name]
+        effect = every()[name]
         rows.append((effect.title, value, U, *fitted, effect.reported[0].unit))
     columns = (
         Column("Parameter", numeric=False), Column("Equations"), Column("U"), Column("Fitted model"), Column("U"),

@@ -83,10 +83,10 @@ def test_what_is_granted_is_as_good_as_what_a_certificate_leaves_open() -> None:
     random = np.random.default_rng(3)
     explanations = rivals(random)
     c = comparison(0.02 * random.standard_normal(M), explanations)
-    granted = Version(2, 0, 1.7)
+    given = Version(2, 0, 1.7)
     F = 1.7 * explanations[2].members[0].columns / c.noise_scale[:, None]
     other = replace(c, certified=F)
-    (alone, beside), (nothing, something) = c.log_evidence(granted=[granted]), other.log_evidence()
+    (alone, beside), (nothing, something) = c.log_evidence(given=[given]), other.log_evidence()
     assert alone == pytest.approx(nothing, abs=1e-8)
     assert np.delete(beside, 2) == pytest.approx(np.delete(something, 2), abs=1e-8)
 

@@ -10,13 +10,15 @@ import pytest
 from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.diagnosis.comparison.search import asserted, with_rivals
+from cmm_uq.physics.effect import Nonparametric
 
 BOW, TURN, SQUARE, FUNCTION = range(4)
+X_OF_Y = Nonparametric("y_mm", "x")
 RIVALS = (
-    Explanation("straightness_y_x", EFFECT, ()),
+    Explanation("straightness_y_x", EFFECT, (), imitated_by=(X_OF_Y,)),
     Explanation("rotation_x_z", EFFECT, ()),
-    Explanation("squareness_xy", EFFECT, ()),
-    Explanation("error along X as a function of Y", UNKNOWN, (), mechanisms=("straightness_y_x", "squareness_xy")),
+    Explanation("squareness_xy", EFFECT, (), imitated_by=(X_OF_Y,)),
+    Explanation("error along X as a function of Y", UNKNOWN, (), term=X_OF_Y),
 )
 
 
@@ -40,7 +42,7 @@ def test_one_of_two_that_cannot_be_told_apart_is_asserted_for_both() -> None:
     assert found({(BOW,): 0.45, (TURN,): 0.4, (): 0.15}) == {BOW}
 
 
-def test_effects_whose_sum_is_a_function_that_nobody_named_are_asserted() -> None:
+def test_effects_whose_sum_is_a_nonparametric_term_are_asserted() -> None:
     """A line and a bow are a smooth function; that it is more probable than the two of them is no reason to know nothing."""
     assert found({(FUNCTION,): 0.6, (SQUARE, BOW): 0.4}) == {SQUARE, BOW}
     assert found({(FUNCTION,): 0.9, (SQUARE, BOW): 0.1}) == set()

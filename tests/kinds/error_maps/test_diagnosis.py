@@ -10,7 +10,7 @@ import pytest
 from cmm_uq.kinds.error_maps.columns import MapColumn, columns_of, roughness, turned
 from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
 from cmm_uq.kinds.error_maps.fit import expansion as expansion_of
-from cmm_uq.kinds.error_maps.search import race_of
+from cmm_uq.kinds.error_maps.search import column_comparison
 from cmm_uq.physics.error_map import AxisErrors, ErrorMap, read_error_map
 from cmm_uq.units import ARCSECOND, MICROMETRE
 from tests.conftest import ROOT
@@ -65,9 +65,9 @@ def test_an_expansion_of_a_scale_is_found_with_its_size() -> None:
 
 def test_without_noise_the_expansion_is_that_of_the_differences() -> None:
     """Exact construction: maps that differ by 8 ppm/K and nothing else."""
-    race = race_of(plus(column(sigma=1e-5), expansion(8.0)), (), 0)
-    assert race.effect is not None
-    assert expansion_of(race, race.effect).draws.mean() == pytest.approx(8e-6, rel=1e-3)
+    compared = column_comparison(plus(column(sigma=1e-5), expansion(8.0)), (), 0)
+    assert compared.effect is not None
+    assert expansion_of(compared, compared.effect).draws.mean() == pytest.approx(8e-6, rel=1e-3)
 
 
 def test_an_expansion_that_the_job_names_is_not_found_again() -> None:

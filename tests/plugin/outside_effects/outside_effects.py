@@ -1,0 +1,25 @@
+"""Twist of a bridge's beam: an effect for cmm_uq from a package of its own."""
+
+from collections.abc import Sequence
+
+from cmm_uq.physics.effect import Effect, Parameter
+from cmm_uq.physics.rigid_body import turned
+from cmm_uq.points import Floats, Points
+from cmm_uq.units import ARCSECOND
+
+
+class BeamTwist(Effect):
+    """The beam, held at both ends, twists under the ram in front of it, most in the middle of its travel T from y0."""
+
+    name = "beam_twist"
+    title = "Twist of the beam"
+    formula = "e = ε × what carriage y carries, ε_y = twist·(1 − (2(y − y0)/T − 1)²)"
+    mechanism = "guideway"
+    points_to = "the beam twists under the weight of the ram: check the ram's counterbalance and how the beam is held"
+    coefficients = (Parameter("twist_arcsec", "″", 10.0),)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        low, high = points.machine.travel("y")
+        place = 2 * (points.readings[:, 1] - low) / (high - low) - 1
+        return turned(points, "y", "y", ARCSECOND * (1 - place**2))
