@@ -44,7 +44,7 @@ def write_budget(file: Path, out: Path | None = None, *, seed: int | None = None
 
         data = as_json({**results_of(evaluation), "inputs_sha256": {file.name: model.sha256}})
         document = budget_document(model, evaluation, file.name)
-        pdf = render_pdf(document, {file.name: file.read_bytes(), "results.json": data})
+        pdf = render_pdf(document, {file.name: model.content, "results.json": data})
         contents = {"budget.html": render_html(document).encode(), "budget.pdf": pdf, "results.json": data}
         files = write_whole(place, folder, contents)
     return WrittenBudget(evaluation, data, files)

@@ -14,8 +14,10 @@ from cmm_uq.analysis.refusals import refuse
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.files.content import content_of
+from cmm_uq.files.limits import JOB_BYTES
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reading import content_of, read_job
+from cmm_uq.jobs.reading import read_job
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.jobs.truth import Truth
 from cmm_uq.measurement import MeasurementModel, Noise
@@ -65,7 +67,7 @@ def write_simulation(job: Path, truth: Path, out: Path, *, seed: int | None = No
     """
     read = read_job(job)
     refuse(read, "simulated")
-    content = content_of(truth, "It gives the effects, the noise and the seed")
+    content = content_of(truth, JOB_BYTES, "It gives the effects, the noise and the seed")
     drawn = checked(content, truth, Truth)
     if out.resolve() == read.folder.resolve():
         raise CmmUqError("is the job that is simulated from", where=str(out), fix="Choose another --out")
