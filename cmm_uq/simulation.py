@@ -21,10 +21,13 @@ from cmm_uq.jobs.reading import read_job
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.jobs.truth import Truth
 from cmm_uq.measurement import MeasurementModel, Noise
+from cmm_uq.overflow import must_be_finite, refusing_overflow
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE
 from cmm_uq.writing import staging, write_whole
+
+_FIX = "Give effects, sizes and noise that a machine can have"
 
 
 def simulate(job: Job, truth: Truth, *, seed: int | None = None) -> Points:
@@ -51,7 +54,10 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None) -> Points:
     noise = Noise(truth.noise.coordinate_um * MICROMETRE, truth.noise.placing_um * MICROMETRE)
     random = np.random.default_rng(truth.seed if seed is None else seed)
     coefficients = np.concatenate([np.zeros(0), *(values for values, _ in given)])
-    return points.at(model.simulate(coefficients, _sizes(artefact, truth), noise, random))
+    with refusing_overflow("truth.toml", _FIX):
+        drawn = model.simulate(coefficients, _sizes(artefact, truth), noise, random)
+    must_be_finite(drawn.ravel().tolist(), "truth.toml", _FIX)
+    return points.at(drawn)
 
 
 def write_simulation(job: Path, truth: Path, out: Path, *, seed: int | None = None) -> dict[str, Path]:

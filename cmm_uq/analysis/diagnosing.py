@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from cmm_uq.analysis.consequences import consequences
-from cmm_uq.analysis.error_maps import MapsDiagnosed, diagnose_error_maps
+from cmm_uq.analysis.error_maps import WHERE, MapsDiagnosed, diagnose_error_maps
 from cmm_uq.analysis.estimation import model_of, without_outliers
-from cmm_uq.analysis.refusals import refuse
+from cmm_uq.analysis.refusals import OVERFLOW_FIX, refuse
 from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
@@ -18,6 +18,7 @@ from cmm_uq.measurement import MeasurementModel
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS, diagnose
 from cmm_uq.mismatch.screening import Finding, screened
 from cmm_uq.mismatch.suggestion import suggestions
+from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import effects
 
 
@@ -38,7 +39,8 @@ def diagnose_folder(
     """
     job = _read(folder, alpha)
     if job.facts.artefact.kind == ERROR_MAP:
-        return diagnose_error_maps(job, seed=seed, alpha=alpha, progress=progress)
+        with refusing_overflow(WHERE, "Look for a number that no map of a machine has"):
+            return diagnose_error_maps(job, seed=seed, alpha=alpha, progress=progress)
     return _diagnose(job, seed, alpha, progress)
 
 
@@ -62,8 +64,9 @@ def _read(folder: Path, alpha: float) -> Job:
 
 def _diagnose(job: Job, seed: int, alpha: float, progress: Progress | None) -> Diagnosed:
     refuse(job, "diagnosed as a recording of an artefact")
-    model, findings = screened_model(job)
-    return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
+    with refusing_overflow(job.recording_path, OVERFLOW_FIX):
+        model, findings = screened_model(job)
+        return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
 
 
 def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
