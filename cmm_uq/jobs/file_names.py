@@ -12,7 +12,7 @@ from cmm_uq.files.limits import FILE_NAME
 
 _WRITTEN = re.compile(
     r"job\.toml|results\.json|manifest\.json|truth\.toml|compensation\.json|plan\.csv|(certificate|diagnosis|plan).*\.(html|pdf)"
-    r"|budget\..*|correction_[a-z]+\.csv|\.unfinished-.*",
+    r"|budget\..*|\.unfinished-.*",
     re.IGNORECASE,
 )
 """Names that commands write, or attach to a certificate, beside the recording of a job."""

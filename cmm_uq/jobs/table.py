@@ -20,8 +20,8 @@ class Table(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-LONGEST_MM = 1e9
-"""Largest coordinate or length, mm: a metre in nanometres, so that a mistaken unit is still recognised as one."""
+LONGEST_MM = 1e7
+"""Largest coordinate or length, mm: ten metres written in micrometres, so that a mistaken unit is still told as one."""
 
 SMALLEST_UM = 1e-6
 """Least standard uncertainty or limit other than 0, µm: a picometre, a hundredth of an atom."""
