@@ -82,3 +82,10 @@ def test_one_distance_determines_nothing(example: str, tmp_path: Path) -> None:
     job = job_with(example, one_place, tmp_path)
     with pytest.raises(CmmUqError):
         diagnose_job(job)
+
+
+@pytest.mark.parametrize("row", [0, 4, 41])
+def test_a_triangle_without_one_of_its_corners_is_refused(row: int, tmp_path: Path) -> None:
+    job = job_with("triangle-simulated", lambda table: table.drop(index=row), tmp_path)
+    with pytest.raises(CmmUqError, match="the triangle does not close"):
+        diagnose_job(job)

@@ -247,3 +247,32 @@ def test_a_joint_sample_is_drawn_row_by_row(read: Read) -> None:
     from cmm_uq.uncertainty.monte_carlo import simulate
 
     assert simulate(model, 1000).u[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("a = " + "[" * 3000, "line 1: is nested too deeply"),
+        (LOSS.replace("0.05\n", "9" * 400 + "\n", 1), "has 400 characters"),
+        (LOSS.replace("x1**2", "x1**2 + " + "9" * 5000), "a number is too large, or a name too long"),
+        (LOSS.replace("x1**2", "x1 * 10**400.0"), "finite|range of numbers"),
+        (LOSS.replace("x1**2", "tan(x1 * 1e300)"), "inf cannot be stated"),
+        (LOSS + "".join(f'[inputs.z{i}]\nvalue = 1\ndistribution = "constant"\n' for i in range(500)), "502 entries"),
+    ],
+    ids=["depth", "digits", "expression", "overflow", "tangent", "inputs"],
+)
+def test_hostile_models_end_in_a_result_or_one_line(read: Read, text: str, says: str) -> None:
+    with pytest.raises(CmmUqError, match=says) as caught:
+        read(text).evaluate()
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_fourth_powers_of_large_inputs_do_not_overflow_the_degrees_of_freedom(read: Read) -> None:
+    """The same model in other units has the same degrees of freedom (JCGM 100 G.4.1 is a ratio)."""
+    text = '[model]\noutputs = {{ y = "a + b" }}\nmethod = "first"\n' + "".join(
+        f'[inputs.{name}]\ndistribution = "t"\nvalue = {{scale}}\nu = {{scale}}\ndof = {dof}\n'
+        for name, dof in (("a", 4), ("b", 9))
+    )
+    plain, large = (read(text.format(scale=scale)).evaluate().stated["y"].dof for scale in ("1.0", "1e69"))
+    assert plain == pytest.approx(4 / (1 / 4 + 1 / 9))
+    assert large == pytest.approx(plain, rel=1e-12)
