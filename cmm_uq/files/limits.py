@@ -35,6 +35,7 @@ ROWS = Limit(200_000, "rows", "CSV file", "a scanned surface; larger ones are po
 MAP_ROWS = Limit(30_000, "rows", "error map", "10 m of each axis by the millimetre")
 COLUMNS = Limit(200, "columns", "CSV file", "every column is searched by a diagnosis")
 CELLS = Limit(5_000_000, "cells", "CSV file", "100 000 rows of 30 columns are 3 000 000")
+OBSERVATIONS = Limit(20_000, "observations", "estimate", "its decomposition holds their square in memory, 3.2 GB")
 CELL = Limit(500, "characters", "cell of a CSV file", "a number needs 25, a remark a sentence")
 LINE = Limit(100_000, "characters", "line of a CSV file", "200 columns of 500 characters")
 LINES = Limit(500_000, "lines", "CSV file", "rows, comments and empty lines")
@@ -59,7 +60,7 @@ DRAWS = Limit(250_000, "entries", "samples of an input", "draws of an earlier Mo
 INPUTS = Limit(500, "entries", "inputs, outputs or correlations of a budget", "its matrix of correlations is square")
 
 LIMITS = (
-    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, MAP_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL,
+    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, MAP_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL,
     DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY, LISTED, DRAWS, INPUTS,
 )  # fmt: skip
 """All of them, in the order of docs/limits.md."""
