@@ -8,8 +8,6 @@ from cmm_uq.jobs.job import ERROR_MAP, SHIFT, Job
 OVERFLOW_FIX = (
     "Look for a number that no measurement gives: in the columns of the recording, u_coordinate_um, u_um or travel_mm"
 )
-    "Look for a number that no measurement gives: in the columns of the recording, u_coordinate_um, u_um or travel_mm"
-)
 """Where figures leave the range of numbers."""
 
 _REASONS = {
