@@ -31,8 +31,10 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
     CmmUqError : an unknown effect, too many observations, or a measurement to set aside that is not there.
     """
     if len(artefact.noise_scale) > OBSERVATIONS.most:
-        raise CmmUqError(f"{len(artefact.noise_scale)} observations are more than are estimated from at once",
-                         where=job.recording_path, fix=f"{OBSERVATIONS.most} are the most: thin out the recording")  # fmt: skip
+        raise CmmUqError(
+            f"{len(artefact.noise_scale)} observations are more than are estimated from at once",
+            where=job.recording_path, fix=f"{OBSERVATIONS.most} are the most: thin out the recording",
+        )  # fmt: skip
     stated, aside = job.facts.recording.u_coordinate_um, job.facts.recording.set_aside
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
