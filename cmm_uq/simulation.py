@@ -18,10 +18,11 @@ from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import read_job
+from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.jobs.truth import Truth
 from cmm_uq.measurement import MeasurementModel, Noise
-from cmm_uq.overflow import must_be_finite, refusing_overflow
+from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE
@@ -56,7 +57,8 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None) -> Points:
     coefficients = np.concatenate([np.zeros(0), *(values for values, _ in given)])
     with refusing_overflow("truth.toml", _FIX):
         drawn = model.simulate(coefficients, _sizes(artefact, truth), noise, random)
-    must_be_finite(drawn.ravel().tolist(), "truth.toml", _FIX)
+    if not np.all(np.abs(drawn) <= LONGEST_MM):
+        raise CmmUqError(f"the coordinates would go beyond {LONGEST_MM:g} mm", where="truth.toml", fix=_FIX)
     return points.at(drawn)
 
 
