@@ -1,13 +1,28 @@
 """Errors that a user can act on: what is wrong, where, and how to mend it.
 
 Everything that bad input can cause is raised as :class:`CmmUqError`; the command line prints it without a traceback and
-ends with exit code 2. Where the input is sound and the system refuses the output, it is an :class:`OutputError`, exit code 3.
+ends with exit code 2; where the input is sound and the system refuses the output, it is an :class:`OutputError`, exit code 3.
+Whatever an input holds, its message is one line that a terminal shows as it is written.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import unicodedata
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+
+LONGEST_MESSAGE = 300
+"""Characters of a message."""
+
+_LISTED = 220
+"""Characters of a list of known names; such a list is no longer read."""
+
+_COMPARED = 100
+"""Characters of a word that is compared with the known names: none of them is longer."""
+
+_ELLIPSIS = "…"
+_UNSHOWN = frozenset({"Cc", "Cf", "Co", "Cs", "Zl", "Zp"})
+"""Categories of characters that break the line, change its direction, steer a terminal, or cannot be encoded."""
 
 
 class CmmUqError(Exception):
@@ -25,26 +40,70 @@ class CmmUqError(Exception):
         super().__init__(str(self))
 
     def __str__(self) -> str:
-        located = f"{self.where}: {self.problem}" if self.where else self.problem
-        return f"{located}. {self.fix}" if self.fix else located
+        given = (self.where or "", self.problem, self.fix or "")
+        where, problem, fix = (printable(shortened(part, 2 * LONGEST_MESSAGE)) for part in given)
+        separators = len(": ") * bool(where) + len(". ") * bool(fix)
+        if len(where) + len(problem) + len(fix) + separators > LONGEST_MESSAGE:
+            shares = _shares([len(where), len(problem), len(fix)], LONGEST_MESSAGE - separators)
+            # of a place its end says most: the file's own name, line and key
+            where = shortened(where, shares[0], end=0.75)
+            problem, fix = shortened(problem, shares[1]), shortened(fix, shares[2])
+        located = f"{where}: {problem}" if where else problem
+        return f"{located}. {fix}" if fix else located
+
+
+def printable(text: str) -> str:
+    r"""The text with everything that is no visible character written as an escape, such as ``\n`` or ``\u202e``."""
+    if text.isascii() and text.isprintable():
+        return text
+    shown = (c.encode("unicode_escape").decode() if unicodedata.category(c) in _UNSHOWN else c for c in text)
+    return "".join(shown)
+
+
+def shortened(text: str, most: int, *, end: float = 0.5) -> str:
+    """The text, or its two ends with an ellipsis between, at most ``most`` characters.
+
+    Parameters
+    ----------
+    text : to be shortened.
+    most : characters, 2 or more.
+    end : part of them that is kept of the text's end.
+    """
+    if len(text) <= most:
+        return text
+    tail = int((most - 1) * end)
+    return text[: most - 1 - tail] + _ELLIPSIS + text[len(text) - tail :]
 
 
 class OutputError(CmmUqError):
     """The system refuses the output: a full disk, a missing permission, a closed pipe."""
 
 
-LONGEST_LINE = 300
-
-
-def one_line(text: str) -> str:
-    """Text as one line of at most 300 characters, with what would break it escaped."""
-    plain = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    half = LONGEST_LINE // 2
-    return plain if len(plain) <= LONGEST_LINE else f"{plain[: half - 1]}…{plain[-half:]}"
-
-
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """Answer to an unknown name: the nearest known one, else all of them."""
+    """Answer to an unknown name: the nearest known one, else all of them, or as many as can be read."""
     names = sorted(known)
-    near = get_close_matches(word, names, n=1, cutoff=0.6)
-    return f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(names)}"
+    near = get_close_matches(word, names, n=1, cutoff=0.6) if len(word) <= _COMPARED else []
+    if near:
+        return f"Did you mean {near[0]!r}?"
+    listed = ", ".join(names)
+    if len(listed) > _LISTED:
+        shown = listed[:_LISTED].rpartition(", ")[0]
+        count = shown.count(", ") + 1 if shown else 0
+        listed = f"{shown} and {len(names) - count} more" if shown else f"{len(names)} names"
+    return f"Known: {listed}"
+
+
+def _shares(lengths: Sequence[int], total: int) -> list[int]:
+    """Characters for each part: short ones stay whole, the others share what is left alike."""
+    shares = list(lengths)
+    cut = [i for i, length in enumerate(lengths) if length]
+    while True:
+        whole = [i for i in range(len(lengths)) if i not in cut]
+        share = (total - sum(lengths[i] for i in whole)) // len(cut)
+        longer = [i for i in cut if lengths[i] > share]
+        if longer == cut:
+            break
+        cut = longer
+    for i in cut:
+        shares[i] = share
+    return shares

@@ -72,7 +72,7 @@ def _ended() -> int:
 
 
 def _say(text: str) -> None:
-    from cmm_uq.errors import one_line
+    from cmm_uq.errors import LONGEST_MESSAGE, printable, shortened
 
     with contextlib.suppress(OSError, ValueError, AttributeError):  # where nobody listens the exit code tells
-        print(f"cmm-uq: {one_line(text)}", file=sys.stderr, flush=True)  # noqa: T201
+        print(f"cmm-uq: {shortened(printable(text), LONGEST_MESSAGE)}", file=sys.stderr, flush=True)  # noqa: T201

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cmm_uq.commands.diagnosing import diagnosed, screened_model
 from cmm_uq.commands.estimation import accuracy, influences, noise, parameters, sizes, with_noise
-from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse
 from cmm_uq.conformity.standards import statement
 from cmm_uq.documents.result import Result
 from cmm_uq.inference.posterior import Progress, sample
@@ -17,6 +17,7 @@ from cmm_uq.jobs.job import SHIFT, Job
 from cmm_uq.jobs.reading import read_job
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult, analyse_shift
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult, analyse_plane
+from cmm_uq.overflow import must_be_finite, refusing_overflow
 
 __all__ = ["PlaneShiftResult", "Result", "ShiftResult", "analyse", "analyse_job", "analyse_observations"]
 
@@ -49,11 +50,12 @@ def analyse_job(
     CmmUqError : the job cannot be analysed as it stands.
     """
     refuse(job, "reported", but=SHIFT)
-    if job.facts.artefact.plane is not None:
-        return analyse_plane(job, seed=seed, progress=progress)
-    if job.facts.artefact.kind == SHIFT:
-        return analyse_shift(job, seed=seed, progress=progress)
-    return analyse_observations(job, seed=seed, progress=progress)
+    with refusing_overflow(job.recording_path, OVERFLOW_FIX):
+        if job.facts.artefact.plane is not None:
+            return analyse_plane(job, seed=seed, progress=progress)
+        if job.facts.artefact.kind == SHIFT:
+            return analyse_shift(job, seed=seed, progress=progress)
+        return analyse_observations(job, seed=seed, progress=progress)
 
 
 def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Result:
@@ -71,8 +73,13 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
         statement(wish, model.artefact, figures, f"[[conformity]] {i}")
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
-    return Result(
+    result = Result(
         job, model, findings, influences(model, estimate, findings), estimate, posterior, parameters(model, posterior),
         sizes(model.artefact, posterior), noise(posterior, job.facts.recording.u_coordinate_um, p_value), figures,
         tuple(statements), diagnosed(job, screened, findings, seed=seed),
     )  # fmt: skip
+    for name, quantity in result.quantities():
+        must_be_finite(
+            (quantity.value, quantity.u, *quantity.interval95), f"{job.recording_path}: {name}", OVERFLOW_FIX
+        )
+    return result

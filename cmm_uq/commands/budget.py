@@ -56,7 +56,7 @@ def write_budget(
 
         data = as_json({**results_of(evaluation), "inputs_sha256": {file.name: model.sha256}})
         document = budget_document(model, evaluation, file.name)
-        pdf = render_pdf(document, {file.name: _as_read(file, model.sha256), "results.json": data})
+        pdf = render_pdf(document, {file.name: model.content, "results.json": data})
         contents = {"budget.html": render_html(document).encode(), "budget.pdf": pdf, "results.json": data}
         files = place.write(contents)
     return WrittenBudget(evaluation, data, files)
@@ -65,11 +65,3 @@ def write_budget(
 def _identity(file: Path) -> str:
     """The file's name with a mark of its folder: two models of one name are two."""
     return f"{file.stem}-{hashlib.sha256(os.fsencode(file.absolute().parent)).hexdigest()[:8]}"
-
-
-def _as_read(file: Path, sha256: str) -> bytes:
-    """The model's bytes for the attachment: those that were evaluated."""
-    content = file.read_bytes()
-    if hashlib.sha256(content).hexdigest() != sha256:
-        raise CmmUqError("was changed while it was evaluated", where=str(file), fix="Run the command again")
-    return content

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.commands.estimation import model_of, without_outliers
-from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse
 from cmm_uq.conformity.consequences import consequences
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, diagnose
 from cmm_uq.documents.result import Diagnosed
@@ -14,8 +14,9 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import ERROR_MAP, Job
 from cmm_uq.jobs.reading import read_job
-from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed, diagnose_error_maps
+from cmm_uq.kinds.error_maps.analysis import WHERE, MapsDiagnosed, diagnose_error_maps
 from cmm_uq.model import MeasurementModel
+from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning.suggestion import suggestions
 from cmm_uq.screening.screened import Finding, screened
@@ -50,7 +51,8 @@ def diagnose_read(
     """
     _check_rate(alpha)
     if job.facts.artefact.kind == ERROR_MAP:
-        return diagnose_error_maps(job, seed=seed, alpha=alpha, progress=progress)
+        with refusing_overflow(WHERE, "Look for a number that no map of a machine has"):
+            return diagnose_error_maps(job, seed=seed, alpha=alpha, progress=progress)
     return _diagnose(job, seed, alpha, progress)
 
 
@@ -74,8 +76,9 @@ def _check_rate(alpha: float) -> None:
 
 def _diagnose(job: Job, seed: int, alpha: float, progress: Progress | None) -> Diagnosed:
     refuse(job, "diagnosed as a recording of an artefact")
-    model, findings = screened_model(job)
-    return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
+    with refusing_overflow(job.recording_path, OVERFLOW_FIX):
+        model, findings = screened_model(job)
+        return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
 
 
 def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:

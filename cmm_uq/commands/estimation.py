@@ -11,6 +11,7 @@ from scipy import special
 from cmm_uq.conformity.accuracy import with_uncertainty
 from cmm_uq.documents.result import LACK_OF_FIT, Influence, Noise
 from cmm_uq.errors import CmmUqError
+from cmm_uq.files.limits import OBSERVATIONS
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import Estimate, MeasurementModel
@@ -27,8 +28,13 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
 
     Raises
     ------
-    CmmUqError : an unknown effect, or a measurement to set aside that is not there.
+    CmmUqError : an unknown effect, too many observations, or a measurement to set aside that is not there.
     """
+    if len(artefact.noise_scale) > OBSERVATIONS.most:
+        raise CmmUqError(
+            f"{len(artefact.noise_scale)} observations are more than are estimated from at once",
+            where=job.recording_path, fix=f"{OBSERVATIONS.most} are the most: thin out the recording",
+        )  # fmt: skip
     stated, aside = job.facts.recording.u_coordinate_um, job.facts.recording.set_aside
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmm_uq.artefacts.bryan import Bryan
-from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse
 from cmm_uq.conformity.plan_conditions import Condition, conditions
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.diagnosis.power import Power, powers, without_fault
@@ -16,6 +16,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import SHIFT, Job
 from cmm_uq.kinds.shift_axis.series import shifted_series
 from cmm_uq.kinds.shift_axis.undetermined import undetermined
+from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.candidates import candidates, like, thinned
 from cmm_uq.planning.exchange import choose, score_of
@@ -112,6 +113,7 @@ def minutes(setting: Setting, placing: Placing) -> float:
     return setting.plan.minutes_per_placing + setting.plan.seconds_per_point * len(placing.points) / 60
 
 
+@refusing_overflow("job.toml", OVERFLOW_FIX)
 def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress | None = None) -> Plan:
     """Plan a job.
 

@@ -5,6 +5,11 @@ from __future__ import annotations
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ERROR_MAP, SHIFT, Job
 
+OVERFLOW_FIX = (
+    "Look for a number that no measurement gives: in the columns of the recording, u_coordinate_um, u_um or travel_mm"
+)
+"""Where figures leave the range of numbers."""
+
 _REASONS = {
     SHIFT: ("a shift job cannot be {}: its machine error is a free function, no list of effects",
             "cmm-uq report JOB estimates it"),

@@ -13,14 +13,18 @@ from cmm_uq.artefacts import artefact_of
 from cmm_uq.commands.refusals import refuse
 from cmm_uq.documents.program import program
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.files.content import content_of
+from cmm_uq.files.limits import JOB_BYTES
 from cmm_uq.jobs.derived_job import derived_toml
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import first_line
-from cmm_uq.jobs.reading import content_of, read_job
+from cmm_uq.jobs.reading import read_job
+from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.jobs.truth import Truth
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.artefact import Artefact
+from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE
@@ -28,6 +32,8 @@ from cmm_uq.writing import Owner, staged
 
 TRUTH = "truth.toml"
 """Name of the truth in the folder of a simulated job."""
+
+_FIX = "Give effects, sizes and noise that a machine can have"
 
 
 def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str = TRUTH) -> Points:
@@ -55,7 +61,11 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     noise = Noise(truth.noise.coordinate_um * MICROMETRE, truth.noise.placing_um * MICROMETRE)
     random = np.random.default_rng(truth.seed if seed is None else seed)
     coefficients = np.concatenate([np.zeros(0), *(values for values, _ in given)])
-    return points.at(model.simulate(coefficients, _sizes(artefact, truth, truth_path), noise, random))
+    with refusing_overflow(truth_path, _FIX):
+        drawn = model.simulate(coefficients, _sizes(artefact, truth, truth_path), noise, random)
+    if not np.all(np.abs(drawn) <= LONGEST_MM):
+        raise CmmUqError(f"the coordinates would go beyond {LONGEST_MM:g} mm", where=truth_path, fix=_FIX)
+    return points.at(drawn)
 
 
 def write_simulation(
@@ -74,7 +84,7 @@ def write_simulation(
     """
     read = read_job(job)
     refuse(read, "simulated")
-    content = content_of(truth, "It gives the effects, the noise and the seed")
+    content = content_of(truth, JOB_BYTES, "It gives the effects, the noise and the seed")
     drawn = checked(content, truth, Truth)
     owner = Owner("simulate", read.facts.job.id, read.origin)
     with staged(out, owner, inputs=(*read.paths, truth), force=force, expected=(*read.inputs, TRUTH)) as place:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -112,6 +112,14 @@ class Result:
     accuracy: Mapping[str, Quantity]
     statements: tuple[Statement, ...]
     diagnosed: Diagnosed
+
+    def quantities(self) -> Iterator[tuple[str, Quantity]]:
+        """Every quantity that is reported, with its name."""
+        for effect, values in self.parameters.items():
+            yield from ((f"{effect} {name}", quantity) for name, quantity in values.items())
+        yield from self.sizes.items()
+        yield "u_coordinate_um", self.noise.coordinate
+        yield from self.accuracy.items()
 
     @property
     def artefact(self) -> Artefact:

@@ -15,6 +15,7 @@ from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.program import software
 from cmm_uq.documents.result import Diagnosed, Result
+from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.screening.screened import Finding
@@ -125,7 +126,11 @@ def improvement_data(gain: Improvement) -> dict[str, Any]:
 
 def as_json(data: Mapping[str, Any]) -> bytes:
     """Plain data as UTF-8 JSON with finite numbers of ten digits, so that the last bits of rounding do not show."""
-    return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    try:
+        return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    except ValueError as error:
+        raise CmmUqError(f"a figure is not finite: {error}", where="results.json",
+                         fix="Look for a number in the input that no measurement gives") from error  # fmt: skip
 
 
 def quantity_data(quantity: Quantity) -> dict[str, Any]:

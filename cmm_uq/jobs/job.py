@@ -8,11 +8,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from cmm_uq.errors import suggestion
+from cmm_uq.files.limits import CONFORMITY, EFFECTS, LISTED, MAPS
+from cmm_uq.jobs.file_names import device_name
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.table import (
+    AnyFloat,
+    Length,
+    Limit,
+    Names,
+    Number,
+    Numbers,
+    Position,
+    Range,
+    Table,
+    Temperature,
+    Triple,
+    Uncertainty,
+    at_least,
+)
 from cmm_uq.points import Points
 
 ArtefactKind = Literal[
@@ -26,19 +43,17 @@ WITH_REFERENCES = ("step_gauge", "gauge_blocks", "plate")
 
 Standard = Literal["ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617"]
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Range = Annotated[list[float], Field(min_length=2, max_length=2)]
-Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
+SHORTEST_TRAVEL_MM = 1e-3
+"""Positions are divided by the travel."""
+
+Angle = Annotated[float, Field(ge=-36_000, le=36_000)]
+"""A squareness error, ″: ten degrees."""
+
+Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]
+"""A permissible size of an effect in its own unit."""
 
 
-class _Table(BaseModel):
-    """A table of job.toml: no key beyond the known ones, no text where a number belongs, no NaN."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class JobFacts(_Table):
+class JobFacts(Table):
     """``[job]``: identification, and free text for the certificate.
 
     ``origin`` and ``derived_from`` are written by the commands that make a recording out of another.
@@ -72,10 +87,12 @@ class JobFacts(_Table):
     def _names_a_folder(self) -> Self:
         if set(self.id) == {"."}:
             raise ValueError("must name a folder of its own, so it cannot consist of dots")
+        if device_name(self.id):
+            raise ValueError("must name a folder of its own, and Windows takes this name for a device")
         return self
 
 
-class Laboratory(_Table):
+class Laboratory(Table):
     """``[laboratory]``: who answers for the certificate."""
 
     name: str = ""
@@ -85,7 +102,7 @@ class Laboratory(_Table):
     signatory_role: str = ""
 
 
-class Travel(_Table):
+class Travel(Table):
     """``travel_mm``: lowest and highest scale reading of each axis."""
 
     x: Range | None = None
@@ -98,25 +115,27 @@ class Travel(_Table):
             given = getattr(self, axis)
             if given and not given[0] < given[1]:
                 raise ValueError(f"{axis} = {given}: the first number must be the lower one")
+            if given and given[1] - given[0] < SHORTEST_TRAVEL_MM:
+                raise ValueError(f"{axis} = {given}: a travel of less than {SHORTEST_TRAVEL_MM:g} mm is none")
         return self
 
 
-class ErrorMapFile(_Table):
+class ErrorMapFile(Table):
     """One error map and the temperature it was taken at."""
 
     file: str
-    temperature_c: float
+    temperature_c: Temperature
 
 
-class SquarenessFacts(_Table):
+class SquarenessFacts(Table):
     """``squareness_arcsec``: beside an error map."""
 
-    xy: float = 0.0
-    yz: float = 0.0
-    zx: float = 0.0
+    xy: Angle = 0.0
+    yz: Angle = 0.0
+    zx: Angle = 0.0
 
 
-class MachineFacts(_Table):
+class MachineFacts(Table):
     """``[machine]``."""
 
     name: str
@@ -127,7 +146,7 @@ class MachineFacts(_Table):
     chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
     travel_mm: Travel = Travel()
     origin_mm: Triple = [0.0, 0.0, 0.0]
-    error_map: list[ErrorMapFile] = []
+    error_map: Annotated[list[ErrorMapFile], Field(max_length=MAPS.most)] = []
     squareness_arcsec: SquarenessFacts | None = None
 
     @model_validator(mode="after")
@@ -139,7 +158,7 @@ class MachineFacts(_Table):
         return self
 
 
-class Traceability(_Table):
+class Traceability(Table):
     """The artefact's own certificate."""
 
     number: str = ""
@@ -148,16 +167,16 @@ class Traceability(_Table):
     due: dt.date | None = None
 
 
-class KnownLength(_Table):
+class KnownLength(Table):
     """A known length between two points of a shifted artefact."""
 
-    from_point: Annotated[int, Field(alias="from")]
-    to_point: Annotated[int, Field(alias="to")]
-    length_mm: Positive
-    u_um: NotNegative
+    from_point: Annotated[Number, Field(alias="from")]
+    to_point: Annotated[Number, Field(alias="to")]
+    length_mm: Length
+    u_um: Uncertainty
 
 
-class ArtefactFacts(_Table):
+class ArtefactFacts(Table):
     """``[artefact]``; without ``length_mm`` it is uncalibrated, unless its certified figures stand in the recording.
 
     ``nominal`` says that those figures are nominal only: their common scale then stays free. ``form_um`` is the form
@@ -169,22 +188,22 @@ class ArtefactFacts(_Table):
     kind: ArtefactKind
     name: str = ""
     serial: str = ""
-    length_mm: Positive | None = None
-    u_um: NotNegative | None = None
+    length_mm: Length | None = None
+    u_um: Uncertainty | None = None
     nominal: bool = False
-    form_um: NotNegative | None = None
+    form_um: Uncertainty | None = None
     blocks_mm: Triple | None = None
-    u_blocks_um: NotNegative = 0.0
+    u_blocks_um: Uncertainty = 0.0
     cylinders_mm: Triple | None = None
-    u_cylinders_um: NotNegative = 0.0
-    probe_offset_mm: Positive | None = None
-    u_probe_offset_um: NotNegative = 0.0
-    cte_per_k: float = 0.0
+    u_cylinders_um: Uncertainty = 0.0
+    probe_offset_mm: Length | None = None
+    u_probe_offset_um: Uncertainty = 0.0
+    cte_per_k: AnyFloat = 0.0
     certificate: Traceability | None = None
     axis: Literal["x", "y", "z"] | None = None
     plane: Literal["xy", "yz", "zx"] | None = None
-    shifts_mm: list[float] = []
-    u_shift_um: NotNegative = 0.0
+    shifts_mm: Annotated[list[Position], Field(max_length=LISTED.most)] = []
+    u_shift_um: Uncertainty = 0.0
     known: KnownLength | None = None
 
     @model_validator(mode="after")
@@ -220,7 +239,7 @@ class ArtefactFacts(_Table):
         return self
 
 
-class RecordingFacts(_Table):
+class RecordingFacts(Table):
     """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
 
     ``earlier`` names a recording of the same plate in the same placings at an earlier date: what is estimated then is what
@@ -230,18 +249,18 @@ class RecordingFacts(_Table):
     file: str
     earlier: str | None = None
     earlier_date: dt.date | None = None
-    u_coordinate_um: Positive | None = None
-    set_aside: list[int] = []
+    u_coordinate_um: Limit | None = None
+    set_aside: Numbers = []
 
 
-class ModelFacts(_Table):
+class ModelFacts(Table):
     """``[model]``: the physics that the simulation is told about.
 
     ``tolerances``: largest permissible size of an effect's (first) parameter, by its name and in its unit.
     """
 
-    effects: list[str]
-    tolerances: dict[str, Positive] = {}
+    effects: Names
+    tolerances: Annotated[dict[str, Tolerance], Field(max_length=EFFECTS.most)] = {}
 
     @model_validator(mode="after")
     def _tolerances_of_effects(self) -> Self:
@@ -253,33 +272,33 @@ class ModelFacts(_Table):
         return self
 
 
-class MaximumPermissibleError(_Table):
+class MaximumPermissibleError(Table):
     """``mpe``: E = A + L/K, with L in mm and E in µm."""
 
-    a_um: NotNegative
-    k: Positive
+    a_um: Uncertainty
+    k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)]
 
 
-class GuardBand(_Table):
+class GuardBand(Table):
     """A guard band of so many expanded uncertainties (ILAC-G8:09/2019, 4.2.2)."""
 
-    guard_band: NotNegative
+    guard_band: Annotated[float, Field(ge=0, le=100)]
 
 
-class FalseAccept(_Table):
+class FalseAccept(Table):
     """Accept only when the probability of not conforming is at most this."""
 
-    max_false_accept: Annotated[float, Field(gt=0, lt=1)]
+    max_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-12)]
 
 
 Rule = Literal["simple", "ISO 14253-1"] | GuardBand | FalseAccept
 
 
-class ConformityFacts(_Table):
+class ConformityFacts(Table):
     """One ``[[conformity]]``: a standard, a limit and a decision rule."""
 
     standard: Standard
-    limit_um: Positive | None = None
+    limit_um: Limit | None = None
     mpe: MaximumPermissibleError | None = None
     rule: Rule = "ISO 14253-1"
 
@@ -290,7 +309,7 @@ class ConformityFacts(_Table):
         return self
 
 
-class JobFile(_Table):
+class JobFile(Table):
     """All of job.toml. A job whose recording are the machine's error maps has no ``[recording]``."""
 
     job: JobFacts
@@ -299,7 +318,7 @@ class JobFile(_Table):
     artefact: ArtefactFacts
     recording: RecordingFacts
     model: ModelFacts
-    conformity: list[ConformityFacts] = []
+    conformity: Annotated[list[ConformityFacts], Field(max_length=CONFORMITY.most)] = []
     plan: PlanFacts = PlanFacts()
 
     @model_validator(mode="before")

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from cmm_uq.files.limits import COLUMNS, LISTED
+from cmm_uq.jobs.table import AnyFloat, Column, Duration, Length, Names, Range, Table, at_least
 
 Ready = Literal[
     "ASME B89.4.1", "ISO 10360-2", "ISO 10360-5", "plate placings", "triangle placings", "surface plate", "swept bar",
@@ -12,35 +16,34 @@ Ready = Literal[
 ]  # fmt: skip
 Criterion = Literal["separation", "D", "A", "worst"]
 
-Positive = Annotated[float, Field(gt=0)]
-Range = Annotated[list[float], Field(min_length=2, max_length=2)]
-Direction = Annotated[list[float], Field(min_length=3, max_length=3)]
+_SHORTEST = 1e-6
+"""Length of a direction below which it is none."""
+
+Direction = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=3, max_length=3)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class FixtureFacts(_Table):
+class FixtureFacts(Table):
     """``[plan.fixtures]``: how the artefact may stand.
 
     ``directions``: of a bar or gauge along its length, of a plate or triangle across it, either way; any without them.
     ``heights_mm``: lowest and highest z reading of the artefact's middle.
     """
 
-    directions: list[Direction] = []
+    directions: Annotated[list[Direction], Field(max_length=LISTED.most)] = []
     heights_mm: Range | None = None
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
         if any(not any(direction) for direction in self.directions):
             raise ValueError("directions: [0, 0, 0] points nowhere")
+        if any(hypot(*direction) < _SHORTEST for direction in self.directions):
+            raise ValueError(f"directions: one is shorter than {_SHORTEST:g}")
         if self.heights_mm is not None and not self.heights_mm[0] <= self.heights_mm[1]:
             raise ValueError(f"heights_mm = {self.heights_mm}: the first number must be the lower one")
         return self
 
 
-class PlanFacts(_Table):
+class PlanFacts(Table):
     """``[plan]``.
 
     ``ready`` names the plan to start from where there is no recording. With a ``criterion`` a better one is searched for:
@@ -49,23 +52,23 @@ class PlanFacts(_Table):
 
     ready: Ready | None = None
     volume_mm: dict[Literal["x", "y", "z"], Range] = {}
-    margin_mm: Annotated[float, Field(ge=0)] = 10.0
+    margin_mm: Annotated[float, Field(ge=0, le=1e6)] = 10.0
     fixtures: FixtureFacts = FixtureFacts()
-    length_mm: Positive | None = None
-    lengths_mm: list[Positive] = []
-    pitch_mm: Positive | None = None
-    grid: Annotated[list[Annotated[int, Field(ge=2)]], Field(min_length=2, max_length=2)] = [5, 5]
+    length_mm: Length | None = None
+    lengths_mm: Annotated[list[Length], Field(max_length=LISTED.most)] = []
+    pitch_mm: Length | None = None
+    grid: Annotated[list[Annotated[int, Field(ge=2, le=100)]], Field(min_length=2, max_length=2)] = [5, 5]
     both_ways: bool = False
     repeats: Annotated[int, Field(ge=1, le=20)] = 3
-    rivals: list[str] | None = None
-    columns: dict[str, float] = {}
+    rivals: Names | None = None
+    columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
     criterion: Criterion | None = None
     number: Annotated[int, Field(ge=1, le=200)] | None = None
     more: Annotated[int, Field(ge=1, le=50)] | None = None
     candidates: Annotated[int, Field(ge=1, le=2000)] = 300
-    minutes_per_placing: Annotated[float, Field(ge=0)] = 5.0
-    seconds_per_point: Annotated[float, Field(ge=0)] = 10.0
-    budget_min: Positive | None = None
+    minutes_per_placing: Duration = 5.0
+    seconds_per_point: Duration = 10.0
+    budget_min: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

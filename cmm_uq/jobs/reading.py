@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.files.content import content_of
+from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.earlier import against_earlier
+from cmm_uq.jobs.file_names import check_distinct, inside
 from cmm_uq.jobs.job import ERROR_MAP, Job, JobFile, MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
@@ -33,7 +37,7 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     folder = path.parent
     finish_interrupted(folder)
-    content = content_of(path, "A job is a folder with a job.toml and the recording that it names")
+    content = content_of(path, JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
     facts = checked(content, path, JobFile)
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
@@ -42,16 +46,20 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
                          where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
     machine = _machine(facts.machine)
     maps = [error_map.file for error_map in facts.machine.error_map]
+    recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
+    check_distinct([*recordings, *maps], str(path))
     if facts.artefact.kind == ERROR_MAP:
         if facts.recording.file:
             raise CmmUqError("error maps are the recording themselves", where=f"{path}: [recording] file",
                              fix="Leave [recording] out, and name the maps under [machine] error_map")  # fmt: skip
-        return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path))
-    if not recorded and not _inside(folder, facts.recording.file, path).exists():
+        return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path, MAP_BYTES))
+    if not recorded and not os.path.lexists(inside(folder, facts.recording.file, str(path))):
         return Job(folder, facts, _no_points(machine), inputs)
     derived = facts.job.derived_from
-    names = [facts.recording.file, *filter(None, [earlier]), *maps, *(derived.files if derived else ())]
-    inputs |= _contents(folder, list(dict.fromkeys(names)), path)
+    inputs |= _contents(folder, recordings, path, TABLE_BYTES) | _contents(folder, maps, path, MAP_BYTES)
+    if derived is not None:
+        others = [name for name in derived.files if name not in inputs]
+        inputs |= _contents(folder, others, path, TABLE_BYTES, written=True)
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     points = read_recording(inputs[facts.recording.file], where, machine)
@@ -66,41 +74,16 @@ def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:
     return {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
 
 
-def content_of(path: Path, fix: str) -> bytes:
-    """Bytes of a file.
-
-    Raises
-    ------
-    CmmUqError : it is missing or cannot be read.
-    """
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise CmmUqError("no such file", where=str(path), fix=fix) from None
-    except IsADirectoryError:
-        raise CmmUqError("is a folder, not a file", where=str(path), fix=fix) from None
-    except OSError as error:
-        raise CmmUqError(f"cannot be read: {error.strerror}", where=str(path), fix=fix) from error
-
-
-def _contents(folder: Path, names: Sequence[str], toml: Path) -> dict[str, bytes]:
-    return {
-        name: content_of(_inside(folder, name, toml), f"Put it beside job.toml, or mend its name in {toml}")
-        for name in names
-    }
+def _contents(
+    folder: Path, names: Sequence[str], toml: Path, limit: Limit, *, written: bool = False
+) -> dict[str, bytes]:  # fmt: skip
+    fix = f"Put it beside job.toml, or mend its name in {toml}"
+    return {name: content_of(inside(folder, name, str(toml), written=written), limit, fix) for name in names}
 
 
 def _no_points(machine: Machine) -> Points:
     none = np.zeros(0, dtype=np.int64)
     return Points(np.zeros((0, 3)), none, none, none, machine)
-
-
-def _inside(folder: Path, name: str, toml: Path) -> Path:
-    path = (folder / name).resolve()
-    if not name or not path.is_relative_to(folder.resolve()):
-        raise CmmUqError(f"file {name!r} is not inside the job folder", where=str(toml),
-                         fix="Copy the file into the folder and name it there: a job must be complete by itself")  # fmt: skip
-    return path
 
 
 def _machine(facts: MachineFacts) -> Machine:

@@ -6,8 +6,6 @@ look like is listed here once; any other numeric column is kept as a covariate.
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -15,6 +13,9 @@ from types import MappingProxyType
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.files.cells import cells_of, column_problem
+from cmm_uq.files.numbers import LARGEST, numbers
+from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.points import Floats, Machine, Points
 
 REQUIRED = ("measurement", "point", "x_mm", "y_mm", "z_mm")
@@ -28,6 +29,15 @@ WHOLE = ("measurement", "point", "repeat")
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {re.sub(r"_(mm|um|c|s|hpa|pct|deg|mm_s)$", "", name): name for name in (*REQUIRED, *OPTIONAL)}
 )
+LARGEST_NUMBER = 1e9
+"""Of a measurement, point or repeat."""
+
+LARGEST_OF: Mapping[str, float] = MappingProxyType({"_mm": LONGEST_MM, "_um": 1e9, "_c": 1e5, "_pct": 1e6, "_deg": 1e6})
+"""By the ending of a column's name: far beyond any recording in its unit, so that a mistaken unit is still told as one."""
+
+SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
+"""Lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled."""
+
 OTHER_UNITS = re.compile(
     r"_(m|cm|um|µm|mm|nm|in|inch|mil|k|f|c|min|ms|h|s|pa|kpa|hpa|mbar|mmhg|rad|deg|arcsec|pct|percent)$"
 )
@@ -44,11 +54,19 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
 
     Raises
     ------
-    CmmUqError : a column is missing or twice there, a cell is no finite number, a row is incomplete, a point is there twice.
+    CmmUqError : a column is missing or twice there, a cell is no number of a possible size, a row is incomplete, a point is
+        there twice.
     """
-    header, rows, lines = _cells(content, name)
+    header, rows, lines = _table(content, name)
     _check_header(header, name)
-    table = {column: _numbers([row[i] for row in rows], column, lines, name) for i, column in enumerate(header)}
+
+    def column_of(i: int) -> Floats:
+        return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}")
+
+    table = {column: column_of(i) for i, column in enumerate(header)}
+    for column, values in table.items():
+        _check_size(values, column, lines, name)
+    _check_normals(table, lines, name)
     for column in WHOLE:
         if column in table:
             _check_whole(table[column], column, lines, name)
@@ -67,34 +85,17 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
     return points
 
 
-def _cells(content: bytes, name: str) -> tuple[list[str], list[list[str]], list[int]]:
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise CmmUqError("is not UTF-8 text", where=f"{name} line {line}", fix="Save the recording as UTF-8") from None
-    if "\0" in text:
-        raise CmmUqError("contains zero bytes: it is no text file", where=name, fix="Export the recording as CSV")
-    reader = csv.reader(io.StringIO(text, newline=""))
-    header: list[str] = []
-    rows, lines = [], []
-    for row in reader:
-        cells = [cell.strip() for cell in row]
-        if not any(cells) or cells[0].startswith("#"):
-            continue
-        if not header:
-            header = cells
-            continue
-        if len(cells) != len(header):
+def _table(content: bytes, name: str) -> tuple[list[str], list[list[str]], list[int]]:
+    cells = cells_of(content, name, "Save the recording as CSV in UTF-8")
+    for row, line in zip(cells.rows, cells.lines, strict=True):
+        if len(row) != len(cells.header):
             raise CmmUqError(
-                f"has {len(cells)} cells where the header has {len(header)}", where=f"{name} line {reader.line_num}",
+                f"has {len(row)} cells where the header has {len(cells.header)}", where=f"{name} line {line}",
                 fix="Complete the row; if it is the last one, the file was cut off: export it again",
             )  # fmt: skip
-        rows.append(cells)
-        lines.append(reader.line_num)
-    if not rows:
+    if not cells.rows:
         raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
-    return header, rows, lines
+    return cells.header, cells.rows, cells.lines
 
 
 def _check_header(header: Sequence[str], name: str) -> None:
@@ -107,6 +108,8 @@ def _check_header(header: Sequence[str], name: str) -> None:
             raise CmmUqError(f"column {i + 1} has no name", where=where, fix="Name it, or remove it")
         if column in header[:i]:
             raise CmmUqError(f"the column {column!r} is there twice", where=where, fix="Keep one")
+        if problem := column_problem(column):
+            raise CmmUqError(problem, where=where, fix="Name it with letters, digits and _")
     for column in header:
         known = QUANTITIES.get(OTHER_UNITS.sub("", column))
         if known and column not in (*REQUIRED, *OPTIONAL):
@@ -117,23 +120,37 @@ def _check_header(header: Sequence[str], name: str) -> None:
             raise CmmUqError(f"no column {column!r}", where=where, fix=suggestion(column, header))
 
 
-def _numbers(cells: Sequence[str], column: str, lines: Sequence[int], name: str) -> Floats:
-    values = np.empty(len(cells))
-    for i, cell in enumerate(cells):
-        try:
-            values[i] = float(cell)
-        except ValueError:
-            shown = f"{cell[:40]!r} is not a number" if cell else "no value"
-            fix = "Write decimals with a point" if "," in cell else "Give a number, or remove the column"
-            raise CmmUqError(shown, where=f"{name} line {lines[i]}, column {column}", fix=fix) from None
-        if not np.isfinite(values[i]):
-            raise CmmUqError(f"{cell!r} is not a finite number", where=f"{name} line {lines[i]}, column {column}",
-                             fix="Measure the point again, or leave out its measurement")  # fmt: skip
-    return values
+def largest(column: str) -> float:
+    """Largest number, either way, that a column of this name may hold; that of every number where its name says nothing."""
+    if column in WHOLE:
+        return LARGEST_NUMBER
+    for ending, most in LARGEST_OF.items():
+        if column.endswith(ending):
+            return most
+    return LARGEST
+
+
+def _check_size(values: Floats, column: str, lines: Sequence[int], name: str) -> None:
+    bad = np.flatnonzero(np.abs(values) > largest(column))
+    if bad.size and column not in WHOLE:
+        raise CmmUqError(f"{values[bad[0]]:g} is more than anything that is measured",
+                         where=f"{name} line {lines[bad[0]]}, column {column}",
+                         fix=f"{largest(column):g} is the most: check its unit and its exponent")  # fmt: skip
+
+
+def _check_normals(table: Mapping[str, Floats], lines: Sequence[int], name: str) -> None:
+    """Normals are brought to unit length where they are used; whoever gives other ones must mean a direction."""
+    if not all(f"n{axis}" in table for axis in "xyz"):
+        return
+    length = np.sqrt(sum(table[f"n{axis}"] ** 2 for axis in "xyz"))
+    bad = np.flatnonzero((length != 0) & ((length < SHORTEST_NORMAL) | (length > LONGEST_NORMAL)))
+    if bad.size:
+        raise CmmUqError(f"the normal nx, ny, nz has the length {length[bad[0]]:.3g}",
+                         where=f"{name} line {lines[bad[0]]}", fix="Give outward unit normals")  # fmt: skip
 
 
 def _check_whole(values: Floats, column: str, lines: Sequence[int], name: str) -> None:
-    bad = np.flatnonzero((values != np.round(values)) | (np.abs(values) > 1e9))
+    bad = np.flatnonzero((values != np.round(values)) | (np.abs(values) > LARGEST_NUMBER))
     if bad.size:
         raise CmmUqError(f"{values[bad[0]]:g} is not a whole number",
                          where=f"{name} line {lines[bad[0]]}, column {column}",

@@ -10,9 +10,14 @@ from typing import TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.errors import CmmUqError, shortened, suggestion
+from cmm_uq.files.content import text_of
+from cmm_uq.files.toml import toml_of
 
 Facts = TypeVar("Facts", bound=BaseModel)
+
+_SHOWN = 60
+"""Characters of a key or a value in a message."""
 
 
 def checked(content: bytes, path: Path, model: type[Facts]) -> Facts:
@@ -26,13 +31,11 @@ def checked(content: bytes, path: Path, model: type[Facts]) -> Facts:
 
     Raises
     ------
-    CmmUqError : it is no TOML, or says something unknown, missing or contradictory; with line and key.
+    CmmUqError : it is no TOML, says something unknown, missing or contradictory, or goes beyond a limit; with line and key.
     """
+    text = text_of(content, str(path))
     try:
-        text = content.decode("utf-8-sig")
-        data = tomllib.loads(text)
-    except UnicodeDecodeError as error:
-        raise CmmUqError(f"is not UTF-8 text (byte {error.start})", where=str(path), fix="Save it as UTF-8") from None
+        data = toml_of(text, str(path))
     except tomllib.TOMLDecodeError as error:
         raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
                          fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip
@@ -47,13 +50,14 @@ def _located(error: ErrorDetails, text: str, path: Path, model: type[BaseModel])
     keys = [str(part) for part in error["loc"] if not (isinstance(part, str) and "[" in part)]
     named = [key for key in keys if not re.match(r"^(GuardBand|FalseAccept|literal)", key)]
     line = _line_of(named, text)
+    named = [shortened(key, _SHOWN) for key in named]
     where = f"{path}{f' line {line}' if line else ''}: [{named[0]}]{' ' + '.'.join(named[1:]) if named[1:] else ''}"
     if error["type"] == "missing":
         return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}")
     if error["type"] == "extra_forbidden":
         return CmmUqError("unknown key", where=where, fix=suggestion(named[-1], _known_keys(named[:-1], model)))
     message = error["msg"].removeprefix("Value error, ")
-    given = "" if isinstance(error["input"], dict) else f" (it says {error['input']!r})"
+    given = "" if isinstance(error["input"], dict) else f" (it says {shortened(repr(error['input']), _SHOWN)})"
     return CmmUqError(f"{message[0].lower()}{message[1:]}{given}", where=where)
 
 
@@ -80,9 +84,9 @@ def _line_of(keys: list[str], text: str) -> int | None:
     table, found, count = "", None, -1
     wanted = int(keys[1]) if len(keys) > 1 and keys[1].isdigit() else None
     for number, line in enumerate(text.splitlines(), 1):
-        header = re.match(r"\s*\[+\s*([^\]]+?)\s*\]+", line)
+        header = re.match(r"\s*\[{1,2}([^\[\]]+)\]", line)
         if header:
-            table = header[1]
+            table = header[1].strip()
             count += table == keys[0]
             here = table == keys[0] and wanted in (None, count)
             found = number if here and found is None else found

@@ -15,31 +15,39 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field, field_validator
 
-NotNegative = Annotated[float, Field(ge=0)]
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+from cmm_uq.files.limits import COLUMNS, EFFECTS
+from cmm_uq.jobs.recording import REQUIRED, largest
+from cmm_uq.jobs.table import AnyFloat, Column, Table, Uncertainty
 
 
-class NoiseFacts(_Table):
+class NoiseFacts(Table):
     """``[noise]``: standard deviations of a coordinate, of each reading and of each placing."""
 
-    coordinate_um: NotNegative = 0.0
-    placing_um: NotNegative = 0.0
+    coordinate_um: Uncertainty = 0.0
+    placing_um: Uncertainty = 0.0
 
 
-class Truth(_Table):
+class Truth(Table):
     """All of truth.toml.
 
     ``effects`` gives the reported parameters of each effect that acts, whatever the job's model names; ``artefact`` the true
     sizes; ``columns`` values that hold for every row of the recording, such as temperatures.
     """
 
-    effects: dict[str, dict[str, float]] = {}
-    artefact: dict[str, float] = {}
+    effects: Annotated[dict[str, dict[str, AnyFloat]], Field(max_length=EFFECTS.most)] = {}
+    artefact: dict[str, AnyFloat] = {}
     noise: NoiseFacts = NoiseFacts()
-    columns: dict[str, float] = {}
-    seed: Annotated[int, Field(ge=0)] = 0
+    columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+
+    @field_validator("columns")
+    @classmethod
+    def _of_a_recording(cls, columns: dict[str, float]) -> dict[str, float]:
+        for name, value in columns.items():
+            if name in (*REQUIRED, "repeat"):
+                raise ValueError(f"{name} comes from the job's own recording")
+            if abs(value) > largest(name):
+                raise ValueError(f"{name} = {value:g} is more than anything that is measured")
+        return columns

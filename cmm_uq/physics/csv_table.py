@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.files.cells import cells_of, column_problem
+from cmm_uq.files.limits import ROWS, Limit
+from cmm_uq.files.numbers import number_problem
 
 
 @dataclass(frozen=True)
@@ -36,55 +36,47 @@ class CsvTable:
         CmmUqError : the cell is something else.
         """
         text = self.rows[row][self.header.index(column)]
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
+        if problem := number_problem(text):
+            plain = problem[0].endswith(("a number", "a finite number", "no value"))
             raise CmmUqError(
-                f"{column} = {text!r} is no number", where=self.at(row), fix="Give a number with a decimal point"
-            )
-        return value
+                f"{column} = {text!r} is no number" if plain else f"{column}: {problem[0]}", where=self.at(row),
+                fix="Give a number with a decimal point" if plain else problem[1],
+            )  # fmt: skip
+        return float(text)
 
     def at(self, row: int) -> str:
         """File and line of a row."""
         return f"{self.where} line {self.lines[row]}"
 
 
-def csv_table(content: bytes, where: str, required: Iterable[str]) -> CsvTable:
+def csv_table(content: bytes, where: str, required: Iterable[str], *, most_rows: Limit = ROWS) -> CsvTable:
     """Table of a CSV file.
 
     Raises
     ------
-    CmmUqError : no text, no rows, a required column missing, a column named twice, or a row of another length.
+    CmmUqError : no text, no rows, a required column missing, a column named twice, a row of another length, or beyond the
+        limits of a table.
     """
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise CmmUqError("is not UTF-8 text", where=f"{where} line {line}", fix="Save it as CSV in UTF-8") from None
-    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
-    found = [(reader.line_num, tuple(cell.strip() for cell in row)) for row in reader if any(c.strip() for c in row)]
-    if len(found) < 2:
+    cells = cells_of(content, where, "Save it as CSV in UTF-8", most_rows=most_rows)
+    header = tuple(cells.header)
+    if not cells.rows:
         raise CmmUqError(
             "has no rows", where=where, fix=f"Give a header ({', '.join(required)}) and a row for each position"
         )
-    (_, header), *body = found
+    at = f"{where} line {cells.header_line}"
     for column in required:
         if column not in header:
-            raise CmmUqError(
-                f"column {column} is missing", where=f"{where} line {found[0][0]}", fix="Add it to the header"
-            )
+            raise CmmUqError(f"column {column} is missing", where=at, fix="Add it to the header")
     twice = next((name for name in header if header.count(name) > 1), None)
     if twice is not None:
-        raise CmmUqError(
-            f"column {twice} is there twice", where=f"{where} line {found[0][0]}", fix="Remove one of them"
-        )
-    for line, row in body:
+        raise CmmUqError(f"column {twice} is there twice", where=at, fix="Remove one of them")
+    if problem := next(filter(None, map(column_problem, header)), None):
+        raise CmmUqError(problem, where=at, fix="Name it with letters, digits and _")
+    for line, row in zip(cells.lines, cells.rows, strict=True):
         if len(row) != len(header):
             raise CmmUqError(
                 f"has {len(row)} cells, the header has {len(header)}",
                 where=f"{where} line {line}",
                 fix="Complete the row",
             )
-    return CsvTable(where, header, tuple(row for _, row in body), tuple(line for line, _ in body))
+    return CsvTable(where, header, tuple(map(tuple, cells.rows)), tuple(cells.lines))

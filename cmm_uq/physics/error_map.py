@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.files.content import content_of
+from cmm_uq.files.limits import MAP_BYTES, MAP_ROWS
 from cmm_uq.physics.csv_table import CsvTable, csv_table
 from cmm_uq.points import AXES, Floats, Machine
 from cmm_uq.units import ARCSECOND, MICROMETRE
@@ -87,12 +89,7 @@ class ErrorMap:
 
 def read_error_map(path: Path, *, temperature: float = 20.0, units_checked: bool = True) -> ErrorMap:
     """Error map from a CSV file; see :func:`parse_error_map`."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise CmmUqError(
-            f"cannot be read: {error.strerror}", where=str(path), fix="Check the name of the map"
-        ) from error
+    content = content_of(path, MAP_BYTES, "Check the name of the map")
     return parse_error_map(content, str(path), temperature=temperature, units_checked=units_checked)
 
 
@@ -110,7 +107,7 @@ def parse_error_map(content: bytes, where: str, *, temperature: float = 20.0, un
     ------
     CmmUqError : what is wrong, with its line.
     """
-    table = csv_table(content, where, ("axis", "position_mm", *COLUMNS))
+    table = csv_table(content, where, ("axis", "position_mm", *COLUMNS), most_rows=MAP_ROWS)
     unknown = [name for name in table.header if name not in ("axis", "position_mm", *COLUMNS)]
     if unknown:
         raise CmmUqError(
@@ -151,8 +148,9 @@ def check_positions(axis: str, positions: Sequence[float], places: Sequence[str]
     """
     if len(positions) < 2:
         raise CmmUqError(f"axis {axis} has {len(positions)} positions", where=where, fix="An axis needs two or more")
+    seen = set(positions[:1])
     for i in range(1, len(positions)):
-        if positions[i] in positions[:i]:
+        if positions[i] in seen:
             raise CmmUqError(
                 f"axis {axis}: position {positions[i]:g} mm is there twice", where=places[i], fix="Remove one"
             )
@@ -162,6 +160,7 @@ def check_positions(axis: str, positions: Sequence[float], places: Sequence[str]
                 where=places[i],
                 fix="Sort the positions of each axis, lowest first",
             )
+        seen.add(positions[i])
 
 
 def check_units(carriages: Sequence[AxisErrors], where: str) -> None:

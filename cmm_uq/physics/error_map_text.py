@@ -16,6 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.files.content import content_of
+from cmm_uq.files.limits import LINE, MAP_BYTES, MAP_ROWS
+from cmm_uq.files.numbers import number_problem
 from cmm_uq.physics.error_map import UNITS, AxisErrors, ErrorMap, check_positions, check_units
 from cmm_uq.points import AXES, Floats
 from cmm_uq.units import ARCSECOND
@@ -49,19 +52,20 @@ def read_error_map_text(path: Path, *, temperature: float = 20.0) -> ErrorMap:
     ------
     CmmUqError : what is wrong, with its line.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise CmmUqError(
-            f"cannot be read: {error.strerror}", where=str(path), fix="Check the name of the map"
-        ) from error
+    content = content_of(path, MAP_BYTES, "Check the name of the map")
     return parse_error_map_text(content, str(path), temperature=temperature)
 
 
 def parse_error_map_text(content: bytes, where: str, *, temperature: float = 20.0) -> ErrorMap:
     """Error map and squareness from the content of a contractor's text file; see :func:`read_error_map_text`."""
     reading = _Reading()
-    for number, line in enumerate(content.decode("utf-8-sig", errors="replace").splitlines(), 1):
+    lines = content.decode("utf-8-sig", errors="replace").splitlines()
+    if len(lines) > MAP_ROWS.most or len(max(lines, key=len, default="")) > LINE.most:
+        raise CmmUqError(
+            f"has {len(lines)} lines of up to {len(max(lines, key=len))} characters", where=where,
+            fix=f"{MAP_ROWS.most} lines of {LINE.most} characters are the most of an error map",
+        )  # fmt: skip
+    for number, line in enumerate(lines, 1):
         _read_line(reading, line.translate(_STRAY).strip(), f"{where} line {number}")
     carriages = [_carriage(reading, axis, where) for axis in AXES]
     check_units(carriages, where)
@@ -120,11 +124,8 @@ def _check_letters(letters: str, axis: str, where: str) -> None:
 
 def _numbers(text: str, where: str, wanted: int = 7) -> list[float]:
     cells = text.split()
-    try:
-        values = [float(cell) for cell in cells]
-    except ValueError:
-        values = []
-    if len(values) != wanted or not np.isfinite(values).all():
+    values = [] if any(map(number_problem, cells)) else [float(cell) for cell in cells]
+    if len(values) != wanted:
         raise CmmUqError(
             f"{text!r} is not {'a number' if wanted == 1 else f'{wanted} numbers'}",
             where=where,

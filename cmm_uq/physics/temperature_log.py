@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.files.content import content_of
+from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.physics.csv_table import CsvTable, csv_table
 from cmm_uq.points import AXES, Floats
 
@@ -68,12 +70,7 @@ class TemperatureLog:
 
 def read_temperature_log(path: Path, sensors: Mapping[str, Sequence[str]] | None = None) -> TemperatureLog:
     """Temperature log from a CSV file; see :func:`parse_temperature_log`."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise CmmUqError(
-            f"cannot be read: {error.strerror}", where=str(path), fix="Check the name of the log"
-        ) from error
+    content = content_of(path, TABLE_BYTES, "Check the name of the log")
     return parse_temperature_log(content, str(path), sensors)
 
 

@@ -72,7 +72,8 @@ class Shape:
     def misfit(self, xyz: Floats, reference: Floats, placings: Iterable[int] | None = None) -> Floats:
         """Distance (n,), mm, of every point from where the artefact would have it; zero outside the placings asked for."""
         found = np.zeros(len(xyz))
-        size = self.size if np.isfinite(self.size) or not self.together else _common_length(xyz, self.rows)
+        one_length = self.misfit_of is _bar and not np.isfinite(self.size)
+        size = _common_length(xyz, self.rows) if one_length else self.size
         for placing in range(len(self.rows)) if placings is None else placings:
             rows = self.rows[placing]
             found[rows] = self.misfit_of(xyz[rows], reference[rows], size)

@@ -39,6 +39,9 @@ def effective_dof(contributions: Floats, matrix: Floats, dof: Sequence[Floats | 
     A set of correlated inputs whose degrees of freedom differ was not read simultaneously; the formula does not cover
     it, and the smallest of them is taken for the whole set.
     """
+    # fourth powers leave a double's range long before u does; a power of two in common changes no digit of the ratio
+    _, exponent = np.frexp(np.max(np.abs(contributions), initial=0.0))
+    contributions, variance = np.ldexp(contributions, -exponent), np.ldexp(variance, -2 * exponent)
     known = [bool(np.all(np.isinf(nu))) for nu in dof]
     denominator = np.zeros_like(variance)
     for group in tied(matrix):

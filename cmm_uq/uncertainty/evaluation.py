@@ -12,6 +12,7 @@ from math import inf
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.overflow import must_be_finite, refusing_overflow
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.budget import Budget, Labels, budget_of, joint_line, line_of
 from cmm_uq.uncertainty.choice import Method, Ways, beside, by_propagation, choose, must_be_possible, stability
@@ -107,6 +108,15 @@ def evaluate(model: MeasurementModel, request: Request | None = None, labels: La
     """
     asked, told = request or Request(), labels or Labels()
     model.must_be_at_one_point()
+    fix = "State the inputs in units in which their numbers are neither huge nor tiny"
+    with refusing_overflow("[inputs]", fix):
+        evaluation = _evaluated(model, asked, told)
+    for name, stated in evaluation.stated.items():
+        must_be_finite((stated.value, stated.u, *stated.interval), f"[model] outputs.{name}", fix)
+    return evaluation
+
+
+def _evaluated(model: MeasurementModel, asked: Request, told: Labels) -> Evaluation:
     ways = _ways(model, asked)
     chosen = [_chosen(model, ways, row, asked) for row in range(len(model.outputs))]
     methods = {method for method, _ in chosen}

@@ -8,6 +8,7 @@ complex numbers and jets alike.
 from __future__ import annotations
 
 import ast
+import re
 import unicodedata
 import warnings
 from collections.abc import Callable, Collection, Mapping
@@ -17,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.files.limits import NUMERAL, TEXT
 
 FUNCTIONS: Mapping[str, np.ufunc] = {
     "sqrt": np.sqrt,
@@ -54,7 +56,8 @@ _CALLS: Mapping[str, Callable[..., Any]] = {
     **FUNCTIONS,
 }
 
-LONGEST = 10_000
+LONGEST = TEXT.most
+_LONG_NUMERAL = re.compile(rf"\w{{{NUMERAL.most + 1}}}")
 _DEEPEST = 200
 
 
@@ -116,6 +119,9 @@ def parse(text: str, known: Collection[str], where: str | None = None) -> Expres
     """
     if len(text) > LONGEST:
         raise CmmUqError(f"an expression of {len(text)} characters", where=where, fix=f"{LONGEST} are the most")
+    if _LONG_NUMERAL.search(text):
+        raise CmmUqError(f"{_short(text)!r} is no arithmetic expression: a number is too large, or a name too long",
+                         where=where, fix=f"{NUMERAL.most} digits or letters are the most")  # fmt: skip
     source = text.strip()
     try:
         with warnings.catch_warnings(action="ignore"):  # about doubtful style

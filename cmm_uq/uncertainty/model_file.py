@@ -17,6 +17,9 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.files.content import content_of, text_of
+from cmm_uq.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT
+from cmm_uq.files.toml import toml_of
 from cmm_uq.uncertainty.budget import Labels
 from cmm_uq.uncertainty.distributions import Distribution
 from cmm_uq.uncertainty.evaluation import Evaluation, Request, evaluate
@@ -44,7 +47,7 @@ class ModelFile:
     request : method, coverage, digits and seed asked for.
     labels : units and origins.
     descriptions : of the inputs, where given.
-    sha256 : of the file's bytes.
+    content : the file's bytes.
     """
 
     title: str
@@ -53,7 +56,12 @@ class ModelFile:
     request: Request
     labels: Labels
     descriptions: Mapping[str, str]
-    sha256: str
+    content: bytes
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the file's bytes."""
+        return hashlib.sha256(self.content).hexdigest()
 
     def evaluate(self, seed: int | None = None) -> Evaluation:
         """Evaluate it, with another seed where one is given."""
@@ -68,17 +76,13 @@ def read_model_file(path: Path) -> ModelFile:
     ------
     CmmUqError : the file cannot be read, is no TOML, or a key is unknown, missing, of the wrong kind or contradicting.
     """
+    content = content_of(path, MODEL_BYTES, "Name the TOML file of the measurement model")
+    text = text_of(content, str(path))
     try:
-        content = path.read_bytes()
-        data = tomllib.loads(content.decode("utf-8-sig"))
-    except OSError as error:
-        fix = "Name the TOML file of the measurement model"
-        raise CmmUqError(f"cannot be read: {error.strerror or error}", where=str(path), fix=fix) from error
-    except UnicodeDecodeError as error:
-        raise CmmUqError("is not UTF-8 text", where=str(path), fix="Save it as UTF-8") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        data = toml_of(text, str(path), most_word=TEXT.most, most_listed=DRAWS.most)
+    except tomllib.TOMLDecodeError as error:
         raise CmmUqError(f"is not TOML: {error}", where=str(path), fix="Mend the line that it names") from error
-    return _Reader(str(path)).model_file(data, path.stem, hashlib.sha256(content).hexdigest())
+    return _Reader(str(path)).model_file(data, path.stem, content)
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,7 @@ class _Reader:
 
     file: str
 
-    def model_file(self, data: Mapping[str, Any], stem: str, sha256: str) -> ModelFile:
+    def model_file(self, data: Mapping[str, Any], stem: str, content: bytes) -> ModelFile:
         self._known(data, _TOP, "")
         model, given = self._table(data, "model", ""), self._table(data, "inputs", "")
         correlation = self._correlation(data)
@@ -119,7 +123,7 @@ class _Reader:
             self._request(model),
             self._labels(given, model, expressions),
             {name: keys["description"] for name, keys in given.items() if "description" in keys},
-            sha256,
+            content,
         )
 
     def _where(self, key: str) -> str:
@@ -139,6 +143,10 @@ class _Reader:
         if not isinstance(data[name], dict):
             raise CmmUqError(f"{name} is not a table", where=self._where(within), fix=f"Write it as [{name}]")
         found: Mapping[str, Any] = data[name]
+        if len(found) > INPUTS.most:
+            raise CmmUqError(
+                f"{name} has {len(found)} entries", where=self._where(within), fix=f"{INPUTS.most} are the most"
+            )
         return found
 
     def _text(self, table: Mapping[str, Any], name: str, key: str) -> str:

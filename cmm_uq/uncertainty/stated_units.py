@@ -23,7 +23,7 @@ _SPELLED = re.compile(r"[\w\s.*/^()·%°′″µμΩ−+\-⁰¹²³⁴⁵⁶⁷�
 _POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-−+]?\d{1,2}(?:[./]\d{1,2})?\s*\)?(?!\s*(?:\*\*|\^|\d))")
 _NOT_PLAIN = re.compile(r"\*\*|\^|(?<!\w)(?!1\b)\d|[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]{4,}")
 """What is left of a unit without its powers must hold no further power, and no number but 1: pint would compute it."""
-_QUANTITY = re.compile(r"\s*([-+−]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
+_QUANTITY = re.compile(r"\s*([-+−]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)\s*(.*)", re.DOTALL)
 _CELSIUS = re.compile(r"\b(?:degC|celsius|degree_Celsius)\b|°C")
 
 

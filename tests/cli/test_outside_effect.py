@@ -104,7 +104,9 @@ def test_results_name_the_package_and_its_version(work: Path, folder: str) -> No
     assert results(work / folder)["software"]["plugins"] == PLUGINS
 
 
-@pytest.mark.parametrize("page", ["plan/plan.html", "report/certificate-simulated.html", "diagnosis/diagnosis-simulated.html"])
+@pytest.mark.parametrize(
+    "page", ["plan/plan.html", "report/certificate-simulated.html", "diagnosis/diagnosis-simulated.html"]
+)
 def test_so_does_every_page(work: Path, page: str) -> None:
     assert "with outside-effects 0.1.0" in (work / page).read_text(encoding="utf-8")
 

@@ -71,7 +71,7 @@ def test_what_a_shift_job_cannot_have_is_one_line_and_exit_code_2(command: str, 
         "diagnose": "a shift job cannot be diagnosed",
         "simulate": "a shift job cannot be simulated",
         "compensate": "the job has no error map",
-        "budget": "Is a directory",
+        "budget": "is a folder, not a file",
     }
     assert said[command] in process.stderr
     assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())

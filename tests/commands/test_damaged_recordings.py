@@ -13,6 +13,7 @@ import pytest
 
 from cmm_uq.commands.diagnosing import diagnose_job
 from cmm_uq.errors import CmmUqError
+from cmm_uq.files.limits import OBSERVATIONS
 from cmm_uq.jobs.reading import read_job
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -81,4 +82,21 @@ def test_a_single_placing_is_diagnosed_by_its_points(example: str, tmp_path: Pat
 def test_one_distance_determines_nothing(example: str, tmp_path: Path) -> None:
     job = job_with(example, one_place, tmp_path)
     with pytest.raises(CmmUqError):
+        diagnose_job(job)
+
+
+@pytest.mark.parametrize("row", [0, 4, 41])
+def test_a_triangle_without_one_of_its_corners_is_refused(row: int, tmp_path: Path) -> None:
+    job = job_with("triangle-simulated", lambda table: table.drop(index=row), tmp_path)
+    with pytest.raises(CmmUqError, match="the triangle does not close"):
+        diagnose_job(job)
+
+
+def test_more_observations_than_memory_holds_are_refused_before_the_estimate(tmp_path: Path) -> None:
+    """Each point of a probed plane is an observation; a flat grid of them passes everything else."""
+    rows = np.arange(OBSERVATIONS.most + 1)
+    noise = np.random.default_rng(3).normal(0, 1e-3, len(rows))
+    columns = {"measurement": 1, "point": rows + 1, "x_mm": rows % 150 * 2.0 + 100, "y_mm": rows // 150 * 2.0 + 100}
+    job = job_with("plane-simulated", lambda _: pd.DataFrame({**columns, "z_mm": noise - 300}), tmp_path)
+    with pytest.raises(CmmUqError, match=f"{len(rows)} observations are more than are estimated from at once"):
         diagnose_job(job)

@@ -83,3 +83,8 @@ def test_the_job_itself_is_not_written_over(job: Path, tmp_path: Path) -> None:
     (tmp_path / "truth.toml").write_text("")
     with pytest.raises(CmmUqError, match="is an input of this command"):
         write_simulation(job, tmp_path / "truth.toml", job)
+
+
+def test_a_size_whose_recording_could_not_be_read_back_is_refused(iota: Path) -> None:
+    with pytest.raises(CmmUqError, match=r"truth\.toml: the coordinates would go beyond 1e\+07 mm"):
+        simulate(read_job(iota), Truth(artefact={"length_mm": 1e15}))

@@ -12,6 +12,7 @@ import pytest
 
 from cmm_uq.commands.analysis import analyse
 from cmm_uq.documents.results_file import as_json, results
+from cmm_uq.errors import CmmUqError
 from tests.conftest import ROOT
 
 
@@ -76,5 +77,5 @@ def test_it_keeps_the_published_contract(data: dict[str, Any], tmp_path: Path) -
 
 
 def test_numbers_that_json_cannot_carry_are_refused() -> None:
-    with pytest.raises(ValueError, match="not JSON compliant"):
+    with pytest.raises(CmmUqError, match="a figure is not finite"):
         as_json({"value": float("nan")})

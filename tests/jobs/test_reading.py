@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from pathlib import Path
 
@@ -72,6 +73,24 @@ def test_every_input_is_hashed(iota: Path) -> None:
         (r"^\[job\]$", "[job", r"is not valid TOML"),
         (r"^file = .*", 'file = "../ballbar.csv"', r"is not inside the job folder"),
         (r"^file = .*", 'file = "barbell.csv"', r"barbell\.csv: no such file"),
+        (r"^u_um = .*", "u_um = 1e-300", r"\[artefact\] u_um: must be 0, or at least 1e-06"),
+        (r"^u_um = .*", "u_um = 1e300", r"\[artefact\] u_um: input should be less than or equal to 1000000"),
+        (r"^length_mm = .*", "length_mm = 1e308", r"\[artefact\] length_mm: input should be less than"),
+        (r"^length_mm = .*", "length_mm = 1e-9", r"\[artefact\] length_mm: must be at least 1e-06"),
+        (r"^file = .*", 'file = "ballbar.csv"\nu_coordinate_um = 1e-9', r"u_coordinate_um: must be at least 1e-06"),
+        (r"^file = .*", 'file = "ballbar.csv"\nu_coordinate_um = 1.7e308', r"u_coordinate_um: .* 1000000"),
+        (r"^file = .*", 'file = "ballbar.csv"\nset_aside = [99999999999]', r"set_aside\.0: .* 1000000000"),
+        (r"^limit_um = .*", "limit_um = 1e308", r"limit_um: input should be less than or equal to 1000000"),
+        (r"^limit_um = .*", "mpe = { a_um = 1.0, k = 1e-300 }", r"k: must be at least 0\.001"),
+        (r"^origin_mm = .*", "origin_mm = [1e300, 0.0, 0.0]", r"origin_mm\.0: input should be less than"),
+        (r"x = \[0, 900\]", "x = [0.0, 1e-300]", r"travel_mm.*a travel of less than 0\.001 mm"),
+        (r"x = \[0, 900\]", "x = [0.0, 1e308]", r"travel_mm\.x\.1: input should be less than"),
+        (r"^effects = .*", f"effects = {['scale_x'] * 101}", r"effects: list should have at most 100 items"),
+        (r"^id = .*", 'id = "NUL"', r"\[job\]: .*Windows takes this name for a device"),
+        (r"^u_um = .*", f"u_um = {'9' * 5000}", r"job\.toml line \d+: '9+' … has 5000 characters"),
+        (r"^u_um = .*", f"u_um = {'[' * 3000}", r"job\.toml line \d+: is nested too deeply"),
+        (r"^place = .*", f'place = "{"W" * 100_000}"', r"job\.place: a text of 100000 characters"),
+        (r"^place = .*", r'place = "a\\u202eb"', r"job\.place: has the control character U\+202E"),
     ],
 )  # fmt: skip
 def test_a_wrong_job_is_refused_with_its_place(job: Path, pattern: str, replacement: str, message: str) -> None:
@@ -101,3 +120,23 @@ def test_a_job_that_is_no_text_is_refused(job: Path) -> None:
 @pytest.mark.parametrize("rule", ['"simple"', '"ISO 14253-1"', "{ guard_band = 0.8 }", "{ max_false_accept = 0.02 }"])
 def test_every_decision_rule_is_understood(job: Path, rule: str) -> None:
     assert read_job(edit(job, r"^rule = .*", f"rule = {rule}")).facts.conformity[0].rule
+
+
+def test_a_pipe_is_refused_as_job_and_as_recording(job: Path) -> None:
+    if not hasattr(os, "mkfifo"):
+        pytest.skip("no pipes here")
+    (job / "ballbar.csv").unlink()
+    os.mkfifo(job / "ballbar.csv")
+    assert "ballbar.csv: is a pipe, not a file" in refused(job)
+    (job / "job.toml").unlink()
+    os.mkfifo(job / "job.toml")
+    assert "job.toml: is a pipe, not a file" in refused(job)
+
+
+@pytest.mark.parametrize("what", ["key", "kind", "effects"])
+def test_a_refusal_never_echoes_what_it_refuses(job: Path, what: str) -> None:
+    long = "k" * 90
+    lines = {"key": f"{long} = 1", "kind": f'kind = "{"k " * 4000}"', "effects": f"effects = {[long] * 90}x"}
+    message = refused(edit(job, r"^kind = .*", lines[what]))
+    assert len(message) <= 300
+    assert "job.toml" in message

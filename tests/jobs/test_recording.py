@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.recording import read_recording
+from cmm_uq.jobs.recording import largest, read_recording
 from cmm_uq.points import Machine, Points
 
 HEADER = "measurement,point,x_mm,y_mm,z_mm"
@@ -51,6 +51,20 @@ def test_a_byte_order_mark_and_windows_lines_do_no_harm() -> None:
         (f"{HEADER},approach_x\n1,1,1,2,3,0.5", r"0.5 is no direction"),
         (HEADER.replace(",", ";") + "\n1;1;1;2;3", r"cells are separated by semicolons"),
         (f"{HEADER}\n1,1,1,2,\0", r"no text file"),
+        (f"{HEADER}\n1,1,-2_11.1357,2,3", r"line 2, column x_mm: '-2_11.1357' is not a number"),
+        (f"{HEADER}\n1,1,١٢,2,3", r"column x_mm: '١٢' is not a number"),
+        (f"{HEADER}\n1,1,1e300,2,3", r"column x_mm: '1e300' is too large"),
+        (f"{HEADER}\n1,1,1.1e7,2,3", r"line 2, column x_mm: 1.1e\+07 is more than anything that is measured"),
+        (f"{HEADER},temp_x_c\n1,1,1,2,3,1.1e5", r"column temp_x_c: 110000 is more than"),
+        (f"{HEADER},mood\n1,1,1,2,3,1e-300", r"column mood: '1e-300' is too small"),
+        (
+            f"{HEADER},nx,ny,nz\n1,1,1,2,3,0,0,1\n1,2,1,2,3,-1e14,0,0",
+            r"line 3: the normal nx, ny, nz has the length 1e\+14",
+        ),
+        (f"{HEADER},nx,ny,nz\n1,1,1,2,3,1e-9,0,0", r"the normal nx, ny, nz has the length 1e-09"),
+        (f'{HEADER},"=HYPERLINK(""x"")"\n1,1,1,2,3,4', r"line 1: the column '=HYPERLINK\(\"x\"\)' begins as a formula"),
+        (f"{HEADER},a\x1bb\n1,1,1,2,3,4", r"has a control character in its name"),
+        (f"{HEADER}\n1,1,1,2,{'3' * 140_000}", r"line 2: the line has 140008 characters"),
     ],
 )
 def test_a_spoiled_recording_is_refused_with_its_place(text: str, message: str) -> None:
@@ -72,3 +86,13 @@ def test_no_text_leads_to_anything_but_points_or_a_clear_error(text: str) -> Non
     except UnicodeEncodeError:
         return
     assert np.all(np.isfinite(points.xyz))
+
+
+def test_normals_of_another_length_and_directions_without_one_are_kept() -> None:
+    points = read(f"{HEADER},nx,ny,nz\n1,1,1,2,3,0,0,577\n1,2,1,2,3,0,0,0\n")
+    assert points.column("nz").tolist() == [577, 0]
+
+
+@pytest.mark.parametrize(("column", "most"), [("x_mm", 1e7), ("temp_x_c", 1e5), ("mood", 1e15), ("measurement", 1e9)])
+def test_the_largest_number_of_a_column_goes_by_its_unit(column: str, most: float) -> None:
+    assert largest(column) == most

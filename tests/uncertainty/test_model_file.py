@@ -223,7 +223,7 @@ def test_mistakes_name_file_and_key(read: Read, text: str, where: str, problem: 
 
 
 def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
-    with pytest.raises(CmmUqError, match=r"none\.toml: cannot be read"):
+    with pytest.raises(CmmUqError, match=r"none\.toml: no such file"):
         read_model_file(tmp_path / "none.toml")
     (tmp_path / "latin.toml").write_bytes(b'title = "\xe4"')
     with pytest.raises(CmmUqError, match="not UTF-8"):
@@ -247,3 +247,32 @@ def test_a_joint_sample_is_drawn_row_by_row(read: Read) -> None:
     from cmm_uq.uncertainty.monte_carlo import simulate
 
     assert simulate(model, 1000).u[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("a = " + "[" * 3000, "line 1: is nested too deeply"),
+        (LOSS.replace("0.05\n", "9" * 400 + "\n", 1), "has 400 characters"),
+        (LOSS.replace("x1**2", "x1**2 + " + "9" * 5000), "a number is too large, or a name too long"),
+        (LOSS.replace("x1**2", "x1 * 10**400.0"), "finite|range of numbers"),
+        (LOSS.replace("x1**2", "tan(x1 * 1e300)"), "inf cannot be stated"),
+        (LOSS + "".join(f'[inputs.z{i}]\nvalue = 1\ndistribution = "constant"\n' for i in range(500)), "502 entries"),
+    ],
+    ids=["depth", "digits", "expression", "overflow", "tangent", "inputs"],
+)
+def test_hostile_models_end_in_a_result_or_one_line(read: Read, text: str, says: str) -> None:
+    with pytest.raises(CmmUqError, match=says) as caught:
+        read(text).evaluate()
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_fourth_powers_of_large_inputs_do_not_overflow_the_degrees_of_freedom(read: Read) -> None:
+    """The same model in other units has the same degrees of freedom (JCGM 100 G.4.1 is a ratio)."""
+    text = '[model]\noutputs = {{ y = "a + b" }}\nmethod = "first"\n' + "".join(
+        f'[inputs.{name}]\ndistribution = "t"\nvalue = {{scale}}\nu = {{scale}}\ndof = {dof}\n'
+        for name, dof in (("a", 4), ("b", 9))
+    )
+    plain, large = (read(text.format(scale=scale)).evaluate().stated["y"].dof for scale in ("1.0", "1e69"))
+    assert plain == pytest.approx(4 / (1 / 4 + 1 / 9))
+    assert large == pytest.approx(plain, rel=1e-12)

@@ -1,0 +1,66 @@
+"""The limits of what is read, each with its reason; docs/limits.md prints this table.
+
+They are far beyond what a calibration needs, and near enough that whatever keeps to them is read, or refused, within seconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit.
+
+    Parameters
+    ----------
+    most : what is still read.
+    unit : of it.
+    what : is limited.
+    why : it is.
+    """
+
+    most: int
+    unit: str
+    what: str
+    why: str
+
+
+JOB_BYTES = Limit(1_000_000, "bytes", "job.toml, truth.toml", "a job is a few kilobytes of text")
+MODEL_BYTES = Limit(4_000_000, "bytes", "model file of a budget", "holds 250 000 draws of an earlier Monte Carlo")
+TABLE_BYTES = Limit(64_000_000, "bytes", "recording, temperature log", "100 000 rows of 30 columns take half of it")
+MAP_BYTES = Limit(4_000_000, "bytes", "error map", "30 000 positions")
+
+ROWS = Limit(200_000, "rows", "CSV file", "a scanned surface; larger ones are point clouds")
+MAP_ROWS = Limit(30_000, "rows", "error map", "10 m of each axis by the millimetre")
+COLUMNS = Limit(200, "columns", "CSV file", "every column is searched by a diagnosis")
+CELLS = Limit(5_000_000, "cells", "CSV file", "100 000 rows of 30 columns are 3 000 000")
+OBSERVATIONS = Limit(20_000, "observations", "estimate", "its decomposition holds their square in memory, 3.2 GB")
+CELL = Limit(500, "characters", "cell of a CSV file", "a number needs 25, a remark a sentence")
+LINE = Limit(100_000, "characters", "line of a CSV file", "200 columns of 500 characters")
+LINES = Limit(500_000, "lines", "CSV file", "rows, comments and empty lines")
+COLUMN_NAME = Limit(60, "characters", "name of a column", "it stands in tables, plots and messages")
+NUMERAL = Limit(
+    100, "characters", "number, date or bare key", "a double has 17 digits; longer integers take Python minutes"
+)
+
+DEPTH = Limit(20, "levels", "brackets in TOML, parts of a dotted key", "the deepest key of a job is at 4")
+TOML_KEY = Limit(100, "characters", "key in TOML", "it stands in messages")
+TEXT = Limit(10_000, "characters", "text in TOML", "three pages of remarks; the longest expression")
+WORD = Limit(
+    500, "characters", "word of a text in a job", "a page breaks lines between words; web addresses are shorter"
+)
+FILE_NAME = Limit(200, "characters", "file name in a job", "file systems take 255 bytes")
+
+EFFECTS = Limit(100, "entries", "effects, rivals or tolerances of a model", "the catalogue has fewer")
+MAPS = Limit(20, "entries", "error maps of a machine", "one a degree")
+CONFORMITY = Limit(50, "entries", "[[conformity]]", "each is a section of the certificate")
+LISTED = Limit(10_000, "entries", "other lists of a job", "measurements to set aside, shifts, lengths, directions")
+DRAWS = Limit(250_000, "entries", "samples of an input", "draws of an earlier Monte Carlo")
+INPUTS = Limit(500, "entries", "inputs, outputs or correlations of a budget", "its matrix of correlations is square")
+
+LIMITS = (
+    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, MAP_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS, CELL, LINE, LINES,
+    COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY, LISTED, DRAWS, INPUTS,
+)  # fmt: skip
+"""All of them, in the order of docs/limits.md."""

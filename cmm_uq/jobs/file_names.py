@@ -1,0 +1,99 @@
+"""Names of the files of a job: inside its folder, the same on every system, and never that of something a command writes."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable
+from pathlib import Path, PurePosixPath, PureWindowsPath
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.files.limits import FILE_NAME
+
+_WRITTEN = re.compile(
+    r"job\.toml|results\.json|manifest\.json|truth\.toml|compensation\.json|plan\.csv|(certificate|diagnosis|plan).*\.(html|pdf)"
+    r"|budget\..*|\.unfinished-.*",
+    re.IGNORECASE,
+)
+"""Names that commands write, or attach to a certificate, beside the recording of a job."""
+
+DERIVED = ("truth.toml", "compensation.json")
+"""Names that belong beside a derived recording."""
+
+_DEVICE = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])(\..*)?", re.IGNORECASE)
+"""Windows takes these for devices, with any ending."""
+
+_FORBIDDEN = frozenset('<>:"|?*')
+"""On Windows."""
+
+
+def inside(folder: Path, name: str, where: str, *, written: bool = False) -> Path:
+    """Path of a file that a job names.
+
+    Parameters
+    ----------
+    folder : of the job.
+    name : of the file, relative to the folder, parts separated by /.
+    where : file and key, for messages.
+    written : whether a command wrote it, with the recording that it derived.
+
+    Raises
+    ------
+    CmmUqError : the name is none that every system can read, is reserved, or leads out of the folder.
+    """
+    if problem := _name_problem(name, written):
+        raise CmmUqError(problem[0], where=where, fix=problem[1])
+    try:
+        path = (folder / name).resolve()
+        within = path.is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "its links lead back to themselves"
+        raise CmmUqError(f"file {name!r} cannot be read: {reason}", where=where,
+                         fix="Copy the file itself into the folder") from None  # fmt: skip
+    if not within:
+        raise CmmUqError(f"file {name!r} is not inside the job folder", where=where,
+                         fix="Copy the file into the folder and name it there: a job must be complete by itself")  # fmt: skip
+    return path
+
+
+def check_distinct(names: Iterable[str], where: str) -> None:
+    """Refuse two names that some systems take for one.
+
+    Raises
+    ------
+    CmmUqError : names differ only by upper and lower case, or by how an accent is written.
+    """
+    seen: dict[str, str] = {}
+    for name in names:
+        other = seen.setdefault(unicodedata.normalize("NFC", name).casefold(), name)
+        if other != name:
+            raise CmmUqError(f"the files {other!r} and {name!r} are one on Windows and macOS", where=where,
+                             fix="Rename one of them")  # fmt: skip
+
+
+def device_name(name: str) -> bool:
+    """Whether Windows takes the name for a device."""
+    return _DEVICE.fullmatch(name) is not None
+
+
+def _name_problem(name: str, written: bool) -> tuple[str, str] | None:
+    rename = "Rename the file"
+    if PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive or name.startswith("\\"):
+        return f"file {name!r} is an absolute name", "Name it relative to job.toml, and keep it beside it"
+    outside = "Copy the file into the folder and name it there: a job must be complete by itself"
+    if not name or name.startswith("../"):
+        return f"file {name!r} is not inside the job folder", outside
+    if "\\" in name:
+        return f"file {name!r} has a backslash in it", "Separate folders by /"
+    if len(name) > FILE_NAME.most:
+        return f"file {name!r} has a name of {len(name)} characters: {FILE_NAME.most} are the most", rename
+    if any(unicodedata.category(c)[0] == "C" or c in _FORBIDDEN for c in name):
+        return f"file {name!r} has a character in it that not every system takes in a name", rename
+    parts = name.split("/")
+    if any(part in ("", ".", "..") for part in parts):
+        return f"file {name!r} is no plain name", "Name it relative to job.toml, without . and .."
+    if any(device_name(part) or part != part.rstrip(". ") or part != part.lstrip() for part in parts):
+        return f"file {name!r} is a name that Windows does not take", rename
+    if _WRITTEN.fullmatch(parts[-1]) and not (written and parts[-1] in DERIVED):
+        return f"file {name!r} has a name that cmm-uq writes itself", rename
+    return None
