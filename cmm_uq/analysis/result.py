@@ -9,7 +9,7 @@ from functools import cached_property
 from cmm_uq.analysis.consequences import Consequences
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.conformity.quantity import Quantity
-from cmm_uq.conformity.standards import Statement
+from cmm_uq.conformity.statement import Statement
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job

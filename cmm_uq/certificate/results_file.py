@@ -13,7 +13,7 @@ from cmm_uq.analysis.result import Diagnosed, Result
 from cmm_uq.certificate.diagnosis_words import sentence
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.quantity import Quantity
-from cmm_uq.conformity.standards import Statement
+from cmm_uq.conformity.statement import Decided, Statement
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.mismatch.diagnosis import LeftOut
 from cmm_uq.mismatch.held_out import Improvement
@@ -158,10 +158,21 @@ def _identifiability(result: Result) -> dict[str, Any]:
 
 def _statement(statement: Statement) -> dict[str, Any]:
     return {
-        "standard": statement.facts.standard, "quantity": statement.quantity, "value_um": statement.value_um,
+        "standard": statement.facts.standard, "characteristic": statement.characteristic,
+        "quantity": statement.quantity, "value_um": statement.value_um,
         "limit_um": statement.limit_um, "u_um": statement.u_um, "rule": rule_name(statement.facts.rule),
-        "guard_band_um": statement.decision.guard_band, "decision": statement.decision.outcome,
-        "probability_conforming": statement.decision.probability_conforming, "remarks": list(statement.remarks),
+        "guard_band_um": statement.decision.guard_band, "decision": statement.outcome,
+        "probability_conforming": statement.decision.probability_conforming, "scope": statement.scope,
+        "missing": list(statement.missing), "remarks": list(statement.remarks),
+        "errors": [_decided(item) for item in statement.errors],
+    }  # fmt: skip
+
+
+def _decided(item: Decided) -> dict[str, Any]:
+    return {
+        "measurement": item.measurement, "repeat": item.repeat, "length_mm": item.length_mm, "error_um": item.error_um,
+        "u_um": item.u_um, "limit_um": item.limit_um,
+        "probability_conforming": item.decision.probability_conforming, "outcome": item.decision.outcome,
     }  # fmt: skip
 
 
