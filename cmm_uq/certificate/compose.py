@@ -25,7 +25,7 @@ from cmm_uq.certificate.corner import corner_plot
 from cmm_uq.certificate.diagnosis_page import diagnosis_sections
 from cmm_uq.certificate.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
 from cmm_uq.certificate.warning import warnings
-from cmm_uq.certificate.wording import expanded, listed, probability, title_of, units_of
+from cmm_uq.certificate.wording import expanded, listed, measured, probability, title_of, units_of
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.jobs.job import Job, JobFile
@@ -161,7 +161,7 @@ def _conformity(result: Result) -> Section:
 
 def _decision(statement: Statement) -> Decision:
     decision = statement.decision
-    value, u = rounded(statement.value_um, statement.u_um)
+    value, u = measured(statement)
     said = []
     if statement.outcome == "incomplete":
         said.append(f"The {statement.measured} measured conform; the test lacks what is named as missing.")
@@ -172,7 +172,7 @@ def _decision(statement: Statement) -> Decision:
     if decision.probability_conforming is not None:
         chance = probability(decision.probability_conforming)
         said.append(f"Probability that the quantity is within the limit: {chance}.")
-    known = f", u = {u} µm" if statement.u_um > 0 else ""
+    known = f", u = {u} µm" if u else ""
     return Decision(
         statement.facts.standard, statement.quantity, f"{value} µm{known}", f"{statement.limit_um:.4g} µm",
         decision.rule, statement.outcome, " ".join((*said, *statement.remarks)), statement.missing,

@@ -7,10 +7,9 @@ from cmm_uq.analysis.result import Result
 from cmm_uq.analysis.shifting import ShiftResult
 from cmm_uq.certificate import plane_shift_section, shift_section
 from cmm_uq.certificate.warning import warnings
-from cmm_uq.certificate.wording import expanded, probability, title_of
+from cmm_uq.certificate.wording import expanded, measured, probability, title_of
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.statement import Statement
-from cmm_uq.uncertainty.rounding import rounded
 
 
 def summary(result: Result | ShiftResult | PlaneShiftResult) -> list[tuple[str, str, str]]:
@@ -41,7 +40,7 @@ def summary(result: Result | ShiftResult | PlaneShiftResult) -> list[tuple[str, 
 
 def _remark(statement: Statement) -> str:
     """Value, limit and probability of a statement; what its test lacks."""
-    value, _ = rounded(statement.value_um, statement.u_um)
+    value, _ = measured(statement)
     chance = statement.decision.probability_conforming
     told = [f"{value} µm against {statement.limit_um:.4g} µm"]
     if chance is not None:

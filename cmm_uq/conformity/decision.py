@@ -114,7 +114,7 @@ def _beyond(size: float, u: float, limit: float, signed: bool) -> float:
 def _by_band(size: float, limit: float, band: float) -> Outcome:
     if size <= limit - band:
         return "pass"
-    return "fail" if size > limit and size >= limit + band else "undecided"
+    return "fail" if size >= limit + band else "undecided"
 
 
 def _by_probability(size: float, limit: float, within: float, beyond: float, risk: float) -> Outcome:

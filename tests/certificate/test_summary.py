@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
+from cmm_uq.analysis import analyse
+from cmm_uq.certificate.compose import certificate
 from cmm_uq.certificate.document import Decision
 from cmm_uq.certificate.summary import summary
 from tests.certificate.simulated import analysed, blocks
+from tests.conftest import ROOT
 
 
 def said(job: str, standard: str) -> tuple[str, str]:
@@ -36,3 +42,17 @@ def test_a_complete_test_passes_with_nothing_missing() -> None:
     outcome, remark = said("sphere-simulated", "ISO 10360-5:2010")
     assert outcome == "PASS"
     assert "missing" not in remark
+
+
+def test_without_an_uncertainty_no_probability_is_printed(tmp_path: Path) -> None:
+    job = tmp_path / "job"
+    shutil.copytree(ROOT / "examples" / "gauge-blocks-simulated", job)
+    text = (job / "job.toml").read_text(encoding="utf-8")
+    text = text.replace("u_um = 0.15\n", "").replace("[[conformity]]\n", '[[conformity]]\nrule = "simple"\n')
+    (job / "job.toml").write_text(text, encoding="utf-8")
+    result = analyse(job)
+    (row,) = [row for row in summary(result) if row[0] == "VDI/VDE 2617"]
+    assert row[2].startswith("the lengths measured conform (2.47 µm against 4.25 µm); missing: ")
+    (block,) = [b for section in certificate(result).sections for b in section.blocks if isinstance(b, Decision)]
+    assert (block.measured, "Probability" in block.explanation) == ("2.47 µm", False)
+    assert "u_um is not stated" in block.explanation

@@ -37,6 +37,7 @@ GUARDED: list[Rule] = [rule for rule in RULES if rule != "simple"]
         (7.95, FalseAccept(max_false_accept=0.02), "undecided"),
         (12.05, FalseAccept(max_false_accept=0.02), "undecided"),
         (12.06, FalseAccept(max_false_accept=0.02), "fail"),
+        (10.01, FalseAccept(max_false_accept=0.6), "fail"),  # a risk above one half accepts nothing beyond the limit
         (10.0, GuardBand(guard_band=0.0), "pass"),
         (10.01, GuardBand(guard_band=0.0), "fail"),
     ],
