@@ -10,8 +10,8 @@ import numpy as np
 from cmm_uq.analysis.refusals import refuse
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.artefacts.bryan import Bryan
-from cmm_uq.conformity.plan_conditions import Condition, conditions
-from cmm_uq.conformity.plans import READY
+from cmm_uq.conformity.plan_conditions import conditions
+from cmm_uq.conformity.plans import READY, Condition
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import SHIFT, Job
 from cmm_uq.mismatch.diagnosis import FALSE_ALARMS

@@ -87,6 +87,26 @@ class SpherePlan:
 
 Plan = LengthPlan | BarPlan | SpherePlan
 
+
+@dataclass(frozen=True)
+class Condition:
+    """One thing that a standard asks for.
+
+    Parameters
+    ----------
+    what : it asks, and how much of it there is.
+    missing : what is not there, each in words; nothing when the condition is met.
+    """
+
+    what: str
+    missing: tuple[str, ...] = ()
+
+    @property
+    def met(self) -> bool:
+        """Whether nothing is missing."""
+        return not self.missing
+
+
 ISO_10360_2 = LengthPlan((*SPACE_DIAGONALS, *PARALLELS), 5, 3, 0.66, 30.0)
 """Seven positions, five lengths, three repeats: Harris 2004, 2.6.3, of the edition of 2000, who has 66 % and 30 mm too, and
 Renishaw's summary of ISO 10360. The four space diagonals, and the axes as the three others, are those of the edition of 2009

@@ -8,8 +8,9 @@ import numpy as np
 
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.artefacts.sphere import Sphere
+from cmm_uq.conformity.copies import copied, copies_in_words
 from cmm_uq.conformity.decision import decide, needs_uncertainty
-from cmm_uq.conformity.plan_conditions import conditions, copied, copies_in_words
+from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import PLANS
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable

@@ -9,11 +9,20 @@ import pytest
 
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge import StepGauge
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ConformityFacts, FalseAccept, GuardBand, MaximumPermissibleError, Rule, Standard
+from cmm_uq.jobs.job import (
+    ArtefactFacts,
+    ConformityFacts,
+    FalseAccept,
+    GuardBand,
+    MaximumPermissibleError,
+    Rule,
+    Standard,
+)
 from cmm_uq.points import Machine
 from tests.conformity.recorded import DIAGONALS, SEVEN, again, bars, copied_runs, gauge, sphere
 from tests.recordings import bar_facts
@@ -202,6 +211,16 @@ def test_each_missing_position_is_named(lost: int) -> None:
     assert found.missing == (names[lost], "15 of 105 lengths")
 
 
+def test_where_a_face_is_touched_does_not_move_its_length_to_another_line() -> None:
+    """Faces touched up to 4 mm aside: that turns a length of 20 mm by 11°, and a line of hundreds of mm hardly."""
+    line = gauge()
+    aside = np.where(np.arange(len(line.points)) % 2, 4.0, 0.0)[:, None] * np.array([[0.6, -0.64, 0.48]])
+    facts = ArtefactFacts(kind="step_gauge", length_mm=800.0, u_um=0.4)
+    across = aside - np.einsum("ni,ni->n", aside, line.directions())[:, None] * line.directions()
+    found = judged(StepGauge(facts, line.points.at(line.points.xyz + across)), limit_um=200.0)
+    assert found.missing == ()
+
+
 def test_two_repeats_are_not_three() -> None:
     found = judged(gauge(repeats=2))
     assert found.outcome == "incomplete"
@@ -335,6 +354,15 @@ def test_too_few_copied_or_huddled_points_are_no_test(of: dict[str, float], miss
     assert found.outcome == "incomplete"
     assert len(found.missing) == 1
     assert found.missing[0].startswith(missing)
+
+
+def test_a_range_and_a_form_have_one_side() -> None:
+    """1.65 u below the limit is 95.05 % on one side; near zero the other side would take 5 and 1 points of it."""
+    found = judged(bars(), B89, range_um=0.0, limit_um=0.5 * 1.65)
+    assert (found.outcome, round(found.decision.probability_conforming or 0.0, 4)) == ("pass", 0.9505)
+    value = judged(sphere(), ISO_5, limit_um=5.0).value_um
+    found = judged(sphere(form_um=20.0), ISO_5, limit_um=value + 16.5)
+    assert (found.outcome, round(found.decision.probability_conforming or 0.0, 4)) == ("pass", 0.9505)
 
 
 # --- without an uncertainty ------------------------------------------------------------------------------------------
