@@ -10,6 +10,7 @@ import pytest
 from cmm_uq.artefacts.artefact import Artefact
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge import StepGauge
+from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.conformity.quantity import Quantity
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
@@ -23,7 +24,7 @@ from cmm_uq.jobs.job import (
     Rule,
     Standard,
 )
-from cmm_uq.points import Machine
+from cmm_uq.points import Machine, Points
 from tests.conformity.recorded import DIAGONALS, SEVEN, again, bars, copied_runs, gauge, sphere
 from tests.recordings import bar_facts
 
@@ -228,6 +229,12 @@ def test_two_repeats_are_not_three() -> None:
     assert "35 of 105 lengths" in found.missing
 
 
+def test_the_way_back_along_a_gauge_is_no_repeat() -> None:
+    there_and_back = [20.0, 100.0, 200.0, 300.0, 400.0, 300.0, 200.0, 100.0, 20.0]
+    found = judged(gauge([np.eye(3)[1]], [[*there_and_back, 400.0]], repeats=2))
+    assert "3 repetitions of each length along parallel to Y (2)" in found.missing
+
+
 def test_a_copied_repeat_does_not_count_and_is_not_decided() -> None:
     found = judged(copied_runs(gauge(), {(6, 3): (6, 1)}))
     assert found.outcome == "incomplete"
@@ -291,11 +298,20 @@ def test_a_copy_is_found_whichever_way_its_ends_are_numbered(turned: bool) -> No
 
 
 def test_a_bar_within_ten_millimetres_of_another_is_no_further_position() -> None:
-    for moved, counts in ((9.9, False), (10.1, True)):
-        found = judged(again(bars(), {18: 14}, moved), B89, limit_um=60.0)
+    for moved, counts, turned in ((9.9, False, False), (9.9, False, True), (10.1, True, False), (10.1, True, True)):
+        found = judged(again(bars(), {18: 14}, moved, turned=turned), B89, limit_um=60.0)
         assert (found.outcome == "pass") == counts
         if not counts:
             assert found.missing == ("1 of 20 positions: 19 distinct, measurement 18 is within 10 mm of 14",)
+
+
+def test_a_copied_repeat_leaves_its_position_standing() -> None:
+    once = bars().points
+    twice = Points(
+        np.vstack([once.xyz, once.xyz]), np.tile(once.measurement, 2), np.tile(once.point, 2),
+        np.repeat([1, 2], len(once)), once.machine,
+    )  # fmt: skip
+    assert judged(Ballbar(bar_facts(300.0), twice), B89, limit_um=60.0).missing == ()
 
 
 def test_twenty_bars_along_x_lack_the_other_directions() -> None:
@@ -354,6 +370,16 @@ def test_too_few_copied_or_huddled_points_are_no_test(of: dict[str, float], miss
     assert found.outcome == "incomplete"
     assert len(found.missing) == 1
     assert found.missing[0].startswith(missing)
+
+
+def test_a_copied_sphere_is_no_second_one() -> None:
+    one = sphere(points=24).points
+    two = Points(
+        np.vstack([one.xyz, one.xyz]), np.repeat([1, 2], 24), np.tile(one.point, 2), np.ones(48, dtype=np.int64)
+    )
+    found = judged(Sphere(ArtefactFacts(kind="sphere", length_mm=25.0, form_um=0.2), two), ISO_5, limit_um=20.0)
+    assert found.missing == ("25 points on the sphere of measurement 1 (24 recorded, 24 different)",)
+    assert any("measurement 2, repeat 1 of measurement 1, repeat 1" in text for text in found.remarks)
 
 
 def test_a_range_and_a_form_have_one_side() -> None:
