@@ -97,6 +97,15 @@ class Points:
         rank[np.argsort(first)] = np.arange(len(first))
         return rank[inverse.ravel()]
 
+    @cached_property
+    def twins(self) -> tuple[tuple[int, ...], ...]:
+        """Groups (see :attr:`group`) that have the same coordinates to the last digit, in whatever order of their points."""
+        same: dict[bytes, list[int]] = {}
+        for group in range(int(self.group.max()) + 1 if len(self) else 0):
+            figures = self.xyz[self.group == group] + 0.0  # −0 is 0
+            same.setdefault(figures[np.lexsort(figures.T)].tobytes(), []).append(group)
+        return tuple(tuple(groups) for groups in same.values() if len(groups) > 1)
+
     def column(self, name: str) -> Floats:
         """A recorded column, (n,).
 

@@ -64,7 +64,7 @@ class Ballbar(Artefact):
         if not size.certified:
             return None
         every = np.full(len(self.rows), 1.0)
-        return Indications(self.lengths() - size.nominal, size.nominal * every, size.sd * every, 1)
+        return Indications(self.lengths() - size.nominal, size.nominal * every, size.sd * every, self.rows)
 
     def ends(self) -> Floats:
         """Both ends of each bar, (m, 2, 3) mm, in the recorded frame."""

@@ -106,7 +106,7 @@ class StepGauge(Artefact):
         errors = (np.sign(lengths) * (found - certified) / self.expansion)[chosen]
         lengths = np.abs(lengths)[chosen]
         u = self.sizes[0].sd * lengths / self.sizes[0].nominal
-        return Indications(errors, lengths, u, len(np.unique(np.round(lengths, 1))))
+        return Indications(errors, lengths, u, np.column_stack([first, np.arange(len(first))])[chosen])
 
     def directions(self, xyz: Floats | None = None) -> Floats:
         """Unit vector of each point's line, (n, 3), in the sense of growing distances."""

@@ -64,16 +64,17 @@ class Plate(Rigid):
         if not size.certified:
             return None
         runs = Placings.of(self.points.group)
-        found, certified = [], []
+        found, certified, ends = [], [], []
         for run in range(len(runs.numbers)):
             rows = np.flatnonzero(runs.index == run)
             a, b = rows[np.array(np.triu_indices(len(rows), 1))]
+            ends.append(np.column_stack([a, b]))
             ratio = 0.5 * (self.expansion[a] + self.expansion[b])
             found.append(np.linalg.norm(self.points.xyz[b] - self.points.xyz[a], axis=1) / ratio)
             certified.append(np.linalg.norm(self.reference[b] - self.reference[a], axis=1))
         lengths = np.concatenate(certified)
         return Indications(np.concatenate(found) - lengths, lengths, size.sd * lengths / size.nominal,
-                           len(np.unique(np.round(lengths, 1))))  # fmt: skip
+                           np.concatenate(ends))  # fmt: skip
 
     def _refuse_another_plate(self, where: str | None) -> None:
         points, placings = self.points, self.placings

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from cmm_uq import __version__
 from cmm_uq.conformity.accuracy import TITLES
-from cmm_uq.conformity.standards import Statement
+from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents import tolerance_section
 from cmm_uq.documents.corner import corner_plot
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
@@ -16,7 +16,7 @@ from cmm_uq.documents.origin import CERTIFICATE, came_about
 from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.warning import warnings
-from cmm_uq.documents.wording import expanded, listed, probability, title_of, units_of
+from cmm_uq.documents.wording import expanded, listed, measured, probability, title_of, units_of
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.kinds.ballbar import page as ballbar_section
@@ -165,12 +165,21 @@ def _conformity(result: Result) -> Section:
 
 def _decision(statement: Statement) -> Decision:
     decision = statement.decision
-    value, u = rounded(statement.value_um, statement.u_um)
-    band = f"The guard band is {significant(decision.guard_band)} µm. " if decision.guard_band > 0 else ""
-    chance = f"Probability that the quantity is within the limit: {probability(decision.probability_conforming)}."
+    value, u = measured(statement)
+    said = []
+    if statement.outcome == "incomplete":
+        said.append(f"The {statement.measured} measured conform; the test lacks what is named as missing.")
+    if decision.guard_band is None:
+        said.append("The uncertainty is too large for any value to be accepted.")
+    elif decision.guard_band > 0:
+        said.append(f"The guard band is {significant(decision.guard_band)} µm.")
+    if decision.probability_conforming is not None:
+        chance = probability(decision.probability_conforming)
+        said.append(f"Probability that the quantity is within the limit: {chance}.")
+    known = f", u = {u} µm" if u else ""
     return Decision(
-        statement.facts.standard, statement.quantity, f"{value} µm, u = {u} µm", f"{statement.limit_um:.4g} µm",
-        decision.rule, decision.outcome, " ".join((f"{band}{chance}", *statement.remarks)),
+        statement.facts.standard, statement.quantity, f"{value} µm{known}", f"{statement.limit_um:.4g} µm",
+        decision.rule, statement.outcome, " ".join((*said, *statement.remarks)), statement.missing,
     )  # fmt: skip
 
 

@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cmm_uq.artefacts import artefact_of
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse
-from cmm_uq.conformity.plan_conditions import Condition, conditions
+from cmm_uq.conformity.plan_conditions import conditions
+from cmm_uq.conformity.plans import READY, Condition
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.diagnosis.power import Power, powers, without_fault
 from cmm_uq.errors import CmmUqError
@@ -148,9 +150,7 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     if chosen is not None:
         points = _after(setting, points, chosen[kept:]) if name == RECORDED else _joined(setting, chosen)
         better = _outlook(setting, chosen, points, rivals, power, seed, _part(tell, 0.6, 0.95))
-    met = conditions(name, [placing.points for placing in placings], job.points.machine) + _in_time(
-        setting, name, placings
-    )
+    met = _of_standard(setting, name, start.points) + _in_time(setting, name, placings)
     return Plan(job, setting, name, start, better, kept, scores, met)
 
 
@@ -266,12 +266,22 @@ def _affordable(setting: Setting, count: int, possible: Sequence[Placing], kept:
     return min(count, int(left / each))
 
 
+def _of_standard(setting: Setting, name: str, points: Points) -> tuple[Condition, ...]:
+    """Conditions of the standard that a ready plan is named after; none for a plan of no standard."""
+    if name not in READY:
+        return ()
+    # where the lengths lie counts, not yet what certifies them
+    facts = setting.artefact.model_copy(update={"nominal": False})
+    return conditions(READY[name], artefact_of(facts, points), recorded=False)
+
+
 def _in_time(setting: Setting, name: str, placings: Sequence[Placing]) -> tuple[Condition, ...]:
     budget = setting.plan.budget_min
     if budget is None or name == RECORDED:
         return ()
     total = sum(minutes(setting, placing) for placing in placings)
-    return (Condition(f"at most {budget:g} min: {total:.0f} min", total <= budget),)
+    over = (f"{total - budget:.0f} min too many",) if total > budget else ()
+    return (Condition(f"at most {budget:g} min: {total:.0f} min", over),)
 
 
 def _shift_plan(job: Job, setting: Setting) -> Plan:

@@ -43,7 +43,7 @@ class Report:
         """Whether every statement of conformity is a pass, and the recording agrees with the model that the job names."""
         if not isinstance(self.result, Result):
             return True
-        decided = all(statement.decision.outcome == "pass" for statement in self.result.statements)
+        decided = all(statement.outcome == "pass" for statement in self.result.statements)
         return decided and self.result.diagnosed.diagnosis.verdict == "consistent"
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from cmm_uq.conformity.accuracy import TITLES
+from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.warning import warnings
-from cmm_uq.documents.wording import expanded, probability, title_of
+from cmm_uq.documents.wording import expanded, measured, probability, title_of
 from cmm_uq.kinds.shift_axis import page as shift_section
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shift_plate import page as plane_shift_section
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
-from cmm_uq.uncertainty.rounding import rounded
 
 
 def summary(result: Result | ShiftResult | PlaneShiftResult) -> list[tuple[str, str, str]]:
@@ -35,14 +35,22 @@ def summary(result: Result | ShiftResult | PlaneShiftResult) -> list[tuple[str, 
                 title_of((effect.name, name), result), f"{value} ± {U} {quantity.unit}" if known else "not determined",
                 f"k = {k}" if known else "",
             ))  # fmt: skip
-    for statement in result.statements:
-        value, _ = rounded(statement.value_um, statement.u_um)
-        chance = _chance(statement.decision.probability_conforming)
-        rows.append((
-            statement.facts.standard, statement.decision.outcome.upper(),
-            f"{value} µm against {statement.limit_um:.4g} µm; conforming with {chance}",
-        ))  # fmt: skip
+    rows += [(each.facts.standard, each.outcome.upper(), _remark(each)) for each in result.statements]
     return rows + [("Warning", text, "") for text in warnings(result)]
+
+
+def _remark(statement: Statement) -> str:
+    """Value, limit and probability of a statement; what its test lacks."""
+    value, _ = measured(statement)
+    chance = statement.decision.probability_conforming
+    told = [f"{value} µm against {statement.limit_um:.4g} µm"]
+    if chance is not None:
+        told.append(f"conforming with {_chance(chance)}")
+    if statement.outcome == "incomplete":
+        told = [f"the {statement.measured} measured conform ({', '.join(told)})"]
+    if statement.missing:
+        told.append(f"missing: {'; '.join(statement.missing)}")
+    return "; ".join(told)
 
 
 def _chance(p: float) -> str:

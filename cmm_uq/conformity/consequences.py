@@ -9,7 +9,8 @@ import numpy as np
 
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.conformity.accuracy import with_uncertainty
-from cmm_uq.conformity.standards import Statement, statement
+from cmm_uq.conformity.standards import statement
+from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.inference.posterior import Density
 from cmm_uq.jobs.job import Job
@@ -70,7 +71,7 @@ def consequences(job: Job, diagnosis: Diagnosis, seed: int) -> Consequences | No
     return Consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(
-            (statement(wish, artefact, before, key), statement(wish, corrected, after, key))
+            (statement(wish, artefact, before, key), statement(wish, corrected, after, key, artefact))
             for i, wish in enumerate(job.facts.conformity, 1)
             for key in [f"[[conformity]] {i}"]
         ),

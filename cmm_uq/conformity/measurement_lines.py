@@ -1,23 +1,22 @@
-"""Where ISO 10360-2:2009 wants a length measured: seven lines through the volume, and how long they must be."""
+"""Where in the volume a length is measured: the name of its line, and how much of the travel along it there is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.points import AXES, Floats, Machine
 
 ALIGNED = np.sin(np.radians(10.0))
 """A direction cosine below this does not count: the line is as good as square to that axis."""
 
-LEAST_SHARE = 0.66
-"""The longest length on a line over the travel along it (ISO 10360-2:2009, 6.3.2)."""
+CORNER_TO_CORNER = 0.75
+"""Part of every axis' travel that a line, produced to the ends of travel, crosses on a space diagonal; this project's figure,
+which leaves room for the fixture."""
 
 PARALLELS = tuple(f"parallel to {a.upper()}" for a in AXES)
 SPACE_DIAGONALS = tuple(f"space diagonal {x}X {y}Y +Z" for x in "+−" for y in "+−")
-SEVEN_LINES = (*SPACE_DIAGONALS, *PARALLELS)
-"""The four space diagonals, and by default the three axes (ISO 10360-2:2009, 6.3.3)."""
+FACE_DIAGONALS = tuple(f"face diagonal {s}{a} +{b}" for a, b in ("XY", "YZ", "XZ") for s in "+−")
 
 
 def position_of(direction: Floats) -> str:
@@ -27,26 +26,44 @@ def position_of(direction: Floats) -> str:
     taken = [a.upper() for a, counted in zip(AXES, counts, strict=True) if counted]
     if len(taken) == 1:
         return f"parallel to {taken[0]}"
-    signs = np.sign(u) * np.sign(u[counts][-1])
-    named = [
-        f"{'+' if s > 0 else '−'}{a.upper()}" for a, s, counted in zip(AXES, signs, counts, strict=True) if counted
-    ]
-    return f"{'space' if len(taken) == 3 else 'face'} diagonal {' '.join(named)}"
+    return f"{'space' if len(taken) == 3 else 'face'} diagonal {_signed(u, counts)}"
 
 
-def missing_lines(directions: Iterable[Floats]) -> tuple[str, ...]:
-    """Which of the seven positions none of these lines has."""
-    found = {position_of(direction) for direction in directions}
-    return tuple(line for line in SEVEN_LINES if line not in found)
+def position_on(machine: Machine, middle: Floats, direction: Floats) -> str:
+    """Position of a line through ``middle`` (3,), mm in the recorded frame, where the travel is known: by what it crosses.
+
+    A space diagonal goes from corner to corner: by its direction alone a line across a corner, or one that hardly leaves the
+    floor, would pass for one, and that of a long machine would not. Without travel the direction decides.
+    """
+    crossed = crossed_travel(machine, middle, direction)
+    u = direction / np.linalg.norm(direction)
+    named = position_of(u)
+    if crossed is None:
+        return named
+    if np.all(crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(machine.travel_mm, axis=1)):
+        return f"space diagonal {_signed(u, np.ones(3, dtype=bool))}"
+    return named.replace("space diagonal", "oblique")
 
 
-def share_of_travel(machine: Machine, middle: Floats, direction: Floats, length: float) -> float | None:
-    """Length over the travel along a line through ``middle`` (3,), mm in the recorded frame; ``None`` without travel."""
+def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float | None:
+    """Travel, mm, along a line through ``middle`` (3,) in the recorded frame; 0 outside it, ``None`` where none is stated."""
     travel = machine.travel_mm
     if not np.all(np.isfinite(travel)):
         return None
+    u = direction / np.linalg.norm(direction)
     place = middle + machine.origin_mm
-    moving = np.abs(direction) > 1e-9
-    ends = (travel - place[:, None])[moving] / direction[moving, None]
-    available = float(ends.max(axis=1).min() - ends.min(axis=1).max())
-    return length / available if available > 0 else None
+    moving = np.abs(u) > 1e-9
+    ends = (travel - place[:, None])[moving] / u[moving, None]
+    return max(0.0, float(ends.max(axis=1).min() - ends.min(axis=1).max()))
+
+
+def share_of_travel(machine: Machine, middle: Floats, direction: Floats, length: float) -> float | None:
+    """Length, mm, over the travel along its line; ``None`` where no travel is stated or the line lies outside it."""
+    available = crossed_travel(machine, middle, direction)
+    return length / available if available else None
+
+
+def _signed(u: Floats, counts: NDArray[np.bool_]) -> str:
+    signs = np.sign(u) * np.sign(u[counts][-1])
+    taken = zip(AXES, signs, counts, strict=True)
+    return " ".join(f"{'+' if sign > 0 else '−'}{axis.upper()}" for axis, sign, counted in taken if counted)

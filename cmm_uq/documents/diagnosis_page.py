@@ -145,7 +145,7 @@ def _consequences(found: Diagnosed) -> tuple[Block, ...]:
         )
         blocks.append(Table("Figures of performance", heads, tuple(rows), (note,)))
     decisions = tuple(
-        (f"{before.facts.standard}, {before.quantity}", before.decision.outcome, after.decision.outcome)
+        (f"{before.facts.standard}, {before.quantity}", before.outcome, after.outcome)
         for before, after in found.consequences.statements
     )
     if decisions:

@@ -14,7 +14,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
-Outcome = Literal["pass", "fail", "undecided"]
+Outcome = Literal["pass", "fail", "undecided", "incomplete"]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Plot:
 
 @dataclass(frozen=True)
 class Decision:
-    """A statement of conformity: what was compared with what, by which rule, and what follows."""
+    """A statement of conformity: what was compared with what, by which rule, what follows, and what of the test is missing."""
 
     standard: str
     quantity: str
@@ -80,6 +80,7 @@ class Decision:
     rule: str
     outcome: Outcome
     explanation: str
+    missing: tuple[str, ...] = ()
     kind: ClassVar[str] = "decision"
 
 

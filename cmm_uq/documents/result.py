@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from cmm_uq.conformity.consequences import Consequences
-from cmm_uq.conformity.standards import Statement
+from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import Posterior

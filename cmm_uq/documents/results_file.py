@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.conformity.decision import rule_name
-from cmm_uq.conformity.standards import Statement
+from cmm_uq.conformity.statement import Decided, Statement
 from cmm_uq.diagnosis.diagnosis import LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.diagnosis_words import sentence
@@ -185,10 +185,21 @@ def _identifiability(result: Result) -> dict[str, Any]:
 
 def _statement(statement: Statement) -> dict[str, Any]:
     return {
-        "standard": statement.facts.standard, "quantity": statement.quantity, "value_um": statement.value_um,
+        "standard": statement.facts.standard, "characteristic": statement.characteristic,
+        "quantity": statement.quantity, "value_um": statement.value_um,
         "limit_um": statement.limit_um, "u_um": statement.u_um, "rule": rule_name(statement.facts.rule),
-        "guard_band_um": statement.decision.guard_band, "decision": statement.decision.outcome,
-        "probability_conforming": statement.decision.probability_conforming, "remarks": list(statement.remarks),
+        "guard_band_um": statement.decision.guard_band, "decision": statement.outcome,
+        "probability_conforming": statement.decision.probability_conforming, "scope": statement.scope,
+        "missing": list(statement.missing), "remarks": list(statement.remarks),
+        "errors": [_decided(item) for item in statement.errors],
+    }  # fmt: skip
+
+
+def _decided(item: Decided) -> dict[str, Any]:
+    return {
+        "measurement": item.measurement, "repeat": item.repeat, "length_mm": item.length_mm, "error_um": item.error_um,
+        "u_um": item.u_um, "limit_um": item.limit_um,
+        "probability_conforming": item.decision.probability_conforming, "outcome": item.decision.outcome,
     }  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.result import Result
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.uncertainty.quantity import Quantity
@@ -29,6 +30,13 @@ def probability(p: float) -> str:
     if p > 1 - 1e-4:
         return ">\u00a099.99\u00a0%"
     return f"{100 * p:.{2 if p < 0.5 else 3 if p < 0.999 else 4}g}\u00a0%"
+
+
+def measured(statement: Statement) -> tuple[str, str]:
+    """Value that a statement names and its standard uncertainty, as text; the latter empty where none is known."""
+    if statement.u_um > 0:
+        return rounded(statement.value_um, statement.u_um)
+    return f"{statement.value_um:.4g}", ""
 
 
 def title_of(key: tuple[str, str], result: Result) -> str:

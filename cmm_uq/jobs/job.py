@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS, LISTED, MAPS
@@ -42,6 +42,15 @@ WITH_REFERENCES = ("step_gauge", "gauge_blocks", "plate")
 """Kinds whose certified figures stand in the recording; their ``u_um`` may stand without ``length_mm``."""
 
 Standard = Literal["ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617"]
+
+CHARACTERISTICS: Mapping[Standard, str] = {
+    "ASME B89.4.1-1997": "volumetric performance", "ISO 10360-2:2009": "E0", "ISO 10360-5:2010": "P_FTU",
+    "VDI/VDE 2617": "E0",
+}  # fmt: skip
+"""The characteristic that is decided of each standard, of all that it has."""
+
+LENGTH_STANDARDS: tuple[Standard, ...] = ("ISO 10360-2:2009", "VDI/VDE 2617")
+"""Standards that compare with calibrated lengths."""
 
 SHORTEST_TRAVEL_MM = 1e-3
 """Positions are divided by the travel."""
@@ -298,6 +307,7 @@ class ConformityFacts(Table):
     """One ``[[conformity]]``: a standard, a limit and a decision rule."""
 
     standard: Standard
+    characteristic: str | None = None
     limit_um: Limit | None = None
     mpe: MaximumPermissibleError | None = None
     rule: Rule = "ISO 14253-1"
@@ -307,6 +317,33 @@ class ConformityFacts(Table):
         if (self.limit_um is None) == (self.mpe is None):
             raise ValueError("give either limit_um or mpe = { a_um = …, k = … }")
         return self
+
+    @model_validator(mode="after")
+    def _decided_here(self) -> Self:
+        known = CHARACTERISTICS[self.standard]
+        if self.characteristic not in (None, known):
+            raise ValueError(
+                f"characteristic = {self.characteristic!r} of {self.standard} is not decided here: only {known}"
+            )
+        return self
+
+    def uncertainty_missing(self, artefact: ArtefactFacts) -> str | None:
+        """The key of ``[artefact]`` whose uncertainty the rule needs and does not have; ``None`` when nothing is missing."""
+        if self.rule == "simple":
+            return None
+        if self.standard == "ISO 10360-5:2010":
+            return None if artefact.kind != "sphere" or artefact.form_um else "form_um"
+        certified = artefact.length_mm is not None or (artefact.kind in WITH_REFERENCES and not artefact.nominal)
+        return "u_um" if self.standard in LENGTH_STANDARDS and certified and not artefact.u_um else None
+
+
+def needed(key: str, wish: ConformityFacts) -> tuple[str, str]:
+    """That a rule needs an uncertainty which ``[artefact]`` does not state, and how to mend it."""
+    rule = wish.rule if isinstance(wish.rule, str) else next(iter(wish.rule.model_dump()))
+    return (
+        f"the rule {rule} needs the uncertainty of what {wish.standard} compares with, and [artefact] states no {key} above 0",
+        f'Give {key} in [artefact], or rule = "simple", which takes no account of it',
+    )
 
 
 class JobFile(Table):
@@ -320,6 +357,18 @@ class JobFile(Table):
     model: ModelFacts
     conformity: Annotated[list[ConformityFacts], Field(max_length=CONFORMITY.most)] = []
     plan: PlanFacts = PlanFacts()
+
+    @field_validator("conformity")
+    @classmethod
+    def _rules_have_their_uncertainty(
+        cls, wishes: list[ConformityFacts], info: ValidationInfo
+    ) -> list[ConformityFacts]:  # fmt: skip
+        artefact = info.data.get("artefact")
+        for wish in wishes:
+            key = wish.uncertainty_missing(artefact) if artefact is not None else None
+            if key is not None:
+                raise ValueError(". ".join(needed(key, wish)))
+        return wishes
 
     @model_validator(mode="before")
     @classmethod

@@ -57,7 +57,10 @@ def _located(error: ErrorDetails, text: str, path: Path, model: type[BaseModel])
     if error["type"] == "extra_forbidden":
         return CmmUqError("unknown key", where=where, fix=suggestion(named[-1], _known_keys(named[:-1], model)))
     message = error["msg"].removeprefix("Value error, ")
-    given = "" if isinstance(error["input"], dict) else f" (it says {shortened(repr(error['input']), _SHOWN)})"
+    tables = isinstance(error["input"], dict) or (
+        isinstance(error["input"], list) and any(isinstance(item, dict) for item in error["input"])
+    )
+    given = "" if tables else f" (it says {shortened(repr(error['input']), _SHOWN)})"
     return CmmUqError(f"{message[0].lower()}{message[1:]}{given}", where=where)
 
 

@@ -25,13 +25,13 @@ class Indications:
     errors : (m,) measured minus calibrated, mm.
     lengths : (m,) calibrated lengths, mm.
     u : (m,) standard uncertainty of the calibrated lengths, mm.
-    nominal_lengths : how many different nominal lengths there are.
+    rows : (m, 2) the points between which each length was measured, as rows of the recording.
     """
 
     errors: Floats
     lengths: Floats
     u: Floats
-    nominal_lengths: int
+    rows: Ints
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import numpy as np
 
 from cmm_uq.artefacts.triangle_placings import PLANES, SEVEN_PLACINGS, placed_triangle
 from cmm_uq.artefacts.triangle_standard import TriangleStandard
+from cmm_uq.conformity.plans import B89
 from cmm_uq.errors import CmmUqError
 from cmm_uq.planning import patterns
 from cmm_uq.planning.directions import PRINCIPAL_PLANES, words
@@ -38,9 +39,6 @@ _PARALLELS = (
 )  # fmt: skip
 
 _ACROSS = {"plate": " (across it)", "triangle": " (across it)"}
-
-NEARLY_CUBIC = 2.0
-"""Longest over shortest axis up to which a volume counts as nearly cubic here."""
 
 
 def ready_plan(setting: Setting) -> tuple[str, tuple[Placing, ...]]:
@@ -94,8 +92,8 @@ def _allowed(setting: Setting, direction: Floats) -> None:
 def _sections(volume: Volume) -> list[Volume]:
     """Nearly cubic parts of the volume, overlapping by no more than they must."""
     size = volume.size
-    edge = NEARLY_CUBIC * size.min()
-    counts = [int(np.ceil(extent / edge - 1e-9)) for extent in size]
+    counts = B89.cubes(size)
+    edge = B89.nearly_cubic * size.min()
     found = []
     for at in product(*(range(count) for count in counts)):
         length = np.minimum(size, np.where(np.array(counts) > 1, edge, size))

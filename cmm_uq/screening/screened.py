@@ -126,15 +126,13 @@ def impossible_values(points: Points, kind: str = "") -> list[Finding]:
 
 def repeated_figures(points: Points) -> list[Finding]:
     """Measurements whose coordinates repeat, digit for digit, those of another measurement; runs of them as one block."""
-    first: dict[bytes, int] = {}
-    copies: list[tuple[int, int]] = []
-    for group in range(int(points.group.max()) + 1):
-        figures = points.xyz[points.group == group]
-        key = figures[np.lexsort(figures.T)].tobytes()
-        if key not in first:
-            first[key] = group
-        elif _measurement(points, first[key]) != _measurement(points, group):
-            copies.append((first[key], group))
+    copies = [
+        (groups[0], later)
+        for groups in points.twins
+        for later in groups[1:]
+        if _measurement(points, groups[0]) != _measurement(points, later)
+    ]
+    copies.sort(key=lambda pair: pair[1])
     return [_copied(points, run) for run in _runs(copies)]
 
 

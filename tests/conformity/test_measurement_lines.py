@@ -1,13 +1,22 @@
-"""Positions of ISO 10360-2:2009, 6.3."""
+"""Names of lines in the volume, and the travel along them."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from cmm_uq.conformity.measurement_lines import SEVEN_LINES, missing_lines, position_of, share_of_travel
+from cmm_uq.conformity.measurement_lines import (
+    FACE_DIAGONALS,
+    crossed_travel,
+    position_of,
+    position_on,
+    share_of_travel,
+)
 from cmm_uq.points import Machine
 from tests.recordings import TRAVEL
+
+MACHINE = Machine("m", "XYZ", TRAVEL)
+LONG = Machine("long", "XYZ", np.array([[0.0, 6000.0], [0.0, 1000.0], [-600.0, 0.0]]))
 
 
 @pytest.mark.parametrize(
@@ -21,21 +30,52 @@ from tests.recordings import TRAVEL
 def test_a_line_has_its_position_whichever_way_it_is_measured(direction: tuple[float, ...], position: str) -> None:
     assert position_of(np.array(direction)) == position
     assert position_of(-np.array(direction)) == position
+    for machine in (Machine(), MACHINE):
+        assert (
+            position_on(machine, TRAVEL.mean(axis=1), np.array(direction)).replace("oblique", "space diagonal")
+            == position
+        )
 
 
-def test_seven_positions_are_complete_and_each_missing_one_is_named() -> None:
-    lines = [np.array(d, dtype=float) for d in ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, 1), (1, 0, 0), (0, 1, 0))]
-    assert missing_lines(lines) == ("parallel to Z",)
-    assert missing_lines([*lines, np.array([0, 0, -1.0])]) == ()
-    assert missing_lines([]) == SEVEN_LINES
+def test_the_six_face_diagonals_are_the_names_of_their_directions() -> None:
+    directions = [(a, b, 0) for a, b in ((1, 1), (-1, 1))] + [(0, a, 1) for a in (1, -1)] + [(a, 0, 1) for a in (1, -1)]
+    assert {position_of(np.array(d, dtype=float)) for d in directions} == set(FACE_DIAGONALS)
+    assert len(FACE_DIAGONALS) == 6
+
+
+def test_a_space_diagonal_goes_from_corner_to_corner_where_the_travel_is_known() -> None:
+    diagonal = np.array([900.0, 550, 500])
+    middle = TRAVEL.mean(axis=1)
+    assert position_on(MACHINE, middle, diagonal) == "space diagonal +X +Y +Z"
+    # moved by 20 % of the travel the line still crosses 80 % of every axis; by 30 % no longer
+    assert position_on(MACHINE, middle + np.array([180, 0, 0]), diagonal) == "space diagonal +X +Y +Z"
+    assert position_on(MACHINE, middle + np.array([270, 0, 0]), diagonal) == "oblique +X +Y +Z"
+    # across a corner, and hardly off the floor
+    assert position_on(MACHINE, np.array([50.0, 50.0, -50.0]), np.array([1.0, -1, 1])) == "oblique +X −Y +Z"
+    assert position_on(MACHINE, middle, np.array([1.0, 0.2, 0.2])) == "oblique +X +Y +Z"
+
+
+def test_the_diagonal_of_a_long_machine_is_one_though_it_is_nearly_along_an_axis() -> None:
+    """6000 × 1000 × 600 mm: its diagonal is 11° off X, but less than 10° in each plane."""
+    middle = LONG.travel_mm.mean(axis=1)
+    assert position_of(np.array([6000.0, 1000, 600])) == "parallel to X"
+    assert position_on(LONG, middle, np.array([6000.0, 1000, 600])) == "space diagonal +X +Y +Z"
+    assert position_on(LONG, middle, np.array([6000.0, 100, 60])) == "parallel to X"
 
 
 def test_a_length_is_compared_with_the_travel_along_its_line() -> None:
     """900 × 550 × 500 mm: 450 mm along X is half; the space diagonal is √(900² + 550² + 500²) mm long."""
-    machine = Machine("m", "XYZ", TRAVEL)
     middle = TRAVEL.mean(axis=1)
-    assert share_of_travel(machine, middle, np.array([1.0, 0, 0]), 450.0) == pytest.approx(0.5)
+    assert share_of_travel(MACHINE, middle, np.array([1.0, 0, 0]), 450.0) == pytest.approx(0.5)
     diagonal = np.array([900.0, 550, 500])
     length = float(np.linalg.norm(diagonal))
-    assert share_of_travel(machine, middle, diagonal / length, length) == pytest.approx(1.0)
+    assert crossed_travel(MACHINE, middle, diagonal) == pytest.approx(length)
+    assert share_of_travel(MACHINE, middle, diagonal / length, length) == pytest.approx(1.0)
     assert share_of_travel(Machine(), middle, diagonal / length, length) is None
+    assert crossed_travel(MACHINE, np.array([5000.0, 0, 0]), diagonal) == 0.0
+
+
+def test_the_travel_is_that_of_the_scales() -> None:
+    """Recorded 1000 mm off the scales: the origin brings the line back."""
+    moved = Machine("m", "XYZ", TRAVEL, np.array([1000.0, 0, 0]))
+    assert crossed_travel(moved, TRAVEL.mean(axis=1) - [1000, 0, 0], np.array([1.0, 0, 0])) == pytest.approx(900.0)

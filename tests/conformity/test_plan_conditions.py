@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import pytest
 
+from cmm_uq.artefacts import artefact_of
 from cmm_uq.conformity.plan_conditions import conditions
+from cmm_uq.conformity.plans import READY
+from cmm_uq.planning.placing import joined
 from cmm_uq.planning.ready import ready_plan
-from tests.planning.plans import BALLBAR, EVERY_KIND, GAUGE, MACHINE, setting
+from tests.planning.plans import EVERY_KIND, setting
 
 
 def unmet(kind: str, **wishes: object) -> list[str]:
     facts, usual = EVERY_KIND[kind]
     chosen = setting(facts, **{**usual, **wishes})
     name, placings = ready_plan(chosen)
-    return [c.what for c in conditions(name, [p.points for p in placings], MACHINE) if not c.met]
+    return [c.what for c in conditions(READY[name], artefact_of(facts, joined(placings)), recorded=False) if not c.met]
 
 
 @pytest.mark.parametrize("kind", ["ballbar", "sphere"])
@@ -46,11 +49,3 @@ def test_blocks_on_one_line_count_together() -> None:
 def test_a_shortest_length_above_thirty_millimetres_is_said() -> None:
     said = unmet("step_gauge", length_mm=1000.0, lengths_mm=[100.0, 200.0, 400.0, 550.0, 1000.0])
     assert "shortest length at most 30 mm: 100 mm" in said
-
-
-def test_plans_of_no_standard_have_no_conditions() -> None:
-    assert unmet("plate") == []
-    name, placings = ready_plan(setting(BALLBAR))
-    assert conditions("recording", [p.points for p in placings], MACHINE) == ()
-    assert GAUGE.kind == "step_gauge"
-    assert name == "ASME B89.4.1"

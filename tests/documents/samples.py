@@ -59,6 +59,8 @@ def ballbar_certificate() -> Document:
                      "The error lies within the limit."),
             Decision("VDI/VDE 2617", "Largest error", "4.4 µm, U = 6.1 µm", "4.6 µm", "ISO 14253-1", "undecided",
                      "The difference is smaller than the uncertainty."),
+            Decision("ISO 10360-2:2009", "Largest error", "1.1 µm, U = 0.4 µm", "4.6 µm", "ISO 14253-1", "incomplete",
+                     "The lengths measured conform.", ("space diagonal +X −Y +Z", "81 of 105 lengths")),
         ),
     )  # fmt: skip
     effects = Table(
@@ -106,7 +108,7 @@ def document_of(text: str) -> Document:
     blocks = (
         Paragraph(text), Paragraph(text, "warning"), Paragraph(text, "note"), Facts(((text, text),)),
         Table(text, (column, Column("n")), ((text, "2.0"), ("a", "1.0")), (text,)),
-        Decision(text, text, text, text, text, "pass", text),
+        Decision(text, text, text, text, text, "incomplete", text, (text, text)),
     )  # fmt: skip
     return Document(
         title=text, number=text, subject=text, issuer=(text, text), particulars=(Facts(((text, text),)),),

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cmm_uq.commands.analysis import analyse
@@ -79,3 +80,46 @@ def test_it_keeps_the_published_contract(data: dict[str, Any], tmp_path: Path) -
 def test_numbers_that_json_cannot_carry_are_refused() -> None:
     with pytest.raises(CmmUqError, match="a figure is not finite"):
         as_json({"value": float("nan")})
+
+
+def test_a_statement_has_all_that_was_decided_and_all_that_is_missing(data: dict[str, Any]) -> None:
+    (found,) = data["conformity"]
+    compensated = data["job"]["id"].endswith("-compensated")
+    assert (found["characteristic"], found["scope"]) == ("volumetric performance", "partial")
+    assert found["decision"] == ("undecided" if compensated else "fail")
+    assert found["missing"] == ["1 of 20 positions: 19 distinct, measurement 18 is a copy of 14"]
+    (entry,) = found["errors"]
+    assert (entry["error_um"], entry["u_um"], entry["limit_um"]) == (
+        found["value_um"],
+        found["u_um"],
+        found["limit_um"],
+    )
+    assert (entry["outcome"], entry["measurement"], entry["repeat"]) == (found["decision"], None, None)
+
+
+def test_every_length_is_in_the_table_of_errors_with_its_own_limit() -> None:
+    """Limits 4 + L/100; u of 0.4 µm at 820 mm, in proportion."""
+    (found,) = json.loads(as_json(results(analyse(ROOT / "examples" / "step-gauge-simulated"))))["conformity"]
+    assert found["characteristic"] == "E0"
+    rows = np.genfromtxt(ROOT / "examples" / "step-gauge-simulated" / "recording.csv", delimiter=",", names=True)
+    assert len(found["errors"]) == np.sum(rows["reference_mm"] > 0)
+    for entry in found["errors"]:
+        assert entry.keys() == {"measurement", "repeat", "length_mm", "error_um", "u_um", "limit_um",
+                                "probability_conforming", "outcome"}  # fmt: skip
+        assert entry["limit_um"] == pytest.approx(4 + entry["length_mm"] / 100)
+        assert entry["u_um"] == pytest.approx(0.4 * entry["length_mm"] / 820)
+    assert (
+        abs(next(e["error_um"] for e in found["errors"] if abs(e["error_um"]) == found["value_um"]))
+        == found["value_um"]
+    )
+
+
+def test_the_contract_accepts_an_incomplete_statement(tmp_path: Path) -> None:
+    checker = ROOT.parent / "shared" / "check_results.py"
+    if not checker.exists():
+        pytest.skip("the contract is not here")
+    file = tmp_path / "results.json"
+    file.write_bytes(as_json(results(analyse(ROOT / "examples" / "gauge-blocks-simulated"))))
+    (found,) = json.loads(file.read_bytes())["conformity"]
+    assert (found["decision"], found["scope"]) == ("incomplete", "partial")
+    assert subprocess.run([sys.executable, checker, file], check=False).returncode == 0

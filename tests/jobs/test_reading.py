@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import ArtefactFacts, ConformityFacts
 from cmm_uq.jobs.reading import read_job, sha256
 
 
@@ -70,6 +71,7 @@ def test_every_input_is_hashed(iota: Path) -> None:
         (r"^rule = .*", 'rule = "lenient"', r"\[conformity\] 0\.rule"),
         (r"^limit_um = .*", "", r"give either limit_um or mpe"),
         (r"^limit_um = .*", "limit_um = -1", r"limit_um: input should be greater than 0"),
+        (r"^rule = .*", 'characteristic = "R0"', r"characteristic = 'R0' of ASME B89.4.1-1997 is not decided here"),
         (r"^\[job\]$", "[job", r"is not valid TOML"),
         (r"^file = .*", 'file = "../ballbar.csv"', r"is not inside the job folder"),
         (r"^file = .*", 'file = "barbell.csv"', r"barbell\.csv: no such file"),
@@ -140,3 +142,32 @@ def test_a_refusal_never_echoes_what_it_refuses(job: Path, what: str) -> None:
     message = refused(edit(job, r"^kind = .*", lines[what]))
     assert len(message) <= 300
     assert "job.toml" in message
+
+
+@pytest.mark.parametrize("rule", ['"ISO 14253-1"', "{ guard_band = 0.8 }", "{ max_false_accept = 0.02 }"])
+@pytest.mark.parametrize("stated", ["", "u_um = 0"])
+def test_a_rule_that_needs_an_uncertainty_is_refused_without_at_reading(job: Path, rule: str, stated: str) -> None:
+    edit(edit(job, r"^standard = .*", 'standard = "ISO 10360-2:2009"'), r"^rule = .*", f"rule = {rule}")
+    message = refused(edit(job, r"^u_um = .*", stated))
+    assert re.search(
+        r"line \d+: \[conformity\]: the rule .+ needs the uncertainty .* no u_um above 0\. Give u_um", message
+    )
+    assert "{" not in message
+
+
+def test_simple_acceptance_and_figures_without_a_certificate_need_no_uncertainty(job: Path) -> None:
+    read_job(edit(job, r"^u_um = .*", ""))  # the range of ASME B89.4.1 has its uncertainty from the recording
+    edit(edit(job, r"^standard = .*", 'standard = "ISO 10360-2:2009"'), r"^rule = .*", 'rule = "simple"')
+    assert read_job(job).facts.conformity[0].rule == "simple"
+
+
+def test_a_test_sphere_without_its_form_is_refused_by_name() -> None:
+    wish = ConformityFacts(standard="ISO 10360-5:2010", limit_um=3.0)
+    assert wish.uncertainty_missing(ArtefactFacts(kind="sphere", length_mm=25.0, u_um=0.1)) == "form_um"
+    assert wish.uncertainty_missing(ArtefactFacts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.1)) is None
+
+
+def test_references_in_the_recording_count_as_certified_unless_they_are_nominal() -> None:
+    wish = ConformityFacts(standard="VDI/VDE 2617", limit_um=3.0)
+    assert wish.uncertainty_missing(ArtefactFacts(kind="step_gauge")) == "u_um"
+    assert wish.uncertainty_missing(ArtefactFacts(kind="step_gauge", nominal=True)) is None

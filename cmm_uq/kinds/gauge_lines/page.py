@@ -7,7 +7,8 @@ from typing import cast
 import numpy as np
 
 from cmm_uq.artefacts.gauge import StepGauge
-from cmm_uq.conformity.measurement_lines import LEAST_SHARE, missing_lines, position_of, share_of_travel
+from cmm_uq.conformity.measurement_lines import position_on, share_of_travel
+from cmm_uq.conformity.plans import ISO_10360_2
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import flagged, residual_volume
@@ -61,7 +62,7 @@ def _table(result: Result, gauge: StepGauge, lines: tuple[GaugeLine, ...]) -> Ta
         linearity = rounded(line.linearity / MICROMETRE, 2 * sigma / MICROMETRE)[0]
         row = [
             str(line.measurement),
-            position_of(line.direction),
+            position_on(gauge.points.machine, line.middle, line.direction),
             f"{line.length:.10g}",
             str(line.faces),
             scale,
@@ -113,13 +114,14 @@ def _positions(gauge: StepGauge, lines: tuple[GaugeLine, ...]) -> list[Block]:
         f"line {line.measurement} ({100 * share:.0f} %)"
         for line in lines
         if (share := share_of_travel(machine, line.middle, line.direction, line.length)) is not None
-        and share < LEAST_SHARE
+        and share < ISO_10360_2.least_share
     ]
-    missing = list(missing_lines(line.direction for line in lines))
+    found = {position_on(machine, line.middle, line.direction) for line in lines}
+    missing = [position for position in ISO_10360_2.positions if position not in found]
     texts = []
     if missing:
         texts.append(f"Not measured of the seven positions of ISO 10360-2:2009: {listed(missing)}.")
     if short:
-        least = f"{100 * LEAST_SHARE:.0f} %"
+        least = f"{100 * ISO_10360_2.least_share:.0f} %"
         texts.append(f"Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {listed(short)}.")
     return [Paragraph(" ".join(texts), tone="note")] if texts else []

@@ -1,0 +1,147 @@
+"""Whether calibrated lengths lie where a standard wants them, and are as many, as long and as often repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.artefacts.gauge import StepGauge
+from cmm_uq.conformity.measurement_lines import crossed_travel, position_on
+from cmm_uq.conformity.plans import Condition, LengthPlan
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.placings import Placings
+from cmm_uq.points import Floats, Ints, Machine, Points
+
+SAME_LENGTH_MM = 1.0
+"""Lengths nearer to each other than this are one nominal length."""
+
+
+def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
+    """Positions, longest, different and shortest lengths, and repeats; ``copies`` are groups that do not count."""
+    measured: _Places = {}
+    for found in _lines(plan, artefact, copies):
+        measured.setdefault(found.position, []).append(found)
+    absent = tuple(line for line in plan.positions if line not in measured)
+    return (
+        Condition(f"four space diagonals and three axes{'; missing: ' if absent else ''}{', '.join(absent)}", absent),
+        _long_enough(plan, artefact.points.machine, measured),
+        _different(plan, measured),
+        _shortest(plan, measured),
+        _repeated(plan, measured),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """All that was measured of one nominal length in one position."""
+
+    position: str
+    nominal: int
+    length: float
+    share: float | None
+    repeats: int
+
+
+def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> Iterator[_Measured]:
+    """By position and nominal length."""
+    found = artefact.indications()
+    if found is None:
+        return
+    points = artefact.points
+    group = points.group[found.rows[:, 0]]
+    original = ~np.isin(group, list(copies))
+    nominal = nominals(found.lengths)
+    middles, along = _placed(artefact, found.rows)
+    positions = np.array([position_on(points.machine, m, d) for m, d in zip(middles, along, strict=True)], dtype=object)
+    for position in plan.positions:
+        for length in np.unique(nominal):
+            at = np.flatnonzero(original & (positions == position) & (nominal == length))
+            if not len(at):
+                continue
+            shares = [_share(points, middles[i], along[i], found.lengths[i]) for i in at]
+            known = [share for share in shares if share is not None]
+            yield _Measured(position, int(length), float(found.lengths[at].mean()), max(known, default=None),
+                            len(np.unique(group[at])))  # fmt: skip
+
+
+def _placed(artefact: Artefact, rows: Ints) -> tuple[Floats, Floats]:
+    """A point on the line of each length, and its direction, (m, 3) each.
+
+    The line of a gauge is that of all its faces: where on a face the probe touched would turn a short length by degrees.
+    """
+    xyz = artefact.points.xyz
+    if isinstance(artefact, StepGauge):
+        lines = Placings.of(artefact.points.measurement)
+        return lines.means(xyz)[rows[:, 1]], artefact.directions()[rows[:, 1]]
+    return 0.5 * (xyz[rows[:, 0]] + xyz[rows[:, 1]]), xyz[rows[:, 1]] - xyz[rows[:, 0]]
+
+
+def _share(points: Points, middle: Floats, along: Floats, length: float) -> float | None:
+    available = crossed_travel(points.machine, middle, along)
+    return None if available is None else float(length / available) if available else 0.0
+
+
+def nominals(lengths: Floats) -> Ints:
+    """Which nominal length each of some lengths (m,), mm, is of, counted from the shortest, (m,)."""
+    order = np.argsort(lengths, kind="stable")
+    found = np.empty(len(lengths), dtype=np.int64)
+    found[order] = np.cumsum(np.diff(lengths[order], prepend=lengths[order][:1]) > SAME_LENGTH_MM)
+    return found
+
+
+_Places = dict[str, list[_Measured]]
+
+
+def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Condition:
+    least = f"{100 * plan.least_share:.0f} %"
+    what = f"longest length at least {least} of the travel along each line"
+    if not np.all(np.isfinite(machine.travel_mm)):
+        key = "[machine] travel_mm of all three axes, without which no length's share of the travel is known"
+        return Condition(f"{what}: not known", (key,))
+    shares = {line: max((m.share or 0.0 for m in found), default=0.0) for line, found in places.items()}
+    missing = tuple(
+        f"length of at least {least} of the travel along {line} ({100 * share:.0f} %)"
+        for line, share in shares.items()
+        if share < plan.least_share
+    )
+    return Condition(f"{what}: {_span([100 * share for share in shares.values()], ' %')}", missing)
+
+
+def _span(figures: Sequence[float], unit: str = "") -> str:
+    return f"{min(figures):.0f}{unit} to {max(figures):.0f}{unit}" if figures else "none"
+
+
+def _different(plan: LengthPlan, places: _Places) -> Condition:
+    counts = {line: len(found) for line, found in places.items()}
+    missing = tuple(
+        f"{plan.lengths} different lengths along {line} ({count})"
+        for line, count in counts.items()
+        if count < plan.lengths
+    )
+    return Condition(f"{plan.lengths} lengths on each line: {_span(list(counts.values()))}", missing)
+
+
+def _shortest(plan: LengthPlan, places: _Places) -> Condition:
+    shortest = {line: min(m.length for m in found) for line, found in places.items()}
+    missing = tuple(
+        f"length of at most {plan.shortest_mm:g} mm along {line} ({length:.4g} mm)"
+        for line, length in shortest.items()
+        if length > plan.shortest_mm
+    )
+    longest = f"{max(shortest.values()):.4g} mm" if shortest else "none"
+    return Condition(f"shortest length at most {plan.shortest_mm:g} mm: {longest}", missing)
+
+
+def _repeated(plan: LengthPlan, places: _Places) -> Condition:
+    """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks."""
+    repeats = {line: sorted((m.repeats for m in found), reverse=True) for line, found in places.items()}
+    total = sum(sum(counts) for counts in repeats.values())
+    lost = (f"{plan.total - total} of {plan.total} lengths",) if total < plan.total else ()
+    missing = tuple(
+        f"{plan.repeats} repetitions of each length along {line} ({counts[: plan.lengths][-1]})"
+        for line, counts in repeats.items()
+        if counts[: plan.lengths][-1] < plan.repeats
+    )
+    return Condition(f"{plan.repeats} repetitions of each, {plan.total} lengths in all: {total}", (*missing, *lost))

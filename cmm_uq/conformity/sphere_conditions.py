@@ -1,0 +1,49 @@
+"""Whether a sphere was probed at as many points, and as far round, as a standard wants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cmm_uq.artefacts.sphere import Sphere
+from cmm_uq.conformity.copies import run_of
+from cmm_uq.conformity.plans import Condition, SpherePlan
+from cmm_uq.points import Floats
+
+_DIRECTIONS = 400
+"""On a hemisphere, at which the reach of its points is looked at."""
+
+
+def sphere_points(plan: SpherePlan, sphere: Sphere, copies: Mapping[int, int]) -> tuple[Condition, ...]:
+    """How many points on each sphere, and whether they cover it; ``copies`` are groups that do not count."""
+    points = sphere.points
+    lacking, bare = [], []
+    for group in range(int(points.group.max()) + 1):
+        if group in copies:
+            continue
+        rows = np.flatnonzero(points.group == group)
+        count = len(np.unique(points.xyz[rows] + 0.0, axis=0))
+        name = f"measurement {run_of(points, group)[0]}"
+        if not count == plan.points == len(rows):
+            lacking.append(f"{plan.points} points on the sphere of {name} ({len(rows)} recorded, {count} different)")
+        elif (gap := _farthest(sphere.directions(points.xyz)[rows])) > plan.reach_deg:
+            bare.append(
+                f"points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)"
+            )
+    return (
+        Condition(f"{plan.points} points over the sphere", tuple(lacking)),
+        Condition(f"every direction of a hemisphere within {plan.reach_deg:g}° of a point", tuple(bare)),
+    )
+
+
+def _farthest(normals: Floats) -> float:
+    """Largest angle, °, of a direction of the hemisphere about the mean of some normals (n, 3) to the nearest of them."""
+    pole = normals.mean(axis=0)
+    pole = pole / np.linalg.norm(pole) if np.linalg.norm(pole) > 1e-9 else np.array([0.0, 0.0, 1.0])
+    height = (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(_DIRECTIONS)
+    radius = np.sqrt(1 - height**2)
+    across = np.linalg.svd(pole[None])[2][1:]
+    grid = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height]) @ np.vstack([across, pole])
+    return float(np.degrees(np.arccos(np.clip((grid @ normals.T).max(axis=1), -1.0, 1.0)).max()))

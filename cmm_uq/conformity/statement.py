@@ -1,0 +1,109 @@
+"""A statement of conformity: every quantity decided by itself, what follows from all, and what of the test is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from cmm_uq.conformity.decision import Decision
+from cmm_uq.jobs.job import CHARACTERISTICS, ConformityFacts
+
+StatementOutcome = Literal["pass", "fail", "undecided", "incomplete"]
+
+_GRAVEST = ("fail", "undecided", "pass")
+
+
+@dataclass(frozen=True)
+class Decided:
+    """One quantity against its own limit, with its own uncertainty.
+
+    Parameters
+    ----------
+    error_um, u_um, limit_um : measured value with its sign, standard uncertainty, limit.
+    decision : what follows.
+    measurement, repeat : that it comes from; ``None`` where it comes from all of them.
+    length_mm : calibrated length or size that it belongs to.
+    """
+
+    error_um: float
+    u_um: float
+    limit_um: float
+    decision: Decision
+    measurement: int | None = None
+    repeat: int | None = None
+    length_mm: float | None = None
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A statement of conformity with all it rests on.
+
+    Parameters
+    ----------
+    facts : the job's wish.
+    quantity : what is compared, in words.
+    measured : what was measured, in the plural, for "… conform".
+    errors : all that was decided, in the recording's order.
+    missing : what the test lacks of its standard's plan, in words.
+    remarks : what the reader must know of this use of the standard.
+    """
+
+    facts: ConformityFacts
+    quantity: str
+    measured: str
+    errors: tuple[Decided, ...]
+    missing: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def characteristic(self) -> str:
+        """The one of the standard's that is decided."""
+        return CHARACTERISTICS[self.facts.standard]
+
+    @property
+    def scope(self) -> Literal["complete", "partial"]:
+        """Whether all that the standard asks for was measured."""
+        return "partial" if self.missing else "complete"
+
+    @property
+    def named(self) -> Decided:
+        """The least favourable: of those with the gravest outcome the one with the lowest probability of conforming."""
+        return least_favourable(self.errors)
+
+    @property
+    def outcome(self) -> StatementOutcome:
+        """Fail when anything fails, else undecided when anything is, else pass, if the test is complete."""
+        gravest = self.named.decision.outcome
+        return "incomplete" if gravest == "pass" and self.missing else gravest
+
+    @property
+    def value_um(self) -> float:
+        """Size of the named error."""
+        return abs(self.named.error_um)
+
+    @property
+    def u_um(self) -> float:
+        """Its standard uncertainty."""
+        return self.named.u_um
+
+    @property
+    def limit_um(self) -> float:
+        """Its limit."""
+        return self.named.limit_um
+
+    @property
+    def decision(self) -> Decision:
+        """What follows from it alone."""
+        return self.named.decision
+
+
+def least_favourable(errors: Sequence[Decided]) -> Decided:
+    """See :attr:`Statement.named`; where the probabilities agree to the last digit, the farthest towards or over its limit."""
+
+    def order(item: Decided) -> tuple[int, float, float, float]:
+        decision, room = item.decision, item.limit_um - abs(item.error_um)
+        within, beyond = decision.probability_conforming, decision.probability_beyond
+        return _GRAVEST.index(decision.outcome), 0.0 if within is None else within, -(beyond or 0.0), room
+
+    return min(errors, key=order)
