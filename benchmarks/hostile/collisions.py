@@ -1,4 +1,4 @@
-"""Two commands and one folder: every ordered pair, one after the other and at once, and folders that belong to someone else."""
+"""Two commands and one folder: every ordered pair, one after the other and at once, and folders of someone else."""
 
 from __future__ import annotations
 
