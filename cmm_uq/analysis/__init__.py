@@ -18,7 +18,7 @@ from cmm_uq.inference.posterior import Progress, sample
 from cmm_uq.jobs.job import SHIFT, Job
 from cmm_uq.jobs.reading import read_job
 
-__all__ = ["PlaneShiftResult", "Result", "ShiftResult", "analyse", "analyse_observations"]
+__all__ = ["PlaneShiftResult", "Result", "ShiftResult", "analyse", "analyse_job", "analyse_observations"]
 
 
 def analyse(
@@ -36,7 +36,18 @@ def analyse(
     ------
     CmmUqError : the job cannot be analysed as it stands.
     """
-    job = read_job(folder)
+    return analyse_job(read_job(folder), seed=seed, progress=progress)
+
+
+def analyse_job(
+    job: Job, *, seed: int = 0, progress: Progress | None = None
+) -> Result | ShiftResult | PlaneShiftResult:  # fmt: skip
+    """Analyse a job that was read; see :func:`analyse`.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be analysed as it stands.
+    """
     refuse(job, "reported", but=SHIFT)
     if job.facts.artefact.plane is not None:
         return analyse_plane(job, seed=seed, progress=progress)

@@ -36,7 +36,19 @@ def diagnose_folder(
     ------
     CmmUqError : the job cannot be diagnosed as it stands.
     """
-    job = _read(folder, alpha)
+    return diagnose_read(read_job(folder), seed=seed, alpha=alpha, progress=progress)
+
+
+def diagnose_read(
+    job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
+) -> Diagnosed | MapsDiagnosed:
+    """Diagnose a job that was read; see :func:`diagnose_folder`.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be diagnosed as it stands.
+    """
+    _check_rate(alpha)
     if job.facts.artefact.kind == ERROR_MAP:
         return diagnose_error_maps(job, seed=seed, alpha=alpha, progress=progress)
     return _diagnose(job, seed, alpha, progress)
@@ -51,13 +63,13 @@ def diagnose_job(
     ------
     CmmUqError : the job cannot be diagnosed as it stands, or has no such recording.
     """
-    return _diagnose(_read(folder, alpha), seed, alpha, progress)
+    _check_rate(alpha)
+    return _diagnose(read_job(folder), seed, alpha, progress)
 
 
-def _read(folder: Path, alpha: float) -> Job:
+def _check_rate(alpha: float) -> None:
     if not 1e-6 <= alpha <= 0.5:
         raise CmmUqError(f"a false-alarm rate of {alpha:g}", fix="Give one between 0.000001 and 0.5; 0.01 is usual")
-    return read_job(folder)
 
 
 def _diagnose(job: Job, seed: int, alpha: float, progress: Progress | None) -> Diagnosed:

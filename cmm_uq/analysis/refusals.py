@@ -16,10 +16,15 @@ _REASONS = {
 def refuse(job: Job, what: str, *, but: str = "") -> None:
     """A clear error where a job of free functions cannot be served; ``but`` names the kind that can.
 
+    A recording that only holds the coordinates of a plan can be simulated, and nothing else.
+
     Raises
     ------
-    CmmUqError : the job is of such a kind.
+    CmmUqError : the job is of such a kind, or not measured yet.
     """
+    if job.planned and what != "simulated":
+        raise CmmUqError("holds planned coordinates: nothing is measured", where=f"{job.recording_path} line 1",
+                         fix="Put in what the machine indicated, then remove that line")  # fmt: skip
     kind = job.facts.artefact.kind
     if kind in _REASONS and kind != but:
         problem, fix = _REASONS[kind]

@@ -24,11 +24,13 @@ from cmm_uq.certificate import (
 from cmm_uq.certificate.corner import corner_plot
 from cmm_uq.certificate.diagnosis_page import diagnosis_sections
 from cmm_uq.certificate.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
+from cmm_uq.certificate.origin import CERTIFICATE, came_about
 from cmm_uq.certificate.warning import warnings
 from cmm_uq.certificate.wording import expanded, listed, probability, title_of, units_of
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.standards import Statement
 from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.uncertainty.rounding import rounded, significant
 from cmm_uq.units import MICROMETRE
 
@@ -75,16 +77,16 @@ def certificate(result: Result | ShiftResult | PlaneShiftResult) -> Document:
 def _shifted(result: ShiftResult | PlaneShiftResult, sections: list[Section], told: tuple[str, ...]) -> Document:
     """With the correction table among the attachments."""
     document = _document(result.job, sections, told, result.estimate.chains.sampler, result.estimate.seed)
-    return replace(document, attachments=(*document.attachments, shift_section.TABLE_FILE))
+    return replace(document, attachments=(*document.attachments, shift_section.table_file(result.job)))
 
 
 def _document(job: Job, sections: list[Section], told: tuple[str, ...], sampler: str, seed: int) -> Document:
     """Sections and warnings between what every certificate has."""
     facts = job.facts
     return Document(
-        title="Calibration certificate",
+        title=CERTIFICATE,
         number=facts.job.number or facts.job.id,
-        subject=f"{facts.machine.name}, measured on {facts.job.date.isoformat()}",
+        subject=f"{facts.machine.name}, {came_about(job)} {facts.job.date.isoformat()}",
         issuer=tuple(line for line in (facts.laboratory.name, *facts.laboratory.address.splitlines()) if line),
         particulars=_particulars(facts),
         warnings=told,
@@ -101,6 +103,7 @@ def _document(job: Job, sections: list[Section], told: tuple[str, ...], sampler:
 
 def _particulars(facts: JobFile) -> tuple[Facts, ...]:
     job, machine, laboratory = facts.job, facts.machine, facts.laboratory
+    measured = job.origin == MEASURED
     travel = [
         f"{axis.upper()} {given[0]:g} … {given[1]:g}".replace("-", "−")
         for axis in "xyz"
@@ -108,11 +111,11 @@ def _particulars(facts: JobFile) -> tuple[Facts, ...]:
     ]
     groups = (
         (
-            ("Certificate number", job.number or job.id),
+            ("Certificate number" if measured else "Job", job.number if measured and job.number else job.id),
             ("Customer", "\n".join(filter(None, (job.customer, job.address)))),
             ("Order", job.order),
-            ("Accreditation", laboratory.accreditation),
-            ("Date of measurement", job.date.isoformat()),
+            ("Accreditation", laboratory.accreditation if measured else ""),
+            ("Date of measurement" if job.origin != SIMULATED else "Date", job.date.isoformat()),
             ("Date of issue", job.issued.isoformat() if job.issued else ""),
         ),
         (

@@ -10,12 +10,12 @@ from cmm_uq import __version__
 from cmm_uq.analysis.result import Diagnosed
 from cmm_uq.certificate.diagnosis_words import VERDICTS, noise_words, sentence
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.origin import came_about
 from cmm_uq.certificate.plots import curve_with_band, length_plot
-from cmm_uq.certificate.results_file import SCHEMA, diagnosis_data
+from cmm_uq.certificate.results_file import diagnosis_data, head
 from cmm_uq.certificate.wording import expanded, probability
 from cmm_uq.certificate.working_page import working_page
 from cmm_uq.conformity.accuracy import TITLES, UNITS
-from cmm_uq.jobs.reading import sha256
 from cmm_uq.units import MICROMETRE
 
 
@@ -23,9 +23,7 @@ def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
     """results.json of a diagnosis."""
     posterior = found.diagnosis.posterior
     return {
-        "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
-        "job": {"id": found.job.facts.job.id, "inputs_sha256": sha256(found.job.inputs)},
+        **head(found.job),
         "sampling": {
             "sampler": posterior.sampler, "seed": posterior.seed, "ess_min": posterior.ess_min,
             "rhat_max": posterior.rhat_max, "converged": posterior.converged,
@@ -38,7 +36,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
     """The page of a diagnosis."""
     facts, d = found.job.facts, found.diagnosis
     return working_page(
-        facts, "Diagnosis", f"measured on {facts.job.date.isoformat()}",
+        facts, "Diagnosis", f"{came_about(found.job)} {facts.job.date.isoformat()}",
         particulars=(
             Facts((("Verdict", d.verdict), ("p-value of “nothing is missing”", f"{d.p_value:.2g}"),
                    ("False-alarm rate", f"{100 * d.alpha:g} %"))),

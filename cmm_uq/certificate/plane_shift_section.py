@@ -7,7 +7,7 @@ import numpy as np
 from cmm_uq.analysis.plane_shifting import PlaneShiftResult
 from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Plot, Section, Table
 from cmm_uq.certificate.plots import curve_with_band
-from cmm_uq.certificate.shift_section import SIGN, TABLE_FILE
+from cmm_uq.certificate.shift_section import SIGN, table_file
 from cmm_uq.certificate.vector_plot import vector_plot
 from cmm_uq.certificate.wording import expanded, listed
 from cmm_uq.conformity.quantity import Quantity
@@ -135,7 +135,8 @@ def _table(result: PlaneShiftResult, which: int) -> Table:
         ]
         cells += [[value for value, _ in pairs], [half for _, half in pairs]]
     notes = (SIGN, "U: 95 % at that position.",
-             f"{TABLE_FILE} holds all curves as an error map of the carriages, the squareness as a slope of the second axis; "
+             f"{table_file(result.job)} holds all curves as an error map of the carriages, the squareness as a slope of the "
+             "second axis; "
              "beyond the readings it repeats the last value, uncalibrated.")  # fmt: skip
     return Table(f"Errors of axis {axis.upper()}", tuple(columns), tuple(zip(*cells, strict=True)), notes)
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.cli.options import Json, Out, Quiet, Seed
+from cmm_uq.cli import NOT_CONFORMING
+from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
+from cmm_uq.cli.printing import put, say
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -18,9 +19,11 @@ if TYPE_CHECKING:
 
 def command(
     job: Annotated[Path, typer.Argument(help="Job folder: job.toml and the recording that it names.")],
-    out: Out = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>/diagnosis]")] = None,
     seed: Seed = 0,
     alpha: Annotated[float, typer.Option(help="Rate of false alarms.")] = 0.01,
+    force: Force = False,
+    strict: Strict = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -28,20 +31,22 @@ def command(
     with shown(quiet=quiet or json) as stage:
         from cmm_uq.reporting import write_diagnosis
 
-        written = write_diagnosis(job, out, seed=seed, alpha=alpha, stage=stage)
+        written = write_diagnosis(job, out, seed=seed, alpha=alpha, force=force, stage=stage)
     if json:
-        sys.stdout.write(written.results.decode())
+        put(written.results.decode())
     elif not quiet:
         _summarise(written.diagnosed)
         for path in written.files.values():
-            typer.echo(path)
+            say(str(path))
+    if strict and not written.conforming:
+        raise typer.Exit(NOT_CONFORMING)
 
 
 def _summarise(found: Diagnosed | MapsDiagnosed) -> None:
     d, told = found.diagnosis, _told(found)
-    typer.echo(f"{d.verdict.upper()} (p = {d.p_value:.2g}). {told[0]}")
+    say(f"{d.verdict.upper()} (p = {d.p_value:.2g}). {told[0]}")
     for text in (*told[1:], *(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings)):
-        typer.echo(text)
+        say(text)
 
 
 def _told(found: Diagnosed | MapsDiagnosed) -> list[str]:

@@ -11,9 +11,11 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.job import ERROR_MAP, Job, JobFile, MachineFacts
+from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
+from cmm_uq.writing import finish_interrupted
 
 
 def read_job(folder: Path, *, recorded: bool = True) -> Job:
@@ -30,6 +32,7 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     folder = path.parent
+    finish_interrupted(folder)
     content = content_of(path, "A job is a folder with a job.toml and the recording that it names")
     facts = checked(content, path, JobFile)
     inputs = {"job.toml": content}
@@ -46,13 +49,16 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
         return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path))
     if not recorded and not _inside(folder, facts.recording.file, path).exists():
         return Job(folder, facts, _no_points(machine), inputs)
-    inputs |= _contents(folder, [facts.recording.file, *filter(None, [earlier]), *maps], path)
+    derived = facts.job.derived_from
+    names = [facts.recording.file, *filter(None, [earlier]), *maps, *(derived.files if derived else ())]
+    inputs |= _contents(folder, list(dict.fromkeys(names)), path)
     where = str(folder / facts.recording.file)
+    check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     points = read_recording(inputs[facts.recording.file], where, machine)
     if earlier is not None:
         then = read_recording(inputs[earlier], str(folder / earlier), machine)
         points = against_earlier(points, then, facts.artefact.cte_per_k, where)
-    return Job(folder, facts, points, inputs)
+    return Job(folder, facts, points, inputs, altered(derived, inputs), is_planned(inputs[facts.recording.file]))
 
 
 def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:
