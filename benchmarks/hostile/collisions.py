@@ -73,9 +73,12 @@ def _forced(collision: Collision) -> tuple[str, ...]:
 
 
 def _after(collision: Collision, folder: Path) -> tuple[Outcome, list[str]]:
-    """The set of the first lies there, whole, and the second writes to the same folder."""
+    """The set of the first lies there, whole, and the second writes to the same folder.
+
+    A budget is known by its file's name, which is the same here: two budgets are the same job in two versions.
+    """
     assert collision.first
-    same = collision.relation.startswith("same")
+    same = collision.relation.startswith("same") or (collision.first, collision.second) == ("budget", "budget")
     COMMANDS[collision.second].prepare(folder, 1, name=ONE if same else OTHER)
     theirs = reference(collision.first, 0, ONE)
     put(folder / OUT, theirs)
@@ -85,13 +88,7 @@ def _after(collision: Collision, folder: Path) -> tuple[Outcome, list[str]]:
     before = snapshot(folder)
     outcome = run([*COMMANDS[collision.second].arguments(), *_forced(collision)], folder)
     found = problems(outcome) + lost(before, snapshot(folder), own=frozenset(own)) + set_problems(folder / OUT)
-    if (
-        outcome.code == 0
-        and collision.first == collision.second
-        and not same
-        and not collision.force
-        and collision.second != "budget"
-    ):
+    if outcome.code == 0 and collision.first == collision.second and not same and not collision.force:
         found.append("replaces the set of another job")
     return outcome, found
 

@@ -53,6 +53,8 @@ def problems(outcome: Outcome, *, quiet: bool = True) -> list[str]:
     found = []
     if "Traceback (most recent call last)" in said:
         found.append(f"traceback: {_origin(said)}")
+    elif fault := re.search(r"a fault of the program: (\w+)", said):
+        found.append(f"fault: {fault[1]}")
     elif code not in CODES:
         found.append(f"exit code {code}")
     if warning := re.search(r"\b[A-Z]\w*Warning\b", said):

@@ -46,13 +46,28 @@ def read(kind: str, path: Path) -> None:
 
 
 class Runner:
-    """Runs the command in this process, with what it says caught by descriptor."""
+    """Runs the command in this process, with what it says caught by descriptor, and a fault shown where it happened."""
 
     def __init__(self, stdout: TextIO, stderr: TextIO) -> None:
-        import cmm_uq.cli as cli
+        from cmm_uq.cli import commands, main
+        from cmm_uq.errors import CmmUqError
+        from cmm_uq.writing import interruption
 
-        cli.app.command("read")(read)
-        self._main: Callable[[], None] = cli.main
+        commands.app.command("read")(read)
+        inner = commands.run
+
+        def shown() -> int:
+            try:
+                return inner()
+            except (CmmUqError, MemoryError):
+                raise
+            except Exception:
+                traceback.print_exc()
+                raise
+
+        commands.run = shown
+        interruption.watch = lambda: None  # no signal comes, and each call would cost a thread and a pipe
+        self._main: Callable[[], None] = main
         self._files = stdout, stderr
 
     def __call__(self, arguments: tuple[str, ...]) -> Outcome:

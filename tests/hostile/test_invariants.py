@@ -27,6 +27,7 @@ ValueError: no
         (Outcome(None, "", "", 60.0), ["hangs"]),
         (Outcome(1, "", TRACE, 1.0), ["traceback: ValueError at cmm_uq/points.py:12"]),
         (Outcome(1, "", "", 1.0), ["exit code 1"]),
+        (Outcome(3, "", "cmm-uq: a fault of the program: KeyError: 'x'\n", 1.0), ["fault: KeyError"]),
         (Outcome(-11, "", "", 1.0), ["exit code -11"]),
         (Outcome(0, "", "x.py:1: RuntimeWarning: overflow\n", 1.0), ["warning: RuntimeWarning"]),
         (Outcome(0, "", "hello\n", 1.0), ["speaks on stderr"]),

@@ -28,20 +28,18 @@ def side_by_side(
 
 @pytest.mark.skipif(not available(), reason="strace is not here, or may not trace")
 def test_a_kill_at_any_call_that_moves_a_file_leaves_a_set_after_the_next_run(tmp_path: Path) -> None:
-    where = [call for call in calls("simulate", over=True) if call[0] not in ("write", "fsync")]
-    assert any(name.startswith("rename") for name, _ in where)
+    where = [call for call in calls("simulate", over=True) if call[0].startswith("rename")]
+    assert len(where) >= 5  # each file, and the folder that they come from
     kills = [Kill("simulate", over=True, signal="SIGKILL", call=call) for call in where]
     kills += [Kill("simulate", over=True, signal=name, call=where[-1]) for name in ("SIGINT", "SIGTERM")]
     assert side_by_side([(kill.what, lambda place, kill=kill: strike(kill, place)) for kill in kills], tmp_path) == []
 
 
 def test_commands_that_meet_in_one_folder_lose_nothing(tmp_path: Path) -> None:
-    met = [
-        c
-        for c in collisions(CHEAP)
-        if not c.force and c.relation in ("another job, same --out", "--out is job", "--out is strangers")
-    ]
-    assert len(met) == len(CHEAP) * (len(CHEAP) + 2)
+    given = [c for c in collisions(CHEAP) if not c.force]
+    met = [c for c in given if c.relation == "--out is strangers"]
+    met += [c for c in given if c.relation == "another job, same --out" and "budget" not in (c.first, c.second)]
+    assert len(met) == len(CHEAP) + 4
     assert side_by_side([(c.what, lambda place, c=c: meet(c, place)) for c in met], tmp_path) == []
 
 

@@ -21,7 +21,7 @@ DEAR = ("report", "diagnose", "plan")
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_mutated_input_is_read_or_refused_in_one_line(seed: int, tmp_path: Path) -> None:
-    numbers = [number for number in range(160) if not set(case(seed, number).command[:1]) & set(DEAR)]
+    numbers = [number for number in range(120) if not set(case(seed, number).command[:1]) & set(DEAR)]
     records = list(run_all(numbers, seed, 1, tmp_path))
     assert len(records) == len(numbers)
     assert [(r["number"], r["what"], r["found"], r["said"]) for r in records if r["found"]] == []
