@@ -59,7 +59,7 @@ def problems(outcome: Outcome, *, quiet: bool = True) -> list[str]:
         found.append(f"exit code {code}")
     if warning := re.search(r"\b[A-Z]\w*Warning\b", said):
         found.append(f"warning: {warning[0]}")
-    if code in (2, 3) and outcome.seconds > SECONDS:
+    if code == 2 and outcome.seconds > SECONDS:
         found.append(f"refuses only after more than {SECONDS:g} s")
     if not found:
         found += (

@@ -155,6 +155,8 @@ def _after_signal(kill: Kill, outcome: Outcome, folder: Path, before: Mapping[st
         found.append("old and new are taken for a set")
     if kill.signal == "SIGKILL" and outcome.code in (0, -signal.SIGKILL):
         return found
+    if after == before and outcome.code in (-signal.SIGINT, -signal.SIGTERM) and "cmm_uq" not in outcome.stderr:
+        return found  # it came before the program's first line, or after its last
     if outcome.code is None or outcome.code not in (130, 143):
         late = outcome.code == 0 and outcome.seconds > AT_ONCE
         return [*found, *(problems(outcome) if outcome.code else ["the signal is swallowed"] if late else [])]
