@@ -45,7 +45,8 @@ class Tally:
     ) -> bool:
         """Count one case; whether it is among the first of a violation, and so worth keeping."""
         self.counts[f"{kind}|{code}"] += 1
-        self.full[ran] += bool(ran)
+        if ran:
+            self.full[ran] += 1
         self.violating += bool(found)
         fresh = False
         for problem in dict.fromkeys(found):
