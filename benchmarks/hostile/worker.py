@@ -1,0 +1,157 @@
+"""A process that runs cases one after another by the command's own ``main``: ``python -m benchmarks.hostile.worker``.
+
+A line with a number on standard input asks for that case; lines of JSON on descriptor ``--reply`` say when the full run begins
+and how the case ended. What a case prints goes to files in memory, by descriptor, so that nothing escapes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import shutil
+import sys
+import time
+import traceback
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import TextIO
+
+from benchmarks.hostile.cases import Case, case, lay_out
+from benchmarks.hostile.invariants import Outcome, lost, problems, set_problems, snapshot
+from benchmarks.hostile.seeds import small_truth
+
+MEMORY = 4 * 2**30
+"""Bytes of address space: whoever reads an endless file fails within a second or two."""
+
+
+def read(kind: str, path: Path) -> None:
+    """Read what a command would read first, and no more."""
+    from cmm_uq.analysis.error_maps import maps_of
+    from cmm_uq.jobs.reading import content_of, read_job
+    from cmm_uq.jobs.toml_file import checked
+    from cmm_uq.jobs.truth import Truth
+    from cmm_uq.uncertainty.model_file import read_model_file
+
+    if kind == "budget":
+        read_model_file(path)
+    elif kind == "truth":
+        checked(content_of(path, "-"), path, Truth)
+    else:
+        job = read_job(path, recorded=kind != "plan")
+        if kind == "maps":
+            maps_of(job)
+
+
+class Runner:
+    """Runs the command in this process, with what it says caught by descriptor, and a fault shown where it happened."""
+
+    def __init__(self, stdout: TextIO, stderr: TextIO) -> None:
+        from cmm_uq.cli import commands, main
+        from cmm_uq.errors import CmmUqError
+        from cmm_uq.writing import interruption
+
+        commands.app.command("read")(read)
+        inner = commands.run
+
+        def shown() -> int:
+            try:
+                return inner()
+            except (CmmUqError, MemoryError):
+                raise
+            except Exception:
+                traceback.print_exc()
+                raise
+
+        commands.run = shown
+        interruption.watch = lambda: None  # no signal comes, and each call would cost a thread and a pipe
+        self._main: Callable[[], None] = main
+        self._files = stdout, stderr
+
+    def __call__(self, arguments: tuple[str, ...]) -> Outcome:
+        """Run with these arguments."""
+        for file in self._files:
+            os.ftruncate(file.fileno(), 0)
+            os.lseek(file.fileno(), 0, os.SEEK_SET)
+        sys.argv = ["cmm-uq", *arguments]
+        began = time.process_time()
+        code = self._ended()
+        said = [self._said(file) for file in self._files]
+        return Outcome(code, *said, time.process_time() - began)
+
+    def _ended(self) -> int:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            for silent in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+                warnings.simplefilter("ignore", silent)
+            try:
+                self._main()
+            except SystemExit as end:
+                return end.code if isinstance(end.code, int) else 0 if end.code is None else 1
+            except BaseException:
+                traceback.print_exc()
+                return 1
+            finally:
+                sys.stdout.flush()
+                sys.stderr.flush()
+        return 0
+
+    def _said(self, file: TextIO) -> str:
+        size = os.fstat(file.fileno()).st_size
+        return os.pread(file.fileno(), min(size, 1 << 20), 0).decode("utf-8", "replace")
+
+
+def run_case(this: Case, run: Runner, root: Path, begin: Callable[[], None]) -> dict[str, object]:
+    """Lay a case out, run it, and say what does not hold."""
+    shutil.rmtree(root, ignore_errors=True)
+    root.mkdir(parents=True)
+    lay_out(this, root)
+    (root / "truth.toml").write_bytes(small_truth())
+    os.chdir(root)
+    before = snapshot(root)
+    found, code, ran = [], 0, ""
+    if this.reads:
+        outcome = run(this.reads)
+        found, code = problems(outcome), outcome.code
+    if this.command and code == 0:
+        begin()
+        ran = this.command[0]
+        outcome = run(this.command)
+        found += problems(outcome)
+        code = outcome.code
+        after = snapshot(root)
+        found += lost(before, after)
+        if code in (0, 4) and "out" in this.command:
+            found += set_problems(root / "out")
+        elif code not in (0, 4) and set(after) - set(before):
+            found.append("something is written though refused")
+    os.chdir("/")
+    told = outcome.stderr[-1500:] if found else ""
+    return {"number": this.number, "target": this.target, "what": this.what, "code": code, "ran": ran, "found": found,
+            "said": told, "seconds": outcome.seconds}  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--root", type=Path, required=True)
+    parser.add_argument("--reply", type=int, required=True)
+    options = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    reply = os.fdopen(options.reply, "w")
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        os.dup2(os.memfd_create(name), number)
+    run = Runner(sys.stdout, sys.stderr)
+
+    def tell(**message: object) -> None:
+        print(json.dumps(message), file=reply, flush=True)
+
+    for line in sys.stdin:
+        this = case(options.seed, int(line))
+        tell(done=run_case(this, run, options.root, lambda: tell(begins=True)))
+
+
+if __name__ == "__main__":
+    main()
