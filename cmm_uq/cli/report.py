@@ -34,9 +34,7 @@ def command(
 
 
 def _summarise(report: Report) -> None:
-    from cmm_uq.commands.summary import summary
-
-    rows = summary(report.result) + [(name, str(path), "") for name, path in report.files.items()]
+    rows = [*report.summary, *((name, str(path), "") for name, path in report.files.items())]
     if sys.stdout.isatty():
         from rich.console import Console
         from rich.markup import escape

@@ -9,21 +9,20 @@ from pathlib import Path
 
 from cmm_uq.commands.diagnosing import diagnosed, screened_model
 from cmm_uq.commands.estimation import accuracy, influences, noise, parameters, sizes, with_noise
-from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands.reading import read_job
 from cmm_uq.conformity.standards import statement
+from cmm_uq.documents.compose import certified
+from cmm_uq.documents.outcome import Found, Outcome, OwnAnalysis, Page, Recipe
 from cmm_uq.documents.result import Result
 from cmm_uq.inference.posterior import Progress, sample
-from cmm_uq.jobs.job import SHIFT, Job
-from cmm_uq.jobs.reading import read_job
-from cmm_uq.kinds.shift_axis.analysis import ShiftResult, analyse_shift
-from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult, analyse_plane
+from cmm_uq.jobs.job import Job
+from cmm_uq.kinds import kind_of
+from cmm_uq.model.kind import Kind
 
-__all__ = ["PlaneShiftResult", "Result", "ShiftResult", "analyse", "analyse_observations"]
+__all__ = ["Result", "analyse", "analyse_observations", "outcome_of"]
 
 
-def analyse(
-    folder: Path, *, seed: int = 0, progress: Progress | None = None
-) -> Result | ShiftResult | PlaneShiftResult:  # fmt: skip
+def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) -> Found:
     """Analyse a job.
 
     Parameters
@@ -37,27 +36,23 @@ def analyse(
     CmmUqError : the job cannot be analysed as it stands.
     """
     job = read_job(folder)
-    refuse(job, "reported", but=SHIFT)
-    if job.facts.artefact.plane is not None:
-        return analyse_plane(job, seed=seed, progress=progress)
-    if job.facts.artefact.kind == SHIFT:
-        return analyse_shift(job, seed=seed, progress=progress)
-    return analyse_observations(job, seed=seed, progress=progress)
+    return recipe_of(kind_of(job)).analyse(job, seed=seed, progress=progress)
 
 
 def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Result:
-    """Analyse a job whose observations are explained by named effects: every kind but shift.
+    """Analyse a job whose observations are explained by named effects.
 
     Raises
     ------
     CmmUqError : the job cannot be analysed as it stands.
     """
+    kind = kind_of(job)
     screened, findings = screened_model(job)
     model, estimate, p_value = with_noise(screened)
     posterior = sample(estimate.linear, seed, progress)
     figures = accuracy(model, estimate, posterior, seed)
     statements = [
-        statement(wish, model.artefact, figures, f"[[conformity]] {i}")
+        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.standards)
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
     return Result(
@@ -65,3 +60,28 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
         sizes(model.artefact, posterior), noise(posterior, job.facts.recording.u_coordinate_um, p_value), figures,
         tuple(statements), diagnosed(job, screened, findings, seed=seed),
     )  # fmt: skip
+
+
+def outcome_of(found: Found, seed: int = 0) -> Outcome:
+    """What there is to write of what :func:`analyse` found.
+
+    Raises
+    ------
+    CmmUqError : its kind has no page for a certificate.
+    """
+    return recipe_of(kind_of(found.job)).outcome(found, seed)
+
+
+def recipe_of(kind: Kind) -> Recipe:
+    """How a job of this kind is analysed: in its own way, or as observations that named effects explain.
+
+    Raises
+    ------
+    CmmUqError : in neither.
+    """
+    own = kind.offers("own", OwnAnalysis)
+    if own is not None and own.report is not None:
+        return own.report
+    kind.observing("reported")
+    page = kind.needs("page", Page, "reported")
+    return Recipe(analyse_observations, lambda found, seed: certified(found, page))

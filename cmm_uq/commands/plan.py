@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.commands.planning import Plan, Progress, make_plan
-from cmm_uq.jobs.reading import read_job
+from cmm_uq.commands.reading import read_job
 from cmm_uq.planning.placing import joined
 from cmm_uq.writing import staging, write_whole
 

@@ -7,11 +7,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.commands.analysis import PlaneShiftResult, Result, ShiftResult, analyse
-from cmm_uq.commands.diagnosing import diagnose_folder
+from cmm_uq.commands.analysis import analyse, outcome_of
+from cmm_uq.commands.diagnosing import diagnose_folder, diagnosis_outcome
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.documents.result import Diagnosed
-from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
+from cmm_uq.documents.outcome import Found, Outcome
 from cmm_uq.writing import staging, write_whole
 
 Stage = Callable[[str, float], None]
@@ -25,11 +24,13 @@ class Report:
     Parameters
     ----------
     result : what was found.
+    summary : rows of what, figure and remark.
     results : contents of results.json.
     files : what was written, by name.
     """
 
-    result: Result | ShiftResult | PlaneShiftResult
+    result: Found
+    summary: tuple[tuple[str, ...], ...]
     results: bytes
     files: dict[str, Path]
 
@@ -37,7 +38,7 @@ class Report:
 def write_report(job: Path, out: Path | None = None, *, seed: int = 0, stage: Stage | None = None) -> Report:
     """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
 
-    A shift job adds its correction table, an error map.
+    A kind may add files of its own.
 
     Parameters
     ----------
@@ -57,18 +58,21 @@ def write_report(job: Path, out: Path | None = None, *, seed: int = 0, stage: St
         result = analyse(job, seed=seed, progress=lambda part: tell("Sampling the posterior", 0.1 + 0.4 * part))
         folder = out or Path("reports") / result.job.facts.job.id
         place = place or stack.enter_context(staging(folder))
-        contents = _contents(result, tell)
+        tell("Composing the certificate", 0.5)
+        outcome = outcome_of(result, seed)
+        contents = _contents(outcome, tell)
         tell("Writing", 0.95)
         files = write_whole(place, folder, contents)
     tell("Done", 1.0)
-    return Report(result, contents["results.json"], files)
+    return Report(result, outcome.summary, contents["results.json"], files)
 
 
 @dataclass(frozen=True, eq=False)
 class WrittenDiagnosis:
-    """A written diagnosis: what was found, contents of results.json, and what was written, by name."""
+    """A written diagnosis: what was found, rows of its summary, contents of results.json, and what was written, by name."""
 
-    diagnosed: Diagnosed | MapsDiagnosed
+    diagnosed: Found
+    summary: tuple[tuple[str, ...], ...]
     results: bytes
     files: dict[str, Path]
 
@@ -98,44 +102,24 @@ def write_diagnosis(
         folder = out or Path("reports") / found.job.facts.job.id
         place = place or stack.enter_context(staging(folder))
         tell("Composing the page", 0.9)
-        contents = _diagnosis_contents(found, seed)
+        from cmm_uq.documents.html import render_html
+        from cmm_uq.documents.results_file import as_json
+
+        outcome = diagnosis_outcome(found, seed)
+        data = as_json(outcome.results)
+        contents = {"diagnosis.html": render_html(outcome.document).encode(), "results.json": data}
         files = write_whole(place, folder, contents)
     tell("Done", 1.0)
-    return WrittenDiagnosis(found, contents["results.json"], files)
+    return WrittenDiagnosis(found, outcome.summary, data, files)
 
 
-def _diagnosis_contents(found: Diagnosed | MapsDiagnosed, seed: int) -> dict[str, bytes]:
-    from cmm_uq.documents.diagnosis_page import diagnosis_document, diagnosis_results
-    from cmm_uq.documents.html import render_html
-    from cmm_uq.documents.results_file import as_json
-    from cmm_uq.kinds.error_maps.page import maps_document, maps_results
-
-    if isinstance(found, MapsDiagnosed):
-        data, document = maps_results(found, seed), maps_document(found, seed)
-    else:
-        data, document = diagnosis_results(found), diagnosis_document(found)
-    return {"diagnosis.html": render_html(document).encode(), "results.json": as_json(data)}
-
-
-def _contents(result: Result | ShiftResult | PlaneShiftResult, tell: Stage) -> dict[str, bytes]:
-    from cmm_uq.commands.compose import certificate
+def _contents(outcome: Outcome, tell: Stage) -> dict[str, bytes]:
     from cmm_uq.documents.html import render_html
     from cmm_uq.documents.pdf import render_pdf
-    from cmm_uq.documents.results_file import as_json, results
+    from cmm_uq.documents.results_file import as_json
 
-    tell("Composing the certificate", 0.5)
-    document = certificate(result)
-    more: dict[str, bytes] = {}
-    if isinstance(result, Result):
-        data = as_json(results(result))
-    else:
-        from cmm_uq.kinds.shift_axis.page import TABLE_FILE
-        from cmm_uq.kinds.shift_axis.results import shift_results
-        from cmm_uq.kinds.shift_plate.results import plane_shift_results
-        from cmm_uq.kinds.shifting.correction_table import table_text
-
-        data = as_json(shift_results(result) if isinstance(result, ShiftResult) else plane_shift_results(result))
-        more[TABLE_FILE] = table_text(result.table)
+    data = as_json(outcome.results)
     tell("Rendering", 0.8)
-    pdf = render_pdf(document, {**result.job.inputs, "results.json": data, **more})
-    return {"certificate.html": render_html(document).encode(), "certificate.pdf": pdf, "results.json": data, **more}
+    pdf = render_pdf(outcome.document, {**outcome.found.job.inputs, "results.json": data, **outcome.files})
+    page = render_html(outcome.document).encode()
+    return {"certificate.html": page, "certificate.pdf": pdf, "results.json": data, **outcome.files}

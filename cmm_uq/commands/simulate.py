@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.artefacts import artefact_of
-from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reading import content_of, read_job
+from cmm_uq.jobs.reading import content_of
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.jobs.truth import Truth
+from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import effects
@@ -40,7 +40,7 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None) -> Points:
     """
     columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
     points = replace(job.points, columns={**job.points.columns, **columns})
-    artefact = artefact_of(job.facts.artefact, points, where=job.recording_path)
+    artefact = kind_of(job).observing("simulated")(job.facts.artefact, points, where=job.recording_path)
     acting = effects(tuple(truth.effects), where="truth.toml [effects]")
     given = [effect.from_reported(truth.effects[effect.name]) for effect in acting]
     model = MeasurementModel(
@@ -64,7 +64,7 @@ def write_simulation(job: Path, truth: Path, out: Path, *, seed: int | None = No
     CmmUqError : bad input, or a folder that cannot be written to or already holds another recording.
     """
     read = read_job(job)
-    refuse(read, "simulated")
+    kind_of(read).observing("simulated")
     content = content_of(truth, "It gives the effects, the noise and the seed")
     drawn = checked(content, truth, Truth)
     if out.resolve() == read.folder.resolve():

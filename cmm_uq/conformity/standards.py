@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.conformity.decision import Decision, decide
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ConformityFacts
-from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.artefact import Artefact, Forms
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -51,7 +50,9 @@ class Statement:
     remarks: tuple[str, ...]
 
 
-def statement(facts: ConformityFacts, artefact: Artefact, accuracy: Mapping[str, Quantity], key: str) -> Statement:
+def statement(
+    facts: ConformityFacts, artefact: Artefact, accuracy: Mapping[str, Quantity], key: str, standards: Collection[str]
+) -> Statement:
     """Compare what the standard asks for with its limit, and decide.
 
     Parameters
@@ -60,17 +61,18 @@ def statement(facts: ConformityFacts, artefact: Artefact, accuracy: Mapping[str,
     artefact : with its recording.
     accuracy : figures with uncertainty.
     key : of job.toml, for messages.
+    standards : that may be stated of this kind of artefact.
 
     Raises
     ------
     CmmUqError : the recording is not what the standard is decided on.
     """
-    if facts.standard == "ASME B89.4.1-1997" and artefact.kind == "ballbar":
-        return _volumetric_performance(facts, artefact, accuracy)
-    if facts.standard in ("ISO 10360-2:2009", "VDI/VDE 2617"):
+    if facts.standard in standards:
+        if facts.standard == "ASME B89.4.1-1997":
+            return _volumetric_performance(facts, artefact, accuracy)
+        if (forms := artefact.forms()) is not None:
+            return _form_error(facts, artefact, forms)
         return _error_of_indication(facts, artefact, key)
-    if facts.standard == "ISO 10360-5:2010" and isinstance(artefact, Sphere):
-        return _form_error(facts, artefact)
     raise CmmUqError(f"{facts.standard} is not decided on a {artefact.kind}", where=f"job.toml {key} standard",
                      fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
 
@@ -114,14 +116,13 @@ def _error_of_indication(facts: ConformityFacts, artefact: Artefact, key: str) -
                      decision, tuple(remarks))  # fmt: skip
 
 
-def _form_error(facts: ConformityFacts, sphere: Sphere) -> Statement:
+def _form_error(facts: ConformityFacts, sphere: Artefact, probed: Forms) -> Statement:
     """Probing form error: the largest range of radial distances from a least-squares sphere (ISO 10360-5:2010, 6.2).
 
     Its uncertainty is the test uncertainty (ISO/TS 23165): half the form deviation of the test sphere.
     """
-    probed = sphere.probed()
     worst = int(np.argmax(probed.form))
-    value, u = float(probed.form[worst]) / MICROMETRE, sphere.form / 2 / MICROMETRE
+    value, u = float(probed.form[worst]) / MICROMETRE, probed.certified / 2 / MICROMETRE
     limit = float(_limits_um(facts, np.array([sphere.sizes[0].nominal]))[0])
     remarks = [
         f"u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm."

@@ -6,10 +6,6 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Ready = Literal[
-    "ASME B89.4.1", "ISO 10360-2", "ISO 10360-5", "plate placings", "triangle placings", "surface plate", "swept bar",
-    "shift series",
-]  # fmt: skip
 Criterion = Literal["separation", "D", "A", "worst"]
 
 Positive = Annotated[float, Field(gt=0)]
@@ -47,7 +43,7 @@ class PlanFacts(_Table):
     of ``number`` placings, or of ``more`` beside those that there are.
     """
 
-    ready: Ready | None = None
+    ready: str | None = None
     volume_mm: dict[Literal["x", "y", "z"], Range] = {}
     margin_mm: Annotated[float, Field(ge=0)] = 10.0
     fixtures: FixtureFacts = FixtureFacts()

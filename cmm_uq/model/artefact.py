@@ -34,6 +34,25 @@ class Indications:
     nominal_lengths: int
 
 
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """Form errors of what was probed all around, one for each (measurement, repeat).
+
+    Parameters
+    ----------
+    measurement, repeat : (q,).
+    count : (q,) points of each.
+    form : (q,) range of the distances from the least-squares feature, mm.
+    certified : form deviation of the artefact by its certificate, mm; 0 when it is not given.
+    """
+
+    measurement: Ints
+    repeat: Ints
+    count: Ints
+    form: Floats
+    certified: float
+
+
 @dataclass(frozen=True)
 class Size:
     """A dimension of the artefact at 20 °C, itself to be estimated.
@@ -99,6 +118,10 @@ class Artefact(ABC):
 
     def indications(self) -> Indications | None:
         """Errors of indication of calibrated lengths; ``None`` without a calibration."""
+        return None
+
+    def forms(self) -> Forms | None:
+        """Form errors of a test sphere; ``None`` when they have no meaning here."""
         return None
 
     def placing(self, xyz: Floats) -> Floats:

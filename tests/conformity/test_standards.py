@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.conformity.standards import Statement, statement
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts, ConformityFacts, MaximumPermissibleError, Standard
+from cmm_uq.kinds.ballbar.kind import KIND
+from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.points import Machine, Points
 from cmm_uq.uncertainty.quantity import Quantity
 from tests.recordings import bar_facts
@@ -26,7 +27,8 @@ def bar_of(lengths: list[float], facts: ArtefactFacts) -> Ballbar:
 def judged(standard: Standard, facts: ArtefactFacts | None = None, **limit: object) -> Statement:
     bar = bar_of([400.001, 399.997, 400.002], facts or bar_facts(400.0, 0.4))
     span = Quantity(5.0, 0.5, (4.0, 6.0), "µm")
-    return statement(ConformityFacts(standard=standard, **limit), bar, {"b89_range_um": span}, "[[conformity]] 1")
+    wish = ConformityFacts(standard=standard, **limit)
+    return statement(wish, bar, {"b89_range_um": span}, "[[conformity]] 1", KIND.standards)
 
 
 def test_b89_compares_the_range_of_the_lengths() -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.reading import read_job, sha256
+from cmm_uq.jobs.reading import sha256
 
 
 def edit(job: Path, pattern: str, replacement: str) -> Path:

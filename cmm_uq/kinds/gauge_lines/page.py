@@ -6,14 +6,15 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.artefacts.gauge import StepGauge
 from cmm_uq.conformity.measurement_lines import LEAST_SHARE, missing_lines, position_of, share_of_travel
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import flagged, residual_volume
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import listed
 from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
@@ -123,3 +124,6 @@ def _positions(gauge: StepGauge, lines: tuple[GaugeLine, ...]) -> list[Block]:
         least = f"{100 * LEAST_SHARE:.0f} %"
         texts.append(f"Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {listed(short)}.")
     return [Paragraph(" ".join(texts), tone="note")] if texts else []
+
+
+PAGE = Page(sections)
