@@ -1,7 +1,7 @@
 """Errors that a user can act on: what is wrong, where, and how to mend it.
 
 Everything that bad input can cause is raised as :class:`CmmUqError`; the command line prints it without a traceback and
-ends with exit code 2.
+ends with exit code 2. Where the input is sound and the system refuses the output, it is an :class:`OutputError`, exit code 3.
 """
 
 from __future__ import annotations
@@ -27,6 +27,20 @@ class CmmUqError(Exception):
     def __str__(self) -> str:
         located = f"{self.where}: {self.problem}" if self.where else self.problem
         return f"{located}. {self.fix}" if self.fix else located
+
+
+class OutputError(CmmUqError):
+    """The system refuses the output: a full disk, a missing permission, a closed pipe."""
+
+
+LONGEST_LINE = 300
+
+
+def one_line(text: str) -> str:
+    """Text as one line of at most 300 characters, with what would break it escaped."""
+    plain = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    half = LONGEST_LINE // 2
+    return plain if len(plain) <= LONGEST_LINE else f"{plain[: half - 1]}…{plain[-half:]}"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

@@ -23,6 +23,7 @@ TOML = f"""\
 [job]
 id = "shift-simulated"
 date = 2026-01-01
+origin = "simulated"
 procedure = "Self-calibration of the x axis by shifting an uncalibrated step gauge of 23 faces"
 remarks = \"\"\"
 Simulated, no machine was measured. True error: e = 0.012·sin(x/90) + 0.01·exp((x − 590)/60) + 8e-6·x mm; \\

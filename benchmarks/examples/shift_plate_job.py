@@ -27,6 +27,7 @@ TOML = f"""\
 [job]
 id = "shift-plate-simulated"
 date = 2026-01-01
+origin = "simulated"
 procedure = "Self-calibration of the plane xy by shifting and turning an uncalibrated plate of 25 balls"
 remarks = \"\"\"
 Simulated, no machine was measured. True errors, mm: e_x = 0.010·sin(x/90) + 20e-6·x + 0.003·sin(y/100) − 60e-6·y − y·yaw, \\

@@ -267,6 +267,7 @@ def _toml(example: Simulated) -> str:
 [job]
 id = "{example.id}"
 date = 2026-01-01
+origin = "simulated"
 procedure = "{example.title}"
 remarks = \"\"\"
 Simulated, no machine was measured. {what}: {"; ".join(said)}{size}; \\

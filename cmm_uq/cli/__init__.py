@@ -1,63 +1,78 @@
-"""The command ``cmm-uq``: one subcommand a file, heavy imports only where they are used."""
+"""The command ``cmm-uq``: one subcommand a file, heavy imports only where they are used.
+
+Exit codes: 0 done; 2 bad input; 3 output impossible; 4 done, and not conforming or inconsistent (with ``--strict``);
+130 after SIGINT, 143 after SIGTERM.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import os
-import signal
 import sys
-from types import FrameType
-
-import typer
-
-from cmm_uq.cli import budget, compensate, diagnose, plan, report, selftest, simulate
-from cmm_uq.errors import CmmUqError
+import warnings
 
 BAD_INPUT = 2
 """Exit code of everything that the user can mend."""
 
+NO_OUTPUT = 3
+"""Exit code where the input is sound and the output is impossible: disk, permissions, a closed pipe, a fault in here."""
+
+NOT_CONFORMING = 4
+"""Exit code of a strict run that found a machine not conforming, or a recording that contradicts its model."""
+
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Matrices here are small: more threads cost more than they gain, and how many there are would show in the last digits."""
 
-app = typer.Typer(
-    name="cmm-uq",
-    help="Uncertainty of coordinate measuring machines, and the certificates that state it.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-app.command("report")(report.command)
-app.command("diagnose")(diagnose.command)
-app.command("plan")(plan.command)
-app.command("simulate")(simulate.command)
-app.command("compensate")(compensate.command)
-app.command("budget")(budget.command)
-app.command("selftest")(selftest.command)
-
-
-@app.callback(invoke_without_command=True)
-def _version(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
-    if version:
-        from cmm_uq import __version__
-
-        typer.echo(f"cmm-uq {__version__}")
-        raise typer.Exit
-
 
 def main() -> None:
-    """Run the command; bad input ends with its message and exit code 2, an interruption without half a report."""
+    """Run the command; whatever happens ends with one line and a documented exit code, never with a traceback."""
+    from cmm_uq.writing.interruption import give_way, watch
+
+    watch()
     for variable in THREADS:
         os.environ.setdefault(variable, "1")
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _stop)
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # what matters is an error or a warning of the report, not a line of a library
+    code = _ended()
     try:
-        app(prog_name="cmm-uq")
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except (OSError, ValueError):
+        from cmm_uq.cli.printing import closed
+
+        code = code or NO_OUTPUT
+        _say(str(closed()))
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter would complain once more at its end
+    give_way()
+    sys.exit(code)
+
+
+def _ended() -> int:
+    """Exit code of the subcommand."""
+    from cmm_uq.errors import CmmUqError, OutputError
+
+    try:
+        from cmm_uq.cli.commands import run
+
+        return run()
+    except OutputError as error:
+        _say(str(error))
+        return NO_OUTPUT
     except CmmUqError as error:
-        typer.echo(f"cmm-uq: {error}", err=True)
-        sys.exit(BAD_INPUT)
+        _say(str(error))
+        return BAD_INPUT
+    except MemoryError:
+        _say("the memory does not suffice for this input. Split it, or use a machine with more memory")
+        return NO_OUTPUT
+    except Exception as error:
+        _say(
+            f"a fault of the program: {type(error).__name__}: {error}. Nothing was changed; please report it with the input"
+        )
+        return NO_OUTPUT
 
 
-def _stop(number: int, frame: FrameType | None) -> None:
-    """Ctrl-C and SIGTERM unwind the stack, so that unfinished files are removed."""
-    typer.echo("cmm-uq: interrupted; nothing was written", err=True)
-    sys.exit(128 + number)
+def _say(text: str) -> None:
+    from cmm_uq.errors import one_line
+
+    with contextlib.suppress(OSError, ValueError, AttributeError):  # where nobody listens the exit code tells
+        print(f"cmm-uq: {one_line(text)}", file=sys.stderr, flush=True)  # noqa: T201

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cmm_uq.cli.options import Json, Quiet
+from cmm_uq.cli.options import Force, Json, Quiet
+from cmm_uq.cli.printing import put, say
 
 
 def command(
     file: Annotated[Path, typer.Argument(help="Measurement model: outputs, inputs, correlations, in TOML.")],
     out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<name of the file>]")] = None,
     seed: Annotated[int | None, typer.Option(help="Instead of the file's seed.", min=0)] = None,
+    force: Force = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -22,11 +23,11 @@ def command(
     from cmm_uq.commands.budget import write_budget
     from cmm_uq.uncertainty.budget_results import summary_rows
 
-    written = write_budget(file, out, seed=seed)
+    written = write_budget(file, out, seed=seed, force=force)
     if json:
-        sys.stdout.write(written.results.decode())
+        put(written.results.decode())
     elif not quiet:
         for row in summary_rows(written.evaluation):
-            typer.echo("  ".join(row))
+            say("  ".join(row))
         for path in written.files.values():
-            typer.echo(path)
+            say(str(path))

@@ -7,19 +7,21 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.cli.options import Quiet
+from cmm_uq.cli.options import Force, Quiet
+from cmm_uq.cli.printing import say
 
 
 def command(
     job: Annotated[Path, typer.Argument(help="Job folder with [machine] error_map.")],
     out: Annotated[Path, typer.Option(help="Folder for the compensated job.")],
     extrapolate: Annotated[bool, typer.Option(help="Extrapolate beyond the maps, and flag those points.")] = False,
+    force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Correct a recording by its machine's error maps, as a job folder of its own."""
     from cmm_uq.commands.compensate import write_compensated
 
-    files = write_compensated(job, out, beyond="extrapolate" if extrapolate else "refuse")
+    files = write_compensated(job, out, beyond="extrapolate" if extrapolate else "refuse", force=force)
     if not quiet:
         for path in files.values():
-            typer.echo(path)
+            say(str(path))

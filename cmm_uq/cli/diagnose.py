@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cmm_uq.cli.options import Json, Out, Quiet, Seed
+from cmm_uq.cli import NOT_CONFORMING
+from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
+from cmm_uq.cli.printing import put, say
 from cmm_uq.cli.progress import shown
 
 
 def command(
     job: Annotated[Path, typer.Argument(help="Job folder: job.toml and the recording that it names.")],
-    out: Out = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>/diagnosis]")] = None,
     seed: Seed = 0,
     alpha: Annotated[float, typer.Option(help="Rate of false alarms.")] = 0.01,
+    force: Force = False,
+    strict: Strict = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -24,11 +27,13 @@ def command(
     with shown(quiet=quiet or json) as stage:
         from cmm_uq.commands.report import write_diagnosis
 
-        written = write_diagnosis(job, out, seed=seed, alpha=alpha, stage=stage)
+        written = write_diagnosis(job, out, seed=seed, alpha=alpha, force=force, stage=stage)
     if json:
-        sys.stdout.write(written.results.decode())
+        put(written.results.decode())
     elif not quiet:
         for row in written.summary:
-            typer.echo("  ".join(row))
+            say("  ".join(row))
         for path in written.files.values():
-            typer.echo(path)
+            say(str(path))
+    if strict and not written.conforming:
+        raise typer.Exit(NOT_CONFORMING)

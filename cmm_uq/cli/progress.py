@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import typer
@@ -32,6 +32,7 @@ def shown(*, quiet: bool) -> Iterator[Stage | None]:
         def tell(what: str, part: float) -> None:
             if what not in said:
                 said.add(what)
-                typer.echo(what, err=True)
+                with suppress(OSError):
+                    typer.echo(what, err=True)
 
         yield tell

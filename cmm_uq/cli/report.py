@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.cli.options import Json, Out, Quiet, Seed
+from cmm_uq.cli import NOT_CONFORMING
+from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
+from cmm_uq.cli.printing import put, table
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -17,8 +18,10 @@ if TYPE_CHECKING:
 
 def command(
     job: Annotated[Path, typer.Argument(help="Job folder: job.toml and the recording that it names.")],
-    out: Out = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>]")] = None,
     seed: Seed = 0,
+    force: Force = False,
+    strict: Strict = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -26,26 +29,20 @@ def command(
     with shown(quiet=quiet or json) as stage:
         from cmm_uq.commands.report import write_report
 
-        report = write_report(job, out, seed=seed, stage=stage)
+        report = write_report(job, out, seed=seed, force=force, stage=stage)
     if json:
-        sys.stdout.write(report.results.decode())
+        put(report.results.decode())
     elif not quiet:
         _summarise(report)
+    if strict and not report.conforming:
+        raise typer.Exit(NOT_CONFORMING)
 
 
 def _summarise(report: Report) -> None:
-    rows = [*report.summary, *((name, str(path), "") for name, path in report.files.items())]
-    if sys.stdout.isatty():
-        from rich.console import Console
-        from rich.markup import escape
-        from rich.table import Table
+    from cmm_uq.documents.origin import BANNERS
+    from cmm_uq.jobs.origin import MEASURED
 
-        table = Table(title=escape(report.result.job.facts.job.id), show_header=False, title_justify="left")
-        for i in range(3):
-            table.add_column(overflow="fold", justify="left", style="bold" if i == 1 else None)
-        for row in rows:
-            table.add_row(*(escape(cell) for cell in row))
-        Console().print(table)
-    else:
-        for row in rows:
-            typer.echo("  ".join(cell for cell in row if cell))
+    job = report.result.job
+    derived = [] if job.origin == MEASURED else [(BANNERS[job.origin], "", "")]
+    rows = [*derived, *report.summary, *((name, str(path), "") for name, path in report.files.items())]
+    table(rows, separator="  ", title=job.facts.job.id, bold=1)

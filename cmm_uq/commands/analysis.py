@@ -10,6 +10,7 @@ from pathlib import Path
 from cmm_uq.commands.diagnosing import diagnosed, screened_model
 from cmm_uq.commands.estimation import accuracy, influences, noise, parameters, sizes, with_noise
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.refusals import refuse_planned
 from cmm_uq.conformity.standards import statement
 from cmm_uq.documents.compose import certified
 from cmm_uq.documents.outcome import Found, Outcome, OwnAnalysis, Page, Recipe
@@ -17,9 +18,8 @@ from cmm_uq.documents.result import Result
 from cmm_uq.inference.posterior import Progress, sample
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
-from cmm_uq.model.kind import Kind
 
-__all__ = ["Result", "analyse", "analyse_observations", "outcome_of"]
+__all__ = ["Result", "analyse", "analyse_job", "analyse_observations", "outcome_of"]
 
 
 def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) -> Found:
@@ -35,8 +35,17 @@ def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) ->
     ------
     CmmUqError : the job cannot be analysed as it stands.
     """
-    job = read_job(folder)
-    return recipe_of(kind_of(job)).analyse(job, seed=seed, progress=progress)
+    return analyse_job(read_job(folder), seed=seed, progress=progress)
+
+
+def analyse_job(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Found:
+    """Analyse a job that was read; see :func:`analyse`.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be analysed as it stands.
+    """
+    return recipe_of(job).analyse(job, seed=seed, progress=progress)
 
 
 def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Result:
@@ -69,16 +78,18 @@ def outcome_of(found: Found, seed: int = 0) -> Outcome:
     ------
     CmmUqError : its kind has no page for a certificate.
     """
-    return recipe_of(kind_of(found.job)).outcome(found, seed)
+    return recipe_of(found.job).outcome(found, seed)
 
 
-def recipe_of(kind: Kind) -> Recipe:
-    """How a job of this kind is analysed: in its own way, or as observations that named effects explain.
+def recipe_of(job: Job) -> Recipe:
+    """How a job is analysed: in its kind's own way, or as observations that named effects explain.
 
     Raises
     ------
-    CmmUqError : in neither.
+    CmmUqError : in neither, or nothing is measured yet.
     """
+    refuse_planned(job)
+    kind = kind_of(job)
     own = kind.offers("own", OwnAnalysis)
     if own is not None and own.report is not None:
         return own.report

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.uncertainty.evaluation import Evaluation
 from cmm_uq.uncertainty.model_file import read_model_file
-from cmm_uq.writing import staging, write_whole
+from cmm_uq.writing import Owner, staged
+
+FILES = ("budget.html", "budget.pdf", "results.json")
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +24,9 @@ class WrittenBudget:
     files: dict[str, Path]
 
 
-def write_budget(file: Path, out: Path | None = None, *, seed: int | None = None) -> WrittenBudget:
+def write_budget(
+    file: Path, out: Path | None = None, *, seed: int | None = None, force: bool = False
+) -> WrittenBudget:  # fmt: skip
     """Evaluate a model file and write ``budget.html``, ``budget.pdf`` and ``results.json``, all or none.
 
     Parameters
@@ -27,14 +34,19 @@ def write_budget(file: Path, out: Path | None = None, *, seed: int | None = None
     file : the model, in TOML.
     out : where to write; ``reports/<name of the file>`` by default.
     seed : instead of the file's.
+    force : keep what stands in the way instead of refusing.
 
     Raises
     ------
-    CmmUqError : the model cannot be evaluated, or the folder cannot be written to.
+    CmmUqError : the model cannot be evaluated, or something in the folder is not this command's.
+    OutputError : the folder cannot be written to.
     """
     model = read_model_file(file)
     folder = out or Path("reports") / file.stem
-    with staging(folder) as place:
+    if file.name in FILES:
+        raise CmmUqError("has the name of a file that this command writes", where=str(file), fix="Rename it")
+    owner = Owner("budget", _identity(file))
+    with staged(folder, owner, inputs=(file,), force=force, expected=FILES) as place:
         evaluation = model.evaluate(seed)
         from cmm_uq.documents.budget_page import budget_document
         from cmm_uq.documents.html import render_html
@@ -44,7 +56,20 @@ def write_budget(file: Path, out: Path | None = None, *, seed: int | None = None
 
         data = as_json({**results_of(evaluation), "inputs_sha256": {file.name: model.sha256}})
         document = budget_document(model, evaluation, file.name)
-        pdf = render_pdf(document, {file.name: file.read_bytes(), "results.json": data})
+        pdf = render_pdf(document, {file.name: _as_read(file, model.sha256), "results.json": data})
         contents = {"budget.html": render_html(document).encode(), "budget.pdf": pdf, "results.json": data}
-        files = write_whole(place, folder, contents)
+        files = place.write(contents)
     return WrittenBudget(evaluation, data, files)
+
+
+def _identity(file: Path) -> str:
+    """The file's name with a mark of its folder: two models of one name are two."""
+    return f"{file.stem}-{hashlib.sha256(os.fsencode(file.absolute().parent)).hexdigest()[:8]}"
+
+
+def _as_read(file: Path, sha256: str) -> bytes:
+    """The model's bytes for the attachment: those that were evaluated."""
+    content = file.read_bytes()
+    if hashlib.sha256(content).hexdigest() != sha256:
+        raise CmmUqError("was changed while it was evaluated", where=str(file), fix="Run the command again")
+    return content

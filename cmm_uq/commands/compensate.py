@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
-from cmm_uq import __version__
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.refusals import refuse_planned
 from cmm_uq.commands.simulate import recording
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.derived_job import PROGRAM, derived_toml, is_compensated
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import first_line
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.kinds import kind_of
 from cmm_uq.model.machine_maps import maps_of
 from cmm_uq.physics.compensation import compensate_points, machine_compensation
 from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.points import Points
-from cmm_uq.writing import staging, write_whole
+from cmm_uq.writing import Owner, staged
+
+PROVENANCE = "compensation.json"
+"""How the coordinates were corrected, in the folder of a compensated job."""
 
 
 def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict[str, object]]:
@@ -33,6 +37,7 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
     CmmUqError : the job has no error map, or it does not serve these points.
     """
     maps = maps_of(job)
+    refuse_planned(job)
     if not job.facts.artefact.with_recording:
         raise kind_of(job).refused("compensated")
     compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
@@ -43,8 +48,10 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
         raise CmmUqError(error.problem, where=where, fix=error.fix) from error
 
 
-def write_compensated(job: Path, out: Path, *, beyond: Beyond = "refuse") -> dict[str, Path]:
-    """Write a job folder with the compensated recording; its job.toml names no error map any more.
+def write_compensated(
+    job: Path, out: Path, *, beyond: Beyond = "refuse", force: bool = False
+) -> dict[str, Path]:  # fmt: skip
+    """Write a job folder with the compensated recording, marked as such; its job.toml names no error map any more.
 
     Returns
     -------
@@ -52,26 +59,25 @@ def write_compensated(job: Path, out: Path, *, beyond: Beyond = "refuse") -> dic
 
     Raises
     ------
-    CmmUqError : bad input, or a folder that cannot be written to.
+    CmmUqError : bad input, or something in the folder that this command did not write for this job.
+    OutputError : the folder cannot be written to.
     """
     read = read_job(job)
-    if out.resolve() == read.folder.resolve():
-        raise CmmUqError("is the job that is compensated", where=str(out), fix="Choose another --out")
-    points, provenance = compensate_job(read, beyond=beyond)
-    note = f"# compensated by cmm-uq {__version__}; see compensation.json\n".encode()
-    told = {"software": f"cmm-uq {__version__}", "inputs_sha256": sha256(read.inputs), **provenance}
-    contents = {
-        "job.toml": _without_maps(read.inputs["job.toml"]),
-        read.facts.recording.file: note + recording(points),
-        "compensation.json": (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
-    }
-    with staging(out) as place:
-        return write_whole(place, out, contents)
-
-
-def _without_maps(toml: bytes) -> bytes:
-    """job.toml without its error maps, so that what is compensated is not compensated again."""
-    text = toml.decode("utf-8-sig")
-    text = re.sub(r"(?ms)^\s*error_map\s*=\s*\[.*?\]\s*(#[^\n]*)?$\n?", "", text)
-    text = re.sub(r"(?m)^\s*squareness_arcsec\s*=.*\n?", "", text)
-    return text.encode()
+    if is_compensated(read):
+        raise CmmUqError("is compensated already", where=f"{read.folder / 'job.toml'} [job] origin",
+                         fix="Compensate the measured recording")  # fmt: skip
+    if read.facts.recording.earlier is not None:
+        raise CmmUqError("the recordings of two dates are not compensated together",
+                         where=f"{read.folder / 'job.toml'} [recording] earlier",
+                         fix="Compensate each as a job of its own, then name the earlier result")  # fmt: skip
+    owner = Owner("compensate", read.facts.job.id, read.origin)
+    with staged(out, owner, inputs=read.paths, force=force, expected=(*read.inputs, PROVENANCE)) as place:
+        points, provenance = compensate_job(read, beyond=beyond)
+        told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
+        files = {
+            **{name: data for name, data in read.inputs.items() if name != "job.toml"},
+            read.facts.recording.file: first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
+            PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
+        }  # fmt: skip
+        toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec"))
+        return place.write({"job.toml": toml, **files})

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cmm_uq.commands.estimation import model_of, without_outliers
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.refusals import refuse_planned
 from cmm_uq.conformity.consequences import consequences
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, diagnose
 from cmm_uq.documents.diagnosis_page import diagnosed_outcome
@@ -17,7 +18,6 @@ from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel
-from cmm_uq.model.kind import Kind
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning.setting import Planning
 from cmm_uq.planning.suggestion import suggestions
@@ -40,8 +40,20 @@ def diagnose_folder(
     ------
     CmmUqError : the job cannot be diagnosed as it stands.
     """
-    job = _read(folder, alpha)
-    return recipe_of(kind_of(job)).analyse(job, seed=seed, alpha=alpha, progress=progress)
+    return diagnose_read(read_job(folder), seed=seed, alpha=alpha, progress=progress)
+
+
+def diagnose_read(
+    job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
+) -> Found:  # fmt: skip
+    """Diagnose a job that was read; see :func:`diagnose_folder`.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be diagnosed as it stands.
+    """
+    _check_rate(alpha)
+    return recipe_of(job).analyse(job, seed=seed, alpha=alpha, progress=progress)
 
 
 def diagnose_job(
@@ -53,16 +65,17 @@ def diagnose_job(
     ------
     CmmUqError : the job cannot be diagnosed as it stands, or has no such recording.
     """
-    return _diagnose(_read(folder, alpha), seed=seed, alpha=alpha, progress=progress)
+    _check_rate(alpha)
+    return _diagnose(read_job(folder), seed=seed, alpha=alpha, progress=progress)
 
 
-def _read(folder: Path, alpha: float) -> Job:
+def _check_rate(alpha: float) -> None:
     if not 1e-6 <= alpha <= 0.5:
         raise CmmUqError(f"a false-alarm rate of {alpha:g}", fix="Give one between 0.000001 and 0.5; 0.01 is usual")
-    return read_job(folder)
 
 
 def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> Diagnosed:
+    refuse_planned(job)
     kind_of(job).observing("diagnosed as a recording of an artefact")
     model, findings = screened_model(job)
     return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
@@ -109,16 +122,18 @@ def diagnosed(
 
 def diagnosis_outcome(found: Found, seed: int) -> Outcome:
     """What there is to write of what :func:`diagnose_folder` found."""
-    return recipe_of(kind_of(found.job)).outcome(found, seed)
+    return recipe_of(found.job).outcome(found, seed)
 
 
-def recipe_of(kind: Kind) -> Recipe:
-    """How a job of this kind is diagnosed: in its own way, or as observations that named effects explain.
+def recipe_of(job: Job) -> Recipe:
+    """How a job is diagnosed: in its kind's own way, or as observations that named effects explain.
 
     Raises
     ------
-    CmmUqError : in neither.
+    CmmUqError : in neither, or nothing is measured yet.
     """
+    refuse_planned(job)
+    kind = kind_of(job)
     own = kind.offers("own", OwnAnalysis)
     if own is not None and own.diagnose is not None:
         return own.diagnose

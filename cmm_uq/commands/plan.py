@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.commands.planning import Plan, Progress, make_plan
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.report import REPORTS
+from cmm_uq.documents.origin import file_name, marked
+from cmm_uq.jobs.origin import PLANNED
 from cmm_uq.planning.placing import joined
-from cmm_uq.writing import staging, write_whole
+from cmm_uq.writing import Owner, staged
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,9 +22,20 @@ class WrittenPlan:
     results: bytes
     files: dict[str, Path]
 
+    @property
+    def conforming(self) -> bool:
+        """Whether the plan has all that the standard it is named after asks for."""
+        return all(condition.met for condition in self.plan.conditions)
+
 
 def write_plan(
-    job: Path, out: Path | None = None, *, power: bool = True, seed: int = 0, stage: Progress | None = None
+    job: Path,
+    out: Path | None = None,
+    *,
+    power: bool = True,
+    seed: int = 0,
+    force: bool = False,
+    stage: Progress | None = None,
 ) -> WrittenPlan:
     """Plan a job and write ``plan.csv``, ``plan.html`` and ``results.json``, all or none.
 
@@ -32,31 +45,34 @@ def write_plan(
     Parameters
     ----------
     job : the job folder; its recording may be missing.
-    out : where to write; ``reports/<job id>`` by default.
+    out : where to write; ``reports/<job id>/plan`` by default.
     power : whether to predict what the diagnosis would find, which takes most of the time.
     seed : of the recordings drawn for that.
+    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
     stage : told of progress.
 
     Raises
     ------
-    CmmUqError : the plan is impossible, or the folder cannot be written to.
+    CmmUqError : the plan is impossible, or something in the folder that this command did not write for this job.
+    OutputError : the folder cannot be written to.
     """
     tell = stage or (lambda what, part: None)
-    with ExitStack() as stack:
-        place = stack.enter_context(staging(out)) if out else None
-        plan = make_plan(read_job(job, recorded=False), power=power, seed=seed, progress=tell)
-        folder = out or Path("reports") / plan.job.facts.job.id
-        place = place or stack.enter_context(staging(folder))
+    read = read_job(job, recorded=False)
+    owner = Owner("plan", read.facts.job.id, read.origin)
+    page = file_name("plan.html", read.origin)
+    folder = out or REPORTS / owner.job / "plan"
+    with staged(folder, owner, inputs=read.paths, force=force, expected=(page, "plan.csv", "results.json")) as place:
+        plan = make_plan(read, power=power, seed=seed, progress=tell)
         from cmm_uq.commands.plan_page import plan_document, plan_results
         from cmm_uq.documents.html import render_html
         from cmm_uq.documents.results_file import as_json
 
         tell("Drawing the placings", 0.95)
         data = as_json(plan_results(plan))
-        contents = {"plan.html": render_html(plan_document(plan)).encode(), "results.json": data}
+        contents = {page: render_html(marked(plan_document(plan), plan.job)).encode(), "results.json": data}
         if plan.to_measure:
             contents["plan.csv"] = _recording_to_be(plan)
-        files = write_whole(place, folder, contents)
+        files = place.write(contents)
     tell("Done", 1.0)
     return WrittenPlan(plan, data, files)
 
@@ -70,4 +86,4 @@ def _recording_to_be(plan: Plan) -> bytes:
         plan.to_measure, seconds_per_point=wishes.seconds_per_point, minutes_per_placing=wishes.minutes_per_placing,
         first=plan.first,
     )  # fmt: skip
-    return b"# planned, nothing is measured yet: nominal coordinates\n" + recording(points)
+    return PLANNED.encode() + recording(points)

@@ -23,8 +23,8 @@ from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.diagnosis.power import POWER, SIZES
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.plan_picture import gain_plot, placing_pictures
+from cmm_uq.documents.results_file import head
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.jobs.reading import sha256
 from cmm_uq.units import MICROMETRE
 
 SCHEMA = "cmm-uq/plan/1"
@@ -37,9 +37,7 @@ def plan_results(plan: Plan) -> dict[str, Any]:
         "kept": plan.kept, "added": len(plan.better.placings) - plan.kept, **_outlook_data(plan.better),
     }  # fmt: skip
     return {
-        "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
-        "job": {"id": plan.job.facts.job.id, "inputs_sha256": sha256(plan.job.inputs)},
+        **head(plan.job, SCHEMA),
         "noise": {"coordinate_um": plan.setting.sigma / MICROMETRE, "stated": plan.setting.stated is not None},
         "start": {"name": plan.name, "placings": len(plan.start.placings), **_outlook_data(plan.start)},
         "better": better,

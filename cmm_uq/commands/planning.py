@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cmm_uq.commands.refusals import refuse_planned
 from cmm_uq.conformity.plan_conditions import Condition, conditions
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.diagnosis.power import Power, powers, without_fault
@@ -125,6 +126,7 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     """
     tell = progress or (lambda what, part: None)
     tell("Reading what the placings determine", 0.05)
+    refuse_planned(job)
     setting = Setting.of(job, kind_of(job))
     if setting.planning.free is not None:
         return _series_plan(job, setting)

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq import __version__
 from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.jobs.derived_job import PROGRAM, derived_toml
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import first_line
 from cmm_uq.jobs.reading import content_of
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.jobs.truth import Truth
@@ -22,10 +23,13 @@ from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE
-from cmm_uq.writing import staging, write_whole
+from cmm_uq.writing import Owner, staged
+
+TRUTH = "truth.toml"
+"""Name of the truth in the folder of a simulated job."""
 
 
-def simulate(job: Job, truth: Truth, *, seed: int | None = None) -> Points:
+def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str = TRUTH) -> Points:
     """The points of a recording with the placings of the job's own.
 
     Parameters
@@ -33,6 +37,7 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None) -> Points:
     job : its recording gives the placings and the columns.
     truth : what acts.
     seed : instead of the one in ``truth``.
+    truth_path : file that it was read from, for messages.
 
     Raises
     ------
@@ -41,7 +46,7 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None) -> Points:
     columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
     points = replace(job.points, columns={**job.points.columns, **columns})
     artefact = kind_of(job).observing("simulated")(job.facts.artefact, points, where=job.recording_path)
-    acting = effects(tuple(truth.effects), where="truth.toml [effects]")
+    acting = effects(tuple(truth.effects), where=f"{truth_path} [effects]")
     given = [effect.from_reported(truth.effects[effect.name]) for effect in acting]
     model = MeasurementModel(
         artefact, acting, shapes={effect.name: shape for effect, (_, shape) in zip(acting, given, strict=True)}
@@ -49,11 +54,13 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None) -> Points:
     noise = Noise(truth.noise.coordinate_um * MICROMETRE, truth.noise.placing_um * MICROMETRE)
     random = np.random.default_rng(truth.seed if seed is None else seed)
     coefficients = np.concatenate([np.zeros(0), *(values for values, _ in given)])
-    return points.at(model.simulate(coefficients, _sizes(artefact, truth), noise, random))
+    return points.at(model.simulate(coefficients, _sizes(artefact, truth, truth_path), noise, random))
 
 
-def write_simulation(job: Path, truth: Path, out: Path, *, seed: int | None = None) -> dict[str, Path]:
-    """Write a job folder with a simulated recording, and the truth that it was drawn from.
+def write_simulation(
+    job: Path, truth: Path, out: Path, *, seed: int | None = None, force: bool = False
+) -> dict[str, Path]:  # fmt: skip
+    """Write a job folder with a simulated recording, marked as such, and the truth that it was drawn from.
 
     Returns
     -------
@@ -61,23 +68,23 @@ def write_simulation(job: Path, truth: Path, out: Path, *, seed: int | None = No
 
     Raises
     ------
-    CmmUqError : bad input, or a folder that cannot be written to or already holds another recording.
+    CmmUqError : bad input, or something in the folder that this command did not write for this job.
+    OutputError : the folder cannot be written to.
     """
     read = read_job(job)
     kind_of(read).observing("simulated")
     content = content_of(truth, "It gives the effects, the noise and the seed")
     drawn = checked(content, truth, Truth)
-    if out.resolve() == read.folder.resolve():
-        raise CmmUqError("is the job that is simulated from", where=str(out), fix="Choose another --out")
-    points = simulate(read, drawn, seed=seed)
-    note = f"# simulated by cmm-uq {__version__}, seed {drawn.seed if seed is None else seed}, from truth.toml\n"
-    contents = {
-        **read.inputs,
-        read.facts.recording.file: note.encode() + recording(points),
-        "truth.toml": content,
-    }
-    with staging(out) as place:
-        return write_whole(place, out, contents)
+    owner = Owner("simulate", read.facts.job.id, read.origin)
+    with staged(out, owner, inputs=(*read.paths, truth), force=force, expected=(*read.inputs, TRUTH)) as place:
+        points = simulate(read, drawn, seed=seed, truth_path=str(truth))
+        how = f", seed {drawn.seed if seed is None else seed}, from {TRUTH}"
+        files = {
+            **{name: data for name, data in read.inputs.items() if name != "job.toml"},
+            read.facts.recording.file: first_line("simulate", PROGRAM, how).encode() + recording(points),
+            TRUTH: content,
+        }
+        return place.write({"job.toml": derived_toml(read, "simulate", files), **files})
 
 
 def recording(points: Points) -> bytes:
@@ -93,10 +100,10 @@ def recording(points: Points) -> bytes:
     return text.getvalue().encode()
 
 
-def _sizes(artefact: Artefact, truth: Truth) -> Floats:
+def _sizes(artefact: Artefact, truth: Truth, path: str) -> Floats:
     names = [size.name for size in artefact.sizes]
     for name in truth.artefact:
         if name not in names:
-            raise CmmUqError(f"a {artefact.kind} has no size {name!r}", where="truth.toml [artefact]",
+            raise CmmUqError(f"a {artefact.kind} has no size {name!r}", where=f"{path} [artefact]",
                              fix=suggestion(name, names) if names else "Leave it out")  # fmt: skip
     return np.array([truth.artefact.get(size.name, size.nominal) for size in artefact.sizes], dtype=np.float64)

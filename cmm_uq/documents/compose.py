@@ -9,6 +9,7 @@ from cmm_uq.documents import tolerance_section
 from cmm_uq.documents.corner import corner_plot
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
 from cmm_uq.documents.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
+from cmm_uq.documents.origin import CERTIFICATE, came_about
 from cmm_uq.documents.outcome import Outcome, Page
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.results_file import results
@@ -16,6 +17,7 @@ from cmm_uq.documents.summary import summary
 from cmm_uq.documents.warning import warnings
 from cmm_uq.documents.wording import expanded, listed, probability, title_of, units_of
 from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.uncertainty.rounding import rounded, significant
 from cmm_uq.units import MICROMETRE
 
@@ -41,7 +43,11 @@ def certified(result: Result, page: Page) -> Outcome:
     """
     told = warnings(result)
     more = {} if page.results is None else page.results(result)
-    return Outcome(result, _certificate(result, page, told), {**results(result), **more}, tuple(summary(result)), told)
+    passed = all(statement.decision.outcome == "pass" for statement in result.statements)
+    return Outcome(
+        result, _certificate(result, page, told), {**results(result), **more}, tuple(summary(result)), told,
+        conforming=passed and result.diagnosed.diagnosis.verdict == "consistent",
+    )  # fmt: skip
 
 
 def _certificate(result: Result, page: Page, told: tuple[str, ...]) -> Document:
@@ -60,9 +66,9 @@ def certificate_of(
     """Sections and warnings between what every certificate has; ``files`` are attached beside job and recording."""
     facts = job.facts
     return Document(
-        title="Calibration certificate",
+        title=CERTIFICATE,
         number=facts.job.number or facts.job.id,
-        subject=f"{facts.machine.name}, measured on {facts.job.date.isoformat()}",
+        subject=f"{facts.machine.name}, {came_about(job)} {facts.job.date.isoformat()}",
         issuer=tuple(line for line in (facts.laboratory.name, *facts.laboratory.address.splitlines()) if line),
         particulars=_particulars(facts),
         warnings=told,
@@ -79,6 +85,7 @@ def certificate_of(
 
 def _particulars(facts: JobFile) -> tuple[Facts, ...]:
     job, machine, laboratory = facts.job, facts.machine, facts.laboratory
+    measured = job.origin == MEASURED
     travel = [
         f"{axis.upper()} {given[0]:g} … {given[1]:g}".replace("-", "−")
         for axis in "xyz"
@@ -86,11 +93,11 @@ def _particulars(facts: JobFile) -> tuple[Facts, ...]:
     ]
     groups = (
         (
-            ("Certificate number", job.number or job.id),
+            ("Certificate number" if measured else "Job", job.number if measured and job.number else job.id),
             ("Customer", "\n".join(filter(None, (job.customer, job.address)))),
             ("Order", job.order),
-            ("Accreditation", laboratory.accreditation),
-            ("Date of measurement", job.date.isoformat()),
+            ("Accreditation", laboratory.accreditation if measured else ""),
+            ("Date of measurement" if job.origin != SIMULATED else "Date", job.date.isoformat()),
             ("Date of issue", job.issued.isoformat() if job.issued else ""),
         ),
         (

@@ -10,13 +10,13 @@ from cmm_uq import __version__
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.documents.diagnosis_words import VERDICTS, lines, noise_words, sentence, summary_rows
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.origin import came_about
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.documents.plots import curve_with_band, length_plot
 from cmm_uq.documents.result import Diagnosed
-from cmm_uq.documents.results_file import SCHEMA, diagnosis_data
+from cmm_uq.documents.results_file import diagnosis_data, head
 from cmm_uq.documents.wording import expanded, probability
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.jobs.reading import sha256
 from cmm_uq.units import MICROMETRE
 
 
@@ -24,9 +24,7 @@ def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
     """results.json of a diagnosis."""
     posterior = found.diagnosis.posterior
     return {
-        "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
-        "job": {"id": found.job.facts.job.id, "inputs_sha256": sha256(found.job.inputs)},
+        **head(found.job),
         "sampling": {
             "sampler": posterior.sampler, "seed": posterior.seed, "ess_min": posterior.ess_min,
             "rhat_max": posterior.rhat_max, "converged": posterior.converged,
@@ -39,7 +37,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
     """The page of a diagnosis."""
     facts, d = found.job.facts, found.diagnosis
     return working_page(
-        facts, "Diagnosis", f"measured on {facts.job.date.isoformat()}",
+        facts, "Diagnosis", f"{came_about(found.job)} {facts.job.date.isoformat()}",
         particulars=(
             Facts((("Verdict", d.verdict), ("p-value of “nothing is missing”", f"{d.p_value:.2g}"),
                    ("False-alarm rate", f"{100 * d.alpha:g} %"))),
@@ -191,4 +189,5 @@ def diagnosed_outcome(found: Diagnosed) -> Outcome:
     """What there is to write of a diagnosis."""
     rows = summary_rows(found.diagnosis.verdict, found.diagnosis.p_value, lines(found), found.findings)
     document = diagnosis_document(found)
-    return Outcome(found, document, diagnosis_results(found), rows, document.warnings)
+    consistent = found.diagnosis.verdict == "consistent"
+    return Outcome(found, document, diagnosis_results(found), rows, document.warnings, conforming=consistent)

@@ -122,6 +122,7 @@ class Document:
     date : date of issue, which is also the PDF's date; the clock is never read.
     language : of the text, as BCP 47 tag, for screen readers and hyphenation.
     end : the mark after the last line.
+    banner : what every page must say at its head, such as that nothing was measured.
     """
 
     title: str
@@ -138,6 +139,7 @@ class Document:
     date: dt.date | None = None
     language: str = "en"
     end: str = "End of certificate"
+    banner: str = ""
 
     def as_data(self) -> dict[str, Any]:
         """The document as plain dicts and lists of printable text, ready for JSON.

@@ -32,6 +32,7 @@ class Outcome:
     summary : rows of text for the end of a command.
     warnings : what the reader must know before using a figure.
     files : further ones, by name.
+    conforming : whether every statement of conformity is a pass, and the recording agrees with the model that the job names.
     """
 
     found: Found
@@ -40,6 +41,7 @@ class Outcome:
     summary: tuple[tuple[str, ...], ...]
     warnings: tuple[str, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
+    conforming: bool = True
 
 
 @dataclass(frozen=True)

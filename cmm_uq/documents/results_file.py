@@ -15,6 +15,7 @@ from cmm_uq.diagnosis.diagnosis import LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.result import Diagnosed, Result
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.screening.screened import Finding
 from cmm_uq.uncertainty.quantity import Quantity
@@ -23,13 +24,27 @@ from cmm_uq.units import MICROMETRE
 SCHEMA = "cmm-uq/results/1"
 
 
+def head(job: Job, schema: str = SCHEMA) -> dict[str, Any]:
+    """What every results.json begins with: the schema, the program, and which job with which inputs of which origin."""
+    facts = job.facts.job
+    derived = facts.derived_from
+    return {
+        "schema": schema,
+        "software": {"name": "cmm-uq", "version": __version__},
+        "job": {
+            "id": facts.id,
+            "origin": facts.origin,
+            **({"derived_from": derived.model_dump()} if derived else {}),
+            **({"altered": list(job.altered)} if job.altered else {}),
+            "inputs_sha256": sha256(job.inputs),
+        },
+    }
+
+
 def results(result: Result) -> dict[str, Any]:
     """A result as plain data, in the layout of the schema ``cmm-uq/results/1``."""
-    job = result.job
     return {
-        "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
-        "job": {"id": job.facts.job.id, "inputs_sha256": sha256(job.inputs)},
+        **head(result.job),
         "estimates": {effect: _quantities(values) for effect, values in result.parameters.items()},
         "artefact": _quantities(result.sizes),
         "noise": {
@@ -45,7 +60,7 @@ def results(result: Result) -> dict[str, Any]:
         "accuracy_uncertainty": {name: quantity_data(quantity) for name, quantity in result.accuracy.items()},
         "conformity": [_statement(statement) for statement in result.statements],
         "diagnosis": diagnosis_data(result.diagnosed),
-        "screening": [finding_data(finding, job.facts.recording.file) for finding in result.findings],
+        "screening": [finding_data(finding, result.job.facts.recording.file) for finding in result.findings],
     }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cmm_uq.documents.diagnosis_words import VERDICTS
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import listed, title_of
+from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.uncertainty.rounding import significant
 
 ASSUMED = 0.25
@@ -100,7 +101,9 @@ def _screening(result: Result) -> list[str]:
 
 
 def _missing(result: Result) -> list[str]:
-    """What ISO/IEC 17025:2017 asks for and the job does not say."""
+    """What ISO/IEC 17025:2017 asks for and the job does not say; a recording that nobody measured has no certificate."""
+    if result.job.origin != MEASURED:
+        return []
     facts = result.job.facts
     wanted = (
         (facts.laboratory.name, "name of the laboratory (7.8.2.1 b)"),

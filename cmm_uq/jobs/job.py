@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from cmm_uq.errors import suggestion
+from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.points import Points
 
@@ -30,7 +31,10 @@ class _Table(BaseModel):
 
 
 class JobFacts(_Table):
-    """``[job]``: identification, and free text for the certificate."""
+    """``[job]``: identification, and free text for the certificate.
+
+    ``origin`` and ``derived_from`` are written by the commands that make a recording out of another.
+    """
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=100)]
     date: dt.date
@@ -45,6 +49,16 @@ class JobFacts(_Table):
     conditions: str = ""
     remarks: str = ""
     diagnosis_on_certificate: bool = False
+    origin: Origin = MEASURED
+    derived_from: DerivedFrom | None = None
+
+    @model_validator(mode="after")
+    def _derived(self) -> Self:
+        if self.derived_from is not None and self.origin == MEASURED:
+            raise ValueError(
+                'derived_from says that the recording was made from another: origin must be "simulated" or "compensated"'
+            )
+        return self
 
     @model_validator(mode="after")
     def _names_a_folder(self) -> Self:
@@ -291,12 +305,26 @@ class Job:
     facts : job.toml.
     points : the recording.
     inputs : contents of each input by its path inside the folder, for hashes and attachments.
+    altered : names of files that were changed after a command derived them.
+    planned : whether the recording holds the nominal coordinates of a plan.
     """
 
     folder: Path
     facts: JobFile
     points: Points
     inputs: Mapping[str, bytes]
+    altered: tuple[str, ...] = ()
+    planned: bool = False
+
+    @property
+    def origin(self) -> Origin:
+        """Of the recording."""
+        return self.facts.job.origin
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """Every file that it was read from."""
+        return tuple(self.folder / name for name in self.inputs)
 
     @property
     def recording_path(self) -> str:

@@ -13,18 +13,20 @@ from pydantic import create_model
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, MachineFacts, Tables, job_file_of
+from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
+from cmm_uq.writing import finish_interrupted
 
 
-def read_job(folder: Path, tables: Tables, names: Callable[[], Sequence[str]], *, recorded: bool = True) -> Job:
+def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *, recorded: bool = True) -> Job:
     """Read and check a job.
 
     Parameters
     ----------
     folder : the job folder, or its job.toml.
-    tables, names : of the kinds that may be read.
+    tables, known : of the kinds that may be read, and their names.
     recorded : whether the recording must be there; otherwise a job still to be measured has no points.
 
     Raises
@@ -33,8 +35,9 @@ def read_job(folder: Path, tables: Tables, names: Callable[[], Sequence[str]], *
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     folder = path.parent
+    finish_interrupted(folder)
     content = content_of(path, "A job is a folder with a job.toml and the recording that it names")
-    facts = checked(content, path, lambda data: _model_for(data, tables, names))
+    facts = checked(content, path, lambda data: _model_for(data, tables, known))
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
     if earlier is not None and not facts.artefact.with_earlier:
@@ -50,16 +53,19 @@ def read_job(folder: Path, tables: Tables, names: Callable[[], Sequence[str]], *
         return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path))
     if not recorded and not _inside(folder, facts.recording.file, path).exists():
         return Job(folder, facts, _no_points(machine), inputs)
-    inputs |= _contents(folder, [facts.recording.file, *filter(None, [earlier]), *maps], path)
+    derived = facts.job.derived_from
+    names = [facts.recording.file, *filter(None, [earlier]), *maps, *(derived.files if derived else ())]
+    inputs |= _contents(folder, list(dict.fromkeys(names)), path)
     where = str(folder / facts.recording.file)
+    check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     points = read_recording(inputs[facts.recording.file], where, machine)
     if earlier is not None:
         then = read_recording(inputs[earlier], str(folder / earlier), machine)
         points = against_earlier(points, then, facts.artefact.cte_per_k, where)
-    return Job(folder, facts, points, inputs)
+    return Job(folder, facts, points, inputs, altered(derived, inputs), is_planned(inputs[facts.recording.file]))
 
 
-def _model_for(data: dict[str, Any], tables: Tables, names: Callable[[], Sequence[str]]) -> type[JobFile]:
+def _model_for(data: dict[str, Any], tables: Tables, known: Callable[[], Sequence[str]]) -> type[JobFile]:
     """What a job.toml must say for the kind that it names."""
     artefact = data.get("artefact")
     kind = artefact.get("kind") if isinstance(artefact, dict) else None
@@ -67,8 +73,8 @@ def _model_for(data: dict[str, Any], tables: Tables, names: Callable[[], Sequenc
         return JobFile
     table = tables(kind)
     if table is None:
-        known: Any = Literal[tuple(names())]
-        table = create_model("ArtefactFacts", __base__=ArtefactFacts, kind=(known, ...))
+        names: Any = Literal[tuple(known())]
+        table = create_model("ArtefactFacts", __base__=ArtefactFacts, kind=(names, ...))
     return job_file_of(table)
 
 

@@ -31,7 +31,7 @@ def test_it_names_what_was_left_out_and_keeps_the_contract(told_of_scale_only: P
     assert done.returncode == 0, done.stderr
     assert "EXPLAINED" in done.stdout
     assert "Squareness X–Y" in done.stdout
-    assert sorted(path.name for path in out.iterdir()) == ["diagnosis.html", "results.json"]
+    assert sorted(path.name for path in out.iterdir()) == ["diagnosis.html", "manifest.json", "results.json"]
     data = json.loads((out / "results.json").read_bytes())["diagnosis"]
     assert data["effects"][0]["effect"] == "squareness_xy"
     assert data["screening"][0]["rows"] == ["14", "18"]

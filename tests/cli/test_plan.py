@@ -31,7 +31,7 @@ def test_a_job_without_recording_gets_its_placings_as_table_page_and_recording_t
     assert done.returncode == 0, done.stderr
     assert "along +X +Y" in done.stdout
     assert "Squareness X–Y" in done.stdout
-    assert sorted(path.name for path in out.iterdir()) == ["plan.csv", "plan.html", "results.json"]
+    assert sorted(path.name for path in out.iterdir()) == ["manifest.json", "plan.csv", "plan.html", "results.json"]
     data = json.loads((out / "results.json").read_bytes())
     assert data["schema"] == "cmm-uq/plan/1"
     assert len(data["placings"]) == 22

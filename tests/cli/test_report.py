@@ -15,7 +15,7 @@ import pytest
 
 from tests.cli.process import COMMAND, run
 
-FILES = ["certificate.html", "certificate.pdf", "results.json"]
+FILES = ["certificate.html", "certificate.pdf", "manifest.json", "results.json"]
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,9 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.Com
     return folder, run("report", example, cwd=folder)
 
 
-def test_it_writes_three_files_below_reports(done: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
+def test_it_writes_its_files_and_their_manifest_below_reports(
+    done: tuple[Path, subprocess.CompletedProcess[str]],
+) -> None:
     folder, process = done
     assert process.returncode == 0, process.stderr
     assert sorted(path.name for path in (folder / "reports" / "iota-1102-20C").iterdir()) == FILES
@@ -93,7 +95,7 @@ def test_an_unwritable_folder_is_refused_before_anything_is_computed(iota: Path,
     tmp_path.chmod(0o500)
     process = run("report", iota, "--out", tmp_path / "out")
     tmp_path.chmod(0o700)
-    assert process.returncode == 2
+    assert process.returncode == 3
     assert "Permission denied" in process.stderr
 
 

@@ -27,17 +27,20 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_report_has_its_correction_table_also_inside_the_pdf(report: Path) -> None:
-    names = ["certificate.html", "certificate.pdf", "correction_table.csv", "results.json"]
+    names = [
+        "certificate-simulated.html", "certificate-simulated.pdf", "correction_table-simulated.csv", "manifest.json",
+        "results.json",
+    ]  # fmt: skip
     assert sorted(path.name for path in report.iterdir()) == names
-    with pikepdf.open(report / "certificate.pdf") as pdf:
-        assert set(pdf.attachments) == {"job.toml", "recording.csv", "results.json", "correction_table.csv"}
+    with pikepdf.open(report / "certificate-simulated.pdf") as pdf:
+        assert set(pdf.attachments) == {"job.toml", "recording.csv", "results.json", "correction_table-simulated.csv"}
 
 
 def test_compensating_by_the_table_brings_the_error_down(report: Path, tmp_path: Path) -> None:
     """What is left of about 27 µm is within the uncertainty of the curve: the job calibrates itself a second time."""
     job = tmp_path / "job"
     shutil.copytree(EXAMPLE, job)
-    shutil.copy(report / "correction_table.csv", job)
+    shutil.copy(report / "correction_table-simulated.csv", job / "correction_table.csv")
     text = (job / "job.toml").read_text(encoding="utf-8")
     named = 'error_map = [ { file = "correction_table.csv", temperature_c = 20.0 } ]\n'
     (job / "job.toml").write_text(re.sub(r"(?m)^(chain = .*\n)", rf"\1{named}", text), encoding="utf-8")
@@ -83,7 +86,7 @@ def test_a_plates_table_compensates_the_machine_too(tmp_path: Path) -> None:
     assert run("report", PLATE, "--out", tmp_path / "report").returncode == 0
     job = tmp_path / "job"
     shutil.copytree(PLATE, job)
-    shutil.copy(tmp_path / "report" / "correction_table.csv", job)
+    shutil.copy(tmp_path / "report" / "correction_table-simulated.csv", job / "correction_table.csv")
     text = (job / "job.toml").read_text(encoding="utf-8")
     named = 'error_map = [ { file = "correction_table.csv", temperature_c = 20.0 } ]\n'
     (job / "job.toml").write_text(re.sub(r"(?m)^(chain = .*\n)", rf"\1{named}", text), encoding="utf-8")

@@ -42,7 +42,7 @@ def file(tmp_path: Path) -> Path:
 def test_the_comparison_loss_of_jcgm_101_is_written(file: Path, tmp_path: Path) -> None:
     """JCGM 101:2008 9.4.2.2, x1 = 0.050, r = 0: y = 2550·10⁻⁶, u = 502·10⁻⁶, shortest interval [1590, 3543]·10⁻⁶."""
     written = write_budget(file, tmp_path / "out")
-    assert sorted(written.files) == ["budget.html", "budget.pdf", "results.json"]
+    assert sorted(written.files) == ["budget.html", "budget.pdf", "manifest.json", "results.json"]
     y = json.loads(written.results)["outputs"]["y"]
     assert y["method"] == "monte_carlo"
     assert y["value"] == pytest.approx(2550e-6, abs=3e-6)

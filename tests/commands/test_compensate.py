@@ -93,5 +93,5 @@ def test_points_beyond_the_map_are_refused_with_their_line_or_flagged(job: Path,
 
 
 def test_the_job_itself_is_not_written_over(job: Path) -> None:
-    with pytest.raises(CmmUqError, match="is the job that is compensated"):
+    with pytest.raises(CmmUqError, match="is an input of this command"):
         write_compensated(named(job, straight()), job)

@@ -81,5 +81,5 @@ def test_a_wrong_truth_is_refused(iota: Path, tmp_path: Path, text: str, message
 
 def test_the_job_itself_is_not_written_over(job: Path, tmp_path: Path) -> None:
     (tmp_path / "truth.toml").write_text("")
-    with pytest.raises(CmmUqError, match="is the job that is simulated from"):
+    with pytest.raises(CmmUqError, match="is an input of this command"):
         write_simulation(job, tmp_path / "truth.toml", job)

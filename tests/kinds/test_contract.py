@@ -15,8 +15,9 @@ import pytest
 
 from cmm_uq.commands.plan import write_plan
 from cmm_uq.commands.reading import read_job
-from cmm_uq.commands.report import write_diagnosis, write_report
+from cmm_uq.commands.report import CERTIFICATE, write_diagnosis, write_report
 from cmm_uq.commands.simulate import write_simulation
+from cmm_uq.documents.origin import file_name
 from cmm_uq.documents.outcome import OwnAnalysis, Page
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
@@ -100,13 +101,6 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
     job = tracker if name == OUTSIDE else ROOT / "examples" / EXAMPLE[name]
     own, observed = kind.offers("own", OwnAnalysis) or OwnAnalysis(), kind.observe is not None
 
-    out = tmp_path / "plan"
-    if kind.offers("plan", Planning):
-        plan = write_plan(job, out, power=False)
-        assert json.loads(plan.results)["schema"] == "cmm-uq/plan/1"
-    else:
-        refused(kind, "planned", lambda: write_plan(job, out, power=False), out)
-
     truth.write_text(TRUTH, encoding="utf-8")
     drawn = tmp_path / "drawn"
     if observed:
@@ -114,6 +108,13 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
         job = drawn
     else:
         refused(kind, "simulated", lambda: write_simulation(job, truth, drawn), drawn)
+
+    out = tmp_path / "plan"
+    if kind.offers("plan", Planning):
+        plan = write_plan(job, out, power=False)
+        assert json.loads(plan.results)["schema"] == "cmm-uq/plan/1"
+    else:
+        refused(kind, "planned", lambda: write_plan(job, out, power=False), out)
 
     if kind.offers("screen", Screening):
         read = read_job(job)
@@ -127,11 +128,12 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
         report = write_report(job, out)
         results = json.loads(report.results)
         assert results["schema"] == "cmm-uq/results/1"
-        assert {"certificate.html", "certificate.pdf", "results.json"} <= set(report.files)
+        page, pdf = (file_name(document, read_job(job).origin) for document in CERTIFICATE)
+        assert {page, pdf, "results.json"} <= set(report.files)
         assert report.summary[0][0] == "Measured"
         if name == OUTSIDE:
             assert results["tracker"] == {"distances": 26}
-            assert "Distances by laser tracker" in report.files["certificate.html"].read_text(encoding="utf-8")
+            assert "Distances by laser tracker" in report.files[page].read_text(encoding="utf-8")
     else:
         refused(kind, "reported", lambda: write_report(job, out), out)
 

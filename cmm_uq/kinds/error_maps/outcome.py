@@ -13,7 +13,8 @@ def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
     """What there is to write of it."""
     rows = summary_rows(found.diagnosis.verdict, found.diagnosis.p_value, words.lines(found), found.findings)
     document = maps_document(found, seed)
-    return Outcome(found, document, maps_results(found, seed), rows, document.warnings)
+    consistent = found.diagnosis.verdict == "consistent"
+    return Outcome(found, document, maps_results(found, seed), rows, document.warnings, conforming=consistent)
 
 
 OWN = OwnAnalysis(diagnose=Recipe(diagnose_error_maps, outcome))

@@ -8,10 +8,9 @@ from cmm_uq import __version__
 from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.plots import curve_with_band
-from cmm_uq.documents.results_file import SCHEMA, effect_data, finding_data, improvement_data, quantity_data
+from cmm_uq.documents.results_file import effect_data, finding_data, head, improvement_data, quantity_data
 from cmm_uq.documents.wording import probability
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.jobs.reading import sha256
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.kinds.error_maps.diagnosis import Difference
 from cmm_uq.kinds.error_maps.search import ColumnRace
@@ -25,9 +24,7 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
     d, noise = found.diagnosis, found.diagnosis.displacement
     nothing = {"value": None, "u": None, "interval95": None}
     return {
-        "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
-        "job": {"id": found.job.facts.job.id, "inputs_sha256": sha256(found.job.inputs)},
+        **head(found.job),
         "sampling": {
             "sampler": d.sampler, "seed": seed,
             "ess_min": min((p.ess_min for p in d.posteriors), default=None),

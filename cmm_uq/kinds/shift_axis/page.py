@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.documents.document import Block, Column, Facts, Paragraph, Section, Table
+from cmm_uq.documents.origin import file_name
 from cmm_uq.documents.plots import curve_with_band, length_plot
 from cmm_uq.documents.wording import expanded
+from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
-
-TABLE_FILE = "correction_table.csv"
-"""Name of the error map beside the certificate."""
 
 SIGN = "Sign rule: true coordinate = indicated coordinate + error."
 _MOST_ROWS = 60
@@ -56,6 +55,11 @@ def summary(result: ShiftResult) -> list[tuple[str, str, str]]:
     for name, value, U, k, unit in _quantities(result):
         rows.append((name, f"{value} ± {U} {unit}", f"k = {k}"))
     return rows + [("Warning", text, "") for text in warnings(result)]
+
+
+def table_file(job: Job) -> str:
+    """Name of the correction table, an error map, beside the certificate."""
+    return file_name("correction_table.csv", job.origin)
 
 
 def _quantities(result: ShiftResult) -> list[tuple[str, str, str, str, str]]:
@@ -104,7 +108,8 @@ def _curve(result: ShiftResult) -> Section:
     notes = (
         SIGN,
         f"U: 95 % at that position; band: half width of the band for the whole curve, k = {k:.2f}.",
-        f"{TABLE_FILE} holds the curve as an error map; beyond the readings it repeats the last value, uncalibrated.",
+        f"{table_file(result.job)} holds the curve as an error map; beyond the readings it repeats the last value, "
+        "uncalibrated.",
     )
     return Section("Error of the axis", (plot, Table("Error by position", columns, rows, notes)))
 

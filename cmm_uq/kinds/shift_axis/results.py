@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from cmm_uq import __version__
-from cmm_uq.documents.results_file import SCHEMA
+from cmm_uq.documents.results_file import head
 from cmm_uq.inference.ensembles import Chains
-from cmm_uq.jobs.reading import sha256
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.points import Floats
@@ -25,9 +23,7 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
         estimates[f"scale_{axis}"] = {"ppm": quantity_data(result.scale)}
     before, after = estimate.residuals
     return {
-        "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
-        "job": {"id": job.facts.job.id, "inputs_sha256": sha256(job.inputs)},
+        **head(job),
         "estimates": estimates,
         "noise": {
             "stated_coordinate_um": job.facts.recording.u_coordinate_um,

@@ -9,7 +9,7 @@ from cmm_uq.documents.plots import curve_with_band
 from cmm_uq.documents.vector_plot import vector_plot
 from cmm_uq.documents.wording import expanded, listed
 from cmm_uq.kinds.shift_axis.curve import Curve
-from cmm_uq.kinds.shift_axis.page import SIGN, TABLE_FILE
+from cmm_uq.kinds.shift_axis.page import SIGN, table_file
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.kinds.shift_plate.undetermined import title
 from cmm_uq.kinds.shifting.facts import shift_facts
@@ -136,7 +136,8 @@ def _table(result: PlaneShiftResult, which: int) -> Table:
         ]
         cells += [[value for value, _ in pairs], [half for _, half in pairs]]
     notes = (SIGN, "U: 95 % at that position.",
-             f"{TABLE_FILE} holds all curves as an error map of the carriages, the squareness as a slope of the second axis; "
+             f"{table_file(result.job)} holds all curves as an error map of the carriages, the squareness as a slope of the "
+             "second axis; "
              "beyond the readings it repeats the last value, uncalibrated.")  # fmt: skip
     return Table(f"Errors of axis {axis.upper()}", tuple(columns), tuple(zip(*cells, strict=True)), notes)
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cmm_uq import __version__
-from cmm_uq.documents.results_file import SCHEMA
-from cmm_uq.jobs.reading import sha256
+from cmm_uq.documents.results_file import head
 from cmm_uq.kinds.shift_axis.results import curve_data, quantity_data, rms_um, sampling_data
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.points import AXES
@@ -20,9 +18,7 @@ def plane_shift_results(result: PlaneShiftResult) -> dict[str, Any]:
     before, after = estimate.residuals
     balls, u = estimate.balls.mean(axis=0), estimate.balls.std(axis=0, ddof=1) / MICROMETRE
     return {
-        "schema": SCHEMA,
-        "software": {"name": "cmm-uq", "version": __version__},
-        "job": {"id": job.facts.job.id, "inputs_sha256": sha256(job.inputs)},
+        **head(job),
         "estimates": {
             name: {parameter: quantity_data(q) for parameter, q in parameters.items()}
             for name, parameters in result.scalars.items()

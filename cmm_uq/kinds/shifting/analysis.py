@@ -36,7 +36,7 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
     else:
         sections, warnings, rows = plane_page.sections(found), plane_page.warnings(found), plane_page.summary(found)
         results = plane_shift_results(found)
-    chains, table = found.estimate.chains, axis_page.TABLE_FILE
+    chains, table = found.estimate.chains, axis_page.table_file(found.job)
     document = certificate_of(found.job, sections, warnings, chains.sampler, found.estimate.seed, (table,))
     return Outcome(found, document, results, tuple(rows), warnings, {table: table_text(found.table)})
 

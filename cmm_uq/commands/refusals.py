@@ -1,0 +1,18 @@
+"""Jobs that hardly any command can serve, because nothing is measured yet."""
+
+from __future__ import annotations
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import Job
+
+
+def refuse_planned(job: Job) -> None:
+    """Refuse a recording that only holds the coordinates of a plan; it can be simulated, and nothing else.
+
+    Raises
+    ------
+    CmmUqError : it does.
+    """
+    if job.planned:
+        raise CmmUqError("holds planned coordinates: nothing is measured", where=f"{job.recording_path} line 1",
+                         fix="Put in what the machine indicated, then remove that line")  # fmt: skip

@@ -1,0 +1,95 @@
+"""job.toml of a derived job: another's, with an id of its own, its origin, and nothing that no longer holds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from cmm_uq import __version__
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import DERIVING, MEASURED, SIMULATED
+
+PROGRAM = f"cmm-uq {__version__}"
+LONGEST_ID = 100
+OF_THE_CERTIFICATE = ("number", "issued")
+"""Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
+
+
+def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tuple[str, ...] = ()) -> bytes:
+    """job.toml for a recording that a command made from a job.
+
+    Parameters
+    ----------
+    job : that it was made from.
+    by : the command.
+    files : what the command wrote beside job.toml, by name.
+    without : keys of ``[machine]`` that no longer hold.
+
+    Notes
+    -----
+    A simulated recording stays simulated whatever is made from it.
+    """
+    text = job.inputs["job.toml"].decode("utf-8-sig")
+    written = _hashes(files)
+    changes = {
+        "id": _own_id(job, by, written),
+        "origin": SIMULATED if job.origin == SIMULATED else DERIVING[by],
+        "derived_from": {
+            "job": job.facts.job.id, "by": by, "program": PROGRAM, "inputs": _hashes(job.inputs), "files": written,
+        },
+    }  # fmt: skip
+    wanted = _changed(tomllib.loads(text), changes, without)
+    try:
+        document = _changed(tomlkit.parse(text), changes, without)
+        kept = tomlkit.dumps(document)
+        if tomllib.loads(kept) == wanted:
+            return kept.encode()
+    except (TOMLKitError, tomllib.TOMLDecodeError, KeyError, ValueError, TypeError):
+        pass  # a layout that the library cannot keep: comments are lost, no value is
+    return tomlkit.dumps(wanted).encode()
+
+
+def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...]) -> Any:
+    table = document["job"]
+    for key in (*OF_THE_CERTIFICATE, *changes):
+        if key in table:
+            del table[key]
+    for key, value in changes.items():
+        table[key] = _inline(value) if isinstance(document, tomlkit.TOMLDocument) else deepcopy(value)
+    for key in without:
+        if key in document["machine"]:
+            del document["machine"][key]
+    return document
+
+
+def _inline(value: Any) -> Any:
+    if not isinstance(value, dict):
+        return value
+    table = tomlkit.inline_table()
+    for key, item in value.items():
+        table.append(key, _inline(item))
+    return table
+
+
+def _hashes(files: Mapping[str, bytes]) -> dict[str, str]:
+    return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+
+
+def _own_id(job: Job, by: str, written: Mapping[str, str]) -> str:
+    """An id that no other recording has: that of the job, what was done, and the beginning of a hash of what came out."""
+    mark = hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()[:8]
+    end = f"-{DERIVING[by]}-{mark}"
+    return job.facts.job.id[: LONGEST_ID - len(end)] + end
+
+
+def is_compensated(job: Job) -> bool:
+    """Whether the coordinates of a job were corrected by error maps already."""
+    derived = job.facts.job.derived_from
+    return job.origin not in (MEASURED, SIMULATED) or (derived is not None and derived.by == "compensate")

@@ -1,0 +1,94 @@
+"""Where a recording comes from: measured, or derived from another by a command; and that the mark stays on it.
+
+The commands that derive a recording write the mark into job.toml. That it was taken away shows where a hash or a line still
+tells: the first line of the recording, and the manifest beside it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.writing import MANIFEST, read_manifest
+
+Origin = Literal["measured", "simulated", "compensated"]
+MEASURED: Final = "measured"
+SIMULATED: Final = "simulated"
+COMPENSATED: Final = "compensated"
+DERIVING: Mapping[str, Origin] = {"simulate": SIMULATED, "compensate": COMPENSATED}
+"""Commands that write a recording, and what they make of it."""
+
+_WRITTEN = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*?# (simulated|compensated) by cmm-uq ")
+PLANNED = "# planned, nothing is measured yet: nominal coordinates\n"
+"""First line of the recording that a plan writes for the operator to fill in."""
+
+_PLANNED = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*?# planned, nothing is measured yet")
+
+Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+
+
+class DerivedFrom(BaseModel):
+    """``derived_from``: the job that a recording was made from, by what, and SHA-256 of what went in and came out.
+
+    ``inputs``: of the files of that job; ``files``: of the recording and of what else was written with it (the truth, the
+    error maps), which belong to this job and are attached to its documents.
+    """
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+    job: str
+    by: Literal["simulate", "compensate"]
+    program: str
+    inputs: dict[str, Digest]
+    files: dict[str, Digest]
+
+
+def first_line(by: str, program: str, how: str) -> str:
+    """The line that a derived recording begins with."""
+    return f"# {DERIVING[by]} by {program}{how}\n"
+
+
+def check_mark(folder: Path, origin: str, recording: bytes, where: str) -> None:
+    """That a recording which was derived says so.
+
+    Parameters
+    ----------
+    folder : of the job.
+    origin : what job.toml says.
+    recording : its bytes.
+    where : its file, for messages.
+
+    Raises
+    ------
+    CmmUqError : it was simulated or compensated, and the job passes it off as measured.
+    """
+    if origin != MEASURED:
+        return
+    written = _WRITTEN.match(recording)
+    if written:
+        found = written[1].decode()
+        raise CmmUqError(f"was {found}, and job.toml says measured", where=f"{where} line 1",
+                         fix=f'Write origin = "{found}" in [job]')  # fmt: skip
+    manifest = read_manifest(folder)
+    if manifest is not None and manifest.owner.command in DERIVING:
+        found = DERIVING[manifest.owner.command]
+        raise CmmUqError(f"the recording was {found}, and job.toml says measured", where=str(folder / MANIFEST),
+                         fix=f'Write origin = "{found}" in [job]')  # fmt: skip
+
+
+def is_planned(recording: bytes) -> bool:
+    """Whether a recording is a plan's, with nominal coordinates."""
+    return _PLANNED.match(recording) is not None
+
+
+def altered(derived: DerivedFrom | None, inputs: Mapping[str, bytes]) -> tuple[str, ...]:
+    """Names of files that were changed after a command wrote them."""
+    if derived is None:
+        return ()
+    hashes = {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
+    return tuple(name for name, digest in derived.files.items() if hashes.get(name, digest) != digest)

@@ -1,0 +1,110 @@
+"""What a signal finds: whether anything is staged, being put in place, or written.
+
+A thread waits for SIGINT and SIGTERM, because the main thread may be far inside a library when they come, and libraries
+swallow or print exceptions. It tells the truth about what was written, removes what was staged, and ends the process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cmm_uq.writing.staging import Staged
+
+PATIENCE_S = 1.2
+"""How long to wait for files that are just being put in place: the process ends within two seconds of a signal."""
+
+_placing = threading.Lock()
+_stages: list[Staged] = []
+_written: list[Path] = []
+_going_in: list[Path] = []
+_signalled: list[int] = []
+
+
+@contextlib.contextmanager
+def staged(place: Staged) -> Iterator[None]:
+    """While something is staged, a signal removes it."""
+    _stages.append(place)
+    try:
+        yield
+    finally:
+        _stages.remove(place)
+
+
+@contextlib.contextmanager
+def placing(folder: Path) -> Iterator[None]:
+    """While files are put in place, a signal waits; afterwards it says that they were written."""
+    with _placing:
+        _going_in.append(folder)
+        try:
+            yield
+            _written.append(folder)
+        finally:
+            _going_in.remove(folder)
+
+
+def written() -> tuple[Path, ...]:
+    """Folders whose files this process has put in place."""
+    return tuple(_written)
+
+
+def watch() -> None:
+    """From now on SIGINT and SIGTERM end the process within two seconds, with what is true of its files.
+
+    For the command line; a program that uses the package as a library keeps its own handling, and an exception that it
+    raises leaves no half-written file either.
+    """
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _stand_still)
+    signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
+    threading.Thread(target=_wait, args=(reading,), name="signals", daemon=True).start()
+
+
+def give_way() -> None:
+    """Before a normal end: where a signal came, it decides how the process ends."""
+    if _signalled:
+        time.sleep(2 * PATIENCE_S)
+
+
+def _stand_still(number: int, frame: FrameType | None) -> None:
+    """The main thread starts nothing new while the other one ends the process, but completes what it puts in place."""
+    _signalled.append(number)
+    if not _going_in:
+        give_way()
+
+
+def _wait(reading: int) -> None:
+    while True:
+        number = os.read(reading, 1)[0]
+        if number in (signal.SIGINT, signal.SIGTERM):
+            _end(number)
+
+
+def _end(number: int) -> None:
+    alone = _placing.acquire(timeout=PATIENCE_S)
+    if alone:
+        for place in _stages.copy():
+            place.discard()
+    if _written:
+        said = f"interrupted; what was asked for is written in {', '.join(map(str, _written))}"
+    elif alone:
+        said = "interrupted; nothing was written"
+    else:
+        said = f"interrupted while files were put in place; the next command in {_going_in[0]} completes that"
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        if sys.stderr.isatty():
+            sys.stderr.write("\r\x1b[2K\x1b[?25h")  # a progress bar hides the cursor
+        sys.stderr.write(f"cmm-uq: {said}\n")
+        sys.stderr.flush()
+    os._exit(128 + number)

@@ -1,0 +1,93 @@
+"""A signal ends a command within two seconds, with what is true of its files."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+
+PROGRAM = """
+import ctypes, sys, time
+from pathlib import Path
+from cmm_uq.writing import Owner, staged, interruption, staging
+interruption.watch()
+out, moment = Path(sys.argv[1]), sys.argv[2]
+
+def wait():
+    print("now", flush=True)
+    if moment == "swallowing":
+        while True:
+            try:
+                time.sleep(60)
+            except BaseException:
+                pass
+    ctypes.CDLL(None).sleep(60)  # far inside a library, where no handler of Python's runs
+
+if moment == "placing":
+    real = staging.place
+    def slowly(*arguments):
+        print("now", flush=True)
+        time.sleep(0.5)
+        real(*arguments)
+    staging.place = slowly
+with staged(out, Owner("report", "job"), expected=["x"]) as place:
+    if moment in ("staged", "swallowing"):
+        wait()
+    place.write({"x": b"x"})
+wait()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("moment", "said", "written"),
+    [
+        ("staged", "interrupted; nothing was written", False),
+        ("swallowing", "interrupted; nothing was written", False),
+        ("placing", "interrupted; what was asked for is written in", True),
+        ("done", "interrupted; what was asked for is written in", True),
+    ],
+)
+def test_a_signal_ends_the_process_with_the_truth(
+    tmp_path: Path, number: signal.Signals, moment: str, said: str, written: bool
+) -> None:
+    out = tmp_path / "a" / "out"
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(out), moment], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "now\n"
+        began = time.monotonic()
+        process.send_signal(number)
+        process.wait(timeout=10)
+        assert time.monotonic() - began < 2.0
+        assert process.stderr is not None
+        told = process.stderr.read()
+    assert process.returncode == 128 + number
+    assert told.count("\n") == 1
+    assert said in told
+    if written:
+        assert sorted(path.name for path in out.iterdir()) == ["manifest.json", "x"]
+    else:
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_a_second_signal_changes_nothing(tmp_path: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(tmp_path / "out"), "placing"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        process.stdout.readline()
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGTERM):
+            process.send_signal(number)
+        process.wait(timeout=10)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["manifest.json", "x"]
