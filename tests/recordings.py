@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.kinds import artefact_facts, kind_named
+from cmm_uq.planning.setting import Planning
+from cmm_uq.planning.suggestion import Suggestion, suggestions
 from cmm_uq.points import Floats, Machine, Points
+from cmm_uq.screening import screened as screening
+from cmm_uq.screening.screened import Screened
+from cmm_uq.screening.shape import Screening
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 550.0], [-500.0, 0.0]])
 """Of the DEA Iota 1102, mm."""
@@ -24,10 +32,24 @@ def bars(random: np.random.Generator, count: int, length: float, machine: Machin
 
 
 def bar_facts(length_mm: float | None = 400.0, u_um: float | None = 0.5) -> ArtefactFacts:
-    return ArtefactFacts(kind="ballbar", length_mm=length_mm, u_um=None if length_mm is None else u_um)
+    return artefact_facts(kind="ballbar", length_mm=length_mm, u_um=None if length_mm is None else u_um)
 
 
 def with_columns(points: Points, **columns: Floats) -> Points:
     """The same points with further recorded columns."""
     return Points(points.xyz, points.measurement, points.point, points.repeat, points.machine,
                   {**points.columns, **columns}, points.lines)  # fmt: skip
+
+
+def screened(points: Points, facts: ArtefactFacts, **how: Any) -> Screened:
+    """A recording screened by what its kind asks of it."""
+    kind = kind_named(facts.kind)
+    assert kind is not None
+    return screening.screened(points, facts, kind.offers("screen", Screening), kind.observing("screened"), **how)
+
+
+def suggested(diagnosis: Any, facts: ArtefactFacts) -> tuple[Suggestion, ...]:
+    """Placings that would part what a diagnosis cannot, by what its kind offers."""
+    kind = kind_named(facts.kind)
+    assert kind is not None
+    return suggestions(diagnosis, facts, kind.observing("diagnosed"), kind.offers("plan", Planning))

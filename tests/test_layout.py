@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from cmm_uq.kinds import BUILT_IN
 from tests.conftest import ROOT
 
 PACKAGE = ROOT / "cmm_uq"
 ROWS = [line.split("|")[1] for line in (ROOT / "docs" / "layout.md").read_text(encoding="utf-8").splitlines()
         if line.startswith("| `")]  # fmt: skip
 ORDER = {name.removesuffix(".py"): place for place, row in enumerate(ROWS) for name in re.findall(r"`([^`]+)`", row)}
+KNOW_KINDS = ("kinds", "commands", "geometry")
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path.name not in ("__main__.py", "__init__.py"))
 
 
@@ -36,3 +38,16 @@ def test_a_module_imports_from_its_own_room_and_those_above(path: Path) -> None:
     room = room_of(path)
     below = {name for name in imported(path) - {room} if ORDER[name] > ORDER[room]}
     assert not below
+
+
+def constants(tree: ast.AST) -> set[object]:
+    return {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
+
+
+@pytest.mark.parametrize("path", [path for path in PACKAGE.rglob("*.py") if room_of(path) not in KNOW_KINDS],
+                         ids=lambda path: str(path.relative_to(PACKAGE)))  # fmt: skip
+def test_no_room_below_knows_a_kind_by_name(path: Path) -> None:
+    """Only the kinds themselves, their registry and the commands do; a plane and a sphere are features of geometry too."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    assert not constants(tree) & set(BUILT_IN)
+    assert "kinds" not in imported(path)

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.kinds import artefact_facts
+from cmm_uq.kinds.bryan.observe import Bryan
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine, Points
@@ -49,9 +50,9 @@ def estimates(facts: ArtefactFacts, points: Points) -> tuple[Floats, Floats, Flo
 
 
 def row(name: str, everywhere: bool, length: float | None) -> str:
-    facts = ArtefactFacts(kind="bryan", length_mm=length)
+    facts = artefact_facts(kind="bryan", length_mm=length)
     points = swept(everywhere)
-    truth_model = MeasurementModel(Bryan(ArtefactFacts(kind="bryan", length_mm=LENGTH), points), effects(NAMES))
+    truth_model = MeasurementModel(Bryan(artefact_facts(kind="bryan", length_mm=LENGTH), points), effects(NAMES))
     about = np.eye(6)
     if length is None:
         about[:3, :3] -= 1 / 3

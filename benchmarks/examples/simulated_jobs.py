@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.artefacts import artefact_of
-from cmm_uq.artefacts.triangle_placings import placed_triangle
-from cmm_uq.artefacts.triangle_standard import TriangleStandard
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.kinds import artefact_of
+from cmm_uq.kinds.triangle.placings import placed_triangle
+from cmm_uq.kinds.triangle.standard import TriangleStandard
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Ints, Machine, Points

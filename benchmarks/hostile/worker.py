@@ -29,16 +29,18 @@ MEMORY = 4 * 2**30
 
 def read(kind: str, path: Path) -> None:
     """Read what a command would read first, and no more."""
-    from cmm_uq.analysis.error_maps import maps_of
-    from cmm_uq.jobs.reading import content_of, read_job
+    from cmm_uq.commands.reading import read_job
+    from cmm_uq.files.content import content_of
+    from cmm_uq.files.limits import JOB_BYTES
     from cmm_uq.jobs.toml_file import checked
     from cmm_uq.jobs.truth import Truth
+    from cmm_uq.model.machine_maps import maps_of
     from cmm_uq.uncertainty.model_file import read_model_file
 
     if kind == "budget":
         read_model_file(path)
     elif kind == "truth":
-        checked(content_of(path, "-"), path, Truth)
+        checked(content_of(path, JOB_BYTES, "-"), path, Truth)
     else:
         job = read_job(path, recorded=kind != "plan")
         if kind == "maps":

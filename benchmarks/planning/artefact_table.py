@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import CATALOGUE, effects
 from cmm_uq.planning.identifiability import NOT_TOLD_APART, identifiability
@@ -20,7 +20,7 @@ from cmm_uq.planning.information import certified, gram
 from cmm_uq.planning.placing import joined
 from cmm_uq.planning.ready import ready_plan
 from cmm_uq.planning.separation import FAINT, cosines, imitators, left_of, visible
-from cmm_uq.planning.setting import Setting
+from cmm_uq.planning.setting import Planning, Setting
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Machine
 
@@ -53,10 +53,13 @@ def column(kind: str) -> dict[str, str]:
     mistaken for some, or not be seen.
     """
     facts, wishes = ARTEFACTS[kind]
-    plan = PlanFacts.model_validate(wishes)
+    plan, of = PlanFacts.model_validate(wishes), artefact_facts(kind=kind, **facts)
+    known = kind_named(kind)
+    assert known is not None
     setting = Setting(
-        ArtefactFacts.model_validate({"kind": kind, **facts}), plan, Volume.of(MACHINE, plan), effects(SIX), 1e-3, 1e-3
-    )
+        of, known.observing("planned"), known.needs("plan", Planning, "planned"), plan, Volume.of(MACHINE, plan),
+        effects(SIX), 1e-3, 1e-3,
+    )  # fmt: skip
     points = joined(ready_plan(setting)[1])
     found = identifiability(setting.model(points))
     cells = {}

@@ -12,7 +12,7 @@ import argparse
 import numpy as np
 from settings import SETTINGS
 
-from cmm_uq.artefacts import artefact_of
+from cmm_uq.kinds import artefact_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.planning.identifiability import identifiability

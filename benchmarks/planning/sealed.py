@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 from settings import SETTINGS
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.diagnosis.comparison.search import search
 from cmm_uq.diagnosis.diagnosis import _indistinguishable
 from cmm_uq.diagnosis.power import powers, without_fault
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds import artefact_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import CATALOGUE
 from cmm_uq.planning.candidates import candidates
@@ -52,7 +52,7 @@ def plans(setting):
 
 
 def predicted(setting, placings, rivals):
-    model = without_fault(setting.artefact, setting.model(joined(placings)), setting.sigma, 0)
+    model = without_fault(setting.observed, setting.model(joined(placings)), setting.sigma, 0)
     found = powers(model, rivals, stated=setting.sigma, sigma=setting.sigma, alpha=ALPHA, seed=0, draws=96)
     return {power.effect: power for power in found}
 

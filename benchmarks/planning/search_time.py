@@ -7,7 +7,7 @@ import time
 import numpy as np
 from settings import MACHINE, SIX, setting
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.kinds import artefact_facts
 from cmm_uq.planning.candidates import candidates
 from cmm_uq.planning.exchange import CRITERIA, choose, score_of, step
 from cmm_uq.planning.information import told
@@ -16,7 +16,7 @@ from cmm_uq.planning.placing import joined
 
 def main() -> None:
     columns = {f"temp_{part}_c": 21.0 for part in ("x", "y", "z", "artefact", "table_top", "table_bottom")}
-    plan = setting(ArtefactFacts(kind="step_gauge", u_um=0.4), SIX, pitch_mm=20.0, length_mm=1000.0, columns=columns)
+    plan = setting(artefact_facts(kind="step_gauge", u_um=0.4), SIX, pitch_mm=20.0, length_mm=1000.0, columns=columns)
     began = time.perf_counter()
     possible = candidates(plan)
     rivals = plan.rivals(joined(possible[:2], columns=columns))[:24]

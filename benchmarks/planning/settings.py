@@ -6,8 +6,9 @@ import numpy as np
 
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.planning.setting import Setting
+from cmm_uq.planning.setting import Planning, Setting
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Machine
 
@@ -17,28 +18,32 @@ MACHINE = Machine("bridge machine", "XYZ", np.array([[0.0, 900.0], [0.0, 1200.0]
 
 def setting(facts: ArtefactFacts, named: tuple[str, ...] = SIX, sigma: float = 1e-3, **plan: object) -> Setting:
     wishes = PlanFacts.model_validate(plan)
-    return Setting(facts, wishes, Volume.of(MACHINE, wishes), effects(named), sigma, sigma)
+    kind = kind_named(facts.kind)
+    assert kind is not None
+    planning = kind.needs("plan", Planning, "planned")
+    observe = kind.observing("planned") if planning.free is None else None
+    return Setting(facts, observe, planning, wishes, Volume.of(MACHINE, wishes), effects(named), sigma, sigma)
 
 
 def ballbar() -> Setting:
-    return setting(ArtefactFacts(kind="ballbar", length_mm=500.0, u_um=0.5))
+    return setting(artefact_facts(kind="ballbar", length_mm=500.0, u_um=0.5))
 
 
 def step_gauge() -> Setting:
-    return setting(ArtefactFacts(kind="step_gauge", u_um=0.4), pitch_mm=20.0, length_mm=1000.0, repeats=1)
+    return setting(artefact_facts(kind="step_gauge", u_um=0.4), pitch_mm=20.0, length_mm=1000.0, repeats=1)
 
 
 def plate() -> Setting:
-    return setting(ArtefactFacts(kind="plate", u_um=0.5), repeats=2, pitch_mm=100.0)
+    return setting(artefact_facts(kind="plate", u_um=0.5), repeats=2, pitch_mm=100.0)
 
 
 def triangle() -> Setting:
-    return setting(ArtefactFacts(kind="triangle", blocks_mm=[480.0, 280.0, 380.0], u_blocks_um=0.1,
+    return setting(artefact_facts(kind="triangle", blocks_mm=[480.0, 280.0, 380.0], u_blocks_um=0.1,
                                  cylinders_mm=[20.0, 20.0, 20.0], u_cylinders_um=0.1))  # fmt: skip
 
 
 def bryan() -> Setting:
-    bar = ArtefactFacts(kind="bryan", length_mm=280.0, u_um=0.5)
+    bar = artefact_facts(kind="bryan", length_mm=280.0, u_um=0.5)
     return setting(bar)
 
 

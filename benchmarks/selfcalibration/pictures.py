@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.examples.shift_job import error as example_error
-from cmm_uq.commands.analysis import ShiftResult, analyse
+from cmm_uq.commands.analysis import analyse
 from cmm_uq.documents.plot_style import ACCENT, INK, MUTED, as_svg, house_style, new_figure
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.points import Floats
 
 ROOT = Path(__file__).parents[2]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,10 +11,6 @@ from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
 from cmm_uq.cli.printing import put, say
 from cmm_uq.cli.progress import shown
-
-if TYPE_CHECKING:
-    from cmm_uq.documents.result import Diagnosed
-    from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 
 
 def command(
@@ -35,23 +31,9 @@ def command(
     if json:
         put(written.results.decode())
     elif not quiet:
-        _summarise(written.diagnosed)
+        for row in written.summary:
+            say("  ".join(row))
         for path in written.files.values():
             say(str(path))
     if strict and not written.conforming:
         raise typer.Exit(NOT_CONFORMING)
-
-
-def _summarise(found: Diagnosed | MapsDiagnosed) -> None:
-    d, told = found.diagnosis, _told(found)
-    say(f"{d.verdict.upper()} (p = {d.p_value:.2g}). {told[0]}")
-    for text in (*told[1:], *(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings)):
-        say(text)
-
-
-def _told(found: Diagnosed | MapsDiagnosed) -> list[str]:
-    from cmm_uq.documents import diagnosis_words
-    from cmm_uq.kinds.error_maps import words as map_words
-    from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
-
-    return map_words.lines(found) if isinstance(found, MapsDiagnosed) else diagnosis_words.lines(found)

@@ -39,11 +39,10 @@ def command(
 
 
 def _summarise(report: Report) -> None:
-    from cmm_uq.commands.summary import summary
     from cmm_uq.documents.origin import BANNERS
     from cmm_uq.jobs.origin import MEASURED
 
     job = report.result.job
     derived = [] if job.origin == MEASURED else [(BANNERS[job.origin], "", "")]
-    rows = derived + summary(report.result) + [(name, str(path), "") for name, path in report.files.items()]
+    rows = [*derived, *report.summary, *((name, str(path), "") for name, path in report.files.items())]
     table(rows, separator="  ", title=job.facts.job.id, bold=1)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.refusals import refuse_planned
 from cmm_uq.commands.simulate import recording
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.derived_job import PROGRAM, derived_toml, is_compensated
-from cmm_uq.jobs.job import SHIFT, Job
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import first_line
-from cmm_uq.jobs.reading import read_job, sha256
-from cmm_uq.kinds.error_maps.analysis import maps_of
+from cmm_uq.jobs.reading import sha256
+from cmm_uq.kinds import kind_of
+from cmm_uq.model.machine_maps import maps_of
 from cmm_uq.physics.compensation import compensate_points, machine_compensation
 from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.points import Points
@@ -35,7 +37,9 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
     CmmUqError : the job has no error map, or it does not serve these points.
     """
     maps = maps_of(job)
-    refuse(job, "compensated", but=SHIFT)
+    refuse_planned(job)
+    if not job.facts.artefact.with_recording:
+        raise kind_of(job).refused("compensated")
     compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
     try:
         return compensate_points(job.points, compensation), compensation.provenance()

@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.commands.estimation import model_of, without_outliers
-from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse
+from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
 from cmm_uq.conformity.consequences import consequences
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, diagnose
+from cmm_uq.documents.diagnosis_page import diagnosed_outcome
+from cmm_uq.documents.outcome import Found, Outcome, OwnAnalysis, Recipe
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
-from cmm_uq.jobs.job import ERROR_MAP, Job
-from cmm_uq.jobs.reading import read_job
-from cmm_uq.kinds.error_maps.analysis import WHERE, MapsDiagnosed, diagnose_error_maps
+from cmm_uq.jobs.job import Job
+from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel
 from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning.setting import Planning
 from cmm_uq.planning.suggestion import suggestions
 from cmm_uq.screening.screened import Finding, screened
+from cmm_uq.screening.shape import Screening
 
 
 def diagnose_folder(
     folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
-) -> Diagnosed | MapsDiagnosed:
-    """Diagnose a job: a recording of an artefact, or the machine's error maps.
+) -> Found:
+    """Diagnose a job, in the way of its kind.
 
     Parameters
     ----------
@@ -42,7 +46,7 @@ def diagnose_folder(
 
 def diagnose_read(
     job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
-) -> Diagnosed | MapsDiagnosed:
+) -> Found:  # fmt: skip
     """Diagnose a job that was read; see :func:`diagnose_folder`.
 
     Raises
@@ -50,10 +54,8 @@ def diagnose_read(
     CmmUqError : the job cannot be diagnosed as it stands.
     """
     _check_rate(alpha)
-    if job.facts.artefact.kind == ERROR_MAP:
-        with refusing_overflow(WHERE, "Look for a number that no map of a machine has"):
-            return diagnose_error_maps(job, seed=seed, alpha=alpha, progress=progress)
-    return _diagnose(job, seed, alpha, progress)
+    with refusing_overflow(job.recording_path, OVERFLOW_FIX):
+        return recipe_of(job).analyse(job, seed=seed, alpha=alpha, progress=progress)
 
 
 def diagnose_job(
@@ -66,7 +68,7 @@ def diagnose_job(
     CmmUqError : the job cannot be diagnosed as it stands, or has no such recording.
     """
     _check_rate(alpha)
-    return _diagnose(read_job(folder), seed, alpha, progress)
+    return _diagnose(read_job(folder), seed=seed, alpha=alpha, progress=progress)
 
 
 def _check_rate(alpha: float) -> None:
@@ -74,11 +76,11 @@ def _check_rate(alpha: float) -> None:
         raise CmmUqError(f"a false-alarm rate of {alpha:g}", fix="Give one between 0.000001 and 0.5; 0.01 is usual")
 
 
-def _diagnose(job: Job, seed: int, alpha: float, progress: Progress | None) -> Diagnosed:
-    refuse(job, "diagnosed as a recording of an artefact")
-    with refusing_overflow(job.recording_path, OVERFLOW_FIX):
-        model, findings = screened_model(job)
-        return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
+def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> Diagnosed:
+    refuse_planned(job)
+    kind_of(job).observing("diagnosed as a recording of an artefact")
+    model, findings = screened_model(job)
+    return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
 
 
 def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
@@ -88,13 +90,15 @@ def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
     ------
     CmmUqError : the recording does not fit the model.
     """
-    where = job.recording_path
+    kind = kind_of(job)
+    where, observe = job.recording_path, kind.observing("screened")
     acting = effects(job.facts.model.effects, where="job.toml [model] effects")
     recording = screened(
-        job.points, job.facts.artefact, needed={column for effect in acting for column in effect.columns},
+        job.points, job.facts.artefact, kind.offers("screen", Screening), observe,
+        needed={column for effect in acting for column in effect.columns},
         set_aside=job.facts.recording.set_aside, where=where,
     )  # fmt: skip
-    model = model_of(job, artefact_of(job.facts.artefact, recording.points, where=where))
+    model = model_of(job, observe(job.facts.artefact, recording.points, where=where))
     model, outliers = without_outliers(model)
     return model, (*recording.findings, *outliers)
 
@@ -111,5 +115,29 @@ def diagnosed(
     """Diagnose the screened model of a job."""
     stated = job.facts.recording.u_coordinate_um
     diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress)
-    changes = consequences(job, diagnosis, seed)
-    return Diagnosed(job, findings, diagnosis, suggestions(diagnosis, job.facts.artefact, job.facts.plan), changes)
+    kind, facts = kind_of(job), job.facts.artefact
+    observe = kind.observing("diagnosed")
+    changes = consequences(job, diagnosis, partial(observe, facts, where=job.recording_path), kind.standards, seed)
+    next_ones = suggestions(diagnosis, facts, observe, kind.offers("plan", Planning), job.facts.plan)
+    return Diagnosed(job, findings, diagnosis, next_ones, changes)
+
+
+def diagnosis_outcome(found: Found, seed: int) -> Outcome:
+    """What there is to write of what :func:`diagnose_folder` found."""
+    return recipe_of(found.job).outcome(found, seed)
+
+
+def recipe_of(job: Job) -> Recipe:
+    """How a job is diagnosed: in its kind's own way, or as observations that named effects explain.
+
+    Raises
+    ------
+    CmmUqError : in neither, or nothing is measured yet.
+    """
+    refuse_planned(job)
+    kind = kind_of(job)
+    own = kind.offers("own", OwnAnalysis)
+    if own is not None and own.diagnose is not None:
+        return own.diagnose
+    kind.observing("diagnosed as a recording of an artefact")
+    return Recipe(_diagnose, lambda found, seed: diagnosed_outcome(found))

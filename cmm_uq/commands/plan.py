@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.commands.planning import Plan, Progress, make_plan
+from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.report import REPORTS
 from cmm_uq.documents.origin import file_name, marked
 from cmm_uq.jobs.origin import PLANNED
-from cmm_uq.jobs.reading import read_job
 from cmm_uq.planning.placing import joined
 from cmm_uq.writing import Owner, staged
 

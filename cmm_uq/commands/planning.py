@@ -7,26 +7,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.artefacts import artefact_of
-from cmm_uq.artefacts.bryan import Bryan
-from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse
+from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
 from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import READY, Condition
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.diagnosis.power import Power, powers, without_fault
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import SHIFT, Job
-from cmm_uq.kinds.shift_axis.series import shifted_series
-from cmm_uq.kinds.shift_axis.undetermined import undetermined
+from cmm_uq.jobs.job import Job
+from cmm_uq.kinds import kind_of
 from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.effect import Effect
-from cmm_uq.planning.candidates import candidates, like, thinned
+from cmm_uq.planning.candidates import candidates, thinned
 from cmm_uq.planning.exchange import choose, score_of
 from cmm_uq.planning.identifiability import Identifiability, identifiability
 from cmm_uq.planning.information import told, whole
-from cmm_uq.planning.placing import Pattern, Placing, appended, joined, split
+from cmm_uq.planning.placing import Placing, appended, joined, split
 from cmm_uq.planning.ready import ready_plan
-from cmm_uq.planning.setting import Setting
+from cmm_uq.planning.setting import Setting, Start
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import MICROMETRE
 
@@ -47,7 +44,7 @@ class Outlook:
     ----------
     placings : of them all.
     points : the same as one recording.
-    identifiability : of the effects named; ``None`` for a shift job.
+    identifiability : of the effects named; ``None`` for a kind that names none.
     powers : how large each effect that the job does not name must be for the diagnosis to find it; empty when not asked for,
         and for placings that give way to others by a criterion which does not part effects.
     """
@@ -71,7 +68,7 @@ class Plan:
     kept : how many of the start are part of the better plan.
     scores : of the criterion, before and after; smaller is better.
     conditions : of the standard.
-    free : of a shift job, what no reading shows, in words.
+    free : of a kind that names no effects, what no reading shows, in words.
     """
 
     job: Job
@@ -132,10 +129,10 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     """
     tell = progress or (lambda what, part: None)
     tell("Reading what the placings determine", 0.05)
-    refuse(job, "planned", but=SHIFT)
-    setting = Setting.of(job)
-    if setting.artefact.kind == SHIFT:
-        return _shift_plan(job, setting)
+    refuse_planned(job)
+    setting = Setting.of(job, kind_of(job))
+    if setting.planning.free is not None:
+        return _series_plan(job, setting)
     name, placings, points = _start(job, setting)
     setting = setting.sized(points)
     if name == RECORDED and job.facts.recording.u_coordinate_um is None:
@@ -200,7 +197,7 @@ def _outlook(
     predicted: list[Power] = []
     if power and rivals:
         stated = setting.stated
-        quiet = without_fault(setting.artefact, model, setting.sigma, seed)
+        quiet = without_fault(setting.observed, model, setting.sigma, seed)
         asked = powers(quiet, rivals, stated=stated, sigma=setting.sigma, alpha=FALSE_ALARMS, seed=seed)
         for i, each in enumerate(asked):
             predicted.append(each)
@@ -240,16 +237,9 @@ def _seen(rows: list[int], information: Floats) -> list[int]:
 
 
 def _possible(setting: Setting, start: Outlook, name: str) -> tuple[Placing, ...]:
-    """Candidates: of a recording the artefact with the points that were recorded in its first placing."""
+    """Candidates, of a recording those of its first placing."""
     artefact = setting.model(start.points).artefact
-    if isinstance(artefact, Bryan):
-        centre = artefact.centres(start.points.readings, artefact.sizes[0].nominal)[0]
-        return candidates(setting, np.asarray(centre, dtype=np.float64))
-    if name != RECORDED or artefact.kind == "triangle":
-        return candidates(setting)
-    pattern, attitude, _ = Pattern.of_recording(start.placings[0].points)
-    again = pattern.once().repeated(setting.plan.repeats)
-    return like(again, artefact.kind, setting.volume, attitude, setting.plan.candidates)
+    return candidates(setting, Start(artefact, start.placings[0] if name == RECORDED else None))
 
 
 def _affordable(setting: Setting, count: int, possible: Sequence[Placing], kept: Sequence[Placing]) -> int:
@@ -268,11 +258,11 @@ def _affordable(setting: Setting, count: int, possible: Sequence[Placing], kept:
 
 def _of_standard(setting: Setting, name: str, points: Points) -> tuple[Condition, ...]:
     """Conditions of the standard that a ready plan is named after; none for a plan of no standard."""
-    if name not in READY:
+    if name not in READY or setting.observe is None:
         return ()
     # where the lengths lie counts, not yet what certifies them
     facts = setting.artefact.model_copy(update={"nominal": False})
-    return conditions(READY[name], artefact_of(facts, points), recorded=False)
+    return conditions(READY[name], setting.observe(facts, points, where=None), recorded=False)
 
 
 def _in_time(setting: Setting, name: str, placings: Sequence[Placing]) -> tuple[Condition, ...]:
@@ -284,30 +274,13 @@ def _in_time(setting: Setting, name: str, placings: Sequence[Placing]) -> tuple[
     return (Condition(f"at most {budget:g} min: {total:.0f} min", over),)
 
 
-def _shift_plan(job: Job, setting: Setting) -> Plan:
-    """Series of a shift job, and what their readings cannot tell."""
-    facts = setting.artefact
-    if facts.plane is not None:
-        raise CmmUqError(
-            "the placings of a plate shifted in a plane are not planned", where="job.toml [artefact] plane",
-            fix="cmm-uq report says what those of a recording leave open",
-        )  # fmt: skip
+def _series_plan(job: Job, setting: Setting) -> Plan:
+    """Placings of a kind that names no effects, and what their readings cannot tell."""
+    if setting.planning.free is None:
+        raise ValueError("a kind that says nothing of what its placings leave open")
     if setting.plan.criterion is not None:
         candidates(setting)  # which says why there are none
     name, placings, points = _start(job, setting)
-    series = shifted_series(
-        points, facts.axis or "x", np.array(facts.shifts_mm, dtype=np.float64), facts.u_shift_um * MICROMETRE,
-        job.recording_path,
-    )  # fmt: skip
-    left = undetermined(series, scale_known=facts.known is not None)
-    free = [
-        f"errors that repeat every {left.period:.4g} mm, or a half, a third … of it: every shift is a multiple of it"
-    ]
-    if facts.known is None:
-        free.append("the mean scale of the axis: no length of the artefact is known")
-    if left.patterns.shape[1]:
-        free.append(
-            f"{left.patterns.shape[1]} independent patterns of error at the places read, unless errors are smooth"
-        )
+    free = setting.planning.free(setting, points, job.recording_path)
     start = Outlook(placings, points, None, ())
-    return Plan(job, setting, name, start, None, 0, None, _in_time(setting, name, placings), tuple(free))
+    return Plan(job, setting, name, start, None, 0, None, _in_time(setting, name, placings), free)

@@ -1,36 +1,23 @@
-"""Jobs that some commands cannot serve, because nothing in them is a list of effects acting on points."""
+"""Jobs that hardly any command can serve, because nothing is measured yet."""
 
 from __future__ import annotations
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ERROR_MAP, SHIFT, Job
+from cmm_uq.jobs.job import Job
 
 OVERFLOW_FIX = (
     "Look for a number that no measurement gives: in the columns of the recording, u_coordinate_um, u_um or travel_mm"
 )
 """Where figures leave the range of numbers."""
 
-_REASONS = {
-    SHIFT: ("a shift job cannot be {}: its machine error is a free function, no list of effects",
-            "cmm-uq report JOB estimates it"),
-    ERROR_MAP: ("error maps cannot be {}: they are free functions, no points of an artefact",
-                "cmm-uq diagnose JOB compares them with each other"),
-}  # fmt: skip
 
-
-def refuse(job: Job, what: str, *, but: str = "") -> None:
-    """A clear error where a job of free functions cannot be served; ``but`` names the kind that can.
-
-    A recording that only holds the coordinates of a plan can be simulated, and nothing else.
+def refuse_planned(job: Job) -> None:
+    """Refuse a recording that only holds the coordinates of a plan; it can be simulated, and nothing else.
 
     Raises
     ------
-    CmmUqError : the job is of such a kind, or not measured yet.
+    CmmUqError : it does.
     """
-    if job.planned and what != "simulated":
+    if job.planned:
         raise CmmUqError("holds planned coordinates: nothing is measured", where=f"{job.recording_path} line 1",
                          fix="Put in what the machine indicated, then remove that line")  # fmt: skip
-    kind = job.facts.artefact.kind
-    if kind in _REASONS and kind != but:
-        problem, fix = _REASONS[kind]
-        raise CmmUqError(problem.format(what), where="job.toml [artefact] kind", fix=fix)

@@ -6,14 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.commands.analysis import PlaneShiftResult, Result, ShiftResult, analyse_job
-from cmm_uq.commands.diagnosing import diagnose_read
-from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands import analysis, diagnosing
+from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.documents.result import Diagnosed
-from cmm_uq.jobs.job import SHIFT, Job
-from cmm_uq.jobs.reading import read_job
-from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
+from cmm_uq.documents.outcome import Found, Outcome
+from cmm_uq.jobs.job import Job
 from cmm_uq.writing import Owner, staged
 
 Stage = Callable[[str, float], None]
@@ -30,21 +27,17 @@ class Report:
     Parameters
     ----------
     result : what was found.
+    summary : rows of what, figure and remark.
+    conforming : see :class:`~cmm_uq.documents.outcome.Outcome`.
     results : contents of results.json.
     files : what was written, by name.
     """
 
-    result: Result | ShiftResult | PlaneShiftResult
+    result: Found
+    summary: tuple[tuple[str, ...], ...]
+    conforming: bool
     results: bytes
     files: dict[str, Path]
-
-    @property
-    def conforming(self) -> bool:
-        """Whether every statement of conformity is a pass, and the recording agrees with the model that the job names."""
-        if not isinstance(self.result, Result):
-            return True
-        decided = all(statement.outcome == "pass" for statement in self.result.statements)
-        return decided and self.result.diagnosed.diagnosis.verdict == "consistent"
 
 
 def write_report(
@@ -52,8 +45,7 @@ def write_report(
 ) -> Report:
     """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
 
-    A shift job adds its correction table, an error map. Documents of a recording that was not measured carry its origin in
-    their names.
+    A kind may add files of its own. Documents of a recording that was not measured carry its origin in their names.
 
     Parameters
     ----------
@@ -71,31 +63,30 @@ def write_report(
     tell = stage or (lambda what, part: None)
     tell("Reading the job", 0.0)
     read = read_job(job)
-    refuse(read, "reported", but=SHIFT)
+    recipe = analysis.recipe_of(read)
     owner = Owner("report", read.facts.job.id, read.origin)
     with staged(
         out or REPORTS / owner.job, owner, inputs=read.paths, force=force, expected=_names(read, *CERTIFICATE)
     ) as place:
-        result = analyse_job(read, seed=seed, progress=lambda part: tell("Sampling the posterior", 0.1 + 0.4 * part))
-        contents = _contents(result, tell)
+        result = recipe.analyse(read, seed=seed, progress=lambda part: tell("Sampling the posterior", 0.1 + 0.4 * part))
+        tell("Composing the certificate", 0.5)
+        outcome = recipe.outcome(result, seed)
+        contents = _contents(outcome, tell)
         tell("Writing", 0.95)
         files = place.write(contents)
     tell("Done", 1.0)
-    return Report(result, contents["results.json"], files)
+    return Report(result, outcome.summary, outcome.conforming, contents["results.json"], files)
 
 
 @dataclass(frozen=True, eq=False)
 class WrittenDiagnosis:
-    """A written diagnosis: what was found, contents of results.json, and what was written, by name."""
+    """A written diagnosis: what was found, rows of its summary, whether all is well, results.json, and the files."""
 
-    diagnosed: Diagnosed | MapsDiagnosed
+    diagnosed: Found
+    summary: tuple[tuple[str, ...], ...]
+    conforming: bool
     results: bytes
     files: dict[str, Path]
-
-    @property
-    def conforming(self) -> bool:
-        """Whether the recording agrees with the model that the job names."""
-        return self.diagnosed.diagnosis.verdict == "consistent"
 
 
 def write_diagnosis(
@@ -129,12 +120,15 @@ def write_diagnosis(
     folder = out or REPORTS / owner.job / "diagnosis"
     with staged(folder, owner, inputs=read.paths, force=force, expected=_names(read, DIAGNOSIS)) as place:
         tell("Searching for what was left out", 0.0)
-        found = diagnose_read(read, seed=seed, alpha=alpha, progress=lambda part: tell("Sampling", 0.7 + 0.2 * part))
+        found = diagnosing.diagnose_read(
+            read, seed=seed, alpha=alpha, progress=lambda part: tell("Sampling", 0.7 + 0.2 * part)
+        )
         tell("Composing the page", 0.9)
-        contents = _diagnosis_contents(found, seed)
+        outcome = diagnosing.diagnosis_outcome(found, seed)
+        contents = _diagnosis_contents(outcome)
         files = place.write(contents)
     tell("Done", 1.0)
-    return WrittenDiagnosis(found, contents["results.json"], files)
+    return WrittenDiagnosis(found, outcome.summary, outcome.conforming, contents["results.json"], files)
 
 
 def _names(job: Job, *documents: str) -> list[str]:
@@ -144,42 +138,25 @@ def _names(job: Job, *documents: str) -> list[str]:
     return [*(file_name(document, job.origin) for document in documents), "results.json"]
 
 
-def _diagnosis_contents(found: Diagnosed | MapsDiagnosed, seed: int) -> dict[str, bytes]:
-    from cmm_uq.documents.diagnosis_page import diagnosis_document, diagnosis_results
+def _diagnosis_contents(outcome: Outcome) -> dict[str, bytes]:
     from cmm_uq.documents.html import render_html
     from cmm_uq.documents.origin import marked
     from cmm_uq.documents.results_file import as_json
-    from cmm_uq.kinds.error_maps.page import maps_document, maps_results
 
-    if isinstance(found, MapsDiagnosed):
-        data, document = maps_results(found, seed), maps_document(found, seed)
-    else:
-        data, document = diagnosis_results(found), diagnosis_document(found)
-    page, results = _names(found.job, DIAGNOSIS)
-    return {page: render_html(marked(document, found.job)).encode(), results: as_json(data)}
+    job = outcome.found.job
+    page, results = _names(job, DIAGNOSIS)
+    return {page: render_html(marked(outcome.document, job)).encode(), results: as_json(outcome.results)}
 
 
-def _contents(result: Result | ShiftResult | PlaneShiftResult, tell: Stage) -> dict[str, bytes]:
-    from cmm_uq.commands.compose import certificate
+def _contents(outcome: Outcome, tell: Stage) -> dict[str, bytes]:
     from cmm_uq.documents.html import render_html
     from cmm_uq.documents.origin import marked
     from cmm_uq.documents.pdf import render_pdf
-    from cmm_uq.documents.results_file import as_json, results
+    from cmm_uq.documents.results_file import as_json
 
-    tell("Composing the certificate", 0.5)
-    document = marked(certificate(result), result.job)
-    more: dict[str, bytes] = {}
-    if isinstance(result, Result):
-        data = as_json(results(result))
-    else:
-        from cmm_uq.kinds.shift_axis.page import table_file
-        from cmm_uq.kinds.shift_axis.results import shift_results
-        from cmm_uq.kinds.shift_plate.results import plane_shift_results
-        from cmm_uq.kinds.shifting.correction_table import table_text
-
-        data = as_json(shift_results(result) if isinstance(result, ShiftResult) else plane_shift_results(result))
-        more[table_file(result.job)] = table_text(result.table)
+    job, data = outcome.found.job, as_json(outcome.results)
+    document = marked(outcome.document, job)
     tell("Rendering", 0.8)
-    pdf = render_pdf(document, {**result.job.inputs, "results.json": data, **more})
-    html_name, pdf_name, results_name = _names(result.job, *CERTIFICATE)
-    return {html_name: render_html(document).encode(), pdf_name: pdf, results_name: data, **more}
+    pdf = render_pdf(document, {**job.inputs, "results.json": data, **outcome.files})
+    html_name, pdf_name, results_name = _names(job, *CERTIFICATE)
+    return {html_name: render_html(document).encode(), pdf_name: pdf, results_name: data, **outcome.files}

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.artefacts import artefact_of
-from cmm_uq.commands.refusals import refuse
+from cmm_uq.commands.reading import read_job
 from cmm_uq.documents.program import program
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.content import content_of
@@ -18,10 +17,10 @@ from cmm_uq.files.limits import JOB_BYTES
 from cmm_uq.jobs.derived_job import derived_toml
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import first_line
-from cmm_uq.jobs.reading import read_job
 from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.jobs.truth import Truth
+from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.overflow import refusing_overflow
@@ -52,7 +51,7 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     """
     columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
     points = replace(job.points, columns={**job.points.columns, **columns})
-    artefact = artefact_of(job.facts.artefact, points, where=job.recording_path)
+    artefact = kind_of(job).observing("simulated")(job.facts.artefact, points, where=job.recording_path)
     acting = effects(tuple(truth.effects), where=f"{truth_path} [effects]")
     given = [effect.from_reported(truth.effects[effect.name]) for effect in acting]
     model = MeasurementModel(
@@ -83,7 +82,7 @@ def write_simulation(
     OutputError : the folder cannot be written to.
     """
     read = read_job(job)
-    refuse(read, "simulated")
+    kind_of(read).observing("simulated")
     content = content_of(truth, JOB_BYTES, "It gives the effects, the noise and the seed")
     drawn = checked(content, truth, Truth)
     owner = Owner("simulate", read.facts.job.id, read.origin)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.conformity.accuracy import with_uncertainty
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.inference.posterior import Density
 from cmm_uq.jobs.job import Job
+from cmm_uq.model.kind import Observed
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
@@ -34,13 +34,17 @@ class Consequences:
     statements: tuple[tuple[Statement, Statement], ...]
 
 
-def consequences(job: Job, diagnosis: Diagnosis, seed: int) -> Consequences | None:
+def consequences(
+    job: Job, diagnosis: Diagnosis, observe: Observed, standards: Collection[str], seed: int
+) -> Consequences | None:
     """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
 
     The uncertainty of a corrected figure is that of repeated recordings with this correction.
 
     Parameters
     ----------
+    observe : makes the artefact of points.
+    standards : that may be stated of its kind.
     seed : of the figures' repetitions.
     """
     found = {item.effect for item in diagnosis.effects}
@@ -54,7 +58,7 @@ def consequences(job: Job, diagnosis: Diagnosis, seed: int) -> Consequences | No
     ours = np.array([unknown.key[0] in found for unknown in linear.unknowns])
     coefficients = np.where(ours, value, 0.0)[: len(value) - len(artefact.sizes)]
     points = artefact.points.at(artefact.points.xyz + model.errors(artefact.points.xyz, coefficients))
-    corrected = artefact_of(job.facts.artefact, points, where=job.recording_path)
+    corrected = observe(points)
     before: dict[str, Quantity] = {}
     after: dict[str, Quantity] = {}
     late = corrected.lengths()
@@ -71,7 +75,10 @@ def consequences(job: Job, diagnosis: Diagnosis, seed: int) -> Consequences | No
     return Consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(
-            (statement(wish, artefact, before, key), statement(wish, corrected, after, key, artefact))
+            (
+                statement(wish, artefact, before, key, standards),
+                statement(wish, corrected, after, key, standards, artefact),
+            )
             for i, wish in enumerate(job.facts.conformity, 1)
             for key in [f"[[conformity]] {i}"]
         ),

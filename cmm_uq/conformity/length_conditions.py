@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.gauge import StepGauge
 from cmm_uq.conformity.measurement_lines import crossed_travel, position_on
 from cmm_uq.conformity.plans import Condition, LengthPlan
 from cmm_uq.model.artefact import Artefact
-from cmm_uq.model.placings import Placings
 from cmm_uq.points import Floats, Ints, Machine, Points
 
 SAME_LENGTH_MM = 1.0
@@ -53,7 +51,7 @@ def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> I
     group = points.group[found.rows[:, 0]]
     original = ~np.isin(group, list(copies))
     nominal = nominals(found.lengths)
-    middles, along = _placed(artefact, found.rows)
+    middles, along = artefact.lines_of(found.rows)
     positions = np.array([position_on(points.machine, m, d) for m, d in zip(middles, along, strict=True)], dtype=object)
     for position in plan.positions:
         for length in np.unique(nominal):
@@ -64,18 +62,6 @@ def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> I
             known = [share for share in shares if share is not None]
             yield _Measured(position, int(length), float(found.lengths[at].mean()), max(known, default=None),
                             len(np.unique(group[at])))  # fmt: skip
-
-
-def _placed(artefact: Artefact, rows: Ints) -> tuple[Floats, Floats]:
-    """A point on the line of each length, and its direction, (m, 3) each.
-
-    The line of a gauge is that of all its faces: where on a face the probe touched would turn a short length by degrees.
-    """
-    xyz = artefact.points.xyz
-    if isinstance(artefact, StepGauge):
-        lines = Placings.of(artefact.points.measurement)
-        return lines.means(xyz)[rows[:, 1]], artefact.directions()[rows[:, 1]]
-    return 0.5 * (xyz[rows[:, 0]] + xyz[rows[:, 1]]), xyz[rows[:, 1]] - xyz[rows[:, 0]]
 
 
 def _share(points: Points, middle: Floats, along: Floats, length: float) -> float | None:

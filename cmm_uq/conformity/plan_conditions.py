@@ -6,7 +6,6 @@ digit does not count: that is a copy, where in a plan it is a wish.
 
 from __future__ import annotations
 
-from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.conformity.bar_conditions import bar_positions
 from cmm_uq.conformity.copies import copied
 from cmm_uq.conformity.length_conditions import lengths_measured
@@ -29,4 +28,5 @@ def conditions(plan: Plan, artefact: Artefact, *, recorded: bool) -> tuple[Condi
         return lengths_measured(plan, artefact, copies)
     if isinstance(plan, BarPlan):
         return bar_positions(plan, artefact, copies)
-    return sphere_points(plan, artefact, copies) if isinstance(artefact, Sphere) else ()
+    forms = artefact.forms()
+    return () if forms is None else sphere_points(plan, artefact.points, forms.directions, copies)

@@ -6,18 +6,25 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.conformity.copies import run_of
 from cmm_uq.conformity.plans import Condition, SpherePlan
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Points
 
 _DIRECTIONS = 400
 """On a hemisphere, at which the reach of its points is looked at."""
 
 
-def sphere_points(plan: SpherePlan, sphere: Sphere, copies: Mapping[int, int]) -> tuple[Condition, ...]:
-    """How many points on each sphere, and whether they cover it; ``copies`` are groups that do not count."""
-    points = sphere.points
+def sphere_points(
+    plan: SpherePlan, points: Points, directions: Floats, copies: Mapping[int, int]
+) -> tuple[Condition, ...]:  # fmt: skip
+    """How many points on each sphere, and whether they cover it.
+
+    Parameters
+    ----------
+    plan : of the standard.
+    points, directions : that were probed, and the outward direction (n, 3) of each from the middle of its sphere.
+    copies : groups that do not count.
+    """
     lacking, bare = [], []
     for group in range(int(points.group.max()) + 1):
         if group in copies:
@@ -27,7 +34,7 @@ def sphere_points(plan: SpherePlan, sphere: Sphere, copies: Mapping[int, int]) -
         name = f"measurement {run_of(points, group)[0]}"
         if not count == plan.points == len(rows):
             lacking.append(f"{plan.points} points on the sphere of {name} ({len(rows)} recorded, {count} different)")
-        elif (gap := _farthest(sphere.directions(points.xyz)[rows])) > plan.reach_deg:
+        elif (gap := _farthest(directions[rows])) > plan.reach_deg:
             bare.append(
                 f"points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)"
             )

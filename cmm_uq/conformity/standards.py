@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.conformity.copies import copied, copies_in_words
 from cmm_uq.conformity.decision import decide, needs_uncertainty
 from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import PLANS
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import LENGTH_STANDARDS, ConformityFacts, needed
-from cmm_uq.model.artefact import Artefact
+from cmm_uq.jobs.job import ConformityFacts, needed
+from cmm_uq.model.artefact import Artefact, Forms
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -25,9 +24,13 @@ NOT_CONSIDERED = (
 
 
 def statement(
-    facts: ConformityFacts, artefact: Artefact, accuracy: Mapping[str, Quantity], key: str,
+    facts: ConformityFacts,
+    artefact: Artefact,
+    accuracy: Mapping[str, Quantity],
+    key: str,
+    standards: Collection[str],
     recorded: Artefact | None = None,
-) -> Statement:  # fmt: skip
+) -> Statement:
     """Compare what the standard asks for with its limit, and decide.
 
     Parameters
@@ -37,18 +40,19 @@ def statement(
     accuracy : figures with uncertainty.
     key : of job.toml, for messages.
     recorded : the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a measurement.
+    standards : that may be stated of this kind of artefact.
 
     Raises
     ------
     CmmUqError : the recording is not what the standard is decided on, or the rule needs an uncertainty that is not stated.
     """
     recorded = recorded or artefact
-    if facts.standard == "ASME B89.4.1-1997" and artefact.kind == "ballbar":
-        return _volumetric_performance(facts, artefact, accuracy, recorded)
-    if facts.standard in LENGTH_STANDARDS:
+    if facts.standard in standards:
+        if facts.standard == "ASME B89.4.1-1997":
+            return _volumetric_performance(facts, artefact, accuracy, recorded)
+        if (forms := artefact.forms()) is not None:
+            return _form_error(facts, artefact, forms, key, recorded)
         return _errors_of_indication(facts, artefact, key, recorded)
-    if facts.standard == "ISO 10360-5:2010" and isinstance(artefact, Sphere):
-        return _form_error(facts, artefact, key, recorded)
     raise CmmUqError(f"{facts.standard} is not decided on a {artefact.kind}", where=f"job.toml {key} standard",
                      fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
 
@@ -98,14 +102,15 @@ def _errors_of_indication(facts: ConformityFacts, artefact: Artefact, key: str, 
     return _stated(facts, "error of indication of length, worst against its limit", "lengths", items, recorded, remarks)
 
 
-def _form_error(facts: ConformityFacts, sphere: Sphere, key: str, recorded: Artefact) -> Statement:
+def _form_error(
+    facts: ConformityFacts, sphere: Artefact, probed: Forms, key: str, recorded: Artefact
+) -> Statement:  # fmt: skip
     """Probing form error: the largest range of radial distances from a least-squares sphere (ISO 10360-5:2010, 6.2).
 
     Its uncertainty is the test uncertainty (ISO/TS 23165): half the form deviation of the test sphere.
     """
-    probed = sphere.probed()
     worst = int(np.argmax(probed.form))
-    value, u = float(probed.form[worst]) / MICROMETRE, sphere.form / 2 / MICROMETRE
+    value, u = float(probed.form[worst]) / MICROMETRE, probed.certified / 2 / MICROMETRE
     _refuse_without_uncertainty(facts, u, "form_um", key)
     limit = float(_limits_um(facts, np.array([sphere.sizes[0].nominal]))[0])
     decision = decide(value, u, limit, facts.rule, signed=False)

@@ -18,14 +18,13 @@ from functools import cached_property
 import numpy as np
 from scipy import special
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.diagnosis.comparison.combinations import Prior
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN
 from cmm_uq.diagnosis.comparison.gate import DRAWS, statistic_of
 from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
-from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.model import MeasurementModel, Noise
+from cmm_uq.model.kind import Observed
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 
@@ -89,12 +88,12 @@ class Power:
         return size / self.per_unit if size <= self.allowed * self.per_unit else None
 
 
-def without_fault(facts: ArtefactFacts, model: MeasurementModel, sigma: float, seed: int) -> MeasurementModel:
+def without_fault(observe: Observed, model: MeasurementModel, sigma: float, seed: int) -> MeasurementModel:
     """The same model of a recording drawn with nothing left out, in the placings of its own.
 
     Parameters
     ----------
-    facts : of the artefact.
+    observe : makes the artefact of points.
     model : gives effects and placings.
     sigma : noise of a coordinate, mm.
     """
@@ -102,7 +101,7 @@ def without_fault(facts: ArtefactFacts, model: MeasurementModel, sigma: float, s
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(8,)))
     sizes = np.array([size.nominal for size in artefact.sizes])
     xyz = model.simulate(np.zeros(len(model.unknowns) - len(sizes)), sizes, Noise(sigma), random)
-    return replace(model, artefact=artefact_of(facts, artefact.points.at(xyz)))
+    return replace(model, artefact=observe(artefact.points.at(xyz)))
 
 
 def powers(

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.conformity.accuracy import TITLES, UNITS
-from cmm_uq.documents.diagnosis_words import VERDICTS, noise_words, sentence
+from cmm_uq.documents.diagnosis_words import VERDICTS, lines, noise_words, sentence, summary_rows
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.origin import came_about
+from cmm_uq.documents.outcome import Outcome
 from cmm_uq.documents.plots import curve_with_band, length_plot
 from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Diagnosed
@@ -182,3 +183,11 @@ def _rivals(found: Diagnosed) -> Table:
     rows = tuple((name, probability(p)) for name, p in found.diagnosis.rivals)
     heads = (Column("Explanation", numeric=False), Column("Probability"))
     return Table("Model comparison: one explanation alone", heads, rows, ("Nothing missing has the rest.",))
+
+
+def diagnosed_outcome(found: Diagnosed) -> Outcome:
+    """What there is to write of a diagnosis."""
+    rows = summary_rows(found.diagnosis.verdict, found.diagnosis.p_value, lines(found), found.findings)
+    document = diagnosis_document(found)
+    consistent = found.diagnosis.verdict == "consistent"
+    return Outcome(found, document, diagnosis_results(found), rows, document.warnings, conforming=consistent)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.wording import expanded, probability
+from cmm_uq.screening.finding import Finding
 
 _SAME = 0.01
 """Difference of two probabilities that is not worth telling."""
@@ -64,3 +67,11 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[str, ...
     if noise.heavy_tails:
         texts.append("The scatter has heavier tails than a normal distribution.")
     return tuple(texts)
+
+
+def summary_rows(
+    verdict: str, p_value: float, told: Sequence[str], findings: Iterable[Finding]
+) -> tuple[tuple[str], ...]:
+    """Verdict and everything that follows from it, and what the screening found, for the end of a command."""
+    first = f"{verdict.upper()} (p = {p_value:.2g}). {told[0]}"
+    return ((first,), *((text,) for text in (*told[1:], *(f"{f.why[0].upper()}{f.why[1:]}." for f in findings))))

@@ -11,7 +11,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import FILE_NAME
 
 _WRITTEN = re.compile(
-    r"job\.toml|results\.json|manifest\.json|truth\.toml|compensation\.json|plan\.csv|(certificate|diagnosis|plan).*\.(html|pdf)"
+    r"job\.toml|results\.json|manifest\.json|truth\.toml|compensation\.json|(certificate|diagnosis|plan).*\.(html|pdf)"
     r"|budget\..*|\.unfinished-.*",
     re.IGNORECASE,
 )

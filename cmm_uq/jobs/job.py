@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
 
 from cmm_uq.errors import suggestion
-from cmm_uq.files.limits import CONFORMITY, EFFECTS, LISTED, MAPS
+from cmm_uq.files.limits import CONFORMITY, EFFECTS, MAPS
 from cmm_uq.jobs.file_names import device_name
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
@@ -20,9 +21,7 @@ from cmm_uq.jobs.table import (
     Length,
     Limit,
     Names,
-    Number,
     Numbers,
-    Position,
     Range,
     Table,
     Temperature,
@@ -31,15 +30,6 @@ from cmm_uq.jobs.table import (
     at_least,
 )
 from cmm_uq.points import Points
-
-ArtefactKind = Literal[
-    "ballbar", "bryan", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere", "plane", "shift", "error_map"
-]
-SHIFT, ERROR_MAP = "shift", "error_map"
-"""Kinds that are no points of an artefact in the volume: readings along one axis, and the machine's error maps."""
-
-WITH_REFERENCES = ("step_gauge", "gauge_blocks", "plate")
-"""Kinds whose certified figures stand in the recording; their ``u_um`` may stand without ``length_mm``."""
 
 Standard = Literal["ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617"]
 
@@ -51,6 +41,9 @@ CHARACTERISTICS: Mapping[Standard, str] = {
 
 LENGTH_STANDARDS: tuple[Standard, ...] = ("ISO 10360-2:2009", "VDI/VDE 2617")
 """Standards that compare with calibrated lengths."""
+
+FORM_STANDARD: Standard = "ISO 10360-5:2010"
+"""Compares the form of a calibrated sphere."""
 
 SHORTEST_TRAVEL_MM = 1e-3
 """Positions are divided by the travel."""
@@ -176,82 +169,76 @@ class Traceability(Table):
     due: dt.date | None = None
 
 
-class KnownLength(Table):
-    """A known length between two points of a shifted artefact."""
-
-    from_point: Annotated[Number, Field(alias="from")]
-    to_point: Annotated[Number, Field(alias="to")]
-    length_mm: Length
-    u_um: Uncertainty
-
-
 class ArtefactFacts(Table):
-    """``[artefact]``; without ``length_mm`` it is uncalibrated, unless its certified figures stand in the recording.
+    """``[artefact]``: what every kind of measurement has; a kind with more keys has a table of its own.
 
-    ``nominal`` says that those figures are nominal only: their common scale then stays free. ``form_um`` is the form
-    deviation of a test sphere by its certificate. ``blocks_mm`` (1–2, 2–3, 3–1) and the diameters ``cylinders_mm`` (1, 2, 3)
-    make a triangle, with the standard uncertainty of each. ``probe_offset_mm`` is the effective radius by which a probed
-    plane is moved to the surface. A shifted artefact lies along an ``axis`` or, a plate, in a ``plane``.
+    Without ``length_mm`` the artefact is uncalibrated, unless its certified figures stand in the recording.
+
+    Attributes
+    ----------
+    with_references : whether they do; its ``u_um`` may then stand without ``length_mm``.
+    with_recording : whether there is one; otherwise what ``[machine]`` names is measured.
+    with_earlier : whether two recordings of it at two dates can be compared.
+    form_key : key of the form deviation by its certificate, for a kind that has a form to be compared.
     """
 
-    kind: ArtefactKind
+    with_references: ClassVar[bool] = False
+    with_recording: ClassVar[bool] = True
+    with_earlier: ClassVar[bool] = False
+    form_key: ClassVar[str | None] = None
+
+    kind: str
     name: str = ""
     serial: str = ""
     length_mm: Length | None = None
     u_um: Uncertainty | None = None
-    nominal: bool = False
-    form_um: Uncertainty | None = None
-    blocks_mm: Triple | None = None
-    u_blocks_um: Uncertainty = 0.0
-    cylinders_mm: Triple | None = None
-    u_cylinders_um: Uncertainty = 0.0
-    probe_offset_mm: Length | None = None
-    u_probe_offset_um: Uncertainty = 0.0
     cte_per_k: AnyFloat = 0.0
     certificate: Traceability | None = None
-    axis: Literal["x", "y", "z"] | None = None
-    plane: Literal["xy", "yz", "zx"] | None = None
-    shifts_mm: Annotated[list[Position], Field(max_length=LISTED.most)] = []
-    u_shift_um: Uncertainty = 0.0
-    known: KnownLength | None = None
 
     @model_validator(mode="after")
     def _uncertainty_of_something(self) -> Self:
-        if self.u_um is not None and self.length_mm is None and self.kind not in WITH_REFERENCES:
+        if self.u_um is not None and self.length_mm is None and not self.with_references:
             raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
-        if self.nominal and (self.u_um is not None or self.length_mm is not None or self.kind not in WITH_REFERENCES):
-            raise ValueError(
-                "nominal = true says that the recording's references are not certified: leave out length_mm and u_um; "
-                f"only {', '.join(WITH_REFERENCES)} have references"
-            )
-        given = self.blocks_mm is not None, self.cylinders_mm is not None
-        if given != (self.kind == "triangle",) * 2:
-            raise ValueError(
-                "a triangle is made of blocks_mm = [1–2, 2–3, 3–1] and cylinders_mm = [1, 2, 3], and nothing else is: give "
-                'both for kind = "triangle", neither for another kind'
-            )
-        if self.plane is not None and (
-            self.kind != "shift" or self.axis is not None or self.shifts_mm or self.u_shift_um
-        ):
-            raise ValueError(
-                "plane belongs to a plate that is shifted and turned: its placings are found from the readings; leave out "
-                "axis, shifts_mm and u_shift_um, or leave out plane"
-            )
-        if self.probe_offset_mm is not None and self.kind != "plane":
-            raise ValueError(f"probe_offset_mm moves a probed plane, not a {self.kind}: leave it out")
-        if self.form_um is not None and self.kind != "sphere":
-            raise ValueError(f"form_um is the form deviation of a test sphere, not of a {self.kind}: leave it out")
         if abs(self.cte_per_k) > 1e-3:
             raise ValueError(
                 f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
             )
         return self
 
+    @property
+    def certified(self) -> bool:
+        """Whether lengths can be compared with it."""
+        return self.length_mm is not None
+
+
+class ReferencedFacts(ArtefactFacts):
+    """``[artefact]`` of a kind whose certified figures stand in the recording.
+
+    ``nominal`` says that those figures are nominal only: their common scale then stays free.
+    """
+
+    with_references: ClassVar[bool] = True
+
+    nominal: bool = False
+
+    @model_validator(mode="after")
+    def _nominal_or_certified(self) -> Self:
+        if self.nominal and (self.u_um is not None or self.length_mm is not None):
+            raise ValueError(
+                "nominal = true says that the recording's references are not certified: leave out length_mm and u_um"
+            )
+        return self
+
+    @property
+    def certified(self) -> bool:
+        """Whether lengths can be compared with it."""
+        return not self.nominal
+
 
 class RecordingFacts(Table):
     """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
 
-    ``earlier`` names a recording of the same plate in the same placings at an earlier date: what is estimated then is what
+    ``earlier`` names a recording of the same artefact in the same placings at an earlier date: what is estimated then is what
     changed between.
     """
 
@@ -331,10 +318,10 @@ class ConformityFacts(Table):
         """The key of ``[artefact]`` whose uncertainty the rule needs and does not have; ``None`` when nothing is missing."""
         if self.rule == "simple":
             return None
-        if self.standard == "ISO 10360-5:2010":
-            return None if artefact.kind != "sphere" or artefact.form_um else "form_um"
-        certified = artefact.length_mm is not None or (artefact.kind in WITH_REFERENCES and not artefact.nominal)
-        return "u_um" if self.standard in LENGTH_STANDARDS and certified and not artefact.u_um else None
+        if self.standard in LENGTH_STANDARDS:
+            return "u_um" if artefact.certified and not artefact.u_um else None
+        key = artefact.form_key if self.standard == FORM_STANDARD else None
+        return key if key is not None and not getattr(artefact, key) else None
 
 
 def needed(key: str, wish: ConformityFacts) -> tuple[str, str]:
@@ -347,7 +334,7 @@ def needed(key: str, wish: ConformityFacts) -> tuple[str, str]:
 
 
 class JobFile(Table):
-    """All of job.toml. A job whose recording are the machine's error maps has no ``[recording]``."""
+    """All of job.toml. A job of a kind without a recording has no ``[recording]``."""
 
     job: JobFacts
     laboratory: Laboratory = Laboratory()
@@ -372,11 +359,21 @@ class JobFile(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _maps_are_the_recording(cls, data: Any) -> Any:
-        artefact = data.get("artefact") if isinstance(data, dict) else None
-        if isinstance(artefact, dict) and artefact.get("kind") == ERROR_MAP:
+    def _without_recording(cls, data: Any) -> Any:
+        table = cls.model_fields["artefact"].annotation
+        if isinstance(data, dict) and not getattr(table, "with_recording", True):
             return {"recording": {"file": ""}, **data}
         return data
+
+
+Tables = Callable[[str], type[ArtefactFacts] | None]
+"""The table of ``[artefact]`` of a kind, by its name; ``None`` where there is no such kind."""
+
+
+@cache
+def job_file_of(table: type[ArtefactFacts]) -> type[JobFile]:
+    """All of job.toml, with the table of one kind in it."""
+    return create_model("JobFile", __base__=JobFile, artefact=(table, ...))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,6 @@ from pydantic import Field, model_validator
 from cmm_uq.files.limits import COLUMNS, LISTED
 from cmm_uq.jobs.table import AnyFloat, Column, Duration, Length, Names, Range, Table, at_least
 
-Ready = Literal[
-    "ASME B89.4.1", "ISO 10360-2", "ISO 10360-5", "plate placings", "triangle placings", "surface plate", "swept bar",
-    "shift series",
-]  # fmt: skip
 Criterion = Literal["separation", "D", "A", "worst"]
 
 _SHORTEST = 1e-6
@@ -50,7 +46,7 @@ class PlanFacts(Table):
     of ``number`` placings, or of ``more`` beside those that there are.
     """
 
-    ready: Ready | None = None
+    ready: str | None = None
     volume_mm: dict[Literal["x", "y", "z"], Range] = {}
     margin_mm: Annotated[float, Field(ge=0, le=1e6)] = 10.0
     fixtures: FixtureFacts = FixtureFacts()

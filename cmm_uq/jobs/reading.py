@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import create_model
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.file_names import check_distinct, inside
-from cmm_uq.jobs.job import ERROR_MAP, Job, JobFile, MachineFacts
+from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, MachineFacts, Tables, job_file_of
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.toml_file import checked
@@ -22,12 +24,13 @@ from cmm_uq.points import AXES, Machine, Points
 from cmm_uq.writing import finish_interrupted
 
 
-def read_job(folder: Path, *, recorded: bool = True) -> Job:
+def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *, recorded: bool = True) -> Job:
     """Read and check a job.
 
     Parameters
     ----------
     folder : the job folder, or its job.toml.
+    tables, known : of the kinds that may be read, and their names.
     recorded : whether the recording must be there; otherwise a job still to be measured has no points.
 
     Raises
@@ -38,20 +41,21 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
     folder = path.parent
     finish_interrupted(folder)
     content = content_of(path, JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
-    facts = checked(content, path, JobFile)
+    facts = checked(content, path, lambda data: _model_for(data, tables, known))
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
-    if earlier is not None and facts.artefact.kind != "plate":
-        raise CmmUqError(f"earlier compares two recordings of a plate, not of a {facts.artefact.kind}",
+    if earlier is not None and not facts.artefact.with_earlier:
+        raise CmmUqError(f"earlier compares two recordings at two dates, which a job of kind {facts.artefact.kind!r} has not",
                          where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
     machine = _machine(facts.machine)
     maps = [error_map.file for error_map in facts.machine.error_map]
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
     check_distinct([*recordings, *maps], str(path))
-    if facts.artefact.kind == ERROR_MAP:
+    if not facts.artefact.with_recording:
         if facts.recording.file:
-            raise CmmUqError("error maps are the recording themselves", where=f"{path}: [recording] file",
-                             fix="Leave [recording] out, and name the maps under [machine] error_map")  # fmt: skip
+            raise CmmUqError(f"a job of kind {facts.artefact.kind!r} has no recording of points",
+                             where=f"{path}: [recording] file",
+                             fix="Leave [recording] out, and name what is measured under [machine]")  # fmt: skip
         return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path, MAP_BYTES))
     if not recorded and not os.path.lexists(inside(folder, facts.recording.file, str(path))):
         return Job(folder, facts, _no_points(machine), inputs)
@@ -67,6 +71,19 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
         then = read_recording(inputs[earlier], str(folder / earlier), machine)
         points = against_earlier(points, then, facts.artefact.cte_per_k, where)
     return Job(folder, facts, points, inputs, altered(derived, inputs), is_planned(inputs[facts.recording.file]))
+
+
+def _model_for(data: dict[str, Any], tables: Tables, known: Callable[[], Sequence[str]]) -> type[JobFile]:
+    """What a job.toml must say for the kind that it names."""
+    artefact = data.get("artefact")
+    kind = artefact.get("kind") if isinstance(artefact, dict) else None
+    if not isinstance(kind, str):
+        return JobFile
+    table = tables(kind)
+    if table is None:
+        names: Any = Literal[tuple(known())]
+        table = create_model("ArtefactFacts", __base__=ArtefactFacts, kind=(names, ...))
+    return job_file_of(table)
 
 
 def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -20,14 +21,14 @@ _SHOWN = 60
 """Characters of a key or a value in a message."""
 
 
-def checked(content: bytes, path: Path, model: type[Facts]) -> Facts:
+def checked(content: bytes, path: Path, model: type[Facts] | Callable[[dict[str, Any]], type[Facts]]) -> Facts:
     """The contents of a TOML file as a checked object.
 
     Parameters
     ----------
     content : the file's bytes, UTF-8.
     path : of the file, for messages.
-    model : what it must say.
+    model : what it must say, or what that is for a file that says this.
 
     Raises
     ------
@@ -39,10 +40,11 @@ def checked(content: bytes, path: Path, model: type[Facts]) -> Facts:
     except tomllib.TOMLDecodeError as error:
         raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
                          fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip
+    wanted = cast("type[Facts]", model if isinstance(model, type) else model(data))
     try:
-        return model.model_validate(data)
+        return wanted.model_validate(data)
     except ValidationError as error:
-        raise _located(error.errors(include_url=False)[0], text, path, model) from None
+        raise _located(error.errors(include_url=False)[0], text, path, wanted) from None
 
 
 def _located(error: ErrorDetails, text: str, path: Path, model: type[BaseModel]) -> CmmUqError:

@@ -34,6 +34,27 @@ class Indications:
     rows: Ints
 
 
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """Form errors of what was probed all around, one for each (measurement, repeat).
+
+    Parameters
+    ----------
+    measurement, repeat : (q,).
+    count : (q,) points of each.
+    form : (q,) range of the distances from the least-squares feature, mm.
+    certified : form deviation of the artefact by its certificate, mm; 0 when it is not given.
+    directions : (n, 3) outward direction of each point from the middle of its feature.
+    """
+
+    measurement: Ints
+    repeat: Ints
+    count: Ints
+    form: Floats
+    certified: float
+    directions: Floats
+
+
 @dataclass(frozen=True)
 class Size:
     """A dimension of the artefact at 20 °C, itself to be estimated.
@@ -99,6 +120,15 @@ class Artefact(ABC):
 
     def indications(self) -> Indications | None:
         """Errors of indication of calibrated lengths; ``None`` without a calibration."""
+        return None
+
+    def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
+        """A point on the line of each length between two points, and the line's direction, (m, 3) each."""
+        first, last = self.points.xyz[rows[:, 0]], self.points.xyz[rows[:, 1]]
+        return 0.5 * (first + last), last - first
+
+    def forms(self) -> Forms | None:
+        """Form errors of a test sphere; ``None`` when they have no meaning here."""
         return None
 
     def placing(self, xyz: Floats) -> Floats:

@@ -3,68 +3,113 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
-from cmm_uq.artefacts.triangle_placings import PLANES as TRIANGLE_PLANES
-from cmm_uq.artefacts.triangle_placings import Placing as TrianglePlacing
-from cmm_uq.artefacts.triangle_placings import placed_triangle
-from cmm_uq.artefacts.triangle_standard import TriangleStandard
 from cmm_uq.errors import CmmUqError
-from cmm_uq.planning import patterns
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.planning.directions import PLANES, attitudes_of_lines
-from cmm_uq.planning.placing import Pattern, Placing, split
-from cmm_uq.planning.setting import Setting
-from cmm_uq.planning.swept import swept
+from cmm_uq.planning.placing import Pattern, Placing
+from cmm_uq.planning.setting import Setting, Start
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Floats
 
-LINES = ("ballbar", "step_gauge", "gauge_blocks")
-SURFACES = ("plate", "plane")
-
-_THIRDS = (0.0, 0.5, 1.0)
+THIRDS = (0.0, 0.5, 1.0)
 _FIFTHS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 Shape = Callable[[Floats], Pattern | None]
 """The pattern for an attitude; ``None`` where it does not fit."""
 
+Attitudes = Callable[[Volume], list[tuple[str, Floats]]]
+"""Ways of setting up an artefact that the fixtures of a volume allow, by their words."""
 
-def candidates(setting: Setting, centre: Floats | None = None) -> tuple[Placing, ...]:
-    """Placings that the volume and the fixtures allow, at most as many as the plan says.
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """A recorded artefact, that stands by itself in each placing, set up in other places.
 
     Parameters
     ----------
-    centre : (3,) of the fixed ball of a swept bar, in scale readings.
+    attitudes : in which it is set up, beside that of the recording.
+    """
+
+    attitudes: Attitudes
+
+    def __call__(self, artefact: Artefact, volume: Volume, count: int) -> tuple[Placing, ...]:
+        """The first recorded placing, once, in many places and attitudes.
+
+        Raises
+        ------
+        CmmUqError : there is none.
+        """
+        first = artefact.points.select(artefact.points.measurement == artefact.measurement[0])
+        pattern, attitude, _ = Pattern.of_recording(first.select(first.repeat == first.repeat.min()))
+        return self.like(pattern, attitude, volume, count)
+
+    def like(self, pattern: Pattern, recorded: Floats, volume: Volume, count: int) -> tuple[Placing, ...]:
+        """A pattern in other places; first of all in the recorded attitude (3, 3).
+
+        Raises
+        ------
+        CmmUqError : there is none.
+        """
+        ways = [("as recorded", recorded), *self.attitudes(volume)]
+        return thinned(everywhere(volume, ways, lambda _: pattern), count, volume)
+
+
+@dataclass(frozen=True)
+class Everywhere:
+    """Candidates of an artefact that stands by itself in each placing.
+
+    Parameters
+    ----------
+    attitudes : in which it is set up.
+    shape : what is measured of it in one placing.
+    elsewhere : of a recorded one.
+    """
+
+    attitudes: Attitudes
+    shape: Callable[[Setting], Shape]
+    elsewhere: Elsewhere
+
+    def candidates(self, setting: Setting, start: Start | None) -> tuple[Placing, ...]:
+        """In many places: as the plan says, or as it was recorded.
+
+        Raises
+        ------
+        CmmUqError : there is none.
+        """
+        plan, volume = setting.plan, setting.volume
+        if start is not None and start.again is not None:
+            pattern, attitude, _ = Pattern.of_recording(start.again.points)
+            return self.elsewhere.like(pattern.once().repeated(plan.repeats), attitude, volume, plan.candidates)
+        return thinned(everywhere(volume, self.attitudes(volume), self.shape(setting)), plan.candidates, volume)
+
+
+def candidates(setting: Setting, start: Start | None = None) -> tuple[Placing, ...]:
+    """Placings that the volume and the fixtures allow, at most as many as the plan says.
 
     Raises
     ------
     CmmUqError : there is none.
     """
-    kind, plan, volume = setting.artefact.kind, setting.plan, setting.volume
-    if kind == "shift":
-        raise CmmUqError("a shift job has its series, and no other placings to choose from",
-                         where="job.toml [plan] criterion", fix="Leave it out; shifts_mm says what is measured")  # fmt: skip
-    if kind == "bryan":
-        return swept(volume, patterns.length_of(setting.artefact, plan), plan.candidates, plan.repeats, centre)
-    if kind == "triangle":
-        return thinned(_triangles(setting), plan.candidates, volume)
-    return thinned(_everywhere(volume, attitudes(kind, volume), _shape(setting)), plan.candidates, volume)
+    return setting.planning.candidates(setting, start)
 
 
-def like(pattern: Pattern, kind: str, volume: Volume, recorded: Floats, count: int) -> tuple[Placing, ...]:
-    """The same pattern elsewhere: attitudes of its kind and, first of all, the recorded one (3, 3)."""
-    ways = [("as recorded", recorded)] + ([] if kind == "sphere" else attitudes(kind, volume))
-    return thinned(_everywhere(volume, ways, lambda _: pattern), count, volume)
+def along_lines(volume: Volume) -> list[tuple[str, Floats]]:
+    """Attitudes of a bar or gauge, held along its length."""
+    return [(title, way) for title, way in attitudes_of_lines(volume.size) if volume.allows(way[:, 0])]
 
 
-def attitudes(kind: str, volume: Volume) -> list[tuple[str, Floats]]:
-    """Ways of setting up an artefact of a kind, those that fixtures allow; a plate is held by its normal."""
-    if kind in LINES:
-        return [(title, way) for title, way in attitudes_of_lines(volume.size) if volume.allows(way[:, 0])]
-    if kind in (*SURFACES, "triangle"):
-        return [(title, way) for title, way in PLANES if volume.allows(way[:, 2])]
+def across_planes(volume: Volume) -> list[tuple[str, Floats]]:
+    """Attitudes of a plate, held by its normal."""
+    return [(title, way) for title, way in PLANES if volume.allows(way[:, 2])]
+
+
+def upright(volume: Volume) -> list[tuple[str, Floats]]:
+    """The one attitude of what looks alike from all sides."""
     return [("upright", np.eye(3))]
 
 
@@ -88,36 +133,9 @@ def thinned(placings: Iterator[Placing], count: int, volume: Volume) -> tuple[Pl
     return tuple(found[i] for i in np.unique(np.linspace(0, len(found) - 1, count).round().astype(int)))
 
 
-def _shape(setting: Setting) -> Shape:
-    facts, plan, volume = setting.artefact, setting.plan, setting.volume
-    if facts.kind in ("step_gauge", "gauge_blocks"):
-        lengths = patterns.distances(facts, plan)
-
-        def gauge(attitude: Floats) -> Pattern | None:
-            fitting = patterns.five_of(lengths, volume.chord(attitude[:, 0]))
-            if not len(fitting):
-                return None
-            return (
-                patterns.gauge(fitting, plan)
-                if facts.kind == "step_gauge"
-                else patterns.block(float(fitting[-1]), plan)
-            )
-
-        return gauge
-    if facts.kind == "ballbar":
-        pattern = patterns.ballbar(facts, plan)
-    elif facts.kind == "plate":
-        pattern = patterns.plate(facts, plan, float(volume.size.min()))
-    elif facts.kind == "plane":
-        pattern = patterns.surface(facts, plan, np.full(2, 0.5 * volume.size.min()))
-    else:
-        pattern = patterns.sphere(facts, plan)
-    return lambda _: pattern
-
-
-def _everywhere(volume: Volume, ways: Sequence[tuple[str, Floats]], shape: Shape) -> Iterator[Placing]:
+def everywhere(volume: Volume, ways: Sequence[tuple[str, Floats]], shape: Shape) -> Iterator[Placing]:
     """Every attitude in the corners, on the edges and in the middle of the room that it has."""
-    steps = _FIFTHS if len(ways) < 4 else _THIRDS
+    steps = _FIFTHS if len(ways) < 4 else THIRDS
     for title, attitude in ways:
         pattern = shape(attitude)
         room = None if pattern is None else volume.room(pattern.turned(attitude))
@@ -131,26 +149,3 @@ def _everywhere(volume: Volume, ways: Sequence[tuple[str, Floats]], shape: Shape
             if key not in seen:
                 seen.add(key)
                 yield pattern.placed(volume.machine, attitude, middle, title)
-
-
-def _triangles(setting: Setting) -> Iterator[Placing]:
-    """Every plane, place and tip."""
-    volume = setting.volume
-    sides = TriangleStandard.of(setting.artefact).sides
-    machine = replace(setting.machine, travel_mm=volume.box)
-    normals = {plane: np.eye(3)[3 - a - b] for plane, (a, b) in TRIANGLE_PLANES.items()}
-    for plane, normal in normals.items():
-        if not volume.allows(normal):
-            continue
-        tipped = [
-            TrianglePlacing(f"in the plane {plane}{', longer tip' if long else ''}", plane, (x, y, z), long)
-            for x, y, z in product(_THIRDS, repeat=3)
-            for long in (False, True)
-        ]
-        try:
-            points = placed_triangle(machine, sides, tipped, repeats=setting.plan.repeats)
-        except CmmUqError:  # it does not fit this plane
-            continue
-        for placing, some in zip(tipped, split(points), strict=True):
-            if volume.heights[0] <= some.middle[2] <= volume.heights[1]:
-                yield Placing(placing.title, replace(some.points, machine=setting.machine))

@@ -63,7 +63,7 @@ def told(setting: Setting, placings: Sequence[Placing], also: tuple[Effect, ...]
         placings, seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing,
         columns=plan.columns,
     )  # fmt: skip
-    if setting.artefact.kind == "bryan":
+    if setting.planning.shared:
         return shared(setting.model(points, also))
     numbers = np.unique(points.measurement)
     models = [setting.model(points.select(points.measurement == number), also) for number in numbers]
@@ -74,7 +74,7 @@ def told(setting: Setting, placings: Sequence[Placing], also: tuple[Effect, ...]
 def whole(setting: Setting, points: Points, also: tuple[Effect, ...] = ()) -> Floats:
     """Information (k, k) of a whole recording, in the rows of :func:`told`, without that of certificates."""
     model = setting.model(points, also)
-    if setting.artefact.kind == "bryan":
+    if setting.planning.shared:
         return np.asarray(shared(model).each.sum(axis=0), dtype=np.float64)
     return gram(model, np.array([u.prior_mean for u in model.unknowns]))
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import WITH_REFERENCES, ArtefactFacts, Job
+from cmm_uq.jobs.job import ArtefactFacts, Job
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.kind import Kind, Observe
 from cmm_uq.physics.catalogue import effects, every
 from cmm_uq.physics.effect import CONTRACT, Effect
+from cmm_uq.planning.placing import Placing
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Machine, Points
 from cmm_uq.units import MICROMETRE
@@ -20,12 +23,47 @@ ASSUMED_NOISE_UM = 1.0
 
 
 @dataclass(frozen=True, eq=False)
+class Start:
+    """What there is before better placings are searched for.
+
+    Parameters
+    ----------
+    artefact : at the placings of a recording or of a ready plan.
+    again : the first placing of the recording, to be set up elsewhere; ``None`` without a recording.
+    """
+
+    artefact: Artefact
+    again: Placing | None
+
+
+@dataclass(frozen=True)
+class Planning:
+    """What a kind of measurement offers to planning.
+
+    Parameters
+    ----------
+    ready : plans by name, the usual one first.
+    candidates : placings that volume and fixtures allow, at most as many as the plan says.
+    elsewhere : a recorded artefact in other places and attitudes, once in each, at most so many.
+    shared : whether the freedoms of its placing are common to all measurements, so that their information does not add.
+    free : what placings leave open, in words, of a kind that names no effects; ``(setting, points, where)``.
+    """
+
+    ready: Mapping[str, Callable[[Setting], tuple[Placing, ...]]]
+    candidates: Callable[[Setting, Start | None], tuple[Placing, ...]]
+    elsewhere: Callable[[Artefact, Volume, int], tuple[Placing, ...]] | None = None
+    shared: bool = False
+    free: Callable[[Setting, Points, str], tuple[str, ...]] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Setting:
     """An artefact, a plan's wishes, and the room for it.
 
     Parameters
     ----------
     artefact : as the job describes it.
+    observe, planning : makes an artefact of that and of points; what its kind offers here.
     plan : ``[plan]``.
     volume : room.
     named : effects that the job's model names.
@@ -34,6 +72,8 @@ class Setting:
     """
 
     artefact: ArtefactFacts
+    observe: Observe | None
+    planning: Planning
     plan: PlanFacts
     volume: Volume
     named: tuple[Effect, ...]
@@ -41,21 +81,23 @@ class Setting:
     stated: float | None = None
 
     @classmethod
-    def of(cls, job: Job) -> Setting:
-        """What a job says.
+    def of(cls, job: Job, kind: Kind) -> Setting:
+        """What a job says, which is of this kind.
 
         Raises
         ------
-        CmmUqError : no effect is named, or one is unknown; the volume is not known.
+        CmmUqError : the kind cannot be planned; no effect is named, or one is unknown; the volume is not known.
         """
         facts, plan = job.facts, job.facts.plan
-        if not facts.model.effects and facts.artefact.kind != "shift":
+        planning = kind.needs("plan", Planning, "planned")
+        observe = kind.observing("planned") if planning.free is None else None
+        if not facts.model.effects and planning.free is None:
             raise CmmUqError("no effect is named, so there is nothing to determine", where="job.toml [model] effects",
                              fix="Name the error factors that the measurement shall determine")  # fmt: skip
         recorded = job.points.readings if len(job.points) else None
         stated = facts.recording.u_coordinate_um
         return cls(
-            facts.artefact, plan, Volume.of(job.points.machine, plan, recorded),
+            facts.artefact, observe, planning, plan, Volume.of(job.points.machine, plan, recorded),
             effects(facts.model.effects, where="job.toml [model] effects"),
             (stated or ASSUMED_NOISE_UM) * MICROMETRE, None if stated is None else stated * MICROMETRE,
         )  # fmt: skip
@@ -70,14 +112,20 @@ class Setting:
 
         Without it each placing would take the longest distance of its own for the one that the certificate speaks of.
         """
-        if self.artefact.kind not in WITH_REFERENCES or self.artefact.length_mm is not None:
+        if not self.artefact.with_references or self.artefact.length_mm is not None:
             return self
-        longest = artefact_of(self.artefact, points).sizes[0].nominal
+        longest = self.observed(points).sizes[0].nominal
         return replace(self, artefact=self.artefact.model_copy(update={"length_mm": longest}))
 
     def model(self, points: Points, also: tuple[Effect, ...] = ()) -> MeasurementModel:
         """The model that the job names, with further effects, of the artefact at these points."""
-        return MeasurementModel(artefact_of(self.artefact, points), (*self.named, *also), self.sigma)
+        return MeasurementModel(self.observed(points), (*self.named, *also), self.sigma)
+
+    def observed(self, points: Points) -> Artefact:
+        """The artefact at these points."""
+        if self.observe is None:
+            raise ValueError("a kind that names no effects has no artefact")
+        return self.observe(self.artefact, points)
 
     def rivals(self, points: Points) -> tuple[Effect, ...]:
         """Effects that the job does not name: those that the plan lists, else all of the first tier that could act here.

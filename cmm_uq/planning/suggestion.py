@@ -9,26 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 
-from cmm_uq.artefacts import artefact_of
-from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.diagnosis.comparison.explanations import shapes
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import WITH_REFERENCES, ArtefactFacts
+from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.model import MeasurementModel
-from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.kind import Observe, Observed
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import every
-from cmm_uq.planning.candidates import like
 from cmm_uq.planning.information import certified, gram, scales, shared
-from cmm_uq.planning.placing import Pattern, Placing, appended
+from cmm_uq.planning.placing import Placing, appended
 from cmm_uq.planning.separation import left_of
-from cmm_uq.planning.swept import swept
+from cmm_uq.planning.setting import Planning
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Floats
 
@@ -71,25 +69,35 @@ class _Information:
     prior: Floats
 
 
-def suggestions(diagnosis: Diagnosis, facts: ArtefactFacts, plan: PlanFacts | None = None) -> tuple[Suggestion, ...]:
+def suggestions(
+    diagnosis: Diagnosis,
+    facts: ArtefactFacts,
+    observe: Observe,
+    planning: Planning | None,
+    plan: PlanFacts | None = None,
+) -> tuple[Suggestion, ...]:
     """One placing for each pair that cannot be told apart, within the machine's travel or the recorded volume.
 
     Parameters
     ----------
     diagnosis : with groups of effects that look alike.
     facts : of the artefact.
+    observe : makes the artefact of facts and points.
+    planning : what its kind offers; without it nothing is suggested.
     plan : what the volume and the fixtures allow.
     """
     pairs = [pair for group in diagnosis.indistinguishable for pair in combinations(group[:3], 2)]
-    if not pairs:
+    if not pairs or planning is None or planning.elsewhere is None:
         return ()
     model = _with_all(diagnosis.after, sorted({name for pair in pairs for name in pair}))
     artefact = diagnosis.after.artefact
-    if facts.kind in WITH_REFERENCES:  # one placing alone does not show how long the artefact is
+    if facts.with_references:  # one placing alone does not show how long the artefact is
         facts = facts.model_copy(update={"length_mm": artefact.sizes[0].nominal})
     try:
-        places = _candidates(artefact, plan or PlanFacts(margin_mm=0.0))
-        known = _information(diagnosis.after, model, facts, places)
+        points = artefact.points
+        volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.readings)
+        places = planning.elsewhere(artefact, volume, _CANDIDATES)
+        known = _information(diagnosis.after, model, partial(observe, facts), places, shared_freedoms=planning.shared)
     except CmmUqError:  # nowhere else to put it
         return ()
     found = [_best(diagnosis.after, known, places, artefact.title.lower(), pair) for pair in pairs]
@@ -106,40 +114,27 @@ def _with_all(after: MeasurementModel, names: Sequence[str]) -> MeasurementModel
     return replace(after, effects=(*others, *(every()[name] for name in names)), shapes=shape)
 
 
-def _candidates(artefact: Artefact, plan: PlanFacts) -> tuple[Placing, ...]:
-    """The first recorded placing, once, in many places and attitudes."""
-    points = artefact.points
-    volume = Volume.of(points.machine, plan, points.readings)
-    if isinstance(artefact, Bryan):
-        length = artefact.sizes[0].nominal
-        centre = artefact.centres(points.readings, length)[0]
-        places = swept(volume, length, _CANDIDATES, 1, centre)
-        means = {name: np.full(1, float(values.mean())) for name, values in points.columns.items()}
-        return tuple(replace(place, points=replace(place.points, columns=means)) for place in places)
-    first = points.select(points.measurement == artefact.measurement[0])
-    once = first.select(first.repeat == first.repeat.min())
-    pattern, attitude, _ = Pattern.of_recording(once)
-    return like(pattern, artefact.kind, volume, attitude, _CANDIDATES)
-
-
 def _information(
-    after: MeasurementModel, model: MeasurementModel, facts: ArtefactFacts, places: Sequence[Placing]
+    after: MeasurementModel,
+    model: MeasurementModel,
+    observe: Observed,
+    places: Sequence[Placing],
+    *,
+    shared_freedoms: bool,
 ) -> _Information:
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     names = tuple(unknown.key[0] for unknown in model.unknowns)
     fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
-    if isinstance(model.artefact, Bryan):
+    if shared_freedoms:
         every = appended(model.artefact.points, places)
-        whole = shared(MeasurementModel(artefact_of(facts, every), model.effects, model.sigma, shapes=model.shapes))
+        whole = shared(MeasurementModel(observe(every), model.effects, model.sigma, shapes=model.shapes))
         count = len(whole.each) - len(places)
         more = len(whole.prior) - len(names)
         return _Information(
             (*names, *[ARTEFACT] * more), fitted, whole.each[:count].sum(axis=0), whole.each[count:], whole.prior
         )
     each = [
-        gram(
-            MeasurementModel(artefact_of(facts, place.points), model.effects, model.sigma, shapes=model.shapes), values
-        )
+        gram(MeasurementModel(observe(place.points), model.effects, model.sigma, shapes=model.shapes), values)
         for place in places
     ]
     return _Information(names, fitted, gram(model, values), np.stack(each), certified(model.unknowns))

@@ -16,8 +16,6 @@ Rows = NDArray[np.bool_]
 
 SCALES = tuple(f"temp_{a}_c" for a in AXES)
 TEMPERATURES = (*SCALES, "temp_artefact_c", "temp_table_top_c", "temp_table_bottom_c", "temp_air_c")
-BALLS = ("ballbar", "plate", "triangle", "bryan")
-"""Kinds whose points are centres of balls or cylinders, each of several touches."""
 
 LONGEST_PAUSE, SHORTEST_BALL = 6 * 3600.0, 0.6
 """s between points of one placing that no operator waits, and that no machine probes a ball in."""
@@ -71,15 +69,15 @@ SENSORS = (*BOUNDS, "time_s")
 """Columns that are left out where they cannot be trusted."""
 
 
-def column_findings(points: Points, kind: str) -> list[Finding]:
+def column_findings(points: Points, *, balls: bool) -> list[Finding]:
     """All that is odd beside the coordinates, a finding a column.
 
     Parameters
     ----------
     points : the recording.
-    kind : of artefact.
+    balls : whether its points are centres of balls or cylinders, each of several touches.
     """
-    found = [*_impossible(points), *_fraction(points), *_time(points, kind), *_stuck(points), *_slipped(points)]
+    found = [*_impossible(points), *_fraction(points), *_time(points, balls), *_stuck(points), *_slipped(points)]
     return [*found, *_approach(points)]
 
 
@@ -106,7 +104,7 @@ def _fraction(points: Points) -> Iterator[Finding]:
         yield finding("unit", points, every, why, "humidity_pct")
 
 
-def _time(points: Points, kind: str) -> Iterator[Finding]:
+def _time(points: Points, balls: bool) -> Iterator[Finding]:
     """A clock in other units, seen by the time from point to point of one placing; single moments out of their order."""
     if "time_s" not in points.columns:
         return
@@ -117,7 +115,7 @@ def _time(points: Points, kind: str) -> Iterator[Finding]:
     if usual > LONGEST_PAUSE:
         yield finding("unit", points, every, f"time_s: {usual:.3g} s from point to point of one placing is longer than "
                       "anybody waits; it looks like milliseconds: divide by 1000", "time_s")  # fmt: skip
-    elif kind in BALLS and 0 < usual < SHORTEST_BALL:
+    elif balls and 0 < usual < SHORTEST_BALL:
         yield finding("unit", points, every, f"time_s: {usual:.3g} s from ball to ball is shorter than a machine can "
                       "probe one; it looks like minutes or hours: give seconds", "time_s")  # fmt: skip
     else:

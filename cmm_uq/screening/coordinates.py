@@ -10,9 +10,8 @@ from collections.abc import Collection
 
 import numpy as np
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.kind import Observed
 from cmm_uq.points import AXES, Points
 from cmm_uq.screening.changes import Change, changes, changes_of_blocks
 from cmm_uq.screening.finding import Finding, at_lines, finding
@@ -26,14 +25,15 @@ _ABSURD = (1.0, 2e4)
 
 
 def coordinate_findings(
-    points: Points, facts: ArtefactFacts, shape: Shape, set_aside: Collection[int], where: str
+    points: Points, shape: Shape, observe: Observed, set_aside: Collection[int], where: str
 ) -> list[Finding]:
     """Damaged coordinates, each with the rows to leave out.
 
     Parameters
     ----------
     points : the recording.
-    facts, shape : what the job says of its artefact, and what that asks of the points.
+    shape : what the artefact asks of the points.
+    observe : makes the artefact of points, in whose own checks another one shows.
     set_aside : measurements that the job leaves out of the estimates; however many of them are damaged is no matter.
     where : the recording's name, for messages.
 
@@ -47,7 +47,7 @@ def coordinate_findings(
     if search.bad.sum() >= _SEVERAL:
         _refuse_whole(search, where)
     if 2 * int(search.bad[counted].sum()) > counted.sum():
-        _refuse_another(search, facts, where)
+        _refuse_another(search, observe, where)
     found = search.findings() if search.bad.any() else []
     lost = {row for f in found for row in f.rows if counted[row]}
     if len(lost) > max(MOST * len(points), 2):
@@ -96,9 +96,9 @@ def _astray(points: Points) -> float:
     return float(np.any(outside_travel(points), axis=1).mean())
 
 
-def _refuse_another(search: Search, facts: ArtefactFacts, where: str) -> None:
+def _refuse_another(search: Search, observe: Observed, where: str) -> None:
     """Refuse a recording of another artefact, or of none: in the words of the artefact's own checks where these see it."""
-    artefact_of(facts, search.points, where=where)
+    observe(search.points)
     raise CmmUqError(
         _missed(search), where=where, fix="Check [artefact] in job.toml, and the order of rows and columns"
     )

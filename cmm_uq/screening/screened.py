@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,13 @@ from scipy import linalg, special
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.kind import Observe
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.screening.columns import SENSORS, about_whole_column, column_findings
 from cmm_uq.screening.coordinates import coordinate_findings
 from cmm_uq.screening.finding import Finding, finding, span
 from cmm_uq.screening.search import outside_travel
-from cmm_uq.screening.shape import shape_of
+from cmm_uq.screening.shape import Screening
 
 __all__ = ["Finding", "Screened", "gross_outliers", "impossible_values", "repeated_figures", "screen", "screened"]
 
@@ -48,14 +50,17 @@ class Screened:
 
 
 def screened(
-    points: Points, facts: ArtefactFacts, *, needed: Collection[str], set_aside: Collection[int], where: str
-) -> Screened:
+    points: Points, facts: ArtefactFacts, screening: Screening | None, observe: Observe, *, needed: Collection[str],
+    set_aside: Collection[int], where: str,
+) -> Screened:  # fmt: skip
     """A recording without what cannot be used, and all that is odd in it; before an artefact is made of it.
 
     Parameters
     ----------
     points : the recording as read.
     facts : what the job says of the artefact.
+    screening : what its kind asks of a recording; ``None`` when it asks nothing.
+    observe : makes the artefact of facts and points.
     needed : columns that the model uses.
     set_aside : measurements that the job leaves out of the estimates.
     where : the recording's name, for messages.
@@ -64,9 +69,11 @@ def screened(
     ------
     CmmUqError : a damage of the whole recording, of a whole column, or of one that the model uses.
     """
-    shape = shape_of(facts, points)
-    damaged = coordinate_findings(points, facts, shape, set_aside, where) if shape else []
-    odd = screen(points, needed=needed, set_aside=set_aside, where=where, kind=facts.kind)
+    shape = screening.shape_of(facts, points) if screening else None
+    made = partial(observe, facts, where=where)
+    damaged = coordinate_findings(points, shape, made, set_aside, where) if shape else []
+    balls = screening is not None and screening.balls
+    odd = screen(points, needed=needed, set_aside=set_aside, where=where, balls=balls)
     if shape and shape.together:
         damaged = [_reversal(found, points, needed) for found in damaged]
     findings = (*damaged, *(_left_out(f) for f in odd if not _told(f, damaged)))
@@ -78,7 +85,7 @@ def screened(
 
 
 def screen(
-    points: Points, *, needed: Collection[str], set_aside: Collection[int], where: str, kind: str = ""
+    points: Points, *, needed: Collection[str], set_aside: Collection[int], where: str, balls: bool = False
 ) -> tuple[Finding, ...]:
     """All that is odd in a recording without regard to its artefact's shape.
 
@@ -88,13 +95,13 @@ def screen(
     needed : columns that the model uses.
     set_aside : measurements that the job leaves out of the estimates.
     where : the recording's name, for messages.
-    kind : of artefact.
+    balls : whether its points are centres of balls or cylinders, each of several touches.
 
     Raises
     ------
     CmmUqError : a whole column in another unit or place, or a value that the model uses cannot be.
     """
-    impossible = impossible_values(points, kind)
+    impossible = impossible_values(points, balls=balls)
     for found in impossible:
         if found.column in needed:
             raise CmmUqError(found.why, where=_place(where, found),
@@ -105,9 +112,9 @@ def screen(
     return tuple(replace(f, set_aside=f.measurements[-1] in set_aside) for f in odd)
 
 
-def impossible_values(points: Points, kind: str = "") -> list[Finding]:
+def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
     """Values that cannot be: one finding a column, and one an axis whose readings leave the machine's travel."""
-    found = column_findings(points, kind)
+    found = column_findings(points, balls=balls)
     if all(f"n{a}" in points.columns for a in AXES):
         norm = np.linalg.norm([points.columns[f"n{a}"] for a in AXES], axis=0)
         if np.any(rows := np.abs(norm - 1) > _UNIT_LENGTH):

@@ -12,12 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cmm_uq.artefacts.plane import DIRECTION_POINT
-from cmm_uq.artefacts.plate import REFERENCES
-from cmm_uq.artefacts.triangle_standard import TriangleStandard, corners
-from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.model.placings import Placings
-from cmm_uq.points import AXES, Floats, Ints, Points
+from cmm_uq.points import Floats, Ints, Points
 
 TOLERANCE_MM, TOLERANCE_RATIO = 0.5, 5e-3
 """Misfit that no machine's errors explain: so many mm, and so much of the artefact's size."""
@@ -27,11 +23,6 @@ _JUDGED = 1000
 _PAIRS = 60
 _ACROSS = 10.0
 """Where on a face the probe touched is nobody's business: misfit across a line counts by this less."""
-
-_NORMAL = 0.4
-"""Part of the radius by which a recorded normal may miss the point: normals may be nominal, 20° off."""
-
-_NORMALS = tuple(f"n{a}" for a in AXES)
 
 Misfit = Callable[[Floats, Floats, float], Floats]
 
@@ -62,7 +53,7 @@ class Shape:
     @property
     def is_bar(self) -> bool:
         """Whether its placings are lengths or positions of a bar, without references."""
-        return self.misfit_of in (_bar, _ball) and not self.reference.shape[1]
+        return self.misfit_of in (bar_misfit, ball_misfit) and not self.reference.shape[1]
 
     @property
     def tolerance(self) -> float:
@@ -72,90 +63,34 @@ class Shape:
     def misfit(self, xyz: Floats, reference: Floats, placings: Iterable[int] | None = None) -> Floats:
         """Distance (n,), mm, of every point from where the artefact would have it; zero outside the placings asked for."""
         found = np.zeros(len(xyz))
-        one_length = self.misfit_of is _bar and not np.isfinite(self.size)
-        size = _common_length(xyz, self.rows) if one_length else self.size
+        one_length = self.misfit_of is bar_misfit and not np.isfinite(self.size)
+        size = common_length(xyz, self.rows) if one_length else self.size
         for placing in range(len(self.rows)) if placings is None else placings:
             rows = self.rows[placing]
             found[rows] = self.misfit_of(xyz[rows], reference[rows], size)
         return found
 
 
-def shape_of(facts: ArtefactFacts, points: Points) -> Shape | None:
-    """The shape of a job's artefact; ``None`` where the recording lacks what this kind needs, or nothing is known of it."""
-    makers: dict[str, Callable[[ArtefactFacts, Points], Shape | None]] = {
-        "ballbar": _bars, "step_gauge": _lines, "gauge_blocks": _lines, "plate": _plate, "triangle": _triangle,
-        "sphere": _spheres, "bryan": _swept, "plane": _planes,
-    }  # fmt: skip
-    return makers[facts.kind](facts, points) if facts.kind in makers else None
+@dataclass(frozen=True)
+class Screening:
+    """What a kind of measurement offers to the screening.
+
+    Parameters
+    ----------
+    shape_of : ``(facts, points)``: what its artefact asks of the points; ``None`` where the recording lacks what that needs.
+    balls : whether its points are centres of balls or cylinders, each of several touches.
+    """
+
+    shape_of: Callable[..., Shape | None]
+    balls: bool = False
 
 
-def _bars(facts: ArtefactFacts, points: Points) -> Shape | None:
-    rows = _placings(points.group)
-    if any(sorted(points.point[r]) != [1, 2] for r in rows):
-        return None
-    length = facts.length_mm or np.nan
-    return Shape(rows, _bar, length, facts.length_mm or _common_length(points.xyz, rows), True, (), _nothing(points))
-
-
-def _lines(facts: ArtefactFacts, points: Points) -> Shape | None:
-    if "reference_mm" not in points.columns:
-        return None
-    reference = points.columns["reference_mm"][:, None]
-    rows = _placings(points.measurement)
-    if any(np.ptp(reference[r]) == 0 for r in rows):
-        return None
-    extent = float(np.median([np.ptp(reference[r]) for r in rows]))
-    return Shape(rows, _line, np.nan, extent, False, ("reference_mm",), reference)
-
-
-def _plate(facts: ArtefactFacts, points: Points) -> Shape | None:
-    if any(name not in points.columns for name in REFERENCES):
-        return None
-    reference = np.column_stack([points.columns[name] for name in REFERENCES])
-    return Shape(_placings(points.measurement), _body, np.nan, _spread(reference), False, REFERENCES, reference)
-
-
-def _triangle(facts: ArtefactFacts, points: Points) -> Shape | None:
-    if not np.isin(points.point, (1, 2, 3)).all():
-        return None
-    sides = TriangleStandard.of(facts).sides
-    body = corners(sides)[points.point - 1]
-    return Shape(_placings(points.measurement), _body, np.nan, float(sides.max()), True, (), body)
-
-
-def _spheres(facts: ArtefactFacts, points: Points) -> Shape | None:
-    rows, radius = _placings(points.measurement), (facts.length_mm or np.nan) / 2
-    if any(len(r) < 5 for r in rows):
-        return None
-    extent = radius if np.isfinite(radius) else 0.5 * float(np.median([_spread(points.xyz[r]) for r in rows]))
-    if not all(name in points.columns for name in _NORMALS):
-        return Shape(rows, _ball, radius, extent, False, (), _nothing(points))
-    normals = np.column_stack([points.columns[name] for name in _NORMALS])
-    return Shape(rows, _ball_with_normals, radius, extent, False, _NORMALS, normals)
-
-
-def _swept(facts: ArtefactFacts, points: Points) -> Shape | None:
-    if len(points) < 8 or np.any(points.point != 1):
-        return None
-    about = points.xyz - np.median(points.xyz, axis=0)
-    extent = facts.length_mm or float(np.median(np.linalg.norm(about, axis=1)))
-    return Shape((np.arange(len(points)),), _ball, facts.length_mm or np.nan, extent, False, (), _nothing(points))
-
-
-def _planes(facts: ArtefactFacts, points: Points) -> Shape | None:
-    touched = points.point != DIRECTION_POINT
-    rows = tuple(np.flatnonzero(touched & (points.measurement == m)) for m in np.unique(points.measurement[touched]))
-    if not rows or any(len(r) < 4 for r in rows):
-        return None
-    extent = float(np.median([_spread(points.xyz[r]) for r in rows]))
-    return Shape(rows, _flat, np.nan, extent, False, (), _nothing(points))
-
-
-def _bar(xyz: Floats, _: Floats, length: float) -> Floats:
+def bar_misfit(xyz: Floats, _: Floats, length: float) -> Floats:
+    """The distance of two points against the length."""
     return np.full(2, abs(float(np.linalg.norm(xyz[1] - xyz[0])) - length))
 
 
-def _line(xyz: Floats, reference: Floats, _: float) -> Floats:
+def line_misfit(xyz: Floats, reference: Floats, _: float) -> Floats:
     """Direction by the median slope over distant pairs (Theil–Sen), place by the median."""
     r = reference[:, 0]
     if len(r) <= _PAIRS:
@@ -176,11 +111,11 @@ def _line(xyz: Floats, reference: Floats, _: float) -> Floats:
     return np.asarray(np.maximum(np.abs(along), across / _ACROSS), dtype=np.float64)
 
 
-def _body(xyz: Floats, body: Floats, _: float) -> Floats:
+def body_misfit(xyz: Floats, body: Floats, _: float) -> Floats:
     """Placed by the three balls that suit half of all best, then by all that agree with these."""
     if len(xyz) < 3:
         return np.zeros(len(xyz))
-    samples = _broad(body, np.array([np.arange(3)]) if len(xyz) == 3 else _samples(len(xyz), 3))
+    samples = _broad(body, np.array([np.arange(3)]) if len(xyz) == 3 else samples_of(len(xyz), 3))
     some = _some(len(xyz))
     misfits = np.linalg.norm(xyz[some] - _placed(body[some], body[samples], xyz[samples]), axis=2)
     chosen = samples[[np.argmin(np.median(misfits, axis=1))]]
@@ -207,9 +142,9 @@ def _placed(body: Floats, own: Floats, found: Floats) -> Floats:
     return np.asarray(np.einsum("sij,skj->ski", turn, body[None] - own_middle) + found_middle, dtype=np.float64)
 
 
-def _ball(xyz: Floats, _: Floats, radius: float) -> Floats:
+def ball_misfit(xyz: Floats, _: Floats, radius: float) -> Floats:
     """Through the four points whose sphere suits half of all best."""
-    samples = _samples(len(xyz), 4)
+    samples = samples_of(len(xyz), 4)
     about = xyz - np.median(xyz, axis=0)
     four = about[samples]
     scale = max(float(np.median(np.linalg.norm(about, axis=1))), 1e-9)
@@ -222,26 +157,11 @@ def _ball(xyz: Floats, _: Floats, radius: float) -> Floats:
     distances = np.linalg.norm(about[None, _some(len(xyz))] - centres[:, None], axis=2)
     radii = np.median(distances, axis=1) if np.isnan(radius) else np.full(len(centres), radius)
     best = np.argmin(np.median(np.abs(distances - radii[:, None]), axis=1))
-    away, nearest = _centred(about - centres[best], float(radii[best]), free=bool(np.isnan(radius)))
+    away, nearest = recentred(about - centres[best], float(radii[best]), free=bool(np.isnan(radius)))
     return np.asarray(np.abs(np.linalg.norm(away, axis=1) - nearest), dtype=np.float64)
 
 
-def _ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
-    """Each normal says where the centre lies; their median does not follow a few."""
-    if np.isnan(radius):
-        i, j = _samples(len(xyz), 2).T
-        steps = normals[j] - normals[i]
-        squares = np.sum(steps**2, axis=1)
-        if not np.any(wide := squares > 0.5 * squares.max()):
-            return np.zeros(len(xyz))
-        radius = float(np.median(np.sum((xyz[j] - xyz[i]) * steps, axis=1)[wide] / squares[wide]))
-    away = xyz - np.median(xyz - radius * normals, axis=0)
-    away, radius = _centred(away, radius, free=False)  # nominal normals put it astray
-    misses = np.linalg.norm(away - radius * normals, axis=1) - _NORMAL * abs(radius)
-    return np.asarray(np.maximum(np.abs(np.linalg.norm(away, axis=1) - radius), misses), dtype=np.float64)
-
-
-def _centred(away: Floats, radius: float, *, free: bool) -> tuple[Floats, float]:
+def recentred(away: Floats, radius: float, *, free: bool) -> tuple[Floats, float]:
     """Points (k, 3) about the centre of the sphere through those near to one, and its radius: Gauss–Newton, trimmed."""
     for _ in range(5):
         distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
@@ -254,9 +174,9 @@ def _centred(away: Floats, radius: float, *, free: bool) -> tuple[Floats, float]
     return away, radius
 
 
-def _flat(xyz: Floats, _: Floats, __: float) -> Floats:
+def flat_misfit(xyz: Floats, _: Floats, __: float) -> Floats:
     """Through the three points whose plane suits half of all best."""
-    samples = xyz[_broad(xyz, _samples(len(xyz), 3))]
+    samples = xyz[_broad(xyz, samples_of(len(xyz), 3))]
     normals = np.cross(samples[:, 1] - samples[:, 0], samples[:, 2] - samples[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     if not np.all(lengths):
@@ -267,12 +187,13 @@ def _flat(xyz: Floats, _: Floats, __: float) -> Floats:
     return np.asarray(np.abs((xyz - samples[best, 0]) @ normals[best]), dtype=np.float64)
 
 
-def _placings(numbers: Ints) -> tuple[Ints, ...]:
+def rows_by(numbers: Ints) -> tuple[Ints, ...]:
+    """Rows of the recording (k,) for each different number of ``numbers`` (n,)."""
     index = Placings.of(numbers).index
     return tuple(np.flatnonzero(index == i) for i in range(int(index.max()) + 1))
 
 
-def _samples(count: int, size: int) -> Ints:
+def samples_of(count: int, size: int) -> Ints:
     """Rows of different points, the same for every recording of so many."""
     random = np.random.default_rng(count)
     return np.argsort(random.random((_SAMPLES, count)), axis=1)[:, :size]
@@ -283,14 +204,17 @@ def _some(count: int) -> Ints:
     return np.unique(np.linspace(0, count - 1, min(count, _JUDGED)).astype(np.int64))
 
 
-def _common_length(xyz: Floats, rows: tuple[Ints, ...]) -> float:
+def common_length(xyz: Floats, rows: tuple[Ints, ...]) -> float:
+    """Median distance, mm, of the first two points of each placing."""
     ends = np.array(rows)
     return float(np.median(np.linalg.norm(xyz[ends[:, 1]] - xyz[ends[:, 0]], axis=1)))
 
 
-def _spread(xyz: Floats) -> float:
+def spread(xyz: Floats) -> float:
+    """Diagonal, mm, of the box about some points."""
     return float(np.linalg.norm(np.ptp(xyz, axis=0)))
 
 
-def _nothing(points: Points) -> Floats:
+def no_references(points: Points) -> Floats:
+    """References (n, 0) of a recording that has none."""
     return np.zeros((len(points), 0))

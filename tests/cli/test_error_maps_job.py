@@ -75,7 +75,7 @@ def test_other_commands_say_what_to_do_instead(
     [
         (TWO_MORE, "", "one error map has nothing to be compared with"),
         ("error_map_25C.csv", "elsewhere.csv", "no such file"),
-        ("[model]", '[recording]\nfile = "a.csv"\n[model]', "error maps are the recording themselves"),
+        ("[model]", '[recording]\nfile = "a.csv"\n[model]', "a job of kind 'error_map' has no recording of points"),
         ("effects = []", 'effects = ["thermal_scal_x"]', "thermal_scale_x"),
         ("effects = []", 'effects = ["hysteresis_x"]', "hysteresis_x needs approach_x, which error maps do not have"),
         ("[model]", '[[conformity]]\nstandard = "VDI/VDE 2617"\nlimit_um = 5.0\n[model]', "no standard here decides on them"),

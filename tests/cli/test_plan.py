@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.jobs.reading import read_job
+from cmm_uq.commands.reading import read_job
 from tests.cli.process import run as run_command
 from tests.commands.test_planning import JOB, SIX
 

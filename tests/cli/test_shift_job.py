@@ -10,7 +10,8 @@ import numpy as np
 import pikepdf
 import pytest
 
-from cmm_uq.commands.analysis import ShiftResult, analyse
+from cmm_uq.commands.analysis import analyse
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from tests.cli.process import run
 from tests.conftest import ROOT
 

@@ -11,8 +11,8 @@ import pytest
 
 from cmm_uq.commands.analysis import analyse
 from cmm_uq.commands.compensate import write_compensated
+from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.reading import read_job
 from tests.conftest import ROOT
 
 

@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 
 from cmm_uq.commands.diagnosing import diagnose_job
+from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import OBSERVATIONS
-from cmm_uq.jobs.reading import read_job
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NO_POINTS = {"shift-simulated", "shift-plate-simulated", "iota-1102-maps"}

@@ -15,11 +15,11 @@ import pytest
 
 from cmm_uq.commands.compensate import write_compensated
 from cmm_uq.commands.plan import write_plan
+from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.report import write_diagnosis, write_report
 from cmm_uq.commands.simulate import write_simulation
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.derived_job import derived_toml
-from cmm_uq.jobs.reading import read_job
 from tests.commands.test_compensate import named, straight
 from tests.conftest import ROOT
 

@@ -11,10 +11,10 @@ import pytest
 from cmm_uq.commands.plan_page import plan_document, plan_results
 from cmm_uq.commands.plan_words import combination
 from cmm_uq.commands.planning import Plan, make_plan
+from cmm_uq.commands.reading import read_job
 from cmm_uq.documents.html import render_html
 from cmm_uq.documents.plan_picture import gain_plot, placing_pictures
 from cmm_uq.documents.results_file import as_json
-from cmm_uq.jobs.reading import read_job
 from cmm_uq.planning.ready import ready_plan
 from tests.commands.test_planning import JOB, SIX
 from tests.planning.plans import EVERY_KIND, setting

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.commands.planning import RECORDED, SPREAD, Plan, make_plan
+from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.reading import read_job
 from tests.conftest import ROOT
 
 JOB = """
@@ -147,7 +147,7 @@ def test_power_comes_for_every_effect_that_the_job_does_not_name(tmp_path: Path)
     ('criterion = "D"', '"rotation_z_z"', 400.0, "no candidate placing shows any of these effects"),
     ('rivals = ["hysteresis_x"]', SIX, 400.0, "needs the column approach_x"),
     ('rivals = ["rotation_w_z"]', SIX, 400.0, "unknown effect"),
-    ('ready = "ISO 10360-2"', SIX, 400.0, "not for ballbar"),
+    ('ready = "ISO 10360-2"', SIX, 400.0, "no plan for a job of kind 'ballbar'"),
 ])  # fmt: skip
 def test_what_cannot_be_planned_is_refused_with_its_reason(
     tmp_path: Path, plan: str, effects: str, length: float, said: str

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cmm_uq.commands.analysis import analyse
+from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.simulate import simulate, write_simulation
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.reading import read_job
 from cmm_uq.jobs.truth import NoiseFacts, Truth
 
 TRUTH = """

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.artefacts.ballbar import Ballbar
-from cmm_uq.artefacts.gauge import StepGauge
-from cmm_uq.artefacts.sphere import Sphere
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.kinds import artefact_facts
+from cmm_uq.kinds.ballbar.observe import Ballbar
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
+from cmm_uq.kinds.sphere.observe import Sphere
 from cmm_uq.points import Floats, Ints, Machine, Points
 from tests.recordings import TRAVEL, bar_facts
 
@@ -42,7 +42,7 @@ def gauge(
     points = Points(
         np.vstack(xyz), whole(measurement), whole(point), whole(repeated), machine, {"reference_mm": reference}
     )
-    return StepGauge(ArtefactFacts(kind="step_gauge", length_mm=length_mm, u_um=u_um), points)
+    return StepGauge(artefact_facts(kind="step_gauge", length_mm=length_mm, u_um=u_um), points)
 
 
 def five(direction: Floats) -> list[float]:
@@ -65,7 +65,7 @@ def copied_runs(artefact: StepGauge, runs: Mapping[tuple[int, int], tuple[int, i
             (points.measurement == measurement) & (points.repeat == repeat) for measurement, repeat in (to, of)
         )
         xyz[at] = xyz[source]
-    facts = ArtefactFacts(kind="step_gauge", length_mm=artefact.sizes[0].nominal, u_um=artefact.sizes[0].sd * 1e3)
+    facts = artefact_facts(kind="step_gauge", length_mm=artefact.sizes[0].nominal, u_um=artefact.sizes[0].sd * 1e3)
     return StepGauge(facts, points.at(xyz))
 
 
@@ -116,7 +116,7 @@ def sphere(
     xyz = np.vstack([xyz, xyz[:copied]])
     every = np.vstack([xyz + np.array([30.0 * k, 0, 0]) for k in range(spheres)])
     number = np.repeat(np.arange(1, spheres + 1), points)
-    facts = ArtefactFacts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=form_um)
+    facts = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=form_um)
     return Sphere(
         facts, Points(every, number, np.tile(np.arange(1, points + 1), spheres), np.ones_like(number), MACHINE)
     )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import READY
+from cmm_uq.kinds import artefact_of
 from cmm_uq.planning.placing import joined
 from cmm_uq.planning.ready import ready_plan
 from tests.planning.plans import EVERY_KIND, setting

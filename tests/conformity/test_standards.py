@@ -7,14 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.ballbar import Ballbar
-from cmm_uq.artefacts.gauge import StepGauge
-from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import (
-    ArtefactFacts,
     ConformityFacts,
     FalseAccept,
     GuardBand,
@@ -22,6 +18,10 @@ from cmm_uq.jobs.job import (
     Rule,
     Standard,
 )
+from cmm_uq.kinds import artefact_facts, kind_named
+from cmm_uq.kinds.ballbar.observe import Ballbar
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
+from cmm_uq.kinds.sphere.observe import Sphere
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Machine, Points
 from cmm_uq.uncertainty.quantity import Quantity
@@ -45,7 +45,9 @@ def judged(
     limit = limit or {"mpe": MPE}
     span = Quantity(range_um, 0.5, (range_um - 1, range_um + 1), "µm")
     wish = ConformityFacts(standard=standard, rule=rule, **limit)
-    return statement(wish, artefact, {"b89_range_um": span}, "[[conformity]] 1")
+    kind = kind_named(artefact.kind)
+    assert kind is not None
+    return statement(wish, artefact, {"b89_range_um": span}, "[[conformity]] 1", kind.standards)
 
 
 def at(bar: Ballbar, machine: Machine) -> Ballbar:
@@ -216,7 +218,7 @@ def test_where_a_face_is_touched_does_not_move_its_length_to_another_line() -> N
     """Faces touched up to 4 mm aside: that turns a length of 20 mm by 11°, and a line of hundreds of mm hardly."""
     line = gauge()
     aside = np.where(np.arange(len(line.points)) % 2, 4.0, 0.0)[:, None] * np.array([[0.6, -0.64, 0.48]])
-    facts = ArtefactFacts(kind="step_gauge", length_mm=800.0, u_um=0.4)
+    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4)
     across = aside - np.einsum("ni,ni->n", aside, line.directions())[:, None] * line.directions()
     found = judged(StepGauge(facts, line.points.at(line.points.xyz + across)), limit_um=200.0)
     assert found.missing == ()
@@ -339,8 +341,8 @@ def test_a_correction_makes_no_copy_a_measurement() -> None:
     """Corrected by an amount that depends on time, a copy is no longer one to the last digit."""
     recorded, wish = again(bars(), {18: 14}), ConformityFacts(standard=B89, limit_um=60.0)
     span = {"b89_range_um": Quantity(5.0, 0.5, (4.0, 6.0), "µm")}
-    assert statement(wish, bars(), span, "").outcome == "pass"
-    assert statement(wish, bars(), span, "", recorded).outcome == "incomplete"
+    assert statement(wish, bars(), span, "", [B89]).outcome == "pass"
+    assert statement(wish, bars(), span, "", [B89], recorded).outcome == "incomplete"
 
 
 # --- ISO 10360-5 -----------------------------------------------------------------------------------------------------
@@ -377,7 +379,7 @@ def test_a_copied_sphere_is_no_second_one() -> None:
     two = Points(
         np.vstack([one.xyz, one.xyz]), np.repeat([1, 2], 24), np.tile(one.point, 2), np.ones(48, dtype=np.int64)
     )
-    found = judged(Sphere(ArtefactFacts(kind="sphere", length_mm=25.0, form_um=0.2), two), ISO_5, limit_um=20.0)
+    found = judged(Sphere(artefact_facts(kind="sphere", length_mm=25.0, form_um=0.2), two), ISO_5, limit_um=20.0)
     assert found.missing == ("25 points on the sphere of measurement 1 (24 recorded, 24 different)",)
     assert any("measurement 2, repeat 1 of measurement 1, repeat 1" in text for text in found.remarks)
 

@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.commands.diagnosing import diagnose_job
+from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.comparison.search import model_comparison
 from cmm_uq.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.diagnosis.held_out import improvement
-from cmm_uq.jobs.reading import read_job
+from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.planning.suggestion import suggestions
 from cmm_uq.points import Floats, Machine, Points
 from tests.conftest import ROOT
-from tests.recordings import TRAVEL, bar_facts, bars, with_columns
+from tests.recordings import TRAVEL, bar_facts, bars, suggested, with_columns
 
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
 SIGMA_UM = 1.0
@@ -155,7 +154,7 @@ def test_effects_with_one_signature_are_named_together_with_a_measurement_that_p
     assert found.verdict == "explained"
     (group,) = found.indistinguishable
     assert {"rotation_x_z", "scale_x"} <= set(group)
-    assert any({"rotation_x_z", "scale_x"} == set(s.separates) for s in suggestions(found, bar_facts()))
+    assert any({"rotation_x_z", "scale_x"} == set(s.separates) for s in suggested(found, bar_facts()))
 
 
 def test_the_held_out_error_of_least_squares_is_the_press_residual() -> None:

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.artefacts.ballbar import Ballbar
-from cmm_uq.artefacts.gauge import StepGauge
+from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.held_out import FOLDS, improvement
 from cmm_uq.inference.posterior import Density
-from cmm_uq.jobs.reading import read_job
+from cmm_uq.kinds.ballbar.observe import Ballbar
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine, Points

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cmm_uq.commands.diagnosing import screened_model
+from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.noise import kinds
 from cmm_uq.diagnosis.recorded_noise import repeated_quantity
-from cmm_uq.jobs.reading import read_job
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 from scipy import stats
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.diagnosis.comparison.search import model_comparison
 from cmm_uq.diagnosis.power import POWER, Power, powers, without_fault
+from cmm_uq.kinds import artefact_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning.placing import joined
@@ -23,7 +23,7 @@ POINTS = joined(ready_plan(SETTING)[1])
 
 @cache
 def predicted() -> dict[str, Power]:
-    model = without_fault(GAUGE, SETTING.model(POINTS), SETTING.sigma, 0)
+    model = without_fault(SETTING.observed, SETTING.model(POINTS), SETTING.sigma, 0)
     rivals = effects(("rotation_y_y", "rotation_x_y", "rotation_y_x", "rotation_z_z"))
     found = powers(model, rivals, stated=SETTING.sigma, sigma=SETTING.sigma, alpha=ALPHA, seed=0)
     return {power.effect: power for power in found}

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.file_names import check_distinct, inside
-from cmm_uq.jobs.reading import read_job
 from tests.jobs.test_reading import edit, refused
 
 
@@ -47,7 +47,7 @@ def test_plain_names_stay_inside(tmp_path: Path, name: str) -> None:
         *(
             (name, "a name that cmm-uq writes itself. Rename the file")
             for name in (
-                "job.toml", "Results.JSON", "manifest.json", "truth.toml", "compensation.json", "plan.csv",
+                "job.toml", "Results.JSON", "manifest.json", "truth.toml", "compensation.json",
                 "certificate.html", "certificate-2.pdf", "diagnosis.html", "plan.html", "budget.toml", "sub/results.json",
             )
         ),

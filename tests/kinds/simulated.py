@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from cmm_uq.commands.analysis import Result, analyse
-from cmm_uq.commands.compose import certificate
+from cmm_uq.commands.analysis import Result, analyse, outcome_of
 from cmm_uq.documents.document import Block, Document, Table
 from tests.conftest import ROOT
 
@@ -20,7 +19,7 @@ def analysed(job: str) -> Result:
 
 @cache
 def document(job: str) -> Document:
-    return certificate(analysed(job))
+    return outcome_of(analysed(job)).document
 
 
 def blocks(job: str) -> list[Block]:

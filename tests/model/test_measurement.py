@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine, Points

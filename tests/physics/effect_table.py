@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.artefacts import artefact_of
-from cmm_uq.jobs.reading import read_job
+from cmm_uq.commands.reading import read_job
+from cmm_uq.kinds import artefact_of
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import CATALOGUE, EVERY, FURTHER

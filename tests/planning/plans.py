@@ -6,8 +6,9 @@ import numpy as np
 
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.planning.setting import Setting
+from cmm_uq.planning.setting import Planning, Setting
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Machine
 
@@ -20,27 +21,29 @@ def setting(
     facts: ArtefactFacts, named: tuple[str, ...] = SIX, sigma: float = 1e-3, machine: Machine = MACHINE, **plan: object
 ) -> Setting:
     wishes = PlanFacts.model_validate(plan)
-    return Setting(facts, wishes, Volume.of(machine, wishes), effects(named), sigma, sigma)
+    kind = kind_named(facts.kind)
+    assert kind is not None
+    planning = kind.needs("plan", Planning, "planned")
+    observe = kind.observing("planned") if planning.free is None else None
+    return Setting(facts, observe, planning, wishes, Volume.of(machine, wishes), effects(named), sigma, sigma)
 
 
-BALLBAR = ArtefactFacts(kind="ballbar", length_mm=400.0, u_um=0.5)
-GAUGE = ArtefactFacts(kind="step_gauge", u_um=0.4)
+BALLBAR = artefact_facts(kind="ballbar", length_mm=400.0, u_um=0.5)
+GAUGE = artefact_facts(kind="step_gauge", u_um=0.4)
 EVERY_KIND = {
     "ballbar": (BALLBAR, {}),
     "step_gauge": (GAUGE, {"length_mm": 820.0}),
-    "gauge_blocks": (ArtefactFacts(kind="gauge_blocks", u_um=0.2), {"lengths_mm": [25.0, 100.0, 200.0, 300.0, 400.0]}),
-    "plate": (ArtefactFacts(kind="plate", u_um=0.5), {"pitch_mm": 90.0}),
+    "gauge_blocks": (artefact_facts(kind="gauge_blocks", u_um=0.2), {"lengths_mm": [25.0, 100.0, 200.0, 300.0, 400.0]}),
+    "plate": (artefact_facts(kind="plate", u_um=0.5), {"pitch_mm": 90.0}),
     "triangle": (
-        ArtefactFacts(kind="triangle", blocks_mm=[380.0, 240.0, 300.0], cylinders_mm=[20.0, 20.0, 20.0]), {},
+        artefact_facts(kind="triangle", blocks_mm=[380.0, 240.0, 300.0], cylinders_mm=[20.0, 20.0, 20.0]), {},
     ),
-    "sphere": (ArtefactFacts(kind="sphere", length_mm=25.0, u_um=0.1), {}),
-    "plane": (ArtefactFacts(kind="plane"), {}),
-    "bryan": (ArtefactFacts(kind="bryan"), {"length_mm": 300.0}),
+    "sphere": (artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1), {}),
+    "plane": (artefact_facts(kind="plane"), {}),
+    "bryan": (artefact_facts(kind="bryan"), {"length_mm": 300.0}),
     "shift": (
-        ArtefactFacts.model_validate({
-            "kind": "shift", "axis": "x", "shifts_mm": [0.0, 20.0, 50.0],
-            "known": {"from": 1, "to": 23, "length_mm": 440.0, "u_um": 0.5},
-        }), {},
+        artefact_facts(kind="shift", axis="x", shifts_mm=[0.0, 20.0, 50.0],
+                       known={"from": 1, "to": 23, "length_mm": 440.0, "u_um": 0.5}), {},
     ),
 }  # fmt: skip
 """Facts of each kind of artefact, and what its plan needs besides."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.errors import CmmUqError
-from cmm_uq.planning.candidates import candidates, like
+from cmm_uq.kinds import artefact_of
+from cmm_uq.planning.candidates import candidates
 from cmm_uq.planning.directions import lines, words
-from cmm_uq.planning.placing import Pattern, joined
+from cmm_uq.planning.placing import joined
+from cmm_uq.planning.setting import Start
 from tests.planning.plans import BALLBAR, EVERY_KIND, GAUGE, setting
 
 KINDS = [kind for kind in EVERY_KIND if kind != "shift"]
@@ -54,9 +55,8 @@ def test_a_shift_job_has_nothing_to_choose_from() -> None:
 
 def test_a_recorded_placing_is_tried_elsewhere_as_it_was_recorded() -> None:
     chosen = setting(GAUGE, length_mm=400.0)
-    recorded = candidates(chosen)[40].points
-    pattern, attitude, _ = Pattern.of_recording(recorded)
-    found = like(pattern, "step_gauge", chosen.volume, attitude, 80)
+    recorded = candidates(chosen)[40]
+    found = candidates(chosen, Start(chosen.observed(recorded.points), recorded))
     assert "as recorded" in {placing.title for placing in found}
     lengths = {round(float(np.linalg.norm(p.points.xyz[-1] - p.points.xyz[0])), 6) for p in found}
     assert len(lengths) == 1

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts import artefact_of
+from cmm_uq.kinds import artefact_of
+from cmm_uq.kinds.ballbar.plan import ballbar
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.planning import patterns
 from cmm_uq.planning.identifiability import Identifiability, identifiability
 from cmm_uq.planning.placing import Placing, along, joined
 from cmm_uq.planning.ready import ready_plan
@@ -23,7 +23,7 @@ def found(chosen: Setting, placings: tuple[Placing, ...], *rivals: str) -> Ident
 
 
 def bars(chosen: Setting, *directions: tuple[float, float, float]) -> tuple[Placing, ...]:
-    pattern = patterns.ballbar(chosen.artefact, chosen.plan)
+    pattern = ballbar(chosen.artefact, chosen.plan)
     return tuple(
         chosen.volume.set_up(pattern, along(np.array(d)), (0.5, 0.5, 0.5), f"{i}") for i, d in enumerate(directions)
     )

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.planning import patterns
+from cmm_uq.kinds.ballbar.plan import ballbar
+from cmm_uq.kinds.gauge_lines.patterns import gauge
 from cmm_uq.planning.placing import Pattern, along, appended, joined, split
 from cmm_uq.points import Floats
 from tests.planning.plans import BALLBAR, GAUGE, MACHINE, setting
@@ -44,7 +45,7 @@ def test_a_recorded_placing_is_its_pattern_set_up_where_it_was_recorded(seed: in
     random = np.random.default_rng(seed)
     chosen = setting(GAUGE, length_mm=400.0, both_ways=True, repeats=1)
     turned = Rotation.random(random_state=seed).as_matrix()
-    placed = patterns.gauge(np.array([20.0, 100.0, 400.0]), chosen.plan).placed(
+    placed = gauge(np.array([20.0, 100.0, 400.0]), chosen.plan).placed(
         MACHINE, turned, random.uniform(-100, 100, 3), "recorded"
     )
     pattern, attitude, middle = Pattern.of_recording(placed.points)
@@ -57,7 +58,7 @@ def test_a_recorded_placing_is_its_pattern_set_up_where_it_was_recorded(seed: in
 def test_faces_met_on_the_way_back_are_approached_from_the_other_side() -> None:
     """Travel along −X −X …: the sign of every axis that the line moves in turns round."""
     plan = setting(GAUGE, length_mm=400.0, both_ways=True, repeats=1).plan
-    points = patterns.gauge(np.array([100.0, 400.0]), plan).placed(
+    points = gauge(np.array([100.0, 400.0]), plan).placed(
         MACHINE, along(np.array([1.0, -1.0, 0.0])), np.zeros(3), "line"
     ).points  # fmt: skip
     assert points.columns["reference_mm"].tolist() == [0, 100, 400, 400, 100, 0]
@@ -68,7 +69,7 @@ def test_faces_met_on_the_way_back_are_approached_from_the_other_side() -> None:
 
 def test_placings_are_numbered_and_timed_in_the_order_of_measurement() -> None:
     chosen = setting(BALLBAR, repeats=2)
-    pattern = patterns.ballbar(BALLBAR, chosen.plan)
+    pattern = ballbar(BALLBAR, chosen.plan)
     placings = [pattern.placed(MACHINE, along(np.eye(3)[i]), np.zeros(3), str(i)) for i in range(3)]
     points = joined(placings, seconds_per_point=10, minutes_per_placing=5, columns={"temp_x_c": 21.0}, first=4)
     assert np.unique(points.measurement).tolist() == [4, 5, 6]

@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts import artefact_of
 from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.kinds import artefact_of
+from cmm_uq.kinds.ballbar.plan import ballbar
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.planning import patterns
 from cmm_uq.planning.placing import Placing, along, joined
 from cmm_uq.planning.ready import ready_plan
-from cmm_uq.planning.suggestion import ODDS, suggestions
+from cmm_uq.planning.suggestion import ODDS
 from cmm_uq.points import Points
 from tests.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting
+from tests.recordings import suggested
 
 SIGMA = 1e-3
 
@@ -65,14 +66,14 @@ def test_the_odds_of_a_further_bar_are_those_of_a_fit_to_it() -> None:
     is put in without noise, and the false one fitted to the recording and the further bars together.
     """
     chosen = setting(BALLBAR, repeats=1)
-    bar = patterns.ballbar(BALLBAR, chosen.plan)
+    bar = ballbar(BALLBAR, chosen.plan)
     placings = tuple(
         chosen.volume.set_up(bar, along(np.array([np.cos(t), 0.0, np.sin(t)])), (x, 0.3, z), "in the plane")
         for t in (0.0, 0.5, 1.0, 1.5, 2.0, 2.6) for x in (0.2, 0.8) for z in (0.3, 0.6)
     )  # fmt: skip
     pair, named = ("rotation_x_z", "scale_x"), ("scale_z", "squareness_zx")
     found = diagnosed(BALLBAR, placings, "rotation_x_z", 60.0, pair, named)
-    (suggestion,) = suggestions(found, BALLBAR)
+    (suggestion,) = suggested(found, BALLBAR)
     assert suggestion.separates == pair
     assert suggestion.odds >= ODDS
     least = min(log_odds(found, BALLBAR, suggestion.what, suggestion.repetitions, pair, true) for true in pair)
@@ -83,7 +84,7 @@ def test_a_gauge_on_seven_lines_is_told_where_to_lay_an_eighth() -> None:
     placings = ready_plan(setting(GAUGE, length_mm=820.0))[1]
     pair = ("rotation_x_y", "rotation_y_x")
     found = diagnosed(GAUGE, placings, "rotation_x_y", 8.0, pair)
-    (suggestion,) = suggestions(found, GAUGE)
+    (suggestion,) = suggested(found, GAUGE)
     assert suggestion.what.startswith("Place the step gauge at (")
     assert "1 : 1 without it" in suggestion.what
     assert suggestion.odds >= ODDS
@@ -99,7 +100,7 @@ def test_every_artefact_is_asked_for_a_placing_or_has_none(kind: str, true: str,
     facts = facts.model_copy(update={"length_mm": 300.0, "u_um": 0.5}) if kind == "bryan" else facts
     placings = ready_plan(setting(facts, **wishes))[1]
     found = diagnosed(facts, placings, true, 20.0, (true, rival))
-    for suggestion in suggestions(found, facts):
+    for suggestion in suggested(found, facts):
         assert suggestion.odds >= ODDS
         assert 1 <= suggestion.repetitions <= 30
 
@@ -108,4 +109,4 @@ def test_what_is_told_apart_needs_no_further_placing() -> None:
     placings = ready_plan(setting(BALLBAR))[1]
     found = diagnosed(BALLBAR, placings, "rotation_y_x", 12.0, ())
     found.indistinguishable = ()
-    assert suggestions(found, BALLBAR) == ()
+    assert suggested(found, BALLBAR) == ()

@@ -7,7 +7,7 @@ import pytest
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.planning import patterns
+from cmm_uq.kinds.ballbar.plan import ballbar
 from cmm_uq.planning.placing import along
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Machine
@@ -38,14 +38,14 @@ def test_without_travel_and_recording_the_travel_is_asked_for() -> None:
 
 def test_a_bar_longer_than_the_volume_is_refused_with_its_axis() -> None:
     volume = Volume.of(MACHINE, PlanFacts(volume_mm={"z": [-300.0, 0.0]}))
-    bar = patterns.ballbar(BALLBAR, PlanFacts())
+    bar = ballbar(BALLBAR, PlanFacts())
     with pytest.raises(CmmUqError, match=r"400 mm long along Z .*, of which the volume has 280 mm"):
         volume.set_up(bar, along(np.array([0.0, 0.0, 1.0])), (0.5, 0.5, 0.5), "along Z")
 
 
 def test_places_run_from_edge_to_edge() -> None:
     volume = Volume.of(MACHINE, PlanFacts(margin_mm=0.0))
-    bar = patterns.ballbar(BALLBAR, PlanFacts(repeats=1))
+    bar = ballbar(BALLBAR, PlanFacts(repeats=1))
     low = volume.set_up(bar, along(np.array([1.0, 0.0, 0.0])), (0.0, 0.0, 0.0), "low").points.readings
     high = volume.set_up(bar, along(np.array([1.0, 0.0, 0.0])), (1.0, 1.0, 1.0), "high").points.readings
     np.testing.assert_allclose(low.min(axis=0), TRAVEL[:, 0], atol=1e-9)
@@ -61,7 +61,7 @@ def test_fixtures_hold_a_bar_either_way_along_their_directions() -> None:
 
 def test_heights_bound_the_middle_of_the_artefact() -> None:
     volume = Volume.of(MACHINE, PlanFacts.model_validate({"fixtures": {"heights_mm": [-500.0, -400.0]}}))
-    bar = patterns.ballbar(BALLBAR, PlanFacts())
+    bar = ballbar(BALLBAR, PlanFacts())
     level = along(np.array([1.0, 0.0, 0.0]))
     assert volume.set_up(bar, level, (0.5, 0.5, 1.0), "high").middle[2] == pytest.approx(-400.0)
     assert volume.set_up(bar, level, (0.5, 0.5, 0.0), "low").middle[2] == pytest.approx(-500.0)

@@ -8,8 +8,8 @@ import pytest
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import Floats, Points
 from cmm_uq.screening.columns import column_findings
-from cmm_uq.screening.screened import screen, screened
-from tests.recordings import bar_facts, with_columns
+from cmm_uq.screening.screened import screen
+from tests.recordings import bar_facts, screened, with_columns
 
 
 def warming(points: Points, seed: int = 3) -> Floats:
@@ -19,7 +19,7 @@ def warming(points: Points, seed: int = 3) -> Floats:
 
 
 def kinds(points: Points) -> list[str]:
-    return [found.kind for found in column_findings(points, "ballbar")]
+    return [found.kind for found in column_findings(points, balls=True)]
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_a_clock_in_other_units_shows_in_the_time_from_ball_to_ball(
     """Thirty seconds a ball: nobody waits eight hours between the two of a bar, no machine probes one in half a second."""
     time = 30.0 * np.arange(len(ballbar_points))
     assert kinds(with_columns(ballbar_points, time_s=time)) == []
-    (found,) = column_findings(with_columns(ballbar_points, time_s=factor * time), "ballbar")
+    (found,) = column_findings(with_columns(ballbar_points, time_s=factor * time), balls=True)
     assert found.kind == "unit"
     assert says in found.why
 
@@ -83,7 +83,7 @@ def test_one_moment_in_other_units_breaks_the_order_and_is_named(
 ) -> None:
     time = 30.0 * np.arange(1, len(ballbar_points) + 1)
     time[10] *= factor
-    (found,) = column_findings(with_columns(ballbar_points, time_s=time), "ballbar")
+    (found,) = column_findings(with_columns(ballbar_points, time_s=time), balls=True)
     assert (found.kind, found.lines) == ("unit", (12,))
     assert says in found.why
 
@@ -91,7 +91,7 @@ def test_one_moment_in_other_units_breaks_the_order_and_is_named(
 def test_a_sensor_that_sticks_is_found_with_its_lines(ballbar_points: Points) -> None:
     values = warming(ballbar_points)
     values[40:70] = values[40]
-    (found,) = column_findings(with_columns(ballbar_points, temp_z_c=values), "ballbar")
+    (found,) = column_findings(with_columns(ballbar_points, temp_z_c=values), balls=True)
     assert (found.kind, found.column) == ("stuck", "temp_z_c")
     assert found.lines == tuple(range(42, 72))
 
@@ -113,7 +113,7 @@ def test_a_column_that_changes_inside_every_placing_slipped_by_a_row(ballbar_poi
     """Of pairs nobody can tell which way: moved on by another row they are whole again."""
     values = np.roll(warming(ballbar_points), by)
     sound = warming(ballbar_points, seed=4)
-    (found,) = column_findings(with_columns(ballbar_points, temp_x_c=values, temp_y_c=sound), "ballbar")
+    (found,) = column_findings(with_columns(ballbar_points, temp_x_c=values, temp_y_c=sound), balls=True)
     assert (found.kind, found.column) == ("shifted column", "temp_x_c")
     assert "shifted down or up by one row" in found.why
 
@@ -137,14 +137,14 @@ def with_travel(points: Points, normals: Floats, travel: Floats) -> Points:
 
 def test_directions_of_travel_that_slipped_by_a_row_meet_surfaces_from_inside(ballbar_points: Points) -> None:
     normals, travel = sphere(ballbar_points)
-    assert column_findings(with_travel(ballbar_points, normals, travel), "sphere") == []
-    (found,) = column_findings(with_travel(ballbar_points, normals, np.roll(travel, 1, axis=0)), "sphere")
+    assert column_findings(with_travel(ballbar_points, normals, travel), balls=False) == []
+    (found,) = column_findings(with_travel(ballbar_points, normals, np.roll(travel, 1, axis=0)), balls=False)
     assert (found.kind, found.column) == ("shifted column", "approach_x")
 
 
 def test_directions_of_travel_away_from_every_surface_have_the_wrong_sign(ballbar_points: Points) -> None:
     normals, travel = sphere(ballbar_points)
-    (found,) = column_findings(with_travel(ballbar_points, normals, -travel), "sphere")
+    (found,) = column_findings(with_travel(ballbar_points, normals, -travel), balls=False)
     assert found.kind == "sign"
 
 
@@ -152,4 +152,4 @@ def test_scanning_along_a_surface_is_no_fault(ballbar_points: Points) -> None:
     """Directions that have nothing to do with the normals point outwards half of the time."""
     normals, _ = sphere(ballbar_points)
     travel = np.random.default_rng(7).choice([-1.0, 1.0], normals.shape)
-    assert column_findings(with_travel(ballbar_points, normals, travel), "sphere") == []
+    assert column_findings(with_travel(ballbar_points, normals, travel), balls=False) == []

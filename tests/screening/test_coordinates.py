@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ArtefactFacts
-from cmm_uq.jobs.reading import read_job
+from cmm_uq.kinds import artefact_facts
 from cmm_uq.points import Floats, Points
-from cmm_uq.screening.screened import Screened, screened
-from tests.recordings import bar_facts, with_columns
+from cmm_uq.screening.screened import Screened
+from tests.recordings import bar_facts, screened, with_columns
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 REAL = "iota-1102-20C"
@@ -226,7 +227,7 @@ def test_a_plate_counted_by_columns_instead_of_rows_is_told(ballbar_points: Poin
         repeat=np.ones(n, dtype=np.int64), lines=np.arange(2, n + 2),
         columns={f"reference_{a}_mm": np.tile(grid[:, i], 6) for i, a in enumerate("xyz")},
     )  # fmt: skip
-    (found,) = screened(points, ArtefactFacts(kind="plate"), needed=set(), set_aside=[], where="p.csv").findings
+    (found,) = screened(points, artefact_facts(kind="plate"), needed=set(), set_aside=[], where="p.csv").findings
     assert found.kind == "swapped"
     assert found.measurements == (3,)
     assert "numbered in another order" in found.why
@@ -282,7 +283,7 @@ def test_of_two_repeats_the_one_in_inches_is_left_out_and_the_other_used(ballbar
     spoilt = (points.measurement == 5) & (points.repeat == which)
     xyz = points.xyz.copy()
     xyz[spoilt] /= INCH
-    found = screened(points.at(xyz), ArtefactFacts(kind="step_gauge"), needed=set(), set_aside=[], where="g.csv")
+    found = screened(points.at(xyz), artefact_facts(kind="step_gauge"), needed=set(), set_aside=[], where="g.csv")
     (unit,) = found.findings
     assert unit.kind == "unit"
     assert set(unit.rows) == set(np.flatnonzero(spoilt))
@@ -294,7 +295,7 @@ def test_a_gauge_counted_from_its_other_end_is_told(ballbar_points: Points) -> N
     for repeat in (1, 2):
         rows = np.flatnonzero((points.measurement == 3) & (points.repeat == repeat))
         xyz[rows] = xyz[rows[::-1]]
-    found = screened(points.at(xyz), ArtefactFacts(kind="step_gauge"), needed=set(), set_aside=[], where="g.csv")
+    found = screened(points.at(xyz), artefact_facts(kind="step_gauge"), needed=set(), set_aside=[], where="g.csv")
     (swap,) = found.findings
     assert (swap.kind, swap.measurements) == ("swapped", (3,))
     assert "counted from the other end" in swap.why

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.reading import read_job
+from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Points

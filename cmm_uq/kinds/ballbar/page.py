@@ -6,15 +6,16 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.artefacts.ballbar import Ballbar
-from cmm_uq.artefacts.distance_equations import DistanceSolution, solve_distances
 from cmm_uq.documents.budget_page import budget_blocks
 from cmm_uq.documents.document import Column, Section, Table
+from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import flagged, residual_volume
 from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.distances import page as adjustment_section
+from cmm_uq.kinds.distances.equations import DistanceSolution, solve_distances
 from cmm_uq.uncertainty.budget import Budget, Line
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
@@ -101,3 +102,6 @@ def _table(
     note = f"U = {rounded(0.0, expanded)[1]} µm (k = 2) for each length, from the standard uncertainty of a coordinate."
     notes = (note, f"{left} more lengths are in the attached recording.") if left > 0 else (note,)
     return Table("Lengths brought to 20 °C", columns, tuple(rows), notes)
+
+
+PAGE = Page(sections)

@@ -6,14 +6,15 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.artefacts.bryan import Bryan
-from cmm_uq.artefacts.distance_equations import DistanceSolution
 from cmm_uq.documents.document import Section
+from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import flagged, residual_volume
 from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.bryan.observe import Bryan
 from cmm_uq.kinds.distances import page as adjustment_section
+from cmm_uq.kinds.distances.equations import DistanceSolution
 from cmm_uq.units import MICROMETRE
 
 IN_TWO_STEPS = (
@@ -46,3 +47,6 @@ def sections(result: Result) -> list[Section]:
         Section("Distances", (plot, residual_volume(result, "swept positions"))),
         adjustment_section.section(result, second_way, IN_TWO_STEPS),
     ]
+
+
+PAGE = Page(sections)

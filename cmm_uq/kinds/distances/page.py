@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.artefacts.distance_equations import DistanceSolution
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
 from cmm_uq.kinds.distances.adjustment import ADJUSTMENTS, ANGLES
+from cmm_uq.kinds.distances.equations import DistanceSolution
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM

@@ -9,12 +9,10 @@ from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.error_maps.columns import columns_of
 from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
+from cmm_uq.model.machine_maps import WHERE, maps_of
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.physics.error_map import ErrorMap, parse_error_map
 from cmm_uq.physics.thermal import ThermalScale
 from cmm_uq.screening.screened import Finding
-
-WHERE = "job.toml [machine] error_map"
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,24 +29,6 @@ class MapsDiagnosed:
     job: Job
     findings: tuple[Finding, ...]
     diagnosis: MapsDiagnosis
-
-
-def maps_of(job: Job) -> list[ErrorMap]:
-    """The error maps that a job names, with its squareness.
-
-    Raises
-    ------
-    CmmUqError : there is none, or one that is no error map.
-    """
-    machine, maps = job.facts.machine, []
-    if not machine.error_map:
-        raise CmmUqError("the job has no error map", where=WHERE,
-                         fix='Name it: error_map = [ { file = "map.csv", temperature_c = 20.0 } ]')  # fmt: skip
-    for given in machine.error_map:
-        found = parse_error_map(job.inputs[given.file], str(job.folder / given.file), temperature=given.temperature_c)
-        square = machine.squareness_arcsec
-        maps.append(found.with_squareness_arcsec(square.xy, square.yz, square.zx) if square else found)
-    return maps
 
 
 def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> MapsDiagnosed:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from cmm_uq.artefacts.gauge import StepGauge
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.points import Floats
 from cmm_uq.units import PPM
 

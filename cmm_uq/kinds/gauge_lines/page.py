@@ -6,15 +6,16 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.artefacts.gauge import StepGauge
 from cmm_uq.conformity.measurement_lines import position_on, share_of_travel
 from cmm_uq.conformity.plans import ISO_10360_2
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import flagged, residual_volume
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import listed
 from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
@@ -125,3 +126,6 @@ def _positions(gauge: StepGauge, lines: tuple[GaugeLine, ...]) -> list[Block]:
         least = f"{100 * ISO_10360_2.least_share:.0f} %"
         texts.append(f"Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {listed(short)}.")
     return [Paragraph(" ".join(texts), tone="note")] if texts else []
+
+
+PAGE = Page(sections)

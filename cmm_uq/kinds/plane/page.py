@@ -6,11 +6,12 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.artefacts.plane import PlaneSurface, ProbedPlane
 from cmm_uq.documents.document import Block, Column, Section, Table
+from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import flagged, residual_volume
 from cmm_uq.documents.result import Result
+from cmm_uq.kinds.plane.observe import PlaneSurface, ProbedPlane
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
 
@@ -69,3 +70,6 @@ def _by_point(result: Result, plane: PlaneSurface) -> Block:
             f"fitted model {residuals.min():.1f} to {residuals.max():.1f} µm remain."
         ),
     )  # fmt: skip
+
+
+PAGE = Page(sections)

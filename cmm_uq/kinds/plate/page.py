@@ -6,11 +6,12 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.artefacts.plate import Plate
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.vector_plot import vector_plot
 from cmm_uq.documents.wording import expanded
+from cmm_uq.kinds.plate.observe import Plate
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
@@ -109,3 +110,6 @@ def _table(result: Result, plate: Plate, before: Floats, after: Floats) -> Table
     )  # fmt: skip
     note = "Coordinates of every ball minus its reference position, before and after the fitted model; the placing is fitted."
     return Table("Deviation of a coordinate", columns, tuple(rows), (note,))
+
+
+PAGE = Page(sections)

@@ -9,13 +9,14 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
-from cmm_uq.jobs.job import Job, KnownLength
+from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.shift_axis.curve import Curve, CurveEstimate, estimate_curve
 from cmm_uq.kinds.shift_axis.integration_uncertainty import IntegratedCurve, KnownSpan, integrated
 from cmm_uq.kinds.shift_axis.series import ShiftedSeries, shifted_series
 from cmm_uq.kinds.shift_axis.shift_integration import Method
 from cmm_uq.kinds.shift_axis.undetermined import Undetermined, undetermined
 from cmm_uq.kinds.shifting.correction_table import correction_table
+from cmm_uq.kinds.shifting.facts import KnownLength, shift_facts
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.quantity import Quantity
@@ -97,7 +98,7 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
     CmmUqError : the job cannot be analysed as it stands.
     """
     check_facts(job)
-    facts, stated = job.facts.artefact, job.facts.recording.u_coordinate_um
+    facts, stated = shift_facts(job), job.facts.recording.u_coordinate_um
     if facts.axis is None:
         raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
                          fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip

@@ -10,6 +10,7 @@ from cmm_uq.documents.plots import curve_with_band, length_plot
 from cmm_uq.documents.wording import expanded
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
+from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
@@ -166,7 +167,7 @@ def _residuals(result: ShiftResult) -> Section:
 
 
 def _artefact(result: ShiftResult) -> Section:
-    facts, estimate = result.job.facts.artefact, result.estimate
+    facts, estimate = shift_facts(result.job), result.estimate
     mean, u = estimate.artefact.mean(axis=0), estimate.artefact.std(axis=0, ddof=1)
     known = facts.known
     rows = [("Artefact", facts.name or "Uncalibrated artefact, shifted"), ("Serial number", facts.serial)]

@@ -8,13 +8,14 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.inference.posterior import Progress
-from cmm_uq.jobs.job import Job, KnownLength
+from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.shift_axis.analysis import check_facts, check_known, known_points
 from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
 from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate, placed_plate
 from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
 from cmm_uq.kinds.shifting.correction_table import plane_correction_table
+from cmm_uq.kinds.shifting.facts import KnownLength, shift_facts
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.points import AXES
@@ -98,7 +99,7 @@ def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) 
     CmmUqError : the job cannot be analysed as it stands.
     """
     check_facts(job)
-    facts, stated = job.facts.artefact, job.facts.recording.u_coordinate_um
+    facts, stated = shift_facts(job), job.facts.recording.u_coordinate_um
     plate = placed_plate(job.points, str(facts.plane), job.recording_path)
     known = None if facts.known is None else _known(facts.known, plate)
     sigma = None if stated is None else stated * MICROMETRE

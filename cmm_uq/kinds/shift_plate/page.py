@@ -12,6 +12,7 @@ from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.kinds.shift_axis.page import SIGN, table_file
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.kinds.shift_plate.undetermined import title
+from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.points import AXES
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
@@ -197,7 +198,7 @@ def _placings(result: PlaneShiftResult) -> Section:
 
 
 def _plate(result: PlaneShiftResult) -> Section:
-    facts, estimate = result.job.facts.artefact, result.estimate
+    facts, estimate = shift_facts(result.job), result.estimate
     rows = [("Artefact", facts.name or "Uncalibrated plate, shifted and turned"), ("Serial number", facts.serial)]
     if (known := facts.known) is not None:
         rows.append(("Known length", f"balls {known.from_point} to {known.to_point}: {known.length_mm:.10g} mm, "

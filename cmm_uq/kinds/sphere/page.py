@@ -6,11 +6,12 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.artefacts.sphere import Sphere
 from cmm_uq.documents.document import Column, Plot, Section, Table
+from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot, volume_plot
 from cmm_uq.documents.residual_volume import flagged
 from cmm_uq.documents.result import Result
+from cmm_uq.kinds.sphere.observe import Sphere
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
 
@@ -72,3 +73,6 @@ def _over(result: Result, sphere: Sphere) -> Plot:
         caption="Residuals after the fitted model over the sphere (all spheres, about their centres).",
         alternative=f"Three projections of the sphere; residuals of {residuals.min():.1f} to {residuals.max():.1f} µm.",
     )  # fmt: skip
+
+
+PAGE = Page(sections)

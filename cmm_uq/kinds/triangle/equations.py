@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.triangle import Triangle
-from cmm_uq.artefacts.triangle_placings import PLANES
-from cmm_uq.artefacts.triangle_standard import SIDES_OF_DIMENSIONS, corners
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.triangle.observe import Triangle
+from cmm_uq.kinds.triangle.placings import PLANES
+from cmm_uq.kinds.triangle.standard import SIDES_OF_DIMENSIONS, corners
 from cmm_uq.model.placings import Placings
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS
 from cmm_uq.points import AXES, Floats

@@ -6,13 +6,14 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.artefacts.triangle import Triangle
 from cmm_uq.documents.document import Block, Column, Paragraph, Plot, Section, Table
+from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.triangle.equations import PARAMETERS, solve_equations
+from cmm_uq.kinds.triangle.observe import Triangle
 from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
@@ -120,3 +121,6 @@ def _alike(result: Result) -> list[Block]:
     ]
     text = f"Hardly told apart by these placings (correlation): {'; '.join(pairs)}."
     return [Paragraph(text, tone="note")] if pairs else []
+
+
+PAGE = Page(sections)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.diagnosis.comparison.explanations import Explanation, known
+from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.physics.effect import FURTHER

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from cmm_uq.commands.diagnosing import screened_model
+from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.diagnosis.comparison.unknown_functions import directions, unknown
-from cmm_uq.jobs.reading import read_job
 from cmm_uq.points import Floats
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

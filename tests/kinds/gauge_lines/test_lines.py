@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.gauge import StepGauge
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.gauge_lines.lines import lines_of, periodic_part
-from tests.artefacts.constructions import indicated, step_gauge
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
+from tests.kinds.constructions import indicated, step_gauge
 
-GAUGE = ArtefactFacts(kind="step_gauge")
+GAUGE = artefact_facts(kind="step_gauge")
 
 
 def test_a_periodic_error_is_found_with_its_period_and_amplitude() -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.commands.analysis import ShiftResult, analyse
+from cmm_uq.commands.analysis import analyse
 from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from tests.conftest import ROOT
 
 EXAMPLE = ROOT / "examples" / "shift-simulated"

@@ -9,11 +9,10 @@ import shutil
 import numpy as np
 import pytest
 
-from cmm_uq.commands.analysis import ShiftResult, analyse
-from cmm_uq.commands.compose import certificate
-from cmm_uq.commands.summary import summary
+from cmm_uq.commands.analysis import analyse, outcome_of
 from cmm_uq.documents.document import Document, Plot
 from cmm_uq.documents.results_file import as_json
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shift_axis.results import shift_results
 from tests.conftest import ROOT
 from tests.kinds.reading import number, tables
@@ -30,7 +29,7 @@ def result() -> ShiftResult:
 
 @pytest.fixture(scope="module")
 def document(result: ShiftResult) -> Document:
-    return certificate(result)
+    return outcome_of(result).document
 
 
 @pytest.fixture(scope="module")
@@ -75,14 +74,14 @@ def test_what_the_shifts_leave_open_is_warned_of(document: Document) -> None:
 
 
 def test_without_a_known_length_the_certificate_says_that_there_is_no_scale(two_placings: ShiftResult) -> None:
-    document = certificate(two_placings)
+    document = outcome_of(two_placings).document
     assert any("mean sensitivity of the axis is not determined" in text for text in document.warnings)
     assert "The artefact's own dimensions (k = 2)" not in tables(document)
     assert shift_results(two_placings)["artefact"]["distance_mm"] is None
 
 
 def test_two_placings_stand_beside_the_sources_integrations(two_placings: ShiftResult) -> None:
-    table = tables(certificate(two_placings))["Beside the integrations of the method's source"]
+    table = tables(outcome_of(two_placings).document)["Beside the integrations of the method's source"]
     assert len(table.rows) == 23
     for row in table.rows[1:]:
         _, simple, u, improved, *_ = map(number, row)
@@ -109,7 +108,7 @@ def test_what_is_left_with_the_curve_is_the_repeatability(result: ShiftResult) -
 
 
 def test_the_command_ends_with_figures_and_warnings(result: ShiftResult) -> None:
-    said = [row[0] for row in summary(result)]
+    said = [row[0] for row in outcome_of(result).summary]
     assert said[:4] == ["Measured", "Linearity error, peak to valley", "Mean sensitivity error of axis x",
                         "Repeatability (one reading)"]  # fmt: skip
     assert "Warning" in said

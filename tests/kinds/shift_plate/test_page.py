@@ -7,11 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from cmm_uq.commands.analysis import PlaneShiftResult, analyse
-from cmm_uq.commands.compose import certificate
-from cmm_uq.commands.summary import summary
+from cmm_uq.commands.analysis import analyse, outcome_of
 from cmm_uq.documents.document import Document, Paragraph, Plot, Table
 from cmm_uq.documents.results_file import as_json
+from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.kinds.shift_plate.page import sections, warnings
 from cmm_uq.kinds.shift_plate.placed_plate import placed_plate
 from cmm_uq.kinds.shift_plate.plane import estimate_plane
@@ -38,7 +37,7 @@ def result() -> PlaneShiftResult:
 
 @pytest.fixture(scope="module")
 def document(result: PlaneShiftResult) -> Document:
-    return certificate(result)
+    return outcome_of(result).document
 
 
 @pytest.fixture(scope="module")
@@ -122,4 +121,4 @@ def test_a_plate_that_is_only_shifted_states_no_scale_and_no_squareness(only_shi
 
 
 def test_the_command_ends_with_figures(result: PlaneShiftResult) -> None:
-    assert [row[0] for row in summary(result)][:3] == ["Measured", "Squareness X–Y", "Scale of X"]
+    assert [row[0] for row in outcome_of(result).summary][:3] == ["Measured", "Squareness X–Y", "Scale of X"]

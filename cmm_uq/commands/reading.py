@@ -1,0 +1,24 @@
+"""Jobs of every kind there is, read from their folders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cmm_uq.jobs import reading
+from cmm_uq.jobs.job import Job
+from cmm_uq.kinds import names, table_of
+
+
+def read_job(folder: Path, *, recorded: bool = True) -> Job:
+    """Read and check a job; see :func:`cmm_uq.jobs.reading.read_job`.
+
+    Parameters
+    ----------
+    folder : the job folder, or its job.toml.
+    recorded : whether the recording must be there; otherwise a job still to be measured has no points.
+
+    Raises
+    ------
+    CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
+    """
+    return reading.read_job(folder, table_of, names, recorded=recorded)

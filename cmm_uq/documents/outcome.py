@@ -1,0 +1,80 @@
+"""What every analysis ends in: a document, figures for programs, and a summary; and what a kind offers towards them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from cmm_uq.documents.document import Document, Section
+from cmm_uq.documents.result import Result
+from cmm_uq.jobs.job import Job
+
+
+class Found(Protocol):
+    """What an analysis found, in the kind's own terms; of most kinds a :class:`~cmm_uq.documents.result.Result`."""
+
+    @property
+    def job(self) -> Job:
+        """That was analysed."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What there is to write of an analysis.
+
+    Parameters
+    ----------
+    found : in the kind's own terms.
+    document : certificate, or page of a diagnosis.
+    results : contents of results.json.
+    summary : rows of text for the end of a command.
+    warnings : what the reader must know before using a figure.
+    files : further ones, by name.
+    conforming : whether every statement of conformity is a pass, and the recording agrees with the model that the job names.
+    """
+
+    found: Found
+    document: Document
+    results: Mapping[str, Any]
+    summary: tuple[tuple[str, ...], ...]
+    warnings: tuple[str, ...] = ()
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    conforming: bool = True
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a kind adds to a certificate.
+
+    Parameters
+    ----------
+    sections : after those that every certificate has.
+    results : further keys of results.json.
+    """
+
+    sections: Callable[[Result], list[Section]]
+    results: Callable[[Result], Mapping[str, Any]] | None = None
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A kind's own way from a job to its outcome.
+
+    Parameters
+    ----------
+    analyse : ``(job, *, seed, progress)``, of a diagnosis also ``alpha``: what it finds.
+    outcome : of that, and of the seed.
+    """
+
+    analyse: Callable[..., Found]
+    outcome: Callable[[Any, int], Outcome]
+
+
+@dataclass(frozen=True)
+class OwnAnalysis:
+    """What a kind does by itself, because its errors are no list of effects."""
+
+    report: Recipe | None = None
+    diagnose: Recipe | None = None

@@ -1,0 +1,178 @@
+"""The distance equations of US 4,437,151: scale errors and axis angles from positions a known distance apart.
+
+    d² = (1+e1)dX² + 2e2 dXdY + 2e3 dXdZ + (1+e4)dY² + 2e5 dYdZ + (1+e6)dZ²                     (100), (110)
+
+A second way to the six factors, beside the measurement model, with the model's answer to compare: to first order e1, e4 and
+e6 are twice the scale errors, and e2, e3, e5 the squareness errors XY, ZX, YZ with the opposite sign. Any artefact with two
+positions a known distance apart serves; a swept bar gives them once its fixed ball is found (108).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.distances.symmetric_systems import by_doolittle, by_jacobi
+from cmm_uq.points import Floats
+from cmm_uq.units import ARCSECOND, PPM
+
+UNKNOWNS = 6
+
+POORLY_POSED = 1e-3
+"""Ratio of singular values of the equations for unit distances below which a factor hangs on set-up and noise."""
+
+SOLUTIONS: dict[str, Callable[[Floats, Floats], Floats]] = {
+    "QR": lambda A, b: _by_qr(A, b),
+    "Doolittle": lambda A, b: by_doolittle(A.T @ A, A.T @ b),
+    "Jacobi": lambda A, b: by_jacobi(A.T @ A, A.T @ b),
+}
+"""Orthogonal factorisation, which is reported, and the patent's two ways to solve its normal equations."""
+
+PLACINGS: dict[str, tuple[int, int, int]] = {
+    "along X": (1, 0, 0), "along Y": (0, 1, 0), "along Z": (0, 0, 1),
+    "along a diagonal of X and Y": (1, 1, 0), "along the other diagonal of X and Y": (1, -1, 0),
+    "along a diagonal of Y and Z": (0, 1, 1), "along the other diagonal of Y and Z": (0, 1, -1),
+    "along a diagonal of Z and X": (1, 0, 1), "along the other diagonal of Z and X": (1, 0, -1),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceSolution:
+    """What the distance equations say of a machine.
+
+    Parameters
+    ----------
+    e : (6,) e1 … e6.
+    covariance : (6, 6) of them, from the residuals.
+    residuals : (m,) calibrated distance minus the one that e1 … e6 make of the readings, mm.
+    residual_sd : mm; 0 without degrees of freedom.
+    """
+
+    e: Floats
+    covariance: Floats
+    residuals: Floats
+    residual_sd: float
+
+    @property
+    def scales_ppm(self) -> Floats:
+        """(3,) scale errors of X, Y, Z: SE = √(1+e) − 1 (102)–(104)."""
+        return np.asarray((np.sqrt(1 + self.e[[0, 3, 5]]) - 1) / PPM)
+
+    @property
+    def angles_rad(self) -> Floats:
+        """(3,) angles between the axes X–Y, Y–Z, Z–X (105)–(107)."""
+        return np.asarray(np.arccos(_cosines(self.e)), dtype=np.float64)
+
+    @property
+    def squareness_arcsec(self) -> Floats:
+        """(3,) squareness X–Y, Y–Z, Z–X: what each angle has more than 90°."""
+        return np.asarray((self.angles_rad - np.pi / 2) / ARCSECOND)
+
+    @property
+    def u(self) -> Floats:
+        """(6,) standard uncertainties of the three scales, ppm, and the three squarenesses, ″, from the residuals."""
+        step = 1e-6
+        changes = [
+            (_reported(self.e + step * unit) - _reported(self.e - step * unit)) / (2 * step)
+            for unit in np.eye(UNKNOWNS)
+        ]
+        jacobian = np.column_stack(changes)
+        return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", jacobian, self.covariance, jacobian)), dtype=np.float64)
+
+
+def solve_distances(differences: Floats, distance: float | Floats, method: str = "QR") -> DistanceSolution:
+    """Solve equation 100 for e1 … e6 by least squares.
+
+    Parameters
+    ----------
+    differences : (m, 3) readings of one position minus those of the other, mm.
+    distance : the known distance, one or (m,), mm.
+    method : a key of :data:`SOLUTIONS`.
+
+    Raises
+    ------
+    CmmUqError : the distances do not determine all six factors; the message names the placings that would.
+    """
+    differences = np.asarray(differences, dtype=np.float64)
+    d = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(differences))
+    refuse_poor_placings(differences)
+    # divided by 2d, an equation is one of lengths: its noise is that of a length, the same for all
+    A = quadratic_terms(differences) / (2 * d)[:, None]
+    b = (d**2 - np.sum(differences**2, axis=1)) / (2 * d)
+    e = SOLUTIONS[method](A, b)
+    residuals = b - A @ e
+    freedom = len(b) - UNKNOWNS
+    sd = float(np.sqrt(residuals @ residuals / freedom)) if freedom else 0.0
+    inverse = np.linalg.inv(np.linalg.qr(A, mode="r"))
+    return DistanceSolution(e, sd**2 * inverse @ inverse.T, residuals, sd)
+
+
+def quadratic_terms(differences: Floats) -> Floats:
+    """Coefficients (m, 6) of e1 … e6 in equation 100."""
+    x, y, z = differences.T
+    return np.column_stack([x * x, 2 * x * y, 2 * x * z, y * y, 2 * y * z, z * z])
+
+
+def missing_placings(differences: Floats) -> tuple[str, ...]:
+    """Placings, in words and as few as possible, that determine what these (m, 3) leave open; none when they leave nothing."""
+    directions = differences / np.linalg.norm(differences, axis=1, keepdims=True)
+    candidates = np.array(list(PLACINGS.values()), dtype=np.float64)
+    candidates /= np.linalg.norm(candidates, axis=1, keepdims=True)
+    _, s, Vt = np.linalg.svd(quadratic_terms(directions), full_matrices=len(directions) < UNKNOWNS)
+    open_space = Vt[np.append(s, np.zeros(UNKNOWNS))[:UNKNOWNS] < POORLY_POSED * s[0]].T
+    wanted = []
+    while open_space.shape[1]:
+        seen = quadratic_terms(candidates) @ open_space
+        best = int(np.argmax(np.round(np.linalg.norm(seen, axis=1), 6)))
+        wanted.append(list(PLACINGS)[best])
+        open_space = open_space @ np.linalg.svd(seen[best : best + 1])[2][1:].T
+    return tuple(wanted)
+
+
+def refuse_poor_placings(differences: Floats) -> None:
+    """Refuse distances that do not determine all six factors.
+
+    Raises
+    ------
+    CmmUqError : too few, all parallel, all in one plane, or otherwise too much alike.
+    """
+    apart = np.linalg.norm(differences, axis=1)
+    if np.any(apart == 0):
+        raise CmmUqError(f"distance {int(np.argmin(apart)) + 1} is zero: both positions are the same", where="recording",
+                         fix="Record two different positions")  # fmt: skip
+    wanted = missing_placings(differences)
+    if not wanted:
+        return
+    directions = differences / apart[:, None]
+    spread = np.linalg.svd(directions, compute_uv=False)
+    if len(differences) < UNKNOWNS:
+        problem = f"{len(differences)} distances are too few for the six factors of scale and squareness"
+    elif spread[1] < POORLY_POSED * spread[0]:
+        problem = f"all {len(differences)} distances are parallel, so they tell the scale in one direction only"
+    elif spread[2] < POORLY_POSED * spread[0]:
+        problem = f"all {len(differences)} distances lie in one plane, so they tell nothing of the axis across it"
+    else:
+        problem = f"the directions of the {len(differences)} distances leave a factor of scale or squareness open"
+    raise CmmUqError(
+        problem,
+        where="recording",
+        fix=f"Add {len(wanted)} placing{'s' if len(wanted) > 1 else ''}: {', '.join(wanted)}",
+    )
+
+
+def _by_qr(A: Floats, b: Floats) -> Floats:
+    Q, R = np.linalg.qr(A)
+    return np.asarray(np.linalg.solve(R, Q.T @ b), dtype=np.float64)
+
+
+def _cosines(e: Floats) -> Floats:
+    x, y, z = np.sqrt(1 + e[[0, 3, 5]])
+    return np.array([e[1] / (x * y), e[4] / (y * z), e[2] / (x * z)])
+
+
+def _reported(e: Floats) -> Floats:
+    scales = (np.sqrt(1 + e[[0, 3, 5]]) - 1) / PPM
+    return np.concatenate([scales, (np.arccos(_cosines(e)) - np.pi / 2) / ARCSECOND])

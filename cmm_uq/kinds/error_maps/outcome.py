@@ -1,0 +1,20 @@
+"""The diagnosis of error maps as a page."""
+
+from __future__ import annotations
+
+from cmm_uq.documents.diagnosis_words import summary_rows
+from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
+from cmm_uq.kinds.error_maps import words
+from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed, diagnose_error_maps
+from cmm_uq.kinds.error_maps.page import maps_document, maps_results
+
+
+def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
+    """What there is to write of it."""
+    rows = summary_rows(found.diagnosis.verdict, found.diagnosis.p_value, words.lines(found), found.findings)
+    document = maps_document(found, seed)
+    consistent = found.diagnosis.verdict == "consistent"
+    return Outcome(found, document, maps_results(found, seed), rows, document.warnings, conforming=consistent)
+
+
+OWN = OwnAnalysis(diagnose=Recipe(diagnose_error_maps, outcome))

@@ -1,0 +1,1 @@
+"""Gauge blocks: the two faces of each."""

@@ -1,0 +1,16 @@
+"""Gauge blocks, and where their parts are."""
+
+from __future__ import annotations
+
+from cmm_uq.jobs.job import ReferencedFacts
+from cmm_uq.model.kind import Kind
+
+KIND = Kind(
+    name="gauge_blocks",
+    table=ReferencedFacts,
+    observe="cmm_uq.kinds.gauge_lines.observe:GaugeBlocks",
+    screen="cmm_uq.kinds.gauge_lines.screen:SCREENING",
+    plan="cmm_uq.kinds.gauge_blocks.plan:PLANNING",
+    page="cmm_uq.kinds.gauge_lines.page:PAGE",
+    standards=("ISO 10360-2:2009", "VDI/VDE 2617"),
+)

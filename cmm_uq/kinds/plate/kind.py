@@ -1,0 +1,16 @@
+"""A ball plate or hole plate, and where its parts are."""
+
+from __future__ import annotations
+
+from cmm_uq.kinds.plate.facts import PlateFacts
+from cmm_uq.model.kind import Kind
+
+KIND = Kind(
+    name="plate",
+    table=PlateFacts,
+    observe="cmm_uq.kinds.plate.observe:Plate",
+    screen="cmm_uq.kinds.plate.screen:SCREENING",
+    plan="cmm_uq.kinds.plate.plan:PLANNING",
+    page="cmm_uq.kinds.plate.page:PAGE",
+    standards=("ISO 10360-2:2009", "VDI/VDE 2617"),
+)

@@ -1,0 +1,91 @@
+"""Plate: balls or holes at reference positions, placed rigidly and anyhow in each measurement.
+
+All three coordinates of every ball are observations; the six freedoms of each placing are projected out exactly. The
+certificate's uncertainty is taken as common to all positions and proportional to them (one scale of the plate). Nominal
+positions leave that scale free.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.earlier import NOISE_RATIO
+from cmm_uq.kinds.plate.facts import PlateFacts
+from cmm_uq.model.artefact import Indications, Size
+from cmm_uq.model.placings import Placings
+from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
+from cmm_uq.model.rigid import Rigid
+from cmm_uq.points import Floats, Points
+
+REFERENCES = ("reference_x_mm", "reference_y_mm", "reference_z_mm")
+
+
+class Plate(Rigid):
+    """A plate as recorded: 3n observations (x, y, z of each ball in turn) of n points.
+
+    Parameters
+    ----------
+    facts : what the job says of the plate; ``u_um`` belongs to ``length_mm``, or to the farthest ball from the first.
+    points : the recording, with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm``.
+        An earlier recording in place of references (:mod:`cmm_uq.jobs.earlier`) adds its own noise.
+
+    Raises
+    ------
+    CmmUqError : no reference positions, a placing with one ball, or positions that are not those of this plate.
+    """
+
+    kind = "plate"
+    title = "Plate"
+
+    def __init__(self, facts: PlateFacts, points: Points, *, where: str | None = None) -> None:
+        super().__init__(points)
+        if NOISE_RATIO in points.columns:
+            self.noise_scale = points.columns[NOISE_RATIO][self.rows[:, 0]]
+        self.reference = columns_needed(points, REFERENCES, self.kind, where)
+        self.expansion = expansion(facts, points)
+        longest = float(np.linalg.norm(self.reference - self.reference[0], axis=1).max())
+        body = self.reference * self.expansion[:, None]
+        self.body = body - self.placings.means(body)
+        self.sizes = (Size("length_mm", "Length of the plate", "mm", facts.length_mm or longest, certified_sd(facts)),)
+        self._refuse_another_plate(where)
+
+    def shape(self, sizes: Floats) -> Floats:
+        """See :meth:`Rigid.shape`: all positions in proportion."""
+        return np.asarray(self.body * (sizes[0] / self.sizes[0].nominal), dtype=np.float64)
+
+    def size_change(self) -> Floats:
+        """See :meth:`Artefact.size_change`: away from the middle of each placing, in proportion."""
+        return self.body.reshape(-1, 1) / self.sizes[0].nominal
+
+    def indications(self) -> Indications | None:
+        """Distances between every two balls of a (measurement, repeat), against the certified ones."""
+        size = self.sizes[0]
+        if not size.certified:
+            return None
+        runs = Placings.of(self.points.group)
+        found, certified, ends = [], [], []
+        for run in range(len(runs.numbers)):
+            rows = np.flatnonzero(runs.index == run)
+            a, b = rows[np.array(np.triu_indices(len(rows), 1))]
+            ends.append(np.column_stack([a, b]))
+            ratio = 0.5 * (self.expansion[a] + self.expansion[b])
+            found.append(np.linalg.norm(self.points.xyz[b] - self.points.xyz[a], axis=1) / ratio)
+            certified.append(np.linalg.norm(self.reference[b] - self.reference[a], axis=1))
+        lengths = np.concatenate(certified)
+        return Indications(np.concatenate(found) - lengths, lengths, size.sd * lengths / size.nominal,
+                           np.concatenate(ends))  # fmt: skip
+
+    def _refuse_another_plate(self, where: str | None) -> None:
+        points, placings = self.points, self.placings
+        nominal, found = self.extents()
+        if np.any(lost := (nominal == 0) | (found == 0)):
+            number = placings.numbers[np.argmax(lost)]
+            raise CmmUqError(
+                f"measurement {number} has no two different balls, so it tells no length of the plate",
+                where=place(points, points.measurement == number, where),
+                fix="Record at least three balls of different reference positions in each measurement, or leave it out",
+            )  # fmt: skip
+        length = self.sizes[0].nominal
+        check_length(float(found.sum() / nominal.sum()) * length, length, "the recorded plates", where)
+        self.refuse_another_shape("Check the numbering of the balls and their reference positions", where)

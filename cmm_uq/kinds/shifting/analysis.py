@@ -1,0 +1,46 @@
+"""The analysis of shifted artefacts: along an axis, or in a plane."""
+
+from __future__ import annotations
+
+from cmm_uq import __version__
+from cmm_uq.documents.compose import certificate_of
+from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
+from cmm_uq.inference.posterior import Progress
+from cmm_uq.jobs.job import Job
+from cmm_uq.kinds.shift_axis import page as axis_page
+from cmm_uq.kinds.shift_axis.analysis import ShiftResult, analyse_shift
+from cmm_uq.kinds.shift_axis.results import shift_results
+from cmm_uq.kinds.shift_plate import page as plane_page
+from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult, analyse_plane
+from cmm_uq.kinds.shift_plate.results import plane_shift_results
+from cmm_uq.kinds.shifting.correction_table import table_text
+from cmm_uq.kinds.shifting.facts import shift_facts
+
+
+def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult | PlaneShiftResult:
+    """Analyse a shift job.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be analysed as it stands.
+    """
+    if shift_facts(job).plane is not None:
+        return analyse_plane(job, seed=seed, progress=progress)
+    return analyse_shift(job, seed=seed, progress=progress)
+
+
+def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
+    """The certificate of a shift job, with the correction table beside it."""
+    if isinstance(found, ShiftResult):
+        sections, warnings, rows = axis_page.sections(found), axis_page.warnings(found), axis_page.summary(found)
+        results = shift_results(found)
+    else:
+        sections, warnings, rows = plane_page.sections(found), plane_page.warnings(found), plane_page.summary(found)
+        results = plane_shift_results(found)
+    chains, table = found.estimate.chains, axis_page.table_file(found.job)
+    produced_by = f"cmm-uq {__version__}, {chains.sampler}, seed {found.estimate.seed}"
+    document = certificate_of(found.job, sections, warnings, produced_by, (table,))
+    return Outcome(found, document, results, tuple(rows), warnings, {table: table_text(found.table)})
+
+
+OWN = OwnAnalysis(report=Recipe(analyse, outcome))

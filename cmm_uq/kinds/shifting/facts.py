@@ -1,0 +1,44 @@
+"""``[artefact]`` of an artefact that is read in shifted places."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self, cast
+
+from pydantic import Field, model_validator
+
+from cmm_uq.files.limits import LISTED
+from cmm_uq.jobs.job import ArtefactFacts, Job
+from cmm_uq.jobs.table import Length, Number, Position, Table, Uncertainty
+
+
+class KnownLength(Table):
+    """A known length between two points of a shifted artefact."""
+
+    from_point: Annotated[Number, Field(alias="from")]
+    to_point: Annotated[Number, Field(alias="to")]
+    length_mm: Length
+    u_um: Uncertainty
+
+
+class ShiftFacts(ArtefactFacts):
+    """A shifted artefact lies along an ``axis`` or, a plate, in a ``plane``."""
+
+    axis: Literal["x", "y", "z"] | None = None
+    plane: Literal["xy", "yz", "zx"] | None = None
+    shifts_mm: Annotated[list[Position], Field(max_length=LISTED.most)] = Field(default_factory=list)
+    u_shift_um: Uncertainty = 0.0
+    known: KnownLength | None = None
+
+    @model_validator(mode="after")
+    def _axis_or_plane(self) -> Self:
+        if self.plane is not None and (self.axis is not None or self.shifts_mm or self.u_shift_um):
+            raise ValueError(
+                "plane belongs to a plate that is shifted and turned: its placings are found from the readings; leave out "
+                "axis, shifts_mm and u_shift_um, or leave out plane"
+            )
+        return self
+
+
+def shift_facts(job: Job) -> ShiftFacts:
+    """``[artefact]`` of a shift job."""
+    return cast("ShiftFacts", job.facts.artefact)

@@ -1,0 +1,16 @@
+"""``[artefact]`` of a test sphere."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.table import Uncertainty
+
+
+class SphereFacts(ArtefactFacts):
+    """``length_mm`` is the diameter, ``form_um`` the form deviation by the sphere's certificate."""
+
+    form_key: ClassVar[str | None] = "form_um"
+
+    form_um: Uncertainty | None = None

@@ -1,0 +1,16 @@
+"""A test sphere, and where its parts are."""
+
+from __future__ import annotations
+
+from cmm_uq.kinds.sphere.facts import SphereFacts
+from cmm_uq.model.kind import Kind
+
+KIND = Kind(
+    name="sphere",
+    table=SphereFacts,
+    observe="cmm_uq.kinds.sphere.observe:Sphere",
+    screen="cmm_uq.kinds.sphere.screen:SCREENING",
+    plan="cmm_uq.kinds.sphere.plan:PLANNING",
+    page="cmm_uq.kinds.sphere.page:PAGE",
+    standards=("ISO 10360-5:2010",),
+)

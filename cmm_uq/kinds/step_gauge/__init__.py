@@ -1,0 +1,1 @@
+"""Step gauge: faces at certified distances along one line."""

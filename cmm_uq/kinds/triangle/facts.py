@@ -1,0 +1,15 @@
+"""``[artefact]`` of a triangle of gauge blocks and cylinders."""
+
+from __future__ import annotations
+
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.table import Triple, Uncertainty
+
+
+class TriangleFacts(ArtefactFacts):
+    """``blocks_mm`` (1–2, 2–3, 3–1) and the diameters ``cylinders_mm`` (1, 2, 3), with the standard uncertainty of each."""
+
+    blocks_mm: Triple
+    u_blocks_um: Uncertainty = 0.0
+    cylinders_mm: Triple
+    u_cylinders_um: Uncertainty = 0.0

@@ -1,0 +1,85 @@
+"""Triangle standard as recorded: the axes of three cylinders in several placings.
+
+In the source's equations a rotation of any carriage acts on the stylus tip offset too, and two tips of different length part
+yaw from scale. So ``tip_x_mm, tip_y_mm, tip_z_mm`` count for every carriage here, and not for the ram alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.triangle.facts import TriangleFacts
+from cmm_uq.kinds.triangle.standard import DIMENSIONS, SIDES_OF_DIMENSIONS, TriangleStandard, corner_changes, corners
+from cmm_uq.model.artefact import Size
+from cmm_uq.model.recorded import check_length, expansion, place
+from cmm_uq.model.rigid import Rigid
+from cmm_uq.points import Floats, Points
+
+_TITLES = ("Block 1–2", "Block 2–3", "Block 3–1", "Cylinder 1", "Cylinder 2", "Cylinder 3")
+
+
+class Triangle(Rigid):
+    """A triangle as recorded: points 1, 2, 3 of every (measurement, repeat) are the axes of its cylinders.
+
+    Parameters
+    ----------
+    facts : what the job says of blocks and cylinders.
+    points : the recording.
+
+    Attributes
+    ----------
+    standard : dimensions of the triangle.
+
+    Raises
+    ------
+    CmmUqError : the triangle does not close, a corner is missing, or the recording is of another triangle.
+    """
+
+    kind = "triangle"
+    title = "Triangle standard"
+
+    def __init__(self, facts: TriangleFacts, points: Points, *, where: str | None = None) -> None:
+        super().__init__(replace(points, machine=replace(points.machine, tip_on_every_carriage=True)))
+        self.standard = TriangleStandard.of(facts)
+        self.expansion = expansion(facts, points)
+        _refuse_missing_corners(points, where)
+        self._corner = points.point - 1
+        self.sizes = tuple(
+            Size(f"{name}_mm", title, "mm", float(nominal), float(u))
+            for name, title, nominal, u in zip(
+                DIMENSIONS, _TITLES, self.standard.dimensions, self.standard.u, strict=True
+            )
+        )
+        self.body = self.shape(self.standard.dimensions)
+        nominal, found = self.extents()
+        longest = float(self.standard.sides.max())
+        check_length(float(found.sum() / nominal.sum()) * longest, longest, "the longest sides", where)
+        self.refuse_another_shape("Check the numbering of the cylinders: blocks_mm are 1–2, 2–3, 3–1", where)
+
+    def shape(self, sizes: Floats) -> Floats:
+        """See :meth:`Rigid.shape`: corners of the triangle that the dimensions close to."""
+        body = corners(SIDES_OF_DIMENSIONS @ sizes)[self._corner] * self.expansion[:, None]
+        return np.asarray(body - self.placings.means(body), dtype=np.float64)
+
+    def size_change(self) -> Floats:
+        """See :meth:`Artefact.size_change`."""
+        change = corner_changes(self.standard.sides)[self._corner] * self.expansion[:, None, None]
+        return np.asarray((change - self.placings.means(change)).reshape(-1, len(DIMENSIONS)), dtype=np.float64)
+
+
+def _refuse_missing_corners(points: Points, where: str | None) -> None:
+    if np.any(other := ~np.isin(points.point, (1, 2, 3))):
+        raise CmmUqError(f"there is a point {points.point[np.argmax(other)]}: a triangle has 1, 2, 3",
+                         where=place(points, other, where), fix="Number the cylinders as in blocks_mm")  # fmt: skip
+    counts = np.bincount(points.group)
+    if np.any(short := counts[points.group] < 3):
+        row = int(np.argmax(short))
+        present = points.point[points.group == points.group[row]]
+        missing = sorted({1, 2, 3} - set(present.tolist()))[0]
+        raise CmmUqError(
+            f"measurement {points.measurement[row]}, repeat {points.repeat[row]} has no point {missing}: the triangle does "
+            "not close", where=place(points, short, where), fix="Record all three cylinders, or leave out the measurement",
+        )  # fmt: skip

@@ -1,0 +1,121 @@
+"""What a kind of measurement is: a name, its keys in ``[artefact]``, and what it offers to each room.
+
+A room that needs something particular to a kind gets it as an argument and says of what class it must be; it never asks for a
+kind's name. A facet is given as an object, or as the place where it is found, ``"package.module:NAME"``, and is then loaded
+when a command first asks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TypeVar
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.points import Points
+
+Facet = TypeVar("Facet")
+
+Observe = Callable[..., Artefact]
+"""``(facts, points, *, where)``: the artefact that a job describes, as recorded."""
+
+
+Observed = Callable[[Points], Artefact]
+"""The same with what the job says of the artefact filled in."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of measurement. What it does not offer is refused in words.
+
+    Parameters
+    ----------
+    name : in ``[artefact] kind``.
+    table : its keys of ``[artefact]``.
+    observe : makes an artefact of points; ``None`` where the recording is no points of an artefact.
+    screen : a :class:`~cmm_uq.screening.shape.Screening`.
+    plan : a :class:`~cmm_uq.planning.setting.Planning`.
+    page : a :class:`~cmm_uq.documents.outcome.Page`.
+    own : a :class:`~cmm_uq.documents.outcome.OwnAnalysis`, where its errors are no list of effects.
+    standards : that may be stated of it.
+    refusal, instead : why some command cannot serve it, with ``{}`` for what cannot be done, and what can be done.
+    """
+
+    name: str
+    table: type[ArtefactFacts] = ArtefactFacts
+    observe: Observe | str | None = None
+    screen: object = None
+    plan: object = None
+    page: object = None
+    own: object = None
+    standards: tuple[str, ...] = ()
+    refusal: str = ""
+    instead: str = "Use another command"
+
+    def offers(self, facet: str, of: type[Facet]) -> Facet | None:
+        """One of its facets, loaded; ``None`` where it has none.
+
+        Parameters
+        ----------
+        facet : ``screen``, ``plan``, ``page`` or ``own``.
+        of : what it must be.
+
+        Raises
+        ------
+        CmmUqError : it is something else, or cannot be loaded: the package that it comes from is broken.
+        """
+        found = self._loaded(getattr(self, facet))
+        if found is None or isinstance(found, of):
+            return found
+        raise CmmUqError(f"{facet} of the kind {self.name!r} is no {of.__name__}",
+                         fix="Mend the package that it comes from")  # fmt: skip
+
+    def needs(self, facet: str, of: type[Facet], what: str) -> Facet:
+        """One of its facets, for a command that cannot do without.
+
+        Parameters
+        ----------
+        what : cannot be done without it, as ``planned``.
+
+        Raises
+        ------
+        CmmUqError : it has none, or see :meth:`offers`.
+        """
+        found = self.offers(facet, of)
+        if found is None:
+            raise self.refused(what)
+        return found
+
+    def observing(self, what: str) -> Observe:
+        """What makes an artefact of facts and points, for a command that cannot do without.
+
+        Raises
+        ------
+        CmmUqError : it has none, or see :meth:`offers`.
+        """
+        found = self._loaded(self.observe)
+        if found is None:
+            raise self.refused(what)
+        if not callable(found):
+            raise CmmUqError(f"observe of the kind {self.name!r} is no function",
+                             fix="Mend the package that it comes from")  # fmt: skip
+        observe: Observe = found
+        return observe
+
+    def refused(self, what: str) -> CmmUqError:
+        """The error of a command that cannot serve this kind."""
+        refusal = self.refusal or f"a job of kind {self.name!r} cannot be {{}}"
+        return CmmUqError(refusal.format(what), where="job.toml [artefact] kind", fix=self.instead)
+
+    def _loaded(self, facet: object) -> object:
+        if not isinstance(facet, str):
+            return facet
+        module, _, name = facet.partition(":")
+        try:
+            return getattr(import_module(module), name)
+        except (ImportError, AttributeError) as error:
+            raise CmmUqError(f"the kind {self.name!r} names {facet!r}, which cannot be loaded: {error}",
+                             fix="Mend the package that it comes from") from error  # fmt: skip

@@ -1,0 +1,160 @@
+"""What the certificate of the real recording says."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cmm_uq.commands.analysis import Result, analyse, outcome_of
+from cmm_uq.documents.compose import STATEMENTS
+from cmm_uq.documents.document import Decision, Document, Facts, Table
+from cmm_uq.documents.html import render_html
+from cmm_uq.documents.warning import warnings
+from tests.conftest import ROOT
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return analyse(ROOT / "examples" / "iota-1102-20C")
+
+
+@pytest.fixture(scope="module")
+def document(result: Result) -> Document:
+    return outcome_of(result).document
+
+
+@pytest.fixture(scope="module")
+def uncalibrated() -> Result:
+    return analyse(ROOT / "examples" / "iota-1102-20C-compensated")
+
+
+def table(document: Document, caption: str) -> Table:
+    blocks = [block for section in document.sections for block in section.blocks]
+    return next(block for block in blocks if isinstance(block, Table) and block.caption == caption)
+
+
+def facts(document: Document) -> dict[str, str]:
+    blocks = [*document.particulars, *(block for section in document.sections for block in section.blocks)]
+    return {label: value for block in blocks if isinstance(block, Facts) for label, value in block.rows}
+
+
+def test_figures_are_stated_with_expanded_uncertainty_to_two_digits(document: Document) -> None:
+    rows = {row[0]: row[1:] for row in table(document, "Figures of performance").rows}
+    for value, U, k, _ in rows.values():
+        assert len(U.replace(".", "").lstrip("0")) == 2
+        assert len(value.partition(".")[2]) == len(U.partition(".")[2])
+        assert 1.8 < float(k) < 2.6
+    assert rows["Mean length"][0] == "404.2051"
+
+
+def test_the_error_factors_stand_beside_their_least_squares_estimate(document: Document) -> None:
+    rows = {row[0]: row for row in table(document, "Error factors of the machine").rows}
+    assert rows["Squareness X–Y"][1] == "−175"
+    assert rows["Squareness X–Y"][4] == "−174.8"
+    assert rows["Squareness X–Y"][5] == "″"
+
+
+def test_the_budget_of_one_length_says_where_each_figure_comes_from(document: Document) -> None:
+    """u = √(2·9.5² + 5²) µm: the readings of both balls and the certified length."""
+    rows = {row[0]: row for row in table(document, "Contributions to the deviation of one length").rows}
+    assert rows["Certified length"][-1] == "certificate Harris 2004, Table 21"
+    assert any("residuals" in cell for cell in rows["Coordinate of a ball, along the bar, twice"])
+    share = 2 * 9.506**2 / (2 * 9.506**2 + 5.0**2)
+    cells = [cell.replace("\u00a0", " ") for cell in rows["Coordinate of a ball, along the bar, twice"]]
+    assert f"{100 * share:.1f} %" in cells
+
+
+def test_the_decision_names_rule_limit_and_probability(document: Document) -> None:
+    (decision,) = [block for section in document.sections for block in section.blocks if isinstance(block, Decision)]
+    assert decision.outcome == "fail"
+    assert decision.limit == "60 µm"
+    assert "ISO 14253-1:2017" in decision.rule
+    assert "<\u00a00.01\u00a0%" in decision.explanation
+
+
+def test_the_traceability_chain_of_the_artefact_is_printed(document: Document) -> None:
+    said = facts(document)
+    assert said["Certified length at 20 °C"] == "404.2357 mm, u = 5 µm"
+    assert said["Its certificate"] == "Harris 2004, Table 21"
+
+
+def test_the_sentences_on_scope_and_reproduction_are_there(document: Document) -> None:
+    assert document.statements == STATEMENTS
+    assert "relate only to the item" in STATEMENTS[0]
+    assert "except in full" in STATEMENTS[1]
+
+
+def test_what_is_mandatory_and_missing_is_named_in_one_warning(result: Result) -> None:
+    (missing,) = [text for text in warnings(result) if "ISO/IEC 17025" in text]
+    for clause in ("7.8.2.1 b", "7.8.2.1 e", "7.8.2.1 g", "7.8.2.1 j", "7.8.2.1 o"):
+        assert clause in missing
+    assert "7.8.2.1 f" not in missing
+
+
+def test_a_complete_job_has_no_such_warning_and_its_particulars_are_printed(job: Path) -> None:
+    path = job / "job.toml"
+    text = path.read_text(encoding="utf-8")
+    text = text.replace("[job]\n", '[job]\ncustomer = "<b>Müller & Söhne</b>"\nissued = 2004-09-30\n', 1)
+    text = text.replace(
+        "[machine]\n", '[laboratory]\nname = "L"\naddress = "A"\nsignatory = "S"\n[machine]\nserial = "7"\n', 1
+    )
+    path.write_text(text, encoding="utf-8")
+    found = analyse(job)
+    assert not any("ISO/IEC 17025" in text for text in warnings(found))
+    made = outcome_of(found).document
+    assert facts(made)["Customer"] == "<b>Müller & Söhne</b>"
+    assert made.signatures[0].name == "S"
+    html = render_html(made)
+    assert "&lt;b&gt;Müller &amp; Söhne&lt;/b&gt;" in html
+    assert "<b>Müller" not in html
+
+
+def test_free_scales_are_not_given_figures_but_their_differences_are(uncalibrated: Result) -> None:
+    document = outcome_of(uncalibrated).document
+    rows = {row[0]: row for row in table(document, "Error factors of the machine").rows}
+    assert rows["Scale error of X"][1:5] == ("not determined", "", "", "")
+    assert rows["Squareness X–Y"][1] == "1"
+    differences = table(document, "Differences that are determined").rows
+    assert differences[0][0] == "Scale error of Y − Scale error of X"
+    assert float(differences[0][2]) < 60
+    assert any("Not determined by this recording" in text for text in document.warnings)
+
+
+def test_a_run_that_did_not_converge_says_so_first(result: Result) -> None:
+    failed = replace(result, posterior=replace(result.posterior, ess_min=500.0))
+    document = outcome_of(failed).document
+    assert "did not converge" in document.warnings[0]
+    assert "must not be used" in document.warnings[0]
+    assert facts(document)["Convergence"].startswith("NOT reached")
+
+
+def test_the_copied_position_is_told_with_its_influence(document: Document) -> None:
+    assert any("Measurement 18 repeats the coordinates of measurement 14" in text for text in document.warnings)
+    assert any(
+        re.search(r"Without measurement 18: residual standard deviation 13\.2 µm", text) for text in document.warnings
+    )
+
+
+def test_a_recording_that_contradicts_its_model_is_a_warning_and_the_diagnosis_is_printed_on_demand(job: Path) -> None:
+    path = job / "job.toml"
+    text = re.sub(r"(?m)^effects = .*", 'effects = ["scale_x", "scale_y", "scale_z"]', path.read_text(encoding="utf-8"))
+    path.write_text(text.replace("[job]\n", "[job]\ndiagnosis_on_certificate = true\n", 1), encoding="utf-8")
+    document = outcome_of(analyse(job)).document
+    assert "does not agree with the model" in document.warnings[0]
+    assert "Squareness X–Y" in document.warnings[0]
+    assert "What was left out" in [section.title for section in document.sections]
+
+
+def test_a_consistent_recording_prints_no_diagnosis_unless_asked(document: Document) -> None:
+    assert not any("does not agree" in text for text in document.warnings)
+    assert "What was left out" not in [section.title for section in document.sections]
+
+
+def test_the_summary_carries_the_certificates_figures(result: Result, document: Document) -> None:
+    lines = [" ".join(row) for row in outcome_of(result).summary]
+    for row in table(document, "Figures of performance").rows:
+        assert any(f"{row[1]} ± {row[2]}" in line for line in lines)
+    assert any("FAIL" in line for line in lines)

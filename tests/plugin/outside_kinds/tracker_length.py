@@ -1,0 +1,140 @@
+"""Distances by a laser tracker: a kind of measurement for cmm_uq from a package of its own.
+
+A reflector on the ram is read at two places; a tracker in line with both says how far it moved, in the column ``tracker_mm``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.documents.document import Column, Section, Table
+from cmm_uq.documents.outcome import Page
+from cmm_uq.documents.result import Result
+from cmm_uq.jobs.job import ReferencedFacts
+from cmm_uq.jobs.table import Uncertainty
+from cmm_uq.model.artefact import Artefact, Size
+from cmm_uq.model.kind import Kind
+from cmm_uq.model.recorded import columns_needed
+from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
+from cmm_uq.planning.directions import words
+from cmm_uq.planning.patterns import length_of
+from cmm_uq.planning.placing import Pattern, Placing, along
+from cmm_uq.planning.ready import MIDDLE, check_allowed
+from cmm_uq.planning.setting import Planning, Setting
+from cmm_uq.points import Floats, Points
+from cmm_uq.screening import shape as screening
+from cmm_uq.units import METRE, MICROMETRE
+
+COLUMN = "tracker_mm"
+
+
+class TrackerFacts(ReferencedFacts):
+    """``u_um_per_m`` is the standard uncertainty of the tracker's wavelength, µm/m, on top of ``u_um``."""
+
+    u_um_per_m: Uncertainty = 0.0
+
+
+class TrackerLength(Artefact):
+    """m distances of 2m points; their direction and place cancel, the tracker's scale is common to all."""
+
+    kind = "tracker_length"
+    title = "Laser tracker"
+
+    def __init__(self, facts: TrackerFacts, points: Points, *, where: str | None = None) -> None:
+        self.points = points
+        self.rows = np.lexsort((points.point, points.group)).reshape(-1, 2)
+        first = self.rows[:, 0]
+        self.measurement, self.repeat = points.measurement[first], points.repeat[first]
+        self.reference = columns_needed(points, (COLUMN,), "laser tracker", where)[first, 0]
+        self.noise_scale = np.full(len(first), np.sqrt(2.0))
+        longest = facts.length_mm or float(self.reference.max())
+        u = MICROMETRE * float(np.hypot(facts.u_um or 0.0, facts.u_um_per_m * longest / METRE))
+        self.sizes = (
+            Size("length_mm", "Longest distance of the tracker", "mm", longest, np.inf if facts.nominal else u),
+        )
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        """See :meth:`Artefact.fit`: same middle, same direction, the tracker's distance."""
+        wanted = self.reference * sizes[0] / self.sizes[0].nominal
+        half, middle = 0.5 * wanted[:, None] * self._directions(true_xyz), true_xyz[self.rows].mean(axis=1)
+        placed = true_xyz.copy()
+        placed[self.rows[:, 0]], placed[self.rows[:, 1]] = middle - half, middle + half
+        return placed
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        """See :meth:`Artefact.project`: relative displacement along the beam."""
+        relative = displacement[self.rows[:, 1]] - displacement[self.rows[:, 0]]
+        return np.asarray(np.einsum("mi,mik->mk", self._directions(xyz), relative))
+
+    def size_change(self) -> Floats:
+        """See :meth:`Artefact.size_change`."""
+        return np.asarray((self.reference / self.sizes[0].nominal)[:, None])
+
+    def deviations(self) -> Floats:
+        """Indicated minus the tracker's distance, (m,) mm."""
+        return np.asarray(np.linalg.norm(np.diff(self.points.xyz[self.rows], axis=1)[:, 0], axis=1) - self.reference)
+
+    def _directions(self, xyz: Floats) -> Floats:
+        steps = xyz[self.rows[:, 1]] - xyz[self.rows[:, 0]]
+        return np.asarray(steps / np.linalg.norm(steps, axis=1, keepdims=True))
+
+
+def shape_of(facts: TrackerFacts, points: Points) -> screening.Shape | None:
+    """Pairs of points as far apart as the tracker says."""
+    rows = screening.rows_by(points.group)
+    if COLUMN not in points.columns or any(sorted(points.point[pair]) != [1, 2] for pair in rows):
+        return None
+    reference = points.columns[COLUMN][:, None]
+    return screening.Shape(rows, _misfit, np.nan, float(reference.max()), True, (COLUMN,), reference)
+
+
+def _misfit(xyz: Floats, reference: Floats, _: float) -> Floats:
+    return np.full(2, abs(float(np.linalg.norm(xyz[1] - xyz[0]) - reference[0, 0])))
+
+
+def pattern(length: float, repeats: int) -> Pattern:
+    """Both ends of one distance."""
+    ends = np.array([[-0.5 * length, 0.0, 0.0], [0.5 * length, 0.0, 0.0]])
+    one = Pattern(ends, np.array([1, 2]), np.ones(2, dtype=np.int64), {COLUMN: np.full(2, length)})
+    return one.repeated(repeats)
+
+
+def tracker_lines(setting: Setting) -> tuple[Placing, ...]:
+    """Three axes, six face diagonals and four space diagonals through the middle of the volume."""
+    length, repeats, found = length_of(setting.artefact, setting.plan), setting.plan.repeats, []
+    signs = [(x, y, z) for x in (0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) > (0, 0, 0)]
+    for direction in np.array(signs, dtype=np.float64):
+        check_allowed(setting, direction)
+        attitude = along(direction)
+        found.append(setting.volume.set_up(pattern(length, repeats), attitude, MIDDLE, words(direction)))
+    return tuple(found)
+
+
+def _shape(setting: Setting) -> Shape:
+    return lambda attitude: pattern(length_of(setting.artefact, setting.plan), setting.plan.repeats)
+
+
+def sections(result: Result) -> list[Section]:
+    """Every distance, as recorded and after the fitted model."""
+    found, residuals = result.artefact, result.residuals / MICROMETRE
+    assert isinstance(found, TrackerLength)
+    rows = tuple(
+        (str(number), f"{distance:.4f}", f"{deviation / MICROMETRE:.1f}", f"{residual:.1f}")
+        for number, distance, deviation, residual in zip(
+            found.measurement, found.reference, found.deviations(), residuals, strict=True
+        )
+    )
+    columns = Column("Measurement"), Column("Tracker", "mm"), Column("Deviation", "µm"), Column("Residual", "µm")
+    return [Section("Distances by laser tracker", (Table("Distances", columns, rows),))]
+
+
+_PLACES = Everywhere(along_lines, _shape, Elsewhere(along_lines))
+
+KIND = Kind(
+    name="tracker_length",
+    table=TrackerFacts,
+    observe=TrackerLength,
+    screen=screening.Screening(shape_of),
+    plan=Planning({"tracker lines": tracker_lines}, _PLACES.candidates, _PLACES.elsewhere),
+    page=Page(sections, lambda result: {"tracker": {"distances": len(result.residuals)}}),
+)

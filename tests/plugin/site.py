@@ -1,0 +1,30 @@
+"""A package as an installer leaves it: its modules beside a dist-info folder with its entry points."""
+
+from __future__ import annotations
+
+import shutil
+import tomllib
+from pathlib import Path
+
+OUTSIDE_KINDS = Path(__file__).parent / "outside_kinds"
+"""The source of a package with a kind of its own: what its author writes."""
+
+
+def install(project: Path, site: Path) -> Path:
+    """Put a project's modules and metadata into a folder that packages are looked for in."""
+    about = tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for module in project.glob("*.py"):
+        shutil.copy(module, site)
+    describe(site, about["name"], about["version"], about["entry-points"])
+    return site
+
+
+def describe(site: Path, name: str, version: str, offers: dict[str, dict[str, str]]) -> None:
+    """Write the metadata of a package that offers something by entry points, in groups."""
+    info = site / f"{name.replace('-', '_')}-{version}.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n", encoding="utf-8")
+    lines = []
+    for group, entries in offers.items():
+        lines += [f"[{group}]", *(f"{entry} = {where}" for entry, where in entries.items()), ""]
+    (info / "entry_points.txt").write_text("\n".join(lines), encoding="utf-8")
