@@ -53,7 +53,7 @@ class Kind:
     own: object = None
     standards: tuple[str, ...] = ()
     refusal: str = ""
-    instead: str = "Another command may: see its documentation"
+    instead: str = "Use another command"
 
     def offers(self, facet: str, of: type[Facet]) -> Facet | None:
         """One of its facets, loaded; ``None`` where it has none.

@@ -27,6 +27,39 @@ Attitudes = Callable[[Volume], list[tuple[str, Floats]]]
 
 
 @dataclass(frozen=True)
+class Elsewhere:
+    """A recorded artefact, that stands by itself in each placing, set up in other places.
+
+    Parameters
+    ----------
+    attitudes : in which it is set up, beside that of the recording.
+    """
+
+    attitudes: Attitudes
+
+    def __call__(self, artefact: Artefact, volume: Volume, count: int) -> tuple[Placing, ...]:
+        """The first recorded placing, once, in many places and attitudes.
+
+        Raises
+        ------
+        CmmUqError : there is none.
+        """
+        first = artefact.points.select(artefact.points.measurement == artefact.measurement[0])
+        pattern, attitude, _ = Pattern.of_recording(first.select(first.repeat == first.repeat.min()))
+        return self.like(pattern, attitude, volume, count)
+
+    def like(self, pattern: Pattern, recorded: Floats, volume: Volume, count: int) -> tuple[Placing, ...]:
+        """A pattern in other places; first of all in the recorded attitude (3, 3).
+
+        Raises
+        ------
+        CmmUqError : there is none.
+        """
+        ways = [("as recorded", recorded), *self.attitudes(volume)]
+        return thinned(everywhere(volume, ways, lambda _: pattern), count, volume)
+
+
+@dataclass(frozen=True)
 class Everywhere:
     """Candidates of an artefact that stands by itself in each placing.
 
@@ -34,12 +67,12 @@ class Everywhere:
     ----------
     attitudes : in which it is set up.
     shape : what is measured of it in one placing.
-    again : attitudes of a recorded one, beside that of the recording; the same by default.
+    elsewhere : of a recorded one.
     """
 
     attitudes: Attitudes
     shape: Callable[[Setting], Shape]
-    again: Attitudes | None = None
+    elsewhere: Elsewhere
 
     def candidates(self, setting: Setting, start: Start | None) -> tuple[Placing, ...]:
         """In many places: as the plan says, or as it was recorded.
@@ -51,24 +84,8 @@ class Everywhere:
         plan, volume = setting.plan, setting.volume
         if start is not None and start.again is not None:
             pattern, attitude, _ = Pattern.of_recording(start.again.points)
-            return self._like(pattern.once().repeated(plan.repeats), attitude, volume, plan.candidates)
+            return self.elsewhere.like(pattern.once().repeated(plan.repeats), attitude, volume, plan.candidates)
         return thinned(everywhere(volume, self.attitudes(volume), self.shape(setting)), plan.candidates, volume)
-
-    def elsewhere(self, artefact: Artefact, volume: Volume, count: int) -> tuple[Placing, ...]:
-        """The first recorded placing, once, in many places and attitudes.
-
-        Raises
-        ------
-        CmmUqError : there is none.
-        """
-        first = artefact.points.select(artefact.points.measurement == artefact.measurement[0])
-        pattern, attitude, _ = Pattern.of_recording(first.select(first.repeat == first.repeat.min()))
-        return self._like(pattern, attitude, volume, count)
-
-    def _like(self, pattern: Pattern, recorded: Floats, volume: Volume, count: int) -> tuple[Placing, ...]:
-        """The same pattern elsewhere; first of all in the recorded attitude (3, 3)."""
-        ways = [("as recorded", recorded), *(self.again or self.attitudes)(volume)]
-        return thinned(everywhere(volume, ways, lambda _: pattern), count, volume)
 
 
 def candidates(setting: Setting, start: Start | None = None) -> tuple[Placing, ...]:

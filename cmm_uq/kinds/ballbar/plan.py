@@ -13,7 +13,7 @@ import numpy as np
 
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.planning.candidates import Everywhere, Shape, along_lines
+from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
 from cmm_uq.planning.directions import words
 from cmm_uq.planning.patterns import length_of
 from cmm_uq.planning.placing import Pattern, Placing, along
@@ -86,6 +86,6 @@ def _shape(setting: Setting) -> Shape:
     return lambda _: pattern
 
 
-_PLACES = Everywhere(along_lines, _shape)
+_PLACES = Everywhere(along_lines, _shape, Elsewhere(along_lines))
 
 PLANNING = Planning({"ASME B89.4.1": ballbar_positions}, _PLACES.candidates, _PLACES.elsewhere)

@@ -9,7 +9,7 @@ import numpy as np
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.kinds.plane.facts import PlaneFacts
-from cmm_uq.planning.candidates import Everywhere, Shape, across_planes
+from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, across_planes
 from cmm_uq.planning.placing import Pattern, Placing
 from cmm_uq.planning.setting import Planning, Setting
 from cmm_uq.points import Floats
@@ -40,6 +40,6 @@ def _shape(setting: Setting) -> Shape:
     return lambda _: pattern
 
 
-_PLACES = Everywhere(across_planes, _shape)
+_PLACES = Everywhere(across_planes, _shape, Elsewhere(across_planes))
 
 PLANNING = Planning({"surface plate": surface_places}, _PLACES.candidates, _PLACES.elsewhere)

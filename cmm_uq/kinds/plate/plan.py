@@ -6,7 +6,7 @@ import numpy as np
 
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.planning.candidates import Everywhere, Shape, across_planes
+from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, across_planes
 from cmm_uq.planning.directions import PRINCIPAL_PLANES
 from cmm_uq.planning.placing import Pattern, Placing
 from cmm_uq.planning.ready import ACROSS, check_allowed
@@ -45,6 +45,6 @@ def _shape(setting: Setting) -> Shape:
     return lambda _: pattern
 
 
-_PLACES = Everywhere(across_planes, _shape)
+_PLACES = Everywhere(across_planes, _shape, Elsewhere(across_planes))
 
 PLANNING = Planning({"plate placings": plate_placings}, _PLACES.candidates, _PLACES.elsewhere)

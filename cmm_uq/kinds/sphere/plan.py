@@ -6,7 +6,7 @@ import numpy as np
 
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.planning.candidates import Everywhere, Shape, upright
+from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, upright
 from cmm_uq.planning.patterns import length_of
 from cmm_uq.planning.placing import Pattern, Placing
 from cmm_uq.planning.ready import MIDDLE
@@ -43,6 +43,6 @@ def _shape(setting: Setting) -> Shape:
     return lambda _: pattern
 
 
-_PLACES = Everywhere(upright, _shape, again=lambda volume: [])
+_PLACES = Everywhere(upright, _shape, Elsewhere(lambda volume: []))
 
 PLANNING = Planning({"ISO 10360-5": sphere_places}, _PLACES.candidates, _PLACES.elsewhere)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.kinds.gauge_lines.patterns import faces_of, five_of, gauge, seven_lines
-from cmm_uq.planning.candidates import Everywhere, Shape, along_lines
+from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
 from cmm_uq.planning.placing import Pattern, Placing
 from cmm_uq.planning.setting import Planning, Setting
 from cmm_uq.points import Floats
@@ -28,6 +28,6 @@ def _shape(setting: Setting) -> Shape:
     return fitting_pattern
 
 
-_PLACES = Everywhere(along_lines, _shape)
+_PLACES = Everywhere(along_lines, _shape, Elsewhere(along_lines))
 
 PLANNING = Planning({"ISO 10360-2": iso_lines}, _PLACES.candidates, _PLACES.elsewhere)

@@ -14,7 +14,7 @@ from cmm_uq.kinds.triangle.facts import TriangleFacts
 from cmm_uq.kinds.triangle.placings import PLANES, SEVEN_PLACINGS, placed_triangle
 from cmm_uq.kinds.triangle.placings import Placing as TrianglePlacing
 from cmm_uq.kinds.triangle.standard import TriangleStandard
-from cmm_uq.planning.candidates import THIRDS, Everywhere, Shape, across_planes, thinned
+from cmm_uq.planning.candidates import THIRDS, Elsewhere, across_planes, thinned
 from cmm_uq.planning.placing import Placing, split
 from cmm_uq.planning.ready import ACROSS, check_allowed
 from cmm_uq.planning.setting import Planning, Setting, Start
@@ -61,8 +61,4 @@ def _everywhere(setting: Setting) -> Iterator[Placing]:
                 yield Placing(placing.title, replace(some.points, machine=setting.machine))
 
 
-def _shape(setting: Setting) -> Shape:
-    return lambda _: None  # candidates are made otherwise
-
-
-PLANNING = Planning({"triangle placings": triangle_placings}, candidates, Everywhere(across_planes, _shape).elsewhere)
+PLANNING = Planning({"triangle placings": triangle_placings}, candidates, Elsewhere(across_planes))

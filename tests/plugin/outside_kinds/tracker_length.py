@@ -14,7 +14,7 @@ from cmm_uq.jobs.job import NotNegative, ReferencedFacts
 from cmm_uq.model.artefact import Artefact, Size
 from cmm_uq.model.kind import Kind
 from cmm_uq.model.recorded import columns_needed
-from cmm_uq.planning.candidates import Everywhere, Shape, along_lines
+from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
 from cmm_uq.planning.directions import words
 from cmm_uq.planning.patterns import length_of
 from cmm_uq.planning.placing import Pattern, Placing, along
@@ -127,7 +127,7 @@ def sections(result: Result) -> list[Section]:
     return [Section("Distances by laser tracker", (Table("Distances", columns, rows),))]
 
 
-_PLACES = Everywhere(along_lines, _shape)
+_PLACES = Everywhere(along_lines, _shape, Elsewhere(along_lines))
 
 KIND = Kind(
     name="tracker_length",
