@@ -42,10 +42,9 @@ def certified(result: Result, page: Page) -> Outcome:
     page : what its kind adds.
     """
     told = warnings(result)
-    more = {} if page.results is None else page.results(result)
     passed = all(statement.outcome == "pass" for statement in result.statements)
     return Outcome(
-        result, _certificate(result, page, told), {**results(result), **more}, tuple(summary(result)), told,
+        result, _certificate(result, page, told), page.with_further(result, results(result)), tuple(summary(result)), told,
         conforming=passed and result.diagnosed.diagnosis.verdict == "consistent",
     )  # fmt: skip
 

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from cmm_uq.documents.document import Document, Section
 from cmm_uq.documents.result import Result
+from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 
 
@@ -56,6 +57,19 @@ class Page:
 
     sections: Callable[[Result], list[Section]]
     results: Callable[[Result], Mapping[str, Any]] | None = None
+
+    def with_further(self, result: Result, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Contents of results.json that every result has, and the kind's further keys.
+
+        Raises
+        ------
+        CmmUqError : one of these is a key that every result has.
+        """
+        further = {} if self.results is None else self.results(result)
+        if clash := sorted(set(further) & set(data)):
+            raise CmmUqError(f"a kind's own results cannot be named {clash[0]!r}, which every result has",
+                             fix="Mend the package that the kind comes from")  # fmt: skip
+        return {**data, **further}
 
 
 @dataclass(frozen=True)

@@ -226,3 +226,10 @@ def test_a_facet_of_another_class_is_the_package_s_mistake() -> None:
         odd.offers("screen", Screening)
     with pytest.raises(CmmUqError, match="names 'nowhere:PLANNING', which cannot be loaded"):
         odd.offers("plan", Planning)
+
+
+def test_a_kind_adds_results_and_replaces_none() -> None:
+    page = Page(lambda result: [], lambda result: {"tracker": 1})
+    assert page.with_further(None, {"estimates": 2}) == {"estimates": 2, "tracker": 1}
+    with pytest.raises(CmmUqError, match="cannot be named 'tracker'"):
+        page.with_further(None, {"tracker": 2})
