@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
-LONGEST_MESSAGE = 300
+LONGEST_MESSAGE = 300 - len("cmm-uq: ")
 """Characters of a message."""
 
 _LISTED = 220

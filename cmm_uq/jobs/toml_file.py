@@ -50,7 +50,7 @@ def checked(content: bytes, path: Path, model: type[Facts] | Callable[[dict[str,
 def _located(error: ErrorDetails, text: str, path: Path, model: type[BaseModel]) -> CmmUqError:
     """The first validation error, with line and key."""
     keys = [str(part) for part in error["loc"] if not (isinstance(part, str) and "[" in part)]
-    named = [key for key in keys if not re.match(r"^(GuardBand|FalseAccept|literal)", key)]
+    named = [key for key in keys if not re.match(r"^(GuardBand|FalseAccept|literal)", key)] or [str(error["loc"][0])]
     line = _line_of(named, text)
     named = [shortened(key, _SHOWN) for key in named]
     where = f"{path}{f' line {line}' if line else ''}: [{named[0]}]{' ' + '.'.join(named[1:]) if named[1:] else ''}"

@@ -31,3 +31,9 @@ def test_what_no_recording_could_hold_is_refused(text: str, says: str) -> None:
 def test_what_a_machine_can_have_is_taken() -> None:
     text = b"seed = 1\n[effects.scale_x]\nppm = -3e4\n[noise]\ncoordinate_um = 0.0\n[columns]\ntemp_x_c = 22.5"
     assert checked(text, Path("truth.toml"), Truth).columns == {"temp_x_c": 22.5}
+
+
+def test_a_table_of_an_odd_name_is_refused_by_that_name(tmp_path: Path) -> None:
+    path = tmp_path / "truth.toml"
+    with pytest.raises(CmmUqError, match=r"unknown key"):
+        checked(b'["[/]"]\nx = 1\n', path, Truth)
