@@ -63,5 +63,8 @@ def write_budget(
 
 
 def _identity(file: Path) -> str:
-    """The file's name with a mark of its folder: two models of one name are two."""
-    return f"{file.stem}-{hashlib.sha256(os.fsencode(file.absolute().parent)).hexdigest()[:8]}"
+    """Two models of one name are two: the path from the working folder, which moves with its reports, or a mark of another."""
+    path = file.absolute()
+    if path.is_relative_to(Path.cwd()):
+        return path.relative_to(Path.cwd()).as_posix()
+    return f"{file.stem}-{hashlib.sha256(os.fsencode(path.parent)).hexdigest()[:8]}"

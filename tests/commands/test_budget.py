@@ -84,3 +84,21 @@ def test_the_command_prints_the_result_and_refuses_code(file: Path, tmp_path: Pa
     done = subprocess.run(command, capture_output=True, text=True, check=False, encoding="utf-8")
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
+
+
+def test_two_models_of_one_name_do_not_replace_each_other_and_a_moved_project_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = '[model]\noutputs = { y = "2*x" }\nmethod = "first"\n[inputs.x]\ndistribution = "normal"\nvalue = 1.0\nu = 0.1\n'
+    here = tmp_path / "here"
+    for folder in ("a", "b"):
+        (here / folder).mkdir(parents=True)
+        (here / folder / "budget.toml").write_text(text)
+    monkeypatch.chdir(here)
+    write_budget(Path("a/budget.toml"))
+    write_budget(here / "a" / "budget.toml")
+    with pytest.raises(CmmUqError, match=r"holds what cmm-uq budget for a/budget\.toml wrote"):
+        write_budget(Path("b/budget.toml"))
+    moved = here.rename(tmp_path / "there")
+    monkeypatch.chdir(moved)
+    write_budget(Path("a/budget.toml"))
