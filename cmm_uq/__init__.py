@@ -1,3 +1,3 @@
 """Uncertainty of coordinate measuring machines, and the certificates that state it."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

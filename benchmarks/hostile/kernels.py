@@ -21,9 +21,10 @@ RELATIVE = 1e-9
 """Agreement of closed forms: far below the last digit of any printed figure."""
 SAMPLED = (".estimates", ".noise", ".accuracy_uncertainty")
 """What follows from a posterior whose noise is sampled."""
-TWO_DIGITS = (".u_um", ".guard_band_um", ".prior_share", ".probability_conforming")
-"""Figures that follow from those and are printed to two or three digits, and how far they may move: a tenth of the third."""
-THIRD_DIGIT = 1e-3
+SPREADS = (".u_um", ".guard_band_um", ".prior_share", ".probability_conforming")
+"""Standard deviations and variances of the draws, and what follows from them."""
+OF_SPREAD = 0.04
+"""How far those may move: three standard errors of a variance, √(2/N), of N = 13 000 effective draws."""
 OF_U = 0.1
 """Part of its u by which a sampled figure may move."""
 ASK = """
@@ -75,8 +76,8 @@ def differences(one: object, other: object, where: str = "") -> Iterator[str]:
         for i, pair in enumerate(zip(one, other, strict=True)):
             yield from differences(*pair, f"{where}[{i}]")
     elif isinstance(one, float) and isinstance(other, float):
-        few = any(name in where for name in TWO_DIGITS)
-        if abs(one - other) > (THIRD_DIGIT * abs(one) if few else RELATIVE * max(1.0, abs(one))):
+        spread = any(name in where for name in SPREADS)
+        if abs(one - other) > (OF_SPREAD * abs(one) if spread else RELATIVE * max(1.0, abs(one))):
             yield f"{where}: {one!r} and {other!r}"
     elif one != other:
         yield f"{where}: {one!r} and {other!r}"

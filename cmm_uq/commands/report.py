@@ -10,6 +10,7 @@ from cmm_uq.commands import analysis, diagnosing
 from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.documents.outcome import Found, Outcome
+from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.writing import Owner, staged
 
@@ -156,6 +157,9 @@ def _contents(outcome: Outcome, tell: Stage) -> dict[str, bytes]:
 
     job, data = outcome.found.job, as_json(outcome.results)
     document = marked(outcome.document, job)
+    for name in outcome.files.keys() & job.inputs.keys():
+        raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
+                         fix="Rename it, in job.toml too")  # fmt: skip
     tell("Rendering", 0.8)
     pdf = render_pdf(document, {**job.inputs, "results.json": data, **outcome.files})
     html_name, pdf_name, results_name = _names(job, *CERTIFICATE)
