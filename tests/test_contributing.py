@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
 from tests.conftest import ROOT
-from tests.plugin.packages import OUTSIDE
+from tests.plugin.packages import OUTSIDE_EFFECTS, OUTSIDE_KINDS
 
-SHOWN = dict(re.findall(r"```(\w+)\n(.*?)```", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.DOTALL))
-
-
-@pytest.mark.parametrize(("language", "file"), [("python", "outside_effects.py"), ("toml", "pyproject.toml")])
-def test_the_new_effect_that_is_shown_is_the_one_that_is_tested(language: str, file: str) -> None:
-    assert SHOWN[language] == (OUTSIDE / file).read_text(encoding="utf-8")
+SHOWN = re.findall(r"```(?:python|toml)\n(.*?)```", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.DOTALL)
+EFFECT, KIND = OUTSIDE_EFFECTS / "outside_effects.py", OUTSIDE_KINDS / "tracker_length.py"
 
 
-def test_an_outside_effect_needs_no_more_than_thirty_lines() -> None:
-    assert len((OUTSIDE / "outside_effects.py").read_text(encoding="utf-8").splitlines()) <= 30
+@pytest.mark.parametrize("source", [EFFECT, OUTSIDE_EFFECTS / "pyproject.toml", KIND, OUTSIDE_KINDS / "pyproject.toml"],
+                         ids=lambda path: f"{path.parent.name}-{path.name}")  # fmt: skip
+def test_what_is_shown_is_what_is_tested(source: Path) -> None:
+    assert source.read_text(encoding="utf-8") in SHOWN
+
+
+@pytest.mark.parametrize(("source", "most"), [(EFFECT, 30), (KIND, 150)], ids=["effect", "kind"])
+def test_an_outside_package_needs_no_more_lines(source: Path, most: int) -> None:
+    assert len(source.read_text(encoding="utf-8").splitlines()) <= most

@@ -14,7 +14,7 @@ import pytest
 from tests.cli.process import COMMAND
 from tests.commands.test_planning import JOB, SIX
 from tests.conftest import ROOT
-from tests.plugin.packages import OUTSIDE, describe, install
+from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
 
 TWIST = 10.0
 TRUTH = f"""
@@ -52,7 +52,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     site, job = work / "site", work / "job"
     for folder in (site, job):
         folder.mkdir()
-    install(OUTSIDE, site)
+    install(OUTSIDE_EFFECTS, site)
     named = f'{SIX}, "beam_twist"'
     text = JOB.format(plan='criterion = "A"\nnumber = 40', effects=named, length=400.0)
     (job / "job.toml").write_text(text, encoding="utf-8")
@@ -125,7 +125,7 @@ def test_a_package_that_cannot_be_used_is_named_and_nothing_is_written(
     site, out = tmp_path / "site", tmp_path / "out"
     site.mkdir()
     (site / "torn.py").write_text("import nowhere", encoding="utf-8")
-    describe(site, "torn-effects", "3.0", {"torn": "torn:Torn"})
+    describe(site, "torn-effects", "3.0", {"cmm_uq.effects": {"torn": "torn:Torn"}})
     found = run(site, command, work / "left-out", "--out", out)
     assert found.returncode == 2
     assert "Traceback" not in found.stderr

@@ -27,7 +27,7 @@ from cmm_uq.model.kind import Kind
 from cmm_uq.planning.setting import Planning
 from cmm_uq.screening.shape import Screening
 from tests.conftest import ROOT
-from tests.plugin.site import OUTSIDE_KINDS, describe, install
+from tests.plugin.packages import OUTSIDE_KINDS, describe, install
 from tests.recordings import screened
 
 EXAMPLE = {

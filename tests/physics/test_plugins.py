@@ -13,7 +13,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.physics.catalogue import EVERY, effects, every, plugins
 from cmm_uq.physics.plugins import BrokenPluginError
 from cmm_uq.points import Machine
-from tests.plugin.packages import OUTSIDE, describe, install
+from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
 from tests.recordings import TRAVEL, bars
 
 MACHINE = Machine("m", "XYZ", TRAVEL)
@@ -46,7 +46,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def offer(site: Path) -> Offer:
     def offered(code: str, name: str = "made_up", package: str = "other", where: str | None = None) -> None:
         (site / f"{package}.py").write_text(code, encoding="utf-8")
-        describe(site, f"{package}-effects", "2.1", {name: where or f"{package}:Made"})
+        describe(site, f"{package}-effects", "2.1", {"cmm_uq.effects": {name: where or f"{package}:Made"}})
 
     return offered
 
@@ -61,14 +61,14 @@ def test_without_other_packages_there_are_the_built_in_effects() -> None:
 
 
 def test_an_outside_effect_stands_in_the_catalogue_behind_the_others(site: Path) -> None:
-    install(OUTSIDE, site)
+    install(OUTSIDE_EFFECTS, site)
     assert list(every()) == [*EVERY, "beam_twist"]
     assert plugins() == {"outside-effects": "0.1.0"}
 
 
 def test_an_outside_effect_moves_points_as_its_own_code_says(site: Path) -> None:
     """10″ in the middle of Y turn the ram about Y: x moves by z · 10″, and nothing at the ends."""
-    install(OUTSIDE, site)
+    install(OUTSIDE_EFFECTS, site)
     _, y, z = POINTS.readings.T
     e = effects(["beam_twist"])[0].displacement(POINTS, {"twist_arcsec": 10.0})
     expected = z * np.radians(10 / 3600) * (1 - ((y - 275) / 275) ** 2)
@@ -76,7 +76,7 @@ def test_an_outside_effect_moves_points_as_its_own_code_says(site: Path) -> None
 
 
 def test_a_package_is_imported_when_its_effect_is_named(site: Path) -> None:
-    install(OUTSIDE, site)
+    install(OUTSIDE_EFFECTS, site)
     effects(["scale_x", "thermal_scale_y"])
     assert "outside_effects" not in sys.modules
     effects(["beam_twist"])
@@ -84,7 +84,7 @@ def test_a_package_is_imported_when_its_effect_is_named(site: Path) -> None:
 
 
 def test_a_name_that_is_nearly_that_of_an_outside_effect_is_answered_with_it(site: Path) -> None:
-    install(OUTSIDE, site)
+    install(OUTSIDE_EFFECTS, site)
     with pytest.raises(CmmUqError, match=r"unknown effect 'beam_twst'.*'beam_twist'"):
         effects(["beam_twst"])
 

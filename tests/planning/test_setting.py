@@ -9,7 +9,7 @@ import pytest
 from cmm_uq.physics.catalogue import CATALOGUE
 from cmm_uq.points import Points
 from tests.planning.plans import BALLBAR, SIX, setting
-from tests.plugin.packages import OUTSIDE, install
+from tests.plugin.packages import OUTSIDE_EFFECTS, install
 
 
 def test_by_default_the_linear_ones_of_the_first_tier_that_the_columns_allow(ballbar_points: Points) -> None:
@@ -20,7 +20,7 @@ def test_by_default_the_linear_ones_of_the_first_tier_that_the_columns_allow(bal
 def test_an_outside_effect_is_among_them_and_can_be_listed_by_name(
     ballbar_points: Points, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    install(OUTSIDE, tmp_path)
+    install(OUTSIDE_EFFECTS, tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     rivals = setting(BALLBAR).rivals(ballbar_points)
     assert rivals[-1].name == "beam_twist"

@@ -15,7 +15,7 @@ from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.physics.effect import FURTHER
 from cmm_uq.physics.plugins import BrokenPluginError
 from cmm_uq.points import Machine, Points
-from tests.plugin.packages import OUTSIDE, describe, install
+from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
 from tests.recordings import bar_facts, bars
 
 BROKEN = """
@@ -65,7 +65,7 @@ def test_an_outside_effect_is_a_candidate(
     ballbar_points: Points, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert "beam_twist" not in candidates(ballbar_points)
-    install(OUTSIDE, tmp_path)
+    install(OUTSIDE_EFFECTS, tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     assert candidates(ballbar_points)["beam_twist"].weight == 1.0
 
@@ -74,7 +74,7 @@ def test_one_that_fails_ends_the_diagnosis_and_is_not_left_out(
     ballbar_points: Points, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "torn.py").write_text(BROKEN, encoding="utf-8")
-    describe(tmp_path, "torn-effects", "3.0", {"torn": "torn:Torn"})
+    describe(tmp_path, "torn-effects", "3.0", {"cmm_uq.effects": {"torn": "torn:Torn"}})
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "torn", raising=False)
     with pytest.raises(BrokenPluginError, match="torn-effects"):
