@@ -128,8 +128,9 @@ def _by_default(collision: Collision, folder: Path) -> tuple[Outcome, list[str]]
         found += problems(outcomes[-1])
     own = frozenset(before) if collision.first == collision.second else frozenset()
     found += lost(before, snapshot(folder), own=own)
-    if any(outcome.code for outcome in outcomes):
-        found.append("is refused in its own folder")
+    apart = collision.first == collision.second == "budget"  # a model of that name in another folder is another job
+    if outcomes[0].code or (outcomes[1].code == 2) is not apart:
+        found.append("the folder of another is not refused" if apart else "is refused in its own folder")
     return outcomes[1], found
 
 
