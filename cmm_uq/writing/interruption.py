@@ -64,7 +64,10 @@ def watch() -> None:
     raises leaves no half-written file either.
     """
     reading, writing = os.pipe()
-    os.set_blocking(writing, False)
+    with contextlib.suppress(
+        AttributeError, OSError
+    ):  # on Windows pipes always block, and a pipe of two bytes never fills
+        os.set_blocking(writing, False)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stand_still)
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
