@@ -8,7 +8,7 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.diagnosis.comparison.explanations import UNKNOWN
-from cmm_uq.diagnosis.comparison.gate import tail_probability
+from cmm_uq.diagnosis.comparison.lack_of_fit import tail_probability
 from cmm_uq.diagnosis.comparison.search import ModelComparison
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.points import Floats, Ints

@@ -21,7 +21,7 @@ from scipy import special
 from cmm_uq.diagnosis.comparison.combinations import Prior
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN
-from cmm_uq.diagnosis.comparison.gate import DRAWS, statistic_of
+from cmm_uq.diagnosis.comparison.lack_of_fit import DRAWS, statistic_of
 from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.kind import Observed

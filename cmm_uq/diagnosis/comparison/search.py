@@ -16,7 +16,7 @@ from scipy import special
 from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import Explanation, finer, known, several
-from cmm_uq.diagnosis.comparison.gate import NOTHING, lack_of_fit, log_prior
+from cmm_uq.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.diagnosis.comparison.unknown_functions import unknown
 from cmm_uq.diagnosis.noise import sigma_grid

@@ -17,7 +17,7 @@ from scipy import linalg
 from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.diagnosis.comparison.gate import lack_of_fit
+from cmm_uq.diagnosis.comparison.lack_of_fit import lack_of_fit
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.diagnosis.comparison.unknown_functions import smooth_functions
 from cmm_uq.diagnosis.noise import kinds, tails

@@ -8,7 +8,7 @@ from scipy import special, stats
 
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation, Member
-from cmm_uq.diagnosis.comparison.gate import tail_probability
+from cmm_uq.diagnosis.comparison.lack_of_fit import tail_probability
 from cmm_uq.diagnosis.noise import kinds, sigma_grid, tails
 from cmm_uq.points import Floats
 from tests.diagnosis.dense_noise import covariance, rest
