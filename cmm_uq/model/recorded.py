@@ -58,6 +58,9 @@ def check_length(measured: float, certified: float, what: str, where: str | None
     measured, certified : mm.
     what : in the plural, as ``the recorded bars``.
     """
+    if not certified > 0:
+        raise CmmUqError(f"{what} are {measured:.6g} mm long on average, and their references lie all in one place",
+                         where=where, fix="Give each point its own reference")  # fmt: skip
     ratio = measured / certified
     said = f"{what} are {measured:.6g} mm long on average, by the certificate {certified:.6g} mm"
     for factor, unit in UNIT_MISTAKES.items():
