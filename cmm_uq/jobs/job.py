@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, create_model, field_validator, model_validator
 
 from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS, MAPS
@@ -122,19 +122,30 @@ class Travel(Table):
         return self
 
 
-class ErrorMapFile(Table):
-    """One error map and the temperature it was taken at."""
-
-    file: str
-    temperature_c: Temperature
-
-
 class SquarenessFacts(Table):
     """``squareness_arcsec``: beside an error map."""
 
     xy: Angle = 0.0
     yz: Angle = 0.0
     zx: Angle = 0.0
+
+
+class ErrorMapFile(Table):
+    """One error map, the temperature it was taken at, and the squareness of the axes at that temperature."""
+
+    file: str
+    temperature_c: Temperature
+    squareness_arcsec: SquarenessFacts | None = None
+
+
+def _squareness_of_all_or_none(maps: list[ErrorMapFile]) -> list[ErrorMapFile]:
+    without = [given.file for given in maps if given.squareness_arcsec is None]
+    if without and len(without) < len(maps):
+        raise ValueError(
+            f"the map {without[0]!r} has no squareness_arcsec, and another has: between them it would fall to zero. "
+            "Give it for each map"
+        )
+    return maps
 
 
 class MachineFacts(Table):
@@ -148,8 +159,19 @@ class MachineFacts(Table):
     chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
     travel_mm: Travel = Travel()
     origin_mm: Triple = [0.0, 0.0, 0.0]
-    error_map: Annotated[list[ErrorMapFile], Field(max_length=MAPS.most)] = []
+    error_map: Annotated[
+        list[ErrorMapFile], Field(max_length=MAPS.most), AfterValidator(_squareness_of_all_or_none)
+    ] = []
     squareness_arcsec: SquarenessFacts | None = None
+
+    @model_validator(mode="after")
+    def _squareness_once(self) -> Self:
+        twice = [given.file for given in self.error_map if given.squareness_arcsec is not None]
+        if self.squareness_arcsec is not None and twice:
+            raise ValueError(
+                f"squareness_arcsec is given for the machine and for the map {twice[0]!r}: leave out one of the two"
+            )
+        return self
 
     @model_validator(mode="after")
     def _three_carriages(self) -> Self:

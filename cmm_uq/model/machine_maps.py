@@ -10,7 +10,7 @@ WHERE = "job.toml [machine] error_map"
 
 
 def maps_of(job: Job) -> list[ErrorMap]:
-    """The error maps that a job names, with its squareness.
+    """The error maps that a job names, each with its squareness: its own, or that of the machine.
 
     Raises
     ------
@@ -22,6 +22,6 @@ def maps_of(job: Job) -> list[ErrorMap]:
                          fix='Name it: error_map = [ { file = "map.csv", temperature_c = 20.0 } ]')  # fmt: skip
     for given in machine.error_map:
         found = parse_error_map(job.inputs[given.file], str(job.folder / given.file), temperature=given.temperature_c)
-        square = machine.squareness_arcsec
+        square = given.squareness_arcsec or machine.squareness_arcsec
         maps.append(found.with_squareness_arcsec(square.xy, square.yz, square.zx) if square else found)
     return maps

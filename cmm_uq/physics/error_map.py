@@ -69,6 +69,13 @@ class ErrorMap:
         """The map with squareness errors in ″, in the project's sign: e_x = −Sxy·y, e_y = −Syz·z, e_x = −Szx·z."""
         return replace(self, squareness=ARCSECOND * np.array([xy, yz, zx]))
 
+    @property
+    def squareness_arcsec(self) -> dict[str, float]:
+        """Sxy, Syz, Szx in ″ by their pair of axes, as they were stated."""
+        return {
+            pair: round(float(s) / ARCSECOND, 9) for pair, s in zip(("xy", "yz", "zx"), self.squareness, strict=True)
+        }
+
     def covers(self, machine: Machine) -> None:
         """Check that the map reaches over the machine's travel.
 
