@@ -9,10 +9,12 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.refusals import refuse_planned
 from cmm_uq.commands.simulate import recording
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.derived_job import PROGRAM, derived_toml, is_compensated
+from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.logged_temperatures import log_of
 from cmm_uq.jobs.origin import first_line
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.temperature_log import TemperatureLog
 from cmm_uq.kinds import kind_of
 from cmm_uq.model.machine_maps import maps_of
 from cmm_uq.physics.compensation import compensate_points, machine_compensation
@@ -40,9 +42,10 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
     refuse_planned(job)
     if not job.facts.artefact.with_recording:
         raise kind_of(job).refused("compensated")
+    log = log_of(job.facts.machine, job.inputs, job.folder)
     compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
     try:
-        return compensate_points(job.points, compensation), compensation.provenance()
+        return compensate_points(job.points, compensation), compensation.provenance() | _of_the_log(job.points, log)
     except CmmUqError as error:
         where = ", ".join(part for part in (job.recording_path, error.where) if part)
         raise CmmUqError(error.problem, where=where, fix=error.fix) from error
@@ -79,5 +82,20 @@ def write_compensated(
             read.facts.recording.file: first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
             PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
         }  # fmt: skip
-        toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec"))
+        toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec", *IN_THE_RECORDING))
         return place.write({"job.toml": toml, **files})
+
+
+def _of_the_log(points: Points, log: TemperatureLog | None) -> dict[str, object]:
+    """How the temperatures of the scales came about, where a log gave them."""
+    if log is None:
+        return {}
+    times = points.columns["time_s"]
+    return {
+        "temperature_log": {
+            "file": log.source,
+            "rule": "mean of the thermocouples of each scale, linear in time",
+            "largest_u_interpolation_k": round(float(log.u_at(times).max()), 6),
+            "largest_spread_k": round(float(log.spread_at(times).max()), 6),
+        }
+    }

@@ -16,7 +16,9 @@ from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.file_names import check_distinct, inside
-from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, MachineFacts, Tables, job_file_of
+from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, Tables, job_file_of
+from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
+from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.toml_file import checked
@@ -50,27 +52,38 @@ def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *
     machine = _machine(facts.machine)
     maps = [error_map.file for error_map in facts.machine.error_map]
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
-    check_distinct([*recordings, *maps], str(path))
+    logs = [facts.machine.temperature_log.file] if facts.machine.temperature_log is not None else []
+    check_distinct([*recordings, *maps, *logs], str(path))
     if not facts.artefact.with_recording:
-        if facts.recording.file:
-            raise CmmUqError(f"a job of kind {facts.artefact.kind!r} has no recording of points",
-                             where=f"{path}: [recording] file",
-                             fix="Leave [recording] out, and name what is measured under [machine]")  # fmt: skip
+        _refuse_what_needs_a_recording(facts, path)
         return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path, MAP_BYTES))
     if not recorded and not os.path.lexists(inside(folder, facts.recording.file, str(path))):
         return Job(folder, facts, _no_points(machine), inputs)
     derived = facts.job.derived_from
-    inputs |= _contents(folder, recordings, path, TABLE_BYTES) | _contents(folder, maps, path, MAP_BYTES)
+    inputs |= _contents(folder, [*recordings, *logs], path, TABLE_BYTES) | _contents(folder, maps, path, MAP_BYTES)
     if derived is not None:
         others = [name for name in derived.files if name not in inputs]
         inputs |= _contents(folder, others, path, TABLE_BYTES, written=True)
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     points = read_recording(inputs[facts.recording.file], where, machine)
+    planned = is_planned(inputs[facts.recording.file])
+    if not planned:  # a plan has no times yet
+        points = with_logged(points, log_of(facts.machine, inputs, folder), path, where)
     if earlier is not None:
         then = read_recording(inputs[earlier], str(folder / earlier), machine)
         points = against_earlier(points, then, facts.artefact.cte_per_k, where)
-    return Job(folder, facts, points, inputs, altered(derived, inputs), is_planned(inputs[facts.recording.file]))
+    return Job(folder, facts, points, inputs, altered(derived, inputs), planned)
+
+
+def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
+    """That a job of a kind without a recording has none, nor anything to be joined to one."""
+    none = f"a job of kind {facts.artefact.kind!r} has no recording of points"
+    if facts.recording.file:
+        raise CmmUqError(none, where=f"{path}: [recording] file",
+                         fix="Leave [recording] out, and name what is measured under [machine]")  # fmt: skip
+    if facts.machine.temperature_log is not None:
+        raise CmmUqError(none, where=f"{path}: {KEY}", fix="Leave the log out")
 
 
 def _model_for(data: dict[str, Any], tables: Tables, known: Callable[[], Sequence[str]]) -> type[JobFile]:

@@ -14,8 +14,8 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
+from cmm_uq.files.csv_table import CsvTable, csv_table
 from cmm_uq.files.limits import MAP_BYTES, MAP_ROWS
-from cmm_uq.physics.csv_table import CsvTable, csv_table
 from cmm_uq.points import AXES, Floats, Machine
 from cmm_uq.units import ARCSECOND, MICROMETRE
 
