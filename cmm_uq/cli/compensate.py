@@ -15,13 +15,19 @@ def command(
     job: Annotated[Path, typer.Argument(help="Job folder with [machine] error_map.")],
     out: Annotated[Path, typer.Option(help="Folder for the compensated job.")],
     extrapolate: Annotated[bool, typer.Option(help="Extrapolate beyond the maps, and flag those points.")] = False,
+    map_text: Annotated[
+        float | None,
+        typer.Option(help="Also write the error map at this temperature, °C, in the contractors' text form."),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Correct a recording by its machine's error maps, as a job folder of its own."""
     from cmm_uq.commands.compensate import write_compensated
+    from cmm_uq.physics.map_interpolation import Beyond
 
-    files = write_compensated(job, out, beyond="extrapolate" if extrapolate else "refuse", force=force)
+    beyond: Beyond = "extrapolate" if extrapolate else "refuse"
+    files = write_compensated(job, out, beyond=beyond, map_text_c=map_text, force=force)
     if not quiet:
         for path in files.values():
             say(str(path))
