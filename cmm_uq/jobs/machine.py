@@ -7,14 +7,17 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from cmm_uq.files.limits import COLUMNS, MAPS
-from cmm_uq.jobs.table import Column, Range, Table, Temperature, Triple, at_least
+from cmm_uq.files.limits import COLUMNS, LISTED, MAPS
+from cmm_uq.jobs.table import Column, Number, Range, Table, Temperature, Triple, at_least
 
 SHORTEST_TRAVEL_MM = 1e-3
 """Positions are divided by the travel."""
 
 Angle = Annotated[float, Field(ge=-36_000, le=36_000)]
 """A squareness error, ″: ten degrees."""
+
+Turn = Annotated[float, Field(ge=-360, le=360)]
+"""An angle of a pose, °."""
 
 Sensors = Annotated[list[Column], Field(min_length=1, max_length=COLUMNS.most)]
 """Columns of the thermocouples on one scale."""
@@ -88,6 +91,30 @@ class TemperatureLogFile(Table):
     max_gap_s: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
 
 
+class Pose(Table):
+    """Attitude of a digitizer in one index of the wrist: Euler angles 3-1-3 (Harris 2004 eq. 7)."""
+
+    pose: Number = 1
+    alpha_deg: Turn
+    beta_deg: Turn
+    gamma_deg: Turn
+
+
+class DigitizerFacts(Table):
+    """``digitizer``: a laser digitizer on the ram; ``offset_mm`` is [U1 V1 W1], the mount in the digitizer's frame."""
+
+    offset_mm: Triple
+    poses: Annotated[list[Pose], Field(min_length=1, max_length=LISTED.most)]
+
+    @model_validator(mode="after")
+    def _poses_once(self) -> Self:
+        numbers = [given.pose for given in self.poses]
+        twice = next((number for number in numbers if numbers.count(number) > 1), None)
+        if twice is not None:
+            raise ValueError(f"pose {twice} is there twice: number each pose as the cloud does")
+        return self
+
+
 class MachineFacts(Table):
     """``[machine]``."""
 
@@ -104,6 +131,7 @@ class MachineFacts(Table):
     ] = []
     squareness_arcsec: SquarenessFacts | None = None
     temperature_log: TemperatureLogFile | None = None
+    digitizer: DigitizerFacts | None = None
 
     @model_validator(mode="after")
     def _squareness_once(self) -> Self:

@@ -39,20 +39,16 @@ def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *
     ------
     CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
     """
-    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    path, content, facts = _facts(folder, tables, known)
     folder = path.parent
-    finish_interrupted(folder)
-    content = content_of(path, JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
-    facts = checked(content, path, lambda data: _model_for(data, tables, known))
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
     if earlier is not None and not facts.artefact.with_earlier:
         raise CmmUqError(f"earlier compares two recordings at two dates, which a job of kind {facts.artefact.kind!r} has not",
                          where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
     machine = _machine(facts.machine)
-    maps = [error_map.file for error_map in facts.machine.error_map]
+    maps, logs = _of_the_machine(facts.machine)
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
-    logs = [facts.machine.temperature_log.file] if facts.machine.temperature_log is not None else []
     check_distinct([*recordings, *maps, *logs], str(path))
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
@@ -84,6 +80,34 @@ def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
                          fix="Leave [recording] out, and name what is measured under [machine]")  # fmt: skip
     if facts.machine.temperature_log is not None:
         raise CmmUqError(none, where=f"{path}: {KEY}", fix="Leave the log out")
+
+
+def read_machine(folder: Path, tables: Tables, known: Callable[[], Sequence[str]]) -> Job:
+    """A job for its machine alone: job.toml, error maps and temperature log, whatever its recording is.
+
+    Raises
+    ------
+    CmmUqError : see :func:`read_job`.
+    """
+    path, content, facts = _facts(folder, tables, known)
+    maps, logs = _of_the_machine(facts.machine)
+    check_distinct([*maps, *logs], str(path))
+    inputs = {"job.toml": content} | _contents(path.parent, maps, path, MAP_BYTES)
+    inputs |= _contents(path.parent, logs, path, TABLE_BYTES)
+    return Job(path.parent, facts, _no_points(_machine(facts.machine)), inputs)
+
+
+def _facts(folder: Path, tables: Tables, known: Callable[[], Sequence[str]]) -> tuple[Path, bytes, JobFile]:
+    """job.toml: where it lies, its bytes, and what it says."""
+    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    finish_interrupted(path.parent)
+    content = content_of(path, JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
+    return path, content, checked(content, path, lambda data: _model_for(data, tables, known))
+
+
+def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str]]:
+    """Files of its error maps, and of its temperature log."""
+    return [given.file for given in facts.error_map], [facts.temperature_log.file] if facts.temperature_log else []
 
 
 def _model_for(data: dict[str, Any], tables: Tables, known: Callable[[], Sequence[str]]) -> type[JobFile]:
