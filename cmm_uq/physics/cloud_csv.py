@@ -15,6 +15,9 @@ from cmm_uq.files.limits import COLUMNS, LINE
 from cmm_uq.files.numbers import numbers
 from cmm_uq.points import Floats
 
+CHUNK = 2**20
+"""Bytes read at a time, some 20 000 lines."""
+
 _FIX = "Save the cloud as CSV in UTF-8: a line of names, then one line a point"
 
 
@@ -49,18 +52,13 @@ def csv_blocks(path: Path, columns: Sequence[str], block: int) -> Iterator[Float
         if missing:
             raise CmmUqError(f"has no column {missing[0]}", where=str(path), fix=f"A cloud has {', '.join(columns)}")
         places = [header.index(name) for name in columns]
-        while True:
-            lines: list[str] = []
-            at: list[int] = []
-            while len(lines) < block and (line := _line(file, path, number + 1)):
-                number += 1
-                text = line.strip()
-                if text and not text.startswith("#"):
-                    lines.append(text)
-                    at.append(number)
-            if not lines:
-                return
-            yield _values(lines, at, header, places, path)
+        for lines, first in _lines(file, path, number + 1):
+            at = [first + i for i, line in enumerate(lines) if line and line[0] != "#"]
+            given = lines if len(at) == len(lines) else [lines[i - first] for i in at]
+            if given:
+                values = _values(given, at, header, places, path)
+                for start in range(0, len(values), block):
+                    yield values[start : start + block]
 
 
 @contextlib.contextmanager
@@ -89,10 +87,10 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
 
 def _values(lines: list[str], at: list[int], header: Sequence[str], places: Sequence[int], path: Path) -> Floats:
     width = len(header)
-    for line, number in zip(lines, at, strict=True):
-        if line.count(",") != width - 1:
-            raise CmmUqError(f"has {line.count(',') + 1} cells where the header has {width}",
-                             where=f"{path} line {number}", fix="Complete the row")  # fmt: skip
+    other = next((i for i, line in enumerate(lines) if line.count(",") != width - 1), None)
+    if other is not None:
+        raise CmmUqError(f"has {lines[other].count(',') + 1} cells where the header has {width}",
+                         where=f"{path} line {at[other]}", fix="Complete the row")  # fmt: skip
     cells = ",".join(lines).split(",")
     if any(" " in line or "\t" in line for line in lines):
         cells = [cell.strip() for cell in cells]
@@ -125,11 +123,36 @@ def _header(file: BinaryIO, path: Path) -> tuple[tuple[str, ...], int]:
     return header, number
 
 
-def _line(file: BinaryIO, path: Path, number: int) -> str:
-    line = file.readline(LINE.most + 1)
+def _lines(file: BinaryIO, path: Path, number: int) -> Iterator[tuple[list[str], int]]:
+    """Lines without the blanks around them, some at a time, and the number of the first; the first of all is ``number``."""
+    rest = b""
+    while chunk := file.read(CHUNK):
+        whole, newline, rest = (rest + chunk).rpartition(b"\n")
+        if newline:
+            lines = _texts(whole.split(b"\n"), path, number)
+            yield lines, number
+            number += len(lines)
+        _check_length(rest, path, number)
+    if rest:
+        yield _texts([rest], path, number), number
+
+
+def _texts(lines: list[bytes], path: Path, number: int) -> list[str]:
+    longest = max(lines, key=len)
+    _check_length(longest, path, number + lines.index(longest))
+    try:
+        return [line.strip() for line in b"\n".join(lines).decode().split("\n")]
+    except UnicodeDecodeError as error:
+        before = error.object[: error.start].count(b"\n")
+        raise CmmUqError("is not UTF-8 text", where=f"{path} line {number + before}", fix=_FIX) from None
+
+
+def _check_length(line: bytes, path: Path, number: int) -> None:
     if len(line) > LINE.most:
         raise CmmUqError(f"the line is longer than {LINE.most} characters", where=f"{path} line {number}", fix=_FIX)
-    try:
-        return line.decode()
-    except UnicodeDecodeError:
-        raise CmmUqError("is not UTF-8 text", where=f"{path} line {number}", fix=_FIX) from None
+
+
+def _line(file: BinaryIO, path: Path, number: int) -> str:
+    """The next line with its end; empty at the end of the file."""
+    line = file.readline(LINE.most + 1)
+    return f"{_texts([line.rstrip()], path, number)[0]}\n" if line else ""

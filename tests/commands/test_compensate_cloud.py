@@ -6,6 +6,10 @@ import json
 import os
 import re
 import shutil
+import signal
+import subprocess
+import sys
+import time
 import tracemalloc
 from pathlib import Path
 
@@ -221,6 +225,38 @@ def test_a_cloud_that_is_none_is_refused_with_its_line_and_nothing_is_written(
     (tmp_path / "cloud.csv").write_text(text)
     with pytest.raises(CmmUqError, match=says):
         write_compensated_cloud(job, tmp_path / "cloud.csv", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_cloud_is_read_line_by_line_wherever_its_blocks_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Remarks with letters of two bytes, empty lines, blanks and no end of the last line, in pieces of seven bytes."""
+    job, rows = square(tmp_path), scanned(40)
+    lines = [", ".join(f"{value:.17g}" for value in row) for row in rows]
+    lines[5:5] = ["# µµµµµµµµ, ″", "", "  "]
+    (tmp_path / "cloud.csv").write_text("\ufeff# a remark\n" + f"{HEAD}\r\n" + "\r\n".join(lines), encoding="utf-8")
+    monkeypatch.setattr("cmm_uq.physics.cloud_csv.CHUNK", 7)
+    write_compensated_cloud(job, tmp_path / "cloud.csv", tmp_path / "out")
+    np.testing.assert_allclose(read_csv(tmp_path / "out" / "cloud-compensated.csv"), by_hand(rows), rtol=0, atol=6e-8)
+    lines[20] = lines[20].replace(",", ";", 1)
+    (tmp_path / "cloud.csv").write_text("\n".join([HEAD, *lines]), encoding="utf-8")
+    with pytest.raises(CmmUqError, match=r"cloud\.csv line 22: has 4 cells where the header has 5"):
+        write_compensated_cloud(job, tmp_path / "cloud.csv", tmp_path / "out")
+
+
+def test_a_signal_in_the_middle_leaves_nothing(tmp_path: Path) -> None:
+    job, folder = square(tmp_path), tmp_path / "cloud"
+    folder.mkdir()
+    for i in range(40):  # far more than is done before the signal
+        np.save(folder / f"{i:02}.npy", np.resize(scanned(), (250_000, 5)))
+    command = [sys.executable, "-m", "cmm_uq", "compensate", job, "--cloud", folder, "--out", tmp_path / "out"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 60
+        while not list(tmp_path.glob("out/.unfinished-*/new/.unfinished-*")) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=30)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert "interrupted; nothing was written" in said
     assert not (tmp_path / "out").exists()
 
 
