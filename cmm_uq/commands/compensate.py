@@ -9,13 +9,16 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.refusals import refuse_planned
 from cmm_uq.commands.simulate import recording
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.derived_job import PROGRAM, derived_toml, is_compensated
+from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.logged_temperatures import log_of
 from cmm_uq.jobs.origin import first_line
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.temperature_log import TemperatureLog
 from cmm_uq.kinds import kind_of
 from cmm_uq.model.machine_maps import maps_of
 from cmm_uq.physics.compensation import compensate_points, machine_compensation
+from cmm_uq.physics.error_map_text import error_map_text
 from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.points import Points
 from cmm_uq.writing import Owner, staged
@@ -40,18 +43,23 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
     refuse_planned(job)
     if not job.facts.artefact.with_recording:
         raise kind_of(job).refused("compensated")
+    log = log_of(job.facts.machine, job.inputs, job.folder)
     compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
     try:
-        return compensate_points(job.points, compensation), compensation.provenance()
+        return compensate_points(job.points, compensation), compensation.provenance() | _of_the_log(job.points, log)
     except CmmUqError as error:
         where = ", ".join(part for part in (job.recording_path, error.where) if part)
         raise CmmUqError(error.problem, where=where, fix=error.fix) from error
 
 
 def write_compensated(
-    job: Path, out: Path, *, beyond: Beyond = "refuse", force: bool = False
+    job: Path, out: Path, *, beyond: Beyond = "refuse", map_text_c: float | None = None, force: bool = False
 ) -> dict[str, Path]:  # fmt: skip
     """Write a job folder with the compensated recording, marked as such; its job.toml names no error map any more.
+
+    Parameters
+    ----------
+    map_text_c : temperature, °C, at which the error map is written beside it in the contractors' text form.
 
     Returns
     -------
@@ -70,14 +78,42 @@ def write_compensated(
         raise CmmUqError("the recordings of two dates are not compensated together",
                          where=f"{read.folder / 'job.toml'} [recording] earlier",
                          fix="Compensate each as a job of its own, then name the earlier result")  # fmt: skip
+    text = {} if map_text_c is None else _map_text(read, map_text_c, beyond)
     owner = Owner("compensate", read.facts.job.id, read.origin)
-    with staged(out, owner, inputs=read.paths, force=force, expected=(*read.inputs, PROVENANCE)) as place:
+    with staged(out, owner, inputs=read.paths, force=force, expected=(*read.inputs, *text, PROVENANCE)) as place:
         points, provenance = compensate_job(read, beyond=beyond)
         told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
         files = {
             **{name: data for name, data in read.inputs.items() if name != "job.toml"},
             read.facts.recording.file: first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
+            **text,
             PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
         }  # fmt: skip
-        toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec"))
+        toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec", *IN_THE_RECORDING))
         return place.write({"job.toml": toml, **files})
+
+
+def _map_text(job: Job, temperature: float, beyond: Beyond) -> dict[str, bytes]:
+    """The error map at one temperature in the contractors' text form, by the name of its file."""
+    name = f"error-map-{temperature:g}C.txt"
+    if name in job.inputs:
+        raise CmmUqError(
+            f"has a file {name!r}, the name of the map to be written", where=str(job.folder), fix="Rename it"
+        )
+    found = ErrorMaps(maps_of(job)).map_at(temperature, beyond=beyond)
+    return {name: error_map_text(found, name=name).encode()}
+
+
+def _of_the_log(points: Points, log: TemperatureLog | None) -> dict[str, object]:
+    """How the temperatures of the scales came about, where a log gave them."""
+    if log is None:
+        return {}
+    times = points.columns["time_s"]
+    return {
+        "temperature_log": {
+            "file": log.source,
+            "rule": "mean of the thermocouples of each scale, linear in time",
+            "largest_u_interpolation_k": round(float(log.u_at(times).max()), 6),
+            "largest_spread_k": round(float(log.spread_at(times).max()), 6),
+        }
+    }

@@ -22,3 +22,8 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
     CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
     """
     return reading.read_job(folder, table_of, names, recorded=recorded)
+
+
+def read_machine(folder: Path) -> Job:
+    """A job for its machine alone; see :func:`cmm_uq.jobs.reading.read_machine`."""
+    return reading.read_machine(folder, table_of, names)

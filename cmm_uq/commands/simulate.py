@@ -14,7 +14,7 @@ from cmm_uq.documents.program import program
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES
-from cmm_uq.jobs.derived_job import derived_toml
+from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import first_line
 from cmm_uq.jobs.table import LONGEST_MM
@@ -94,7 +94,7 @@ def write_simulation(
             read.facts.recording.file: first_line("simulate", program(drawn.effects), how).encode() + recording(points),
             TRUTH: content,
         }
-        return place.write({"job.toml": derived_toml(read, "simulate", files), **files})
+        return place.write({"job.toml": derived_toml(read, "simulate", files, without=IN_THE_RECORDING), **files})
 
 
 def recording(points: Points) -> bytes:

@@ -57,6 +57,21 @@ def content_of(path: Path, limit: Limit, fix: str) -> bytes:
     return content
 
 
+def check_file(path: Path, fix: str) -> None:
+    """Refuse what is no regular file, for a file that is too large to be read whole.
+
+    Raises
+    ------
+    CmmUqError : it is missing, or is a folder, a pipe or a device.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError) as error:
+        what = error.strerror if isinstance(error, OSError) else str(error)
+        raise CmmUqError(f"cannot be read: {what}", where=str(path), fix=fix) from None
+    _refuse_other_than_a_file(mode, str(path), fix)
+
+
 def text_of(content: bytes, where: str, fix: str = "Save it as UTF-8") -> str:
     """Text of a file's bytes, UTF-8 with or without a byte-order mark.
 

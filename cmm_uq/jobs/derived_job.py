@@ -20,6 +20,8 @@ PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100
 OF_THE_CERTIFICATE = ("number", "issued")
 """Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
+IN_THE_RECORDING = ("temperature_log",)
+"""Keys of ``[machine]`` whose figures stand in every recording that a command writes."""
 
 
 def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tuple[str, ...] = ()) -> bytes:

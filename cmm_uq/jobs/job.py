@@ -12,8 +12,9 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
 
 from cmm_uq.errors import suggestion
-from cmm_uq.files.limits import CONFORMITY, EFFECTS, MAPS
+from cmm_uq.files.limits import CONFORMITY, EFFECTS
 from cmm_uq.jobs.file_names import device_name
+from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.jobs.table import (
@@ -22,10 +23,7 @@ from cmm_uq.jobs.table import (
     Limit,
     Names,
     Numbers,
-    Range,
     Table,
-    Temperature,
-    Triple,
     Uncertainty,
     at_least,
 )
@@ -44,12 +42,6 @@ LENGTH_STANDARDS: tuple[Standard, ...] = ("ISO 10360-2:2009", "VDI/VDE 2617")
 
 FORM_STANDARD: Standard = "ISO 10360-5:2010"
 """Compares the form of a calibrated sphere."""
-
-SHORTEST_TRAVEL_MM = 1e-3
-"""Positions are divided by the travel."""
-
-Angle = Annotated[float, Field(ge=-36_000, le=36_000)]
-"""A squareness error, ″: ten degrees."""
 
 Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]
 """A permissible size of an effect in its own unit."""
@@ -102,62 +94,6 @@ class Laboratory(Table):
     accreditation: str = ""
     signatory: str = ""
     signatory_role: str = ""
-
-
-class Travel(Table):
-    """``travel_mm``: lowest and highest scale reading of each axis."""
-
-    x: Range | None = None
-    y: Range | None = None
-    z: Range | None = None
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        for axis in "xyz":
-            given = getattr(self, axis)
-            if given and not given[0] < given[1]:
-                raise ValueError(f"{axis} = {given}: the first number must be the lower one")
-            if given and given[1] - given[0] < SHORTEST_TRAVEL_MM:
-                raise ValueError(f"{axis} = {given}: a travel of less than {SHORTEST_TRAVEL_MM:g} mm is none")
-        return self
-
-
-class ErrorMapFile(Table):
-    """One error map and the temperature it was taken at."""
-
-    file: str
-    temperature_c: Temperature
-
-
-class SquarenessFacts(Table):
-    """``squareness_arcsec``: beside an error map."""
-
-    xy: Angle = 0.0
-    yz: Angle = 0.0
-    zx: Angle = 0.0
-
-
-class MachineFacts(Table):
-    """``[machine]``."""
-
-    name: str
-    manufacturer: str = ""
-    model: str = ""
-    serial: str = ""
-    owner: str = ""
-    chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
-    travel_mm: Travel = Travel()
-    origin_mm: Triple = [0.0, 0.0, 0.0]
-    error_map: Annotated[list[ErrorMapFile], Field(max_length=MAPS.most)] = []
-    squareness_arcsec: SquarenessFacts | None = None
-
-    @model_validator(mode="after")
-    def _three_carriages(self) -> Self:
-        if sorted(self.chain.replace("F", "", 1)) != ["X", "Y", "Z"]:
-            raise ValueError(
-                f"chain = {self.chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves"
-            )
-        return self
 
 
 class Traceability(Table):

@@ -16,7 +16,9 @@ from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.file_names import check_distinct, inside
-from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, MachineFacts, Tables, job_file_of
+from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, Tables, job_file_of
+from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
+from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.toml_file import checked
@@ -37,40 +39,75 @@ def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *
     ------
     CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
     """
-    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    path, content, facts = _facts(folder, tables, known)
     folder = path.parent
-    finish_interrupted(folder)
-    content = content_of(path, JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
-    facts = checked(content, path, lambda data: _model_for(data, tables, known))
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
     if earlier is not None and not facts.artefact.with_earlier:
         raise CmmUqError(f"earlier compares two recordings at two dates, which a job of kind {facts.artefact.kind!r} has not",
                          where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
     machine = _machine(facts.machine)
-    maps = [error_map.file for error_map in facts.machine.error_map]
+    maps, logs = _of_the_machine(facts.machine)
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
-    check_distinct([*recordings, *maps], str(path))
+    check_distinct([*recordings, *maps, *logs], str(path))
     if not facts.artefact.with_recording:
-        if facts.recording.file:
-            raise CmmUqError(f"a job of kind {facts.artefact.kind!r} has no recording of points",
-                             where=f"{path}: [recording] file",
-                             fix="Leave [recording] out, and name what is measured under [machine]")  # fmt: skip
+        _refuse_what_needs_a_recording(facts, path)
         return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path, MAP_BYTES))
     if not recorded and not os.path.lexists(inside(folder, facts.recording.file, str(path))):
         return Job(folder, facts, _no_points(machine), inputs)
     derived = facts.job.derived_from
-    inputs |= _contents(folder, recordings, path, TABLE_BYTES) | _contents(folder, maps, path, MAP_BYTES)
+    inputs |= _contents(folder, [*recordings, *logs], path, TABLE_BYTES) | _contents(folder, maps, path, MAP_BYTES)
     if derived is not None:
         others = [name for name in derived.files if name not in inputs]
         inputs |= _contents(folder, others, path, TABLE_BYTES, written=True)
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     points = read_recording(inputs[facts.recording.file], where, machine)
+    planned = is_planned(inputs[facts.recording.file])
+    if not planned:  # a plan has no times yet
+        points = with_logged(points, log_of(facts.machine, inputs, folder), path, where)
     if earlier is not None:
         then = read_recording(inputs[earlier], str(folder / earlier), machine)
         points = against_earlier(points, then, facts.artefact.cte_per_k, where)
-    return Job(folder, facts, points, inputs, altered(derived, inputs), is_planned(inputs[facts.recording.file]))
+    return Job(folder, facts, points, inputs, altered(derived, inputs), planned)
+
+
+def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
+    """That a job of a kind without a recording has none, nor anything to be joined to one."""
+    none = f"a job of kind {facts.artefact.kind!r} has no recording of points"
+    if facts.recording.file:
+        raise CmmUqError(none, where=f"{path}: [recording] file",
+                         fix="Leave [recording] out, and name what is measured under [machine]")  # fmt: skip
+    if facts.machine.temperature_log is not None:
+        raise CmmUqError(none, where=f"{path}: {KEY}", fix="Leave the log out")
+
+
+def read_machine(folder: Path, tables: Tables, known: Callable[[], Sequence[str]]) -> Job:
+    """A job for its machine alone: job.toml, error maps and temperature log, whatever its recording is.
+
+    Raises
+    ------
+    CmmUqError : see :func:`read_job`.
+    """
+    path, content, facts = _facts(folder, tables, known)
+    maps, logs = _of_the_machine(facts.machine)
+    check_distinct([*maps, *logs], str(path))
+    inputs = {"job.toml": content} | _contents(path.parent, maps, path, MAP_BYTES)
+    inputs |= _contents(path.parent, logs, path, TABLE_BYTES)
+    return Job(path.parent, facts, _no_points(_machine(facts.machine)), inputs)
+
+
+def _facts(folder: Path, tables: Tables, known: Callable[[], Sequence[str]]) -> tuple[Path, bytes, JobFile]:
+    """job.toml: where it lies, its bytes, and what it says."""
+    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    finish_interrupted(path.parent)
+    content = content_of(path, JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
+    return path, content, checked(content, path, lambda data: _model_for(data, tables, known))
+
+
+def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str]]:
+    """Files of its error maps, and of its temperature log."""
+    return [given.file for given in facts.error_map], [facts.temperature_log.file] if facts.temperature_log else []
 
 
 def _model_for(data: dict[str, Any], tables: Tables, known: Callable[[], Sequence[str]]) -> type[JobFile]:

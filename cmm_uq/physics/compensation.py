@@ -16,7 +16,6 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.physics.kinematics import Chain, exact, first_order
 from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.points import AXES, Floats, Ints, Points
-from cmm_uq.units import ARCSECOND
 
 SETTLED = 1e-10
 """Change of a coordinate, mm, at which the inverse is found."""
@@ -130,10 +129,7 @@ class Compensation:
                     "file": m.source,
                     "sha256": m.sha256,
                     "temperature_c": m.temperature,
-                    "squareness_arcsec": {
-                        pair: round(float(s) / ARCSECOND, 9)
-                        for pair, s in zip(("xy", "yz", "zx"), m.squareness, strict=True)
-                    },
+                    "squareness_arcsec": m.squareness_arcsec,
                 }
                 for m in self.maps.maps
             ],

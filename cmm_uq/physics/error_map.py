@@ -14,8 +14,8 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
+from cmm_uq.files.csv_table import CsvTable, csv_table
 from cmm_uq.files.limits import MAP_BYTES, MAP_ROWS
-from cmm_uq.physics.csv_table import CsvTable, csv_table
 from cmm_uq.points import AXES, Floats, Machine
 from cmm_uq.units import ARCSECOND, MICROMETRE
 
@@ -68,6 +68,13 @@ class ErrorMap:
     def with_squareness_arcsec(self, xy: float, yz: float, zx: float) -> ErrorMap:
         """The map with squareness errors in ″, in the project's sign: e_x = −Sxy·y, e_y = −Syz·z, e_x = −Szx·z."""
         return replace(self, squareness=ARCSECOND * np.array([xy, yz, zx]))
+
+    @property
+    def squareness_arcsec(self) -> dict[str, float]:
+        """Sxy, Syz, Szx in ″ by their pair of axes, as they were stated."""
+        return {
+            pair: round(float(s) / ARCSECOND, 9) for pair, s in zip(("xy", "yz", "zx"), self.squareness, strict=True)
+        }
 
     def covers(self, machine: Machine) -> None:
         """Check that the map reaches over the machine's travel.

@@ -80,6 +80,12 @@ def parse_error_map_text(content: bytes, where: str, *, temperature: float = 20.
     return found.with_squareness_arcsec(*(-reading.squareness[pair] for pair in ("xy", "yz", "zx")))
 
 
+def tables_of(text: str) -> list[str]:
+    """Axes of the tables in a contractor's text, in their order; empty where it is none."""
+    found = (_TABLE.search(line) for line in text.splitlines() if not line.lstrip().startswith("#"))
+    return [match[1].lower() for match in found if match]
+
+
 def error_map_text(error_map: ErrorMap, *, name: str = "errors.txt") -> str:
     """Contractor's text of a map, as :func:`read_error_map_text` reads it."""
     lines = [f"File Name: {name}", "", "Axis Parameters:", "Axis\tMin Position\tMax Position\tPoints"]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.physics.error_map import ErrorMap
+from cmm_uq.physics.error_map import AxisErrors, ErrorMap
 from cmm_uq.points import AXES, Floats, Ints
 
 Beyond = Literal["refuse", "extrapolate"]
@@ -150,11 +150,35 @@ class ErrorMaps:
         for i, stack in enumerate(self._axes):
             lower, weight = weights[i]
             stack.at(np.ascontiguousarray(readings[:, i]), lower, weight, errors[i])
-        lower, weight = weights[3]
+        return LookedUp(errors.transpose(2, 0, 1), self._squareness(*weights[3]), outside.any(axis=1) | hot)
+
+    def map_at(self, temperature: float, *, beyond: Beyond = "refuse") -> ErrorMap:
+        """The map that all scales at one temperature are looked up in, °C, at the positions of all maps.
+
+        Raises
+        ------
+        CmmUqError : it lies beyond the calibrated temperatures and ``beyond`` is "refuse", or is no number.
+        """
+        low, high = self.temperatures[0], self.temperatures[-1]
+        near = low - TEMPERATURE_MARGIN <= temperature <= high + TEMPERATURE_MARGIN
+        if not near and (beyond == "refuse" or not np.isfinite(temperature)):
+            raise CmmUqError(
+                f"no error map at {temperature:g} °C: the error maps are from {low:g} to {high:g} °C",
+                fix="Ask for a temperature between them, add a map, or allow it to be extrapolated",
+            )
+        lower, weight = self._between(np.asarray(temperature, dtype=np.float64))
+        upper = min(int(lower) + 1, len(self.maps) - 1)
+        x, y, z = (
+            AxisErrors(s.positions, (s.values[:, lower] + weight * (s.values[:, upper] - s.values[:, lower])).T)
+            for s in self._axes
+        )
+        return ErrorMap((x, y, z), self._squareness(lower, weight), float(temperature))
+
+    def _squareness(self, lower: Ints | int, weight: Floats | float) -> Floats:
+        """Between map ``lower`` and the next one, (3,) or (n, 3)."""
         upper = np.minimum(np.asarray(lower) + 1, len(self.maps) - 1)
         share = np.asarray(weight)[..., None]
-        squareness = (1 - share) * self.squareness[lower] + share * self.squareness[upper]
-        return LookedUp(errors.transpose(2, 0, 1), squareness, outside.any(axis=1) | hot)
+        return np.asarray((1 - share) * self.squareness[lower] + share * self.squareness[upper])
 
     def _stack(self, axis: int) -> _Stack:
         carriages = [m.axes[axis] for m in self.maps]

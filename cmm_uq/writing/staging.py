@@ -15,7 +15,7 @@ import shutil
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from pathlib import Path
 
 from cmm_uq.errors import CmmUqError, OutputError
@@ -53,12 +53,23 @@ class Staged:
         """The file whose lock says that this process lives."""
         return self.folder / f"{STAGE}{self.token}{LOCK}"
 
-    def write(self, contents: Mapping[str, bytes]) -> dict[str, Path]:
+    def room(self, name: str) -> Path:
+        """Where a file that is too large for memory is written, to be named to :meth:`write`.
+
+        Raises
+        ------
+        CmmUqError : it cannot be the name of an output.
+        """
+        self._check(name)
+        return self.stage / NEW / name
+
+    def write(self, contents: Mapping[str, bytes], large: Iterable[str] = ()) -> dict[str, Path]:
         """Put a set of files in place, the manifest last.
 
         Parameters
         ----------
         contents : of each file by its name inside the folder.
+        large : names of files that were written into their :meth:`room`.
 
         Returns
         -------
@@ -72,15 +83,20 @@ class Staged:
         with _told(self.folder):
             hashes = {name: sha256(content).hexdigest() for name, content in contents.items()}
             sizes = {name: len(content) for name, content in contents.items()}
+            for name in large:
+                hashes[name], sizes[name] = _synced_file(self.stage / NEW / name)
             whole = {**contents, MANIFEST: Manifest(self.owner, hashes).as_json(sizes)}
             for name, content in whole.items():
-                if not plain_name(name):
-                    raise CmmUqError(f"{name!r} cannot be the name of an output", where=str(self.folder))
+                self._check(name)
                 _write(self.stage / NEW / name, content)
             with interruption.placing(self.folder):
-                self._commit(tuple(contents), hashes)
+                self._commit(tuple(hashes), hashes)
         self.made.clear()
-        return {name: self.folder / name for name in whole}
+        return {name: self.folder / name for name in (*hashes, MANIFEST)}
+
+    def _check(self, name: str) -> None:
+        if not plain_name(name):
+            raise CmmUqError(f"{name!r} cannot be the name of an output", where=str(self.folder))
 
     def _commit(self, names: tuple[str, ...], hashes: Mapping[str, str]) -> None:
         placing = self._alone()
@@ -268,6 +284,13 @@ def _write(path: Path, content: bytes) -> None:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
+
+
+def _synced_file(path: Path) -> tuple[str, int]:
+    """SHA-256 and size of a file, once it is on the disk."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+        return file_digest(file, "sha256").hexdigest(), path.stat().st_size
 
 
 @contextlib.contextmanager

@@ -6,7 +6,7 @@ import re
 
 from cmm_uq.files import limits, numbers
 from cmm_uq.jobs import recording, table
-from cmm_uq.jobs.job import SHORTEST_TRAVEL_MM
+from cmm_uq.jobs.machine import SHORTEST_TRAVEL_MM
 from tests.conftest import ROOT
 
 PAGE = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.temperature_log import parse_temperature_log
 from cmm_uq.physics.compensation import BLOCK, Compensation
 from cmm_uq.physics.digitizer import Digitizer, euler_313, euler_angles, mount_axes, scan_plane, scan_roll
 from cmm_uq.physics.error_map import AxisErrors, ErrorMap, read_error_map
 from cmm_uq.physics.kinematics import exact, rotate
 from cmm_uq.physics.map_interpolation import ErrorMaps
-from cmm_uq.physics.temperature_log import parse_temperature_log
 
 HARRIS = Path(__file__).parent / "harris2004"
 OFFSET = np.array([1.001, 264.505, 129.575])

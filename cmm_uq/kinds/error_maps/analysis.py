@@ -9,8 +9,10 @@ from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.error_maps.columns import columns_of
 from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
+from cmm_uq.kinds.error_maps.squareness import squareness_findings
 from cmm_uq.model.machine_maps import WHERE, maps_of
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.thermal import ThermalScale
 from cmm_uq.screening.screened import Finding
 
@@ -22,11 +24,13 @@ class MapsDiagnosed:
     Parameters
     ----------
     job : what was read.
+    maps : its error maps, in the order in which it names them.
     findings : what is odd among the maps' figures.
     diagnosis : what changes with temperature, and which maps contradict the others.
     """
 
     job: Job
+    maps: tuple[ErrorMap, ...]
     findings: tuple[Finding, ...]
     diagnosis: MapsDiagnosis
 
@@ -62,6 +66,7 @@ def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress
         why = "; ".join(finding.why for finding in findings)
         raise CmmUqError(f"the error maps have nothing in common to compare: {why}", where=WHERE,
                          fix="Map the same errors at the same positions each time")  # fmt: skip
+    findings += squareness_findings(maps)
     named = [effect.name for effect in acting]
     found = diagnose_maps(columns, named, alpha=alpha, seed=seed, progress=progress)
-    return MapsDiagnosed(job, tuple(findings), found)
+    return MapsDiagnosed(job, tuple(maps), tuple(findings), found)

@@ -14,6 +14,7 @@ from cmm_uq.documents.working_page import working_page
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.kinds.error_maps.diagnosis import Difference
 from cmm_uq.kinds.error_maps.search import ColumnComparison
+from cmm_uq.kinds.error_maps.squareness import squareness_data, squareness_sections
 from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
 
 _PICTURES = 3
@@ -22,6 +23,7 @@ _PICTURES = 3
 def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
     """results.json of a diagnosis of error maps."""
     d, noise = found.diagnosis, found.diagnosis.displacement
+    squareness = squareness_data(found.maps)
     nothing = {"value": None, "u": None, "interval95": None}
     return {
         **head(found.job, effects=False),
@@ -62,6 +64,7 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
                  ]}
                 for compared in d.comparisons
             ],
+            **({"squareness_arcsec": squareness} if squareness else {}),
         },
     }  # fmt: skip
 
@@ -74,6 +77,7 @@ def maps_document(found: MapsDiagnosed, seed: int) -> Document:
         Section("What makes the maps differ", _told(found)),
         Section("Before and after", (_before_after(found),)),
         Section("Errors compared", (_compared(found),)),
+        *squareness_sections(found.maps),
         Section("Noise", tuple(Paragraph(text) for text in noise_words(d))),
         Section("What to measure next", tuple(Paragraph(what) for _, what in next_words(d))),
     )

@@ -1,0 +1,151 @@
+"""``[machine]`` of job.toml: the machine, its travel, its error maps, and the temperatures of its scales."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from cmm_uq.files.limits import COLUMNS, LISTED, MAPS
+from cmm_uq.jobs.table import Column, Number, Range, Table, Temperature, Triple, at_least
+
+SHORTEST_TRAVEL_MM = 1e-3
+"""Positions are divided by the travel."""
+
+Angle = Annotated[float, Field(ge=-36_000, le=36_000)]
+"""A squareness error, ″: ten degrees."""
+
+Turn = Annotated[float, Field(ge=-360, le=360)]
+"""An angle of a pose, °."""
+
+Sensors = Annotated[list[Column], Field(min_length=1, max_length=COLUMNS.most)]
+"""Columns of the thermocouples on one scale."""
+
+
+class Travel(Table):
+    """``travel_mm``: lowest and highest scale reading of each axis."""
+
+    x: Range | None = None
+    y: Range | None = None
+    z: Range | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for axis in "xyz":
+            given = getattr(self, axis)
+            if given and not given[0] < given[1]:
+                raise ValueError(f"{axis} = {given}: the first number must be the lower one")
+            if given and given[1] - given[0] < SHORTEST_TRAVEL_MM:
+                raise ValueError(f"{axis} = {given}: a travel of less than {SHORTEST_TRAVEL_MM:g} mm is none")
+        return self
+
+
+class SquarenessFacts(Table):
+    """``squareness_arcsec``: beside an error map."""
+
+    xy: Angle = 0.0
+    yz: Angle = 0.0
+    zx: Angle = 0.0
+
+
+class ErrorMapFile(Table):
+    """One error map, the temperature it was taken at, and the squareness of the axes at that temperature."""
+
+    file: str
+    temperature_c: Temperature
+    squareness_arcsec: SquarenessFacts | None = None
+
+
+def _squareness_of_all_or_none(maps: list[ErrorMapFile]) -> list[ErrorMapFile]:
+    without = [given.file for given in maps if given.squareness_arcsec is None]
+    if without and len(without) < len(maps):
+        raise ValueError(
+            f"the map {without[0]!r} has no squareness_arcsec, and another has: between them it would fall to zero. "
+            "Give it for each map"
+        )
+    return maps
+
+
+class ScaleColumns(Table):
+    """``columns`` of a temperature log: the thermocouples on each scale, by the names of their columns."""
+
+    x: Sensors
+    y: Sensors
+    z: Sensors
+
+
+class TemperatureLogFile(Table):
+    """``temperature_log``: what the scales' thermocouples showed while the recording was made.
+
+    Attributes
+    ----------
+    start : moment at which the recording's ``time_s`` was 0, for a log that gives dates.
+    columns : of the thermocouples on each scale, where their names do not say so.
+    max_gap_s : longest interval of the log that is interpolated over; see :data:`cmm_uq.jobs.temperature_log.BRIDGED`.
+    """
+
+    file: str
+    start: dt.datetime | None = None
+    columns: ScaleColumns | None = None
+    max_gap_s: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
+
+
+class Pose(Table):
+    """Attitude of a digitizer in one index of the wrist: Euler angles 3-1-3 (Harris 2004 eq. 7)."""
+
+    pose: Number = 1
+    alpha_deg: Turn
+    beta_deg: Turn
+    gamma_deg: Turn
+
+
+class DigitizerFacts(Table):
+    """``digitizer``: a laser digitizer on the ram; ``offset_mm`` is [U1 V1 W1], the mount in the digitizer's frame."""
+
+    offset_mm: Triple
+    poses: Annotated[list[Pose], Field(min_length=1, max_length=LISTED.most)]
+
+    @model_validator(mode="after")
+    def _poses_once(self) -> Self:
+        numbers = [given.pose for given in self.poses]
+        twice = next((number for number in numbers if numbers.count(number) > 1), None)
+        if twice is not None:
+            raise ValueError(f"pose {twice} is there twice: number each pose as the cloud does")
+        return self
+
+
+class MachineFacts(Table):
+    """``[machine]``."""
+
+    name: str
+    manufacturer: str = ""
+    model: str = ""
+    serial: str = ""
+    owner: str = ""
+    chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
+    travel_mm: Travel = Travel()
+    origin_mm: Triple = [0.0, 0.0, 0.0]
+    error_map: Annotated[
+        list[ErrorMapFile], Field(max_length=MAPS.most), AfterValidator(_squareness_of_all_or_none)
+    ] = []
+    squareness_arcsec: SquarenessFacts | None = None
+    temperature_log: TemperatureLogFile | None = None
+    digitizer: DigitizerFacts | None = None
+
+    @model_validator(mode="after")
+    def _squareness_once(self) -> Self:
+        twice = [given.file for given in self.error_map if given.squareness_arcsec is not None]
+        if self.squareness_arcsec is not None and twice:
+            raise ValueError(
+                f"squareness_arcsec is given for the machine and for the map {twice[0]!r}: leave out one of the two"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _three_carriages(self) -> Self:
+        if sorted(self.chain.replace("F", "", 1)) != ["X", "Y", "Z"]:
+            raise ValueError(
+                f"chain = {self.chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves"
+            )
+        return self
