@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.physics.error_map import ErrorMap
@@ -31,7 +33,8 @@ def maps_of(job: Job) -> list[ErrorMap]:
                              fix=f"Leave squareness_arcsec out in {WHERE}")  # fmt: skip
         if not (square or has_squareness):
             without.append(path)
-        maps.append(found.with_squareness_arcsec(square.xy, square.yz, square.zx) if square else found)
+        named = replace(found, source=given.file)  # as the job names it, wherever its folder lies
+        maps.append(named.with_squareness_arcsec(square.xy, square.yz, square.zx) if square else named)
     if without and len(without) < len(maps):
         raise CmmUqError("has no squareness, and another map has: between them it would fall to zero", where=without[0],
                          fix=f"Give it squareness_arcsec in {WHERE}")  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -95,3 +96,14 @@ def test_points_beyond_the_map_are_refused_with_their_line_or_flagged(job: Path,
 def test_the_job_itself_is_not_written_over(job: Path) -> None:
     with pytest.raises(CmmUqError, match="is an input of this command"):
         write_compensated(named(job, straight()), job)
+
+
+def test_how_it_came_about_names_files_not_folders(job: Path, tmp_path: Path) -> None:
+    """The same bytes wherever the job lies, and nothing of the user's machine."""
+    named(job, straight())
+    elsewhere = Path(shutil.copytree(job, tmp_path / "elsewhere"))
+    for folder, out in ((job, "a"), (elsewhere, "b")):
+        write_compensated(folder, tmp_path / out)
+    told = [(tmp_path / out / "compensation.json").read_bytes() for out in ("a", "b")]
+    assert told[0] == told[1]
+    assert json.loads(told[0])["error_maps"][0]["file"] == "map.csv"
