@@ -36,12 +36,14 @@ class Way:
     prefix : a program that runs it.
     more : for the process: environment, stdout, stderr.
     quiet : whether it should say nothing on stderr when it ends well.
+    heard : whether anything that it says arrives.
     """
 
     arguments: tuple[str, ...]
     prefix: tuple[str, ...] = ()
     more: Mapping[str, object] = field(default_factory=dict)
     quiet: bool = True
+    heard: bool = True
 
 
 class Place(Protocol):
@@ -122,7 +124,8 @@ def in_the_way(folder: Path, way: Way, *, name: str) -> Iterator[Way]:
 @contextmanager
 def prefixed(folder: Path, way: Way, *, prefix: Sequence[str]) -> Iterator[Way]:
     """Another program runs the command: a limit of size, a shell that closes or removes something."""
-    yield replace(way, prefix=tuple(prefix), quiet=False)
+    # a limit of a byte holds for the file that stderr goes to as well
+    yield replace(way, prefix=tuple(prefix), quiet=False, heard=not {"--fsize=0", "--fsize=1"} & set(prefix))
 
 
 @contextmanager
@@ -137,7 +140,7 @@ def shell(folder: Path, way: Way, *, line: str) -> Iterator[Way]:
     """A line of shell that ends in ``"$@"``; the command may print, the job is named by its whole path."""
     where = [str(folder / part) if part.startswith("job") else part for part in way.arguments if part != "--quiet"]
     where = [str(folder / part) if part == "truth.toml" else part for part in where]
-    yield replace(way, arguments=tuple(where), prefix=("sh", "-c", line, "sh"), quiet=False)
+    yield replace(way, arguments=tuple(where), prefix=("sh", "-c", line, "sh"), quiet=False, heard="2>" not in line)
 
 
 @contextmanager
@@ -191,7 +194,7 @@ def attempt(command: str, place: Place, folder: Path) -> tuple[Outcome, list[str
     with place(folder, Way(COMMANDS[command].arguments())) as way:
         before = snapshot(folder)
         outcome = run(way.arguments, folder, prefix=way.prefix, **way.more)
-        found = problems(outcome, quiet=way.quiet)
+        found = problems(outcome, quiet=way.quiet) if way.heard or outcome.code not in (2, 3) else []
         after = snapshot(folder)
     found += lost(before, after, own=old)
     found += [

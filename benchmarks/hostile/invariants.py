@@ -63,14 +63,20 @@ def problems(outcome: Outcome, *, quiet: bool = True) -> list[str]:
         found.append(f"refuses only after more than {SECONDS:g} s")
     if not found:
         found += (
-            refusal_problems(said) if code in (2, 3) else ["speaks on stderr"] if quiet and not code and said else []
+            refusal_problems(said, progress=not quiet)
+            if code in (2, 3)
+            else ["speaks on stderr"]
+            if quiet and not code and said
+            else []
         )
     return found
 
 
-def refusal_problems(said: str) -> list[str]:
-    """What is wrong with the words of a refusal: one line, short, without control characters."""
+def refusal_problems(said: str, *, progress: bool = False) -> list[str]:
+    """What is wrong with the words of a refusal: one line, short, without control characters; ``progress`` may precede it."""
     lines = said.removesuffix("\n").split("\n")
+    if progress:
+        lines = lines[-1:]  # what was being done is said line by line before
     if not said:
         return ["refuses without a word"]
     if len(lines) > 1:
