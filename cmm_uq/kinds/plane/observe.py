@@ -108,8 +108,7 @@ class PlaneSurface(Artefact):
         CmmUqError : a direction point is not within the accepted angle.
         """
         found, points, contact = [], self.points, self.rows[:, 0]
-        fitted = self.fit(points.xyz, np.zeros(0))
-        off = self.project(points.xyz, (points.xyz - fitted)[:, :, None])[:, 0]
+        off = self.off_plane()
         for number in self.placings.numbers:
             rows = contact[self.measurement == number]
             ahead = np.flatnonzero((points.measurement == number) & (points.point == DIRECTION_POINT))
@@ -118,6 +117,11 @@ class PlaneSurface(Artefact):
                 surface = offset_plane(points.xyz[ahead[0]], points.xyz[rows], self.offset, u_offset=self.u_offset)
             found.append(ProbedPlane(int(number), len(rows), float(np.ptp(off[self.measurement == number])), surface))
         return tuple(found)
+
+    def off_plane(self) -> Floats:
+        """(n,) distance of each point of contact from its least-squares plane, mm."""
+        xyz = self.points.xyz
+        return self.project(xyz, (xyz - self.fit(xyz, np.zeros(0)))[:, :, None])[:, 0]
 
     def _axes(self, touched: Floats) -> Floats:
         """Normal and two directions in the plane, as columns, of each point's placing, (n, 3, 3)."""

@@ -18,7 +18,9 @@ from cmm_uq.kinds.shift_axis.undetermined import Undetermined, undetermined
 from cmm_uq.kinds.shifting.correction_table import correction_table
 from cmm_uq.kinds.shifting.facts import KnownLength, shift_facts
 from cmm_uq.physics.error_map import ErrorMap
+from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats, Ints
+from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, PPM
 
@@ -68,16 +70,58 @@ class ShiftResult:
     @cached_property
     def linearity(self) -> Quantity:
         """Linearity error: peak to valley of the curve about the line through its ends at the first series, µm."""
+        about = self._about_the_ends
+        return Quantity.of_draws(np.ptp(about, axis=1) / MICROMETRE, "µm", _ptp(about.mean(axis=0)))
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Of linearity error and, where it is determined, mean sensitivity error."""
+        draws = {f"linearity_{self.axis}.peak_to_valley_um": (np.ptp(self._about_the_ends, axis=1) / MICROMETRE, "µm")}
+        if self.estimate.scale_known:
+            draws[f"{SCALE[self.axis].name}.ppm"] = self.estimate.scale / PPM, "ppm"
+        return Covariance.of_draws(draws)
+
+    @cached_property
+    def shifts(self) -> tuple[Quantity, ...]:
+        """Of each series against the first, mm."""
+        return tuple(Quantity.of_draws(draws, "mm") for draws in self.estimate.shifts.T)
+
+    @cached_property
+    def distances(self) -> tuple[Floats, Floats] | None:
+        """Of the artefact's points from the first, (p,) mm, and their standard uncertainties; ``None`` without a scale."""
+        draws = self.estimate.artefact
+        return (draws.mean(axis=0), draws.std(axis=0, ddof=1)) if self.estimate.scale_known else None
+
+    @cached_property
+    def beside_integrations(self) -> Curve | None:
+        """The curve at the positions of the integrations; ``None`` where there are none."""
+        first = next(iter(self.integrated.values()), None)
+        return None if first is None else self.estimate.at(first.position)
+
+    @cached_property
+    def _about_the_ends(self) -> Floats:
+        """(N, m) draws of the curve about the line through its ends at the first series, mm."""
         curve, ends = self.estimate.curve, self.estimate.series.reading[self.estimate.series.series == 0][[0, -1]]
         draws = curve.draws.copy()
         if self.estimate.scale_known:
             draws -= self.estimate.scale[:, None] * (curve.position - ends[0])
-        return Quantity.of_draws(np.ptp(draws, axis=1) / MICROMETRE, "µm", _ptp(draws.mean(axis=0)))
+        return np.asarray(draws, dtype=np.float64)
+
+    @cached_property
+    def disagreement_um(self) -> tuple[float, float]:
+        """Root mean square of what the placings disagree by, without and with the curve, µm."""
+        without, with_curve = (rms_um(values) for values in self.estimate.residuals)
+        return without, with_curve
 
     @property
     def repeatability(self) -> Quantity:
         """Standard uncertainty of one reading, µm."""
         return Quantity.of_draws(self.estimate.sigma / MICROMETRE, "µm")
+
+
+def rms_um(values: Floats) -> float:
+    """Root mean square of mm, in µm."""
+    return float((values**2).mean() ** 0.5) / MICROMETRE
 
 
 def _ptp(values: Floats) -> float:
