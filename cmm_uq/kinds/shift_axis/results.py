@@ -35,8 +35,9 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
         "curves": {f"linearity_{axis}": curve_data(estimate.curve, MICROMETRE, "um")},
         "integrations": {
             method: {"position_mm": curve.position.tolist(), "error_um": _um(curve.error), "u_um": _um(curve.u)}
-            for method, curve in (*result.integrated.items(), *((("joint", joint),) if joint else ()))
+            for method, curve in result.integrated.items()
         },
+        "beside_integrations": None if joint is None else curve_data(joint, MICROMETRE, "um"),
         "artefact": {"point": estimate.series.numbers.tolist(),
                      "distance_mm": None if distances is None else distances[0].tolist(),
                      "u_um": None if distances is None else _um(distances[1]),
