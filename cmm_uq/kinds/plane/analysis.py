@@ -21,9 +21,9 @@ class PlaneFigures:
     probed: ProbedPlane
 
     @property
-    def flatness_um(self) -> float:
-        """Range of the distances from the least-squares plane, µm."""
-        return self.probed.flatness / MICROMETRE
+    def flatness_um(self) -> float | None:
+        """Range of the distances from the least-squares plane, µm; ``None`` of three points, which have none."""
+        return None if self.probed.flatness is None else self.probed.flatness / MICROMETRE
 
     @property
     def surface(self) -> SurfaceFigures | None:
@@ -77,7 +77,8 @@ class SurfaceFigures:
 
 def figures(result: Result) -> tuple[PlaneFigures, ...]:
     """Of each plane of a result."""
-    return tuple(PlaneFigures(one) for one in cast("PlaneSurface", result.artefact).probed())
+    plane, noise = cast("PlaneSurface", result.artefact), result.noise.coordinate.value * MICROMETRE
+    return tuple(PlaneFigures(one) for one in plane.probed(noise))
 
 
 def results(result: Result) -> dict[str, Any]:

@@ -28,7 +28,12 @@ def sections(result: Result) -> list[Section]:
 def _flatness(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
     noise = result.noise.coordinate.value
     rows = tuple(
-        (str(one.probed.measurement), str(one.probed.count), rounded(one.flatness_um, noise)[0]) for one in probed
+        (
+            str(one.probed.measurement),
+            str(one.probed.count),
+            "–" if one.flatness_um is None else rounded(one.flatness_um, noise)[0],
+        )
+        for one in probed
     )
     columns = (Column("Measurement", numeric=False), Column("Points"), Column("Flatness", "µm"))
     note = "Flatness: range of the distances from the least-squares plane, of surface, machine and probe together."
