@@ -16,10 +16,10 @@ from cmm_uq.kinds.shift_axis.series import ShiftedSeries, shifted_series
 from cmm_uq.kinds.shift_axis.shift_integration import Method
 from cmm_uq.kinds.shift_axis.undetermined import Undetermined, undetermined
 from cmm_uq.kinds.shifting.correction_table import correction_table
-from cmm_uq.kinds.shifting.facts import KnownLength, shift_facts
+from cmm_uq.kinds.shifting.facts import KnownLength, ShiftFacts, shift_facts
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import SCALE
-from cmm_uq.points import Floats, Ints
+from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, PPM
@@ -143,25 +143,31 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
     """
     check_facts(job)
     facts, stated = shift_facts(job), job.facts.recording.u_coordinate_um
-    if facts.axis is None:
-        raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
-                         fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip
-    if not facts.shifts_mm:
-        raise CmmUqError("is missing", where="job.toml [artefact] shifts_mm",
-                         fix="Give one shift a series, 0.0 for the first")  # fmt: skip
-    series = shifted_series(
-        job.points,
-        facts.axis,
-        np.array(facts.shifts_mm, dtype=np.float64),
-        facts.u_shift_um * MICROMETRE,
-        job.recording_path,
-    )
+    series = recorded_series(facts, job.points, job.recording_path)
     known = None if facts.known is None else _known(facts.known, series)
     estimate = estimate_curve(
         series, known, sigma=None if stated is None else stated * MICROMETRE, seed=seed, progress=progress
     )
     return ShiftResult(
         job, estimate, undetermined(series, scale_known=estimate.scale_known), _integrated(series, estimate, known)
+    )
+
+
+def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSeries:
+    """Readings of a shift job along an axis.
+
+    Raises
+    ------
+    CmmUqError : the job names no axis or no shifts, or the readings are no series of these shifts.
+    """
+    if facts.axis is None:
+        raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
+                         fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip
+    if not facts.shifts_mm:
+        raise CmmUqError("is missing", where="job.toml [artefact] shifts_mm",
+                         fix="Give one shift a series, 0.0 for the first")  # fmt: skip
+    return shifted_series(
+        points, facts.axis, np.array(facts.shifts_mm, dtype=np.float64), facts.u_shift_um * MICROMETRE, where
     )
 
 
