@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from cmm_uq.commands.estimation import model_of, without_outliers
+from cmm_uq.commands.estimation import without_outliers
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
 from cmm_uq.conformity.consequences import consequences
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, diagnose
@@ -19,11 +20,9 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel
 from cmm_uq.overflow import refusing_overflow
-from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning.setting import Planning
 from cmm_uq.planning.suggestion import suggestions
-from cmm_uq.screening.screened import Finding, screened
-from cmm_uq.screening.shape import Screening
+from cmm_uq.screening.screened import Finding
 
 
 def diagnose_folder(
@@ -90,17 +89,9 @@ def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
     ------
     CmmUqError : the recording does not fit the model.
     """
-    kind = kind_of(job)
-    where, observe = job.recording_path, kind.observing("screened")
-    acting = effects(job.facts.model.effects, where="job.toml [model] effects")
-    recording = screened(
-        job.points, job.facts.artefact, kind.offers("screen", Screening), observe,
-        needed={column for effect in acting for column in effect.columns},
-        set_aside=job.facts.recording.set_aside, where=where,
-    )  # fmt: skip
-    model = model_of(job, observe(job.facts.artefact, recording.points, where=where))
+    model, findings = recorded_model(job)
     model, outliers = without_outliers(model)
-    return model, (*recording.findings, *outliers)
+    return model, (*findings, *outliers)
 
 
 def diagnosed(

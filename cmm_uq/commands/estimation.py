@@ -99,23 +99,20 @@ def influences(model: MeasurementModel, estimate: Estimate, findings: tuple[Find
 
 def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
     """Reported parameters of each effect, by effect and name."""
-    found, column = {}, 0
-    for effect in model.effects:
-        draws = posterior.draws[:, column : column + len(effect.coefficients)]
-        column += len(effect.coefficients)
-        units = {parameter.name: parameter.unit for parameter in effect.reported}
-        reported = effect.to_reported(draws, np.zeros((len(draws), 0)))
-        found[effect.name] = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
-    return found
+    found = _quantities(model, posterior)
+    return {effect.name: found[effect.name] for effect in model.effects}
 
 
-def sizes(artefact: Artefact, posterior: Posterior) -> dict[str, Quantity]:
+def sizes(model: MeasurementModel, posterior: Posterior) -> dict[str, Quantity]:
     """Sizes of the artefact, by name."""
-    column = {u.key: i for i, u in enumerate(posterior.unknowns)}
-    return {
-        size.name: Quantity.of_draws(posterior.draws[:, column[ARTEFACT, size.name]], size.unit)
-        for size in artefact.sizes
-    }
+    return _quantities(model, posterior).get(ARTEFACT, {})
+
+
+def _quantities(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
+    found: dict[str, dict[str, Quantity]] = {}
+    for (owner, name), (draws, unit) in model.reported(posterior.draws).items():
+        found.setdefault(owner, {})[name] = Quantity.of_draws(draws, unit)
+    return found
 
 
 def noise(posterior: Posterior, stated_um: float | None, p_value: float | None) -> Noise:

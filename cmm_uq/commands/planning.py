@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cmm_uq.commands.recorded import refuse_unfit
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
 from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import READY, Condition
@@ -131,6 +132,7 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     tell("Reading what the placings determine", 0.05)
     refuse_planned(job)
     setting = Setting.of(job, kind_of(job))
+    refuse_unfit(job)
     if setting.planning.free is not None:
         return _series_plan(job, setting)
     name, placings, points = _start(job, setting)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.recorded import refuse_unfit
 from cmm_uq.documents.program import program
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.content import content_of
@@ -51,7 +52,9 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     """
     columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
     points = replace(job.points, columns={**job.points.columns, **columns})
-    artefact = kind_of(job).observing("simulated")(job.facts.artefact, points, where=job.recording_path)
+    observe = kind_of(job).observing("simulated")
+    refuse_unfit(job)
+    artefact = observe(job.facts.artefact, points, where=job.recording_path)
     acting = effects(tuple(truth.effects), where=f"{truth_path} [effects]")
     given = [effect.from_reported(truth.effects[effect.name]) for effect in acting]
     model = MeasurementModel(

@@ -15,7 +15,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.documents.results_file import results
 from cmm_uq.documents.summary import summary
 from cmm_uq.documents.warning import warnings
-from cmm_uq.documents.wording import expanded, listed, measured, probability, title_of, units_of
+from cmm_uq.documents.wording import expanded, listed, measured, probability, title_of
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.uncertainty.rounding import rounded, significant
@@ -197,14 +197,11 @@ def _free_combination(result: Result, combination: tuple[tuple[str, str], ...]) 
         f"{listed(titles)} can change together without changing any observation: the recording does not determine their "
         "common part. A certified length of the artefact would."
     )
-    columns = {unknown.key: i for i, unknown in enumerate(result.posterior.unknowns)}
-    units = units_of(result)
-    alike = [key for key in combination if units[key] == units[combination[0]]]
     rows = []
-    for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False):
-        draws = result.posterior.draws[:, columns[second]] - result.posterior.draws[:, columns[first]]
-        value, U, k = expanded(type(result.noise.coordinate).of_draws(draws, units[first]))
-        rows.append((f"{title_of(second, result)} − {title_of(first, result)}", value, U, k, units[first]))
+    for one in result.differences(combination):
+        value, U, k = expanded(one.quantity)
+        name = f"{title_of(one.second, result)} − {title_of(one.first, result)}"
+        rows.append((name, value, U, k, one.quantity.unit))
     heads = (
         Column("Difference", numeric=False),
         Column("Estimate"),

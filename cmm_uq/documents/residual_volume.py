@@ -26,9 +26,3 @@ def residual_volume(result: Result, what: str) -> Plot:
         caption="Residuals after the fitted model in the machine's volume (scale readings).",
         alternative=f"Three projections of the {what}; residuals of {residuals.min():.1f} to {residuals.max():.1f} µm.",
     )  # fmt: skip
-
-
-def flagged(result: Result) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Observations (m,) of measurements that the screening found odd."""
-    odd = {m for finding in result.findings for m in finding.measurements}
-    return np.isin(result.artefact.measurement, list(odd))

@@ -6,8 +6,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cmm_uq.conformity.consequences import Consequences
 from cmm_uq.conformity.statement import Statement
+from cmm_uq.conformity.tolerances import Judged
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import Posterior
@@ -17,6 +21,7 @@ from cmm_uq.model.artefact import Artefact
 from cmm_uq.planning.suggestion import Suggestion
 from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding
+from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
 
 LACK_OF_FIT = 0.01
@@ -81,6 +86,15 @@ class Diagnosed:
     consequences: Consequences | None = None
 
 
+@dataclass(frozen=True)
+class Difference:
+    """``second`` minus ``first``, parameters by their keys, which is determined where neither of them is."""
+
+    second: tuple[str, str]
+    first: tuple[str, str]
+    quantity: Quantity
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """All that is known of a job after its analysis.
@@ -143,6 +157,47 @@ class Result:
         return tuple(
             tuple(u.key for u, part in zip(ls.unknowns, column, strict=True) if part) for column in ls.null_space.T
         )
+
+    @cached_property
+    def free(self) -> frozenset[str]:
+        """Effects that the recording does not determine by themselves."""
+        return frozenset(effect for combination in self.undetermined for effect, _ in combination)
+
+    def differences(self, combination: tuple[tuple[str, str], ...]) -> tuple[Difference, ...]:
+        """Differences, within a combination that the recording leaves free, of parameters in one unit."""
+        columns = {unknown.key: i for i, unknown in enumerate(self.posterior.unknowns)}
+        units = {unknown.key: unknown.unit for unknown in self.posterior.unknowns}
+        alike = [key for key in combination if units[key] == units[combination[0]]]
+        draws = self.posterior.draws
+        return tuple(
+            Difference(
+                second, first, Quantity.of_draws(draws[:, columns[second]] - draws[:, columns[first]], units[first])
+            )
+            for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False)
+        )
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Of all reported parameters and the artefact's sizes."""
+        reported = self.model.reported(self.posterior.draws)
+        return Covariance.of_draws({".".join(key): values for key, values in reported.items()})
+
+    @cached_property
+    def judged(self) -> tuple[Judged, ...]:
+        """First parameters of the effects that the job sets a tolerance for and the recording determines."""
+        tolerances = self.job.facts.model.tolerances
+        found = []
+        for effect in self.model.effects:
+            if effect.name in tolerances and effect.name not in self.free:
+                name, quantity = next(iter(self.parameters[effect.name].items()))
+                found.append(Judged(effect.name, effect.title, name, quantity, tolerances[effect.name]))
+        return tuple(found)
+
+    @cached_property
+    def flagged(self) -> NDArray[np.bool_]:
+        """Observations (m,) of measurements that the screening found odd."""
+        odd = {m for finding in self.findings for m in finding.measurements}
+        return np.isin(self.artefact.measurement, list(odd))
 
     def prior_share(self, key: tuple[str, str]) -> float:
         """How much of a parameter's variance is left of the prior's: 0 all from the recording, 1 all assumed."""

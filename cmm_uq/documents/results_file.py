@@ -19,6 +19,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.screening.screened import Finding
+from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
@@ -55,6 +56,16 @@ def results(result: Result) -> dict[str, Any]:
         **head(result.job),
         "estimates": {effect: _quantities(values) for effect, values in result.parameters.items()},
         "artefact": _quantities(result.sizes),
+        "certified": {
+            size.name: {"value": size.nominal, "u": size.sd} for size in result.artefact.sizes if size.certified
+        },
+        "covariance": covariance_data(result.covariance),
+        "differences": [
+            {"of": ".".join(one.second), "minus": ".".join(one.first), one.second[1]: quantity_data(one.quantity)}
+            for combination in result.undetermined
+            for one in result.differences(combination)
+        ],
+        "tolerances": {one.effect: {one.parameter: one.tolerance, "verdict": one.verdict} for one in result.judged},
         "noise": {
             "stated_coordinate_um": result.noise.stated_um,
             "coordinate_um": quantity_data(result.noise.coordinate),
@@ -134,8 +145,19 @@ def as_json(data: Mapping[str, Any]) -> bytes:
 
 
 def quantity_data(quantity: Quantity) -> dict[str, Any]:
-    """Value, standard uncertainty and 95 % interval."""
-    return {"value": quantity.value, "u": quantity.u, "interval95": list(quantity.interval95)}
+    """Value, standard uncertainty, 95 % interval, expanded uncertainty, coverage factor; its unit is in the key above it."""
+    return {
+        "value": quantity.value, "u": quantity.u, "interval95": list(quantity.interval95), "U": quantity.expanded,
+        "k": quantity.coverage_factor,
+    }  # fmt: skip
+
+
+def covariance_data(covariance: Covariance) -> dict[str, Any]:
+    """How estimates vary together; an element of the matrix is in the product of the units of its row and column."""
+    return {
+        "parameters": list(covariance.parameters), "units": list(covariance.units),
+        "matrix": covariance.matrix.tolist(),
+    }  # fmt: skip
 
 
 def _quantities(quantities: Mapping[str, Quantity]) -> dict[str, Any]:

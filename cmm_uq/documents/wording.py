@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.result import Result
 from cmm_uq.model.measurement import ARTEFACT
@@ -14,13 +12,11 @@ from cmm_uq.uncertainty.rounding import rounded
 def expanded(quantity: Quantity) -> tuple[str, str, str]:
     """Value, expanded uncertainty and coverage factor, as text.
 
-    The expanded uncertainty is the larger distance from the value to an end of the 95 % interval, to two significant
-    digits; the coverage factor is its ratio to the standard uncertainty.
+    The expanded uncertainty is given to two significant digits.
     """
-    low, high = quantity.interval95
-    U = max(high - quantity.value, quantity.value - low)
-    value, uncertainty = rounded(quantity.value, U)
-    return value, uncertainty, f"{U / quantity.u:.2f}" if quantity.u > 0 else "–"
+    value, uncertainty = rounded(quantity.value, quantity.expanded)
+    k = quantity.coverage_factor
+    return value, uncertainty, "–" if k is None else f"{k:.2f}"
 
 
 def probability(p: float) -> str:
@@ -46,11 +42,6 @@ def title_of(key: tuple[str, str], result: Result) -> str:
         return next(size.title for size in result.artefact.sizes if size.name == name)
     effect = next(effect for effect in result.model.effects if effect.name == owner)
     return effect.title if len(effect.reported) == 1 else f"{effect.title}, {name}"
-
-
-def units_of(result: Result) -> Mapping[tuple[str, str], str]:
-    """Unit of every parameter."""
-    return {unknown.key: unknown.unit for unknown in result.posterior.unknowns}
 
 
 def listed(words: list[str]) -> str:

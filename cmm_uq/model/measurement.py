@@ -104,6 +104,24 @@ class MeasurementModel:
         )
         return coefficients + sizes
 
+    def reported(self, draws: Floats) -> dict[tuple[str, str], tuple[Floats, str]]:
+        """Draws (N,), and unit, of every parameter as it is reported, then of the artefact's sizes, by key.
+
+        Parameters
+        ----------
+        draws : (N, k) of the unknowns.
+        """
+        found, column = {}, 0
+        for effect in self.effects:
+            own = draws[:, column : column + len(effect.coefficients)]
+            column += len(effect.coefficients)
+            units = {parameter.name: parameter.unit for parameter in effect.reported}
+            for name, values in effect.to_reported(own, np.zeros((len(own), 0))).items():
+                found[effect.name, name] = values, units[name]
+        for size, values in zip(self.artefact.sizes, draws[:, column:].T, strict=True):
+            found[ARTEFACT, size.name] = values, size.unit
+        return found
+
     def errors(self, xyz: Floats, coefficients: Floats) -> Floats:
         """Errors e (n, 3), mm, of points indicated at ``xyz``."""
         return np.asarray(self._basis(xyz) @ coefficients, dtype=np.float64)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.uncertainty.budget import Budget
 from cmm_uq.uncertainty.evaluation import Evaluation, Stated
 from cmm_uq.uncertainty.monte_carlo import Simulated
 from cmm_uq.uncertainty.propagation import Propagated
@@ -49,22 +50,40 @@ def _output(evaluation: Evaluation, row: int, stated: Stated) -> dict[str, Any]:
         "first": _propagated(ways.first, row, coverage),
         "second": _propagated(ways.second, row, coverage),
         "monte_carlo": _simulated(ways.simulated, row),
-        "budget": [
-            {
-                "input": line.name,
-                "value": line.value,
-                "u": line.u,
-                "unit": line.unit or None,
-                "distribution": line.distribution or None,
-                "dof": _finite(line.dof),
-                "sensitivity": line.sensitivity,
-                "contribution": line.contribution,
-                "share": share,
-                "source": line.origin,
-            }
-            for line, share in zip(stated.budget.lines, stated.budget.shares, strict=True)
-        ],
+        "budget": _lines(stated.budget),
     }
+
+
+def budget_data(budget: Budget) -> dict[str, Any]:
+    """A budget by itself, of an uncertainty alone or of a measurand with an estimate."""
+    return {
+        "measurand": budget.measurand,
+        "value": budget.value,
+        "u": budget.u,
+        "U": budget.expanded,
+        "k": budget.k,
+        "dof": _finite(budget.dof),
+        "unit": budget.unit or None,
+        "budget": _lines(budget),
+    }
+
+
+def _lines(budget: Budget) -> list[dict[str, Any]]:
+    return [
+        {
+            "input": line.name,
+            "value": line.value,
+            "u": line.u,
+            "unit": line.unit or None,
+            "distribution": line.distribution or None,
+            "dof": _finite(line.dof),
+            "sensitivity": line.sensitivity,
+            "contribution": line.contribution,
+            "share": share,
+            "source": line.origin,
+        }
+        for line, share in zip(budget.lines, budget.shares, strict=True)
+    ]
 
 
 def _propagated(found: Propagated | None, row: int, coverage: float) -> dict[str, Any] | None:

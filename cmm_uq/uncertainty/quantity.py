@@ -32,7 +32,18 @@ class Quantity:
         estimate = float(draws.mean()) if value is None else value
         return cls(estimate, float(draws.std(ddof=1)), (float(low), float(high)), unit)
 
-    def times(self, factor: float, unit: str) -> Quantity:
-        """The same quantity in another unit; the factor is positive."""
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty U: the larger distance from the value to an end of the 95 % interval."""
         low, high = self.interval95
-        return Quantity(self.value * factor, self.u * factor, (low * factor, high * factor), unit)
+        return max(high - self.value, self.value - low)
+
+    @property
+    def coverage_factor(self) -> float | None:
+        """K = U/u; ``None`` where nothing is uncertain."""
+        return self.expanded / self.u if self.u > 0 else None
+
+    def times(self, factor: float, unit: str) -> Quantity:
+        """The quantity multiplied by an exact factor, of either sign, in the unit of the product."""
+        low, high = sorted(factor * end for end in self.interval95)
+        return Quantity(self.value * factor, self.u * abs(factor), (low, high), unit)

@@ -6,6 +6,7 @@ One test carries them all, a kind from another package too: planned, simulated, 
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -144,6 +145,49 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
         assert verdict == "consistent" or not observed  # nothing but white noise was drawn
     else:
         refused(kind, "diagnosed as a recording of an artefact", lambda: write_diagnosis(job, out), out)
+
+
+def spoilt(name: str, how: str, to: Path) -> Path:
+    """An example whose coordinates are in inches, or all in one place; a plane without its direction points."""
+    shutil.copytree(ROOT / "examples" / EXAMPLE[name], to)
+    (file,) = to.glob("*.csv")
+    comments = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    head, *rows = (line.split(",") for line in comments)
+    columns = [head.index(f"{axis}_mm") for axis in "xyz"]
+    for row in rows:
+        for i in columns:
+            row[i] = repr(float(row[i]) / 25.4) if how == "in inches" else rows[0][i]
+    if how == "without direction points":
+        file.write_text("\n".join(line for line in comments if line.split(",")[1] != "0"), encoding="utf-8")
+    else:
+        file.write_text("\n".join(map(",".join, [head, *rows])), encoding="utf-8")
+    return to
+
+
+SPOILT = [
+    *((name, "in one place") for name in EXAMPLE if name != "error_map"),
+    *((name, "in inches") for name in ("ballbar", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere")),
+    ("plane", "without direction points"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "how"), SPOILT)
+def test_what_report_refuses_of_a_recording_every_command_refuses_alike(name: str, how: str, tmp_path: Path) -> None:
+    job, truth = spoilt(name, how, tmp_path / "job"), tmp_path / "truth.toml"
+    truth.write_text(TRUTH, encoding="utf-8")
+    with pytest.raises(CmmUqError) as told:
+        write_report(job, tmp_path / "report")
+    kind = kind_named(name)
+    assert kind is not None
+    commands: list[Callable[[], object]] = [lambda: write_plan(job, tmp_path / "plan", power=False)]
+    if kind.observe is not None:
+        commands += [lambda: write_diagnosis(job, tmp_path / "diagnosis")]
+        commands += [lambda: write_simulation(job, truth, tmp_path / "drawn")]
+    for command in commands:
+        with pytest.raises(CmmUqError) as also:
+            command()
+        assert str(also.value) == str(told.value)
+    assert {path.name for path in tmp_path.iterdir()} == {"job", "truth.toml"}
 
 
 @pytest.mark.parametrize("name", BUILT_IN)

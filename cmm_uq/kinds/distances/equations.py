@@ -11,15 +11,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.distances.symmetric_systems import by_doolittle, by_jacobi
+from cmm_uq.physics.rigid_body import SCALE, SQUARENESS
 from cmm_uq.points import Floats
-from cmm_uq.units import ARCSECOND, PPM
+from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
 
 UNKNOWNS = 6
+
+FACTORS = tuple((effect.name, "ppm") for effect in SCALE.values()) + tuple(
+    (effect.name, "angle_arcsec") for effect in SQUARENESS.values()
+)
+"""Effects that the equations give, with their parameters."""
 
 POORLY_POSED = 1e-3
 """Ratio of singular values of the equations for unit distances below which a factor hangs on set-up and noise."""
@@ -71,6 +78,21 @@ class DistanceSolution:
         """(3,) squareness X–Y, Y–Z, Z–X: what each angle has more than 90°."""
         return np.asarray((self.angles_rad - np.pi / 2) / ARCSECOND)
 
+    def as_data(self) -> dict[str, Any]:
+        """For results.json: e1 … e6 with their covariance, the six factors and the angles that they give."""
+        factors = zip(
+            FACTORS, [*self.scales_ppm.tolist(), *self.squareness_arcsec.tolist()], self.u.tolist(), strict=True
+        )
+        return {
+            "e": self.e.tolist(),
+            "e_covariance": self.covariance.tolist(),
+            "factors": {
+                effect: {parameter: {"value": value, "u": u, "U": 2 * u}} for (effect, parameter), value, u in factors
+            },
+            "angles_deg": dict(zip(SQUARENESS, np.degrees(self.angles_rad).tolist(), strict=True)),
+            "residual_sd_um": self.residual_sd / MICROMETRE,
+        }
+
     @property
     def u(self) -> Floats:
         """(6,) standard uncertainties of the three scales, ppm, and the three squarenesses, ″, from the residuals."""
@@ -81,6 +103,11 @@ class DistanceSolution:
         ]
         jacobian = np.column_stack(changes)
         return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", jacobian, self.covariance, jacobian)), dtype=np.float64)
+
+
+def second_way_data(second_way: DistanceSolution | str) -> dict[str, Any]:
+    """A solution, or why there is none, for results.json."""
+    return {"refused": second_way} if isinstance(second_way, str) else second_way.as_data()
 
 
 def solve_distances(differences: Floats, distance: float | Floats, method: str = "QR") -> DistanceSolution:

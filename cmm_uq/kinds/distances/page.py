@@ -2,47 +2,38 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
-from cmm_uq.kinds.distances.adjustment import ADJUSTMENTS, ANGLES
-from cmm_uq.kinds.distances.equations import DistanceSolution
-from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.kinds.distances.adjustment import ANGLES, Setting
+from cmm_uq.kinds.distances.equations import FACTORS, DistanceSolution
 from cmm_uq.uncertainty.rounding import rounded
-from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
-
-FACTORS = tuple(ADJUSTMENTS)
-"""Order of the six factors, scales first."""
+from cmm_uq.units import MICROMETRE
 
 
-def section(result: Result, second_way: DistanceSolution | str, *remarks: str) -> Section:
+def section(
+    result: Result, settings: tuple[Setting, ...], second_way: DistanceSolution | str, *remarks: str
+) -> Section:
     """What to turn or enter, by the fitted model; beside it the six factors by the distance equations.
 
     Parameters
     ----------
+    settings : by the fitted model.
     second_way : solution of equation 100, or why there is none.
     remarks : on the second way.
     """
-    blocks = [*_adjustments(result), *_second_way(result, second_way, remarks)]
+    blocks = [*_adjustments(settings), *_second_way(result, second_way, remarks)]
     return Section("The adjustment that the machine needs", tuple(blocks))
 
 
-def _adjustments(result: Result) -> list[Block]:
-    free = _free(result)
+def _adjustments(settings: tuple[Setting, ...]) -> list[Block]:
     rows = []
-    for effect, adjustment in ADJUSTMENTS.items():
-        if effect not in result.parameters or effect in free:
-            continue
-        quantity = next(iter(result.parameters[effect].values()))
-        low, high = sorted(adjustment.sign * end for end in quantity.interval95)
-        setting = Quantity(adjustment.sign * quantity.value, quantity.u, (low, high), quantity.unit)
-        value, U, _ = expanded(setting)
-        needed = "" if low <= 0 <= high else "yes"
-        rows.append(
-            (adjustment.what, value, U, quantity.unit, _at_full_travel(result, adjustment.axis, setting), needed)
-        )
+    for setting in settings:
+        value, U, _ = expanded(setting.figure)
+        over = setting.over_travel
+        moved = "" if over is None else rounded(over.value, max(over.u, 1e-3))[0]
+        needed = "yes" if setting.beyond_doubt else ""
+        rows.append((setting.adjustment.what, value, U, setting.figure.unit, moved, needed))
     if not rows:
         return []
     columns = (
@@ -56,25 +47,12 @@ def _adjustments(result: Result) -> list[Block]:
     return [Table("What to turn and what to enter", columns, tuple(rows), notes)]
 
 
-def _free(result: Result) -> set[str]:
-    """Effects that the recording does not determine by themselves."""
-    return {effect for combination in result.undetermined for effect, _ in combination}
-
-
-def _at_full_travel(result: Result, axis: str, setting: Quantity) -> str:
-    low, high = result.artefact.points.machine.travel_mm["xyz".index(axis)]
-    if not np.isfinite(high - low):
-        return ""
-    factor = (PPM if setting.unit == "ppm" else ARCSECOND) * float(high - low) / MICROMETRE
-    return rounded(setting.value * factor, max(abs(setting.u * factor), 1e-3))[0]
-
-
 def _second_way(result: Result, solution: DistanceSolution | str, remarks: tuple[str, ...]) -> list[Block]:
     if isinstance(solution, str):
         return [Paragraph(f"The distance equations (US 4,437,151) have no solution here. {solution}", tone="note")]
-    values, free = [*solution.scales_ppm, *solution.squareness_arcsec], _free(result)
+    values = [*solution.scales_ppm, *solution.squareness_arcsec]
     rows = []
-    for i, effect in enumerate(FACTORS):
+    for i, (effect, _) in enumerate(FACTORS):
         unit = "ppm" if i < 3 else "″"
         value, u = (
             rounded(float(values[i]), float(2 * solution.u[i])) if solution.u[i] > 0 else (f"{values[i]:.4g}", "")
@@ -82,7 +60,7 @@ def _second_way(result: Result, solution: DistanceSolution | str, remarks: tuple
         name = f"Scale error of {effect[-1].upper()}" if i < 3 else f"Angle {ANGLES[effect]} − 90°"
         model = result.parameters.get(effect)
         beside = "" if model is None else expanded(next(iter(model.values())))[0]
-        beside = "not determined" if effect in free else beside
+        beside = "not determined" if effect in result.free else beside
         rows.append((name, value, u, beside, unit))
     columns = (
         Column("Factor", numeric=False), Column("Distance equations"), Column("U"), Column("Fitted model"),

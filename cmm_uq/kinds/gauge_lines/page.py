@@ -6,15 +6,14 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.conformity.measurement_lines import position_on, share_of_travel
 from cmm_uq.conformity.plans import ISO_10360_2
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
-from cmm_uq.documents.residual_volume import flagged, residual_volume
+from cmm_uq.documents.residual_volume import residual_volume
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import listed
-from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
+from cmm_uq.kinds.gauge_lines.analysis import GaugeFigures, LineFigures, figures, results
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
@@ -24,9 +23,9 @@ from cmm_uq.units import MICROMETRE
 def sections(result: Result) -> list[Section]:
     """Deviations by distance, each line by itself, positions by ISO 10360-2, residuals in the volume."""
     gauge = cast("StepGauge", result.artefact)
-    lines = lines_of(gauge)
-    blocks: list[Block] = [_plot(result, gauge), _table(result, gauge, lines)]
-    blocks += [*_periodic(lines), *_positions(gauge, lines), residual_volume(result, "faces")]
+    found = figures(result)
+    blocks: list[Block] = [_plot(result, gauge), _table(result, found.lines)]
+    blocks += [*_periodic(found.lines), *_positions(found), residual_volume(result, "faces")]
     return [Section("Deviations along the gauge", tuple(blocks))]
 
 
@@ -35,7 +34,7 @@ def _plot(result: Result, gauge: StepGauge) -> Block:
     expanded = 2 * result.noise.coordinate.value
     return length_plot(
         _side_by_side(gauge), deviations, residuals, expanded_before_um=expanded, expanded_after_um=expanded,
-        reference="certified distance, mean of each line", flagged=flagged(result),
+        reference="certified distance, mean of each line", flagged=result.flagged,
         position_label="Certified distance from the first face / mm (lines side by side)",
         caption="Deviation of each face from its certified distance, as recorded and after the fitted model, with U (k = 2).",
         alternative=(
@@ -53,25 +52,17 @@ def _side_by_side(gauge: StepGauge) -> Floats:
     return np.asarray(gauge.reference + 0.7 * float(np.diff(faces).min()) * rank, dtype=np.float64)
 
 
-def _table(result: Result, gauge: StepGauge, lines: tuple[GaugeLine, ...]) -> Table:
-    sigma = result.noise.coordinate.value * MICROMETRE
-    relative = gauge.sizes[0].sd / gauge.sizes[0].nominal if gauge.sizes[0].certified else 0.0
-    both = any(line.gap is not None for line in lines)
+def _table(result: Result, found: tuple[LineFigures, ...]) -> Table:
+    noise = 2 * result.noise.coordinate.value
+    both = any(one.line.gap is not None for one in found)
     rows = []
-    for line in lines:
-        scale, U = rounded(line.scale_ppm, 2 * float(np.hypot(line.scale_noise * sigma, relative * 1e6)))
-        linearity = rounded(line.linearity / MICROMETRE, 2 * sigma / MICROMETRE)[0]
-        row = [
-            str(line.measurement),
-            position_on(gauge.points.machine, line.middle, line.direction),
-            f"{line.length:.10g}",
-            str(line.faces),
-            scale,
-            U,
-            linearity,
-        ]
+    for one in found:
+        line = one.line
+        scale, U = rounded(line.scale_ppm, one.expanded_scale_ppm)
+        linearity = rounded(line.linearity / MICROMETRE, noise)[0]
+        row = [str(line.measurement), one.position, f"{line.length:.10g}", str(line.faces), scale, U, linearity]
         if both:
-            row += _gap(line, sigma)
+            row += _gap(one)
         rows.append(tuple(row))
     columns = [
         Column("Line", numeric=False), Column("Position", numeric=False), Column("Length", "mm"), Column("Faces"),
@@ -91,41 +82,33 @@ def _table(result: Result, gauge: StepGauge, lines: tuple[GaugeLine, ...]) -> Ta
     return Table("Each line by itself, at 20 °C", tuple(columns), tuple(rows), tuple(notes))
 
 
-def _gap(line: GaugeLine, sigma: float) -> tuple[str, str]:
-    if line.gap is None:
+def _gap(one: LineFigures) -> tuple[str, str]:
+    if one.line.gap is None or one.expanded_gap_um is None:
         return "", ""
-    return rounded(line.gap / MICROMETRE, 2 * line.gap_noise * sigma / MICROMETRE)
+    return rounded(one.line.gap / MICROMETRE, one.expanded_gap_um)
 
 
-def _periodic(lines: tuple[GaugeLine, ...]) -> list[Block]:
+def _periodic(lines: tuple[LineFigures, ...]) -> list[Block]:
     found = [
         f"line {line.measurement}: amplitude {line.periodic.amplitude / MICROMETRE:.2g} µm, period "
         f"{line.periodic.period:.3g} mm (p = {line.periodic.p_value:.1g})"
-        for line in lines
+        for line in (one.line for one in lines)
         if line.periodic is not None
     ]
     text = f"Periodic along the line, beyond what scatter explains: {'; '.join(found)}."
     return [Paragraph(text)] if found else []
 
 
-def _positions(gauge: StepGauge, lines: tuple[GaugeLine, ...]) -> list[Block]:
+def _positions(found: GaugeFigures) -> list[Block]:
     """Which of the seven positions of ISO 10360-2 are there, and long enough."""
-    machine = gauge.points.machine
-    short = [
-        f"line {line.measurement} ({100 * share:.0f} %)"
-        for line in lines
-        if (share := share_of_travel(machine, line.middle, line.direction, line.length)) is not None
-        and share < ISO_10360_2.least_share
-    ]
-    found = {position_on(machine, line.middle, line.direction) for line in lines}
-    missing = [position for position in ISO_10360_2.positions if position not in found]
+    short = [f"line {one.line.measurement} ({100 * one.share:.0f} %)" for one in found.lines if one.share and one.short]
     texts = []
-    if missing:
-        texts.append(f"Not measured of the seven positions of ISO 10360-2:2009: {listed(missing)}.")
+    if found.missing:
+        texts.append(f"Not measured of the seven positions of ISO 10360-2:2009: {listed(list(found.missing))}.")
     if short:
         least = f"{100 * ISO_10360_2.least_share:.0f} %"
         texts.append(f"Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {listed(short)}.")
     return [Paragraph(" ".join(texts), tone="note")] if texts else []
 
 
-PAGE = Page(sections)
+PAGE = Page(sections, results)

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from pydantic import Field
+
 from cmm_uq.jobs.job import ArtefactFacts
 from cmm_uq.jobs.table import Length, Uncertainty
 
 
 class PlaneFacts(ArtefactFacts):
-    """``probe_offset_mm`` is the effective radius by which the plane of the probe's centres is moved to the surface."""
+    """``probe_offset_mm`` is the effective radius by which the plane of the probe's centres is moved to the surface.
+
+    ``acceptance_deg`` is the largest angle between the normal and the direction of approach at which that is believed.
+    """
 
     probe_offset_mm: Length | None = None
     u_probe_offset_um: Uncertainty = 0.0
+    acceptance_deg: Annotated[float, Field(ge=0.01, le=89.99)] = 60.0

@@ -15,13 +15,13 @@ from cmm_uq.kinds.plane.facts import PlaneFacts
 from cmm_uq.model.artefact import Artefact, Size
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import place
-from cmm_uq.physics.probe_offset import OffsetPlane, offset_plane
-from cmm_uq.points import Floats, Points
+from cmm_uq.physics.probe_offset import DirectionPointError, OffsetPlane, offset_plane
+from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.units import MICROMETRE
 
 DIRECTION_POINT = 0
-LEAST_POINTS = 4
-"""Points of contact in a measurement: three make a plane, a fourth says something of it."""
+LEAST_POINTS = 3
+"""Points of contact in a measurement: three make a plane (US 4,866,643 claim 1 b), a fourth says something of it."""
 
 _ON_A_LINE = 1e-3
 """Extent across over extent along below which points lie on one line and leave the plane free to turn about it."""
@@ -35,13 +35,13 @@ class ProbedPlane:
     ----------
     measurement : its number.
     count : points of contact.
-    flatness : range of the distances from the least-squares plane, mm.
-    surface : the plane moved by the probe's offset; ``None`` without offset or direction point.
+    flatness : range of the distances from the least-squares plane, mm; ``None`` of three points, which have none.
+    surface : the plane moved by the probe's offset; ``None`` without offset.
     """
 
     measurement: int
     count: int
-    flatness: float
+    flatness: float | None
     surface: OffsetPlane | None
 
 
@@ -50,12 +50,13 @@ class PlaneSurface(Artefact):
 
     Parameters
     ----------
-    facts : what the job says; ``probe_offset_mm`` moves the plane from the probe's centre to the surface.
+    facts : what the job says; ``probe_offset_mm`` moves the plane from the probe's centre to the surface, where every
+        measurement has a direction point and all of them are believed.
     points : the recording.
 
     Raises
     ------
-    CmmUqError : too few points of contact, points on one line, or a direction point that is not accepted.
+    CmmUqError : too few points of contact, points on one line, or a direction point that is missing or not accepted.
     """
 
     kind = "plane"
@@ -71,7 +72,10 @@ class PlaneSurface(Artefact):
         self.sizes: tuple[Size, ...] = ()
         self.offset = facts.probe_offset_mm
         self.u_offset = facts.u_probe_offset_um * MICROMETRE
+        self.acceptance = float(np.radians(facts.acceptance_deg))
         self._refuse_no_plane(where)
+        if self.offset is not None:
+            self._refuse_no_side(self.offset, where)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """See :meth:`Artefact.fit`: points of contact dropped on their least-squares plane; direction points stay."""
@@ -100,24 +104,60 @@ class PlaneSurface(Artefact):
         across = np.einsum("ni,nij->nj", about, self._axes(touched)[:, :, 1:])
         return self.placings.columns(np.column_stack([np.ones(len(touched)), across]))
 
-    def probed(self) -> tuple[ProbedPlane, ...]:
+    def probed(self, u_point: float) -> tuple[ProbedPlane, ...]:
         """Flatness of each plane, and the surface where the probe's offset is known.
 
-        Raises
-        ------
-        CmmUqError : a direction point is not within the accepted angle.
+        Parameters
+        ----------
+        u_point : standard uncertainty of a point of contact along the normal, mm; it counts where there are just three,
+            whose scatter nothing shows.
         """
-        found, points, contact = [], self.points, self.rows[:, 0]
-        fitted = self.fit(points.xyz, np.zeros(0))
-        off = self.project(points.xyz, (points.xyz - fitted)[:, :, None])[:, 0]
+        found = []
+        off = self.off_plane()
         for number in self.placings.numbers:
-            rows = contact[self.measurement == number]
-            ahead = np.flatnonzero((points.measurement == number) & (points.point == DIRECTION_POINT))
-            surface = None
-            if self.offset is not None and len(ahead):
-                surface = offset_plane(points.xyz[ahead[0]], points.xyz[rows], self.offset, u_offset=self.u_offset)
-            found.append(ProbedPlane(int(number), len(rows), float(np.ptp(off[self.measurement == number])), surface))
+            own = off[self.measurement == number]
+            given = u_point if len(own) == LEAST_POINTS else None
+            surface = None if self.offset is None else self._surface(int(number), self.offset, given)
+            flatness = float(np.ptp(own)) if len(own) > LEAST_POINTS else None
+            found.append(ProbedPlane(int(number), len(own), flatness, surface))
         return tuple(found)
+
+    def _surface(self, number: int, offset: float, u_point: float | None) -> OffsetPlane:
+        """The surface of one measurement; the C1 of a direction point is the lowest point of contact of its own repeat."""
+        points, contact = self.points, self.rows[self.measurement == number, 0]
+        ahead = self._ahead(number)
+        other = points.repeat[contact] != points.repeat[ahead][:, None]
+        first = np.array([np.lexsort((points.repeat[contact], points.point[contact], row))[0] for row in other])
+        return offset_plane(
+            points.xyz[ahead], points.xyz[contact], offset, first=first, acceptance=self.acceptance,
+            u_offset=self.u_offset, u_point=u_point,
+        )  # fmt: skip
+
+    def _ahead(self, number: int) -> Ints:
+        """Rows of the direction points of a measurement."""
+        points = self.points
+        return np.flatnonzero((points.measurement == number) & (points.point == DIRECTION_POINT))
+
+    def _refuse_no_side(self, offset: float, where: str | None) -> None:
+        points = self.points
+        for number in self.placings.numbers:
+            if not len(self._ahead(number)):
+                raise CmmUqError(
+                    f"measurement {number} has no direction point (point 0), so that nothing says to which side the probe's "
+                    "offset goes", where=place(points, points.measurement == number, where),
+                    fix="Record a point 0 just before contact, or leave out probe_offset_mm",
+                )  # fmt: skip
+            try:
+                self._surface(number, offset, 1.0)  # an angle depends on no uncertainty
+            except DirectionPointError as rejected:
+                row = np.arange(len(points)) == self._ahead(number)[rejected.index]
+                raise CmmUqError(f"measurement {number}: {rejected.problem}", where=place(points, row, where),
+                                 fix=rejected.fix) from rejected  # fmt: skip
+
+    def off_plane(self) -> Floats:
+        """(n,) distance of each point of contact from its least-squares plane, mm."""
+        xyz = self.points.xyz
+        return self.project(xyz, (xyz - self.fit(xyz, np.zeros(0)))[:, :, None])[:, 0]
 
     def _axes(self, touched: Floats) -> Floats:
         """Normal and two directions in the plane, as columns, of each point's placing, (n, 3, 3)."""

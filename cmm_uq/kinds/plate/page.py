@@ -2,47 +2,37 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import cast
-
-import numpy as np
 
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.vector_plot import vector_plot
 from cmm_uq.documents.wording import expanded
+from cmm_uq.kinds.plate.analysis import Arrows, PlateFigures, arrows, compared, figures, results
 from cmm_uq.kinds.plate.observe import Plate
-from cmm_uq.physics.rigid_body import SCALE
-from cmm_uq.points import Floats
-from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
-from cmm_uq.units import MICROMETRE, PPM
+from cmm_uq.units import PPM
 
 _PLATES_SHOWN = 6
 _CERTIFIED = ("Positions on the plate", "Found minus certified", "After the fitted model")
 _COMPARED = ("What changed between the two dates", "Now minus then", "After the fitted change")
-_STEEL = 11.5e-6
-"""Expansion of a plate whose own is not stated, 1/K."""
 
 
 def sections(result: Result) -> list[Section]:
     """Every placing by itself in numbers, and the first of them as arrows in the plate's own plane."""
     plate = cast("Plate", result.artefact)
-    before = np.einsum("nij,ni->nj", plate.attitudes(plate.points.xyz), plate.deviations()) / MICROMETRE
-    after = result.residuals.reshape(-1, 3) / MICROMETRE
-    title, *arrows = _COMPARED if _compared(result) else _CERTIFIED
-    blocks: list[Block] = [_table(result, plate, before, after), *_confounded(result)]
-    blocks += [_picture(plate, number, before, after, arrows) for number in plate.placings.numbers[:_PLATES_SHOWN]]
+    found = figures(result)
+    title, *titles = _COMPARED if compared(result) else _CERTIFIED
+    blocks: list[Block] = [_table(result, found), *_confounded(result, found)]
+    blocks += [_picture(arrows(plate, found, number), titles) for number in plate.placings.numbers[:_PLATES_SHOWN]]
     return [Section(title, tuple(blocks))]
 
 
-def _compared(result: Result) -> bool:
-    return result.job.facts.recording.earlier is not None
-
-
-def _confounded(result: Result) -> list[Block]:
+def _confounded(result: Result, found: PlateFigures) -> list[Block]:
     """What else would look like the change that was found."""
-    if not _compared(result):
+    if not compared(result):
         return []
     facts = result.job.facts
     since = f" of {facts.recording.earlier_date.isoformat()}" if facts.recording.earlier_date else ""
@@ -51,59 +41,41 @@ def _confounded(result: Result) -> list[Block]:
         "changed since. Errors of machine and plate that were there on both dates cancel, as long as the plate stood in the "
         "same places."
     ]
-    scales = [effect.name for effect in SCALE.values() if effect.name in result.parameters]
-    if scales:
-        columns = {unknown.key[0]: i for i, unknown in enumerate(result.posterior.unknowns)}
-        draws = result.posterior.draws[:, [columns[name] for name in scales]].mean(axis=1)
-        value, U, _ = expanded(Quantity.of_draws(draws, "ppm"))
-        cte = facts.artefact.cte_per_k or _STEEL
-        kelvin = rounded(abs(float(draws.mean())) * PPM / cte, 2 * float(draws.std()) * PPM / cte)[0]
-        temperature, size = ("colder", "shrunk") if draws.mean() > 0 else ("warmer", "grown")
+    if found.common is not None:
+        common, cte = found.common, found.common.cte_per_k / PPM
+        value, U, _ = expanded(common.change)
+        kelvin = rounded(abs(common.warmer.value), 2 * common.warmer.u)[0]
+        temperature, size = ("colder", "shrunk") if common.colder else ("warmer", "grown")
         texts.append(
             f"The common part of the scales changed by {value} ppm, U = {U} ppm. A plate that was {temperature} by {kelvin} K "
-            f"(at {cte / PPM:.3g} ppm/K) than its recorded temperatures account for looks the same, and so does one that has "
-            f"{size} by as much."
+            f"(at {cte:.3g} ppm/K) than its recorded temperatures account for looks the same, and so does "
+            f"one that has {size} by as much."
         )
     texts.append("A plate that has sheared or bent since looks like squareness or straightness of its plane.")
     return [Paragraph(" ".join(texts))]
 
 
-def _picture(plate: Plate, number: int, before: Floats, after: Floats, titles: list[str]) -> Block:
-    """Two largest extents of the references span the plane that is shown; repeats are averaged."""
-    rows = plate.points.measurement == number
-    plane = np.sort(np.argsort(np.ptp(plate.reference, axis=0))[1:])
-    balls, index = np.unique(plate.points.point[rows], return_inverse=True)
-    counts = np.bincount(index)[:, None]
-
-    def mean(values: Floats) -> Floats:
-        sums = np.zeros((len(balls), 2))
-        np.add.at(sums, index, values[rows][:, plane])
-        return sums / counts
-
-    vectors = mean(before), mean(after)
-    largest = [float(np.linalg.norm(v, axis=1).max()) for v in vectors]
+def _picture(one: Arrows, titles: list[str]) -> Block:
+    largest = [max(hypot(*arrow) for arrow in arrows.tolist()) for arrows in (one.before, one.after)]
+    first, second = ("xyz"[axis] for axis in one.axes)
     return vector_plot(
-        mean(plate.reference), tuple(zip(titles, vectors, strict=True)),
-        axis_labels=(f"Plate {'xyz'[plane[0]]} / mm", f"Plate {'xyz'[plane[1]]} / mm"),
-        caption=f"Measurement {number}: displacement of each ball in the plane of the plate, placed by least squares.",
+        one.place, tuple(zip(titles, (one.before, one.after), strict=True)),
+        axis_labels=(f"Plate {first} / mm", f"Plate {second} / mm"),
+        caption=f"Measurement {one.measurement}: displacement of each ball in the plane of the plate, "
+        "placed by least squares.",
         alternative=(
-            f"Arrows at {len(balls)} balls: up to {largest[0]:.1f} µm as recorded, up to {largest[1]:.1f} µm after the "
+            f"Arrows at {len(one.place)} balls: up to {largest[0]:.1f} µm as recorded, up to {largest[1]:.1f} µm after the "
             "fitted model."
         ),
     )  # fmt: skip
 
 
-def _table(result: Result, plate: Plate, before: Floats, after: Floats) -> Table:
+def _table(result: Result, found: PlateFigures) -> Table:
     noise = result.noise.coordinate.value
     rows = []
-    for number in plate.placings.numbers:
-        chosen = plate.points.measurement == number
-        figures = [
-            rounded(float(value), noise)[0]
-            for values in (before[chosen], after[chosen])
-            for value in (np.sqrt(np.mean(values**2)), np.abs(values).max())
-        ]
-        rows.append((str(number), str(int(chosen.sum())), *figures))
+    for one in found.spread:
+        sizes = (one.rms_before_um, one.largest_before_um, one.rms_after_um, one.largest_after_um)
+        rows.append((str(one.measurement), str(one.count), *(rounded(size, noise)[0] for size in sizes)))
     columns = (
         Column("Placing", numeric=False), Column("Balls"), Column("rms before", "µm"), Column("Largest before", "µm"),
         Column("rms after", "µm"), Column("Largest after", "µm"),
@@ -112,4 +84,4 @@ def _table(result: Result, plate: Plate, before: Floats, after: Floats) -> Table
     return Table("Deviation of a coordinate", columns, tuple(rows), (note,))
 
 
-PAGE = Page(sections)
+PAGE = Page(sections, results)

@@ -16,9 +16,11 @@ from cmm_uq.kinds.shift_axis.series import ShiftedSeries, shifted_series
 from cmm_uq.kinds.shift_axis.shift_integration import Method
 from cmm_uq.kinds.shift_axis.undetermined import Undetermined, undetermined
 from cmm_uq.kinds.shifting.correction_table import correction_table
-from cmm_uq.kinds.shifting.facts import KnownLength, shift_facts
+from cmm_uq.kinds.shifting.facts import KnownLength, ShiftFacts, shift_facts
 from cmm_uq.physics.error_map import ErrorMap
-from cmm_uq.points import Floats, Ints
+from cmm_uq.physics.rigid_body import SCALE
+from cmm_uq.points import Floats, Ints, Points
+from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, PPM
 
@@ -68,16 +70,58 @@ class ShiftResult:
     @cached_property
     def linearity(self) -> Quantity:
         """Linearity error: peak to valley of the curve about the line through its ends at the first series, µm."""
+        about = self._about_the_ends
+        return Quantity.of_draws(np.ptp(about, axis=1) / MICROMETRE, "µm", _ptp(about.mean(axis=0)))
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Of linearity error and, where it is determined, mean sensitivity error."""
+        draws = {f"linearity_{self.axis}.peak_to_valley_um": (np.ptp(self._about_the_ends, axis=1) / MICROMETRE, "µm")}
+        if self.estimate.scale_known:
+            draws[f"{SCALE[self.axis].name}.ppm"] = self.estimate.scale / PPM, "ppm"
+        return Covariance.of_draws(draws)
+
+    @cached_property
+    def shifts(self) -> tuple[Quantity, ...]:
+        """Of each series against the first, mm."""
+        return tuple(Quantity.of_draws(draws, "mm") for draws in self.estimate.shifts.T)
+
+    @cached_property
+    def distances(self) -> tuple[Floats, Floats] | None:
+        """Of the artefact's points from the first, (p,) mm, and their standard uncertainties; ``None`` without a scale."""
+        draws = self.estimate.artefact
+        return (draws.mean(axis=0), draws.std(axis=0, ddof=1)) if self.estimate.scale_known else None
+
+    @cached_property
+    def beside_integrations(self) -> Curve | None:
+        """The curve at the positions of the integrations; ``None`` where there are none."""
+        first = next(iter(self.integrated.values()), None)
+        return None if first is None else self.estimate.at(first.position)
+
+    @cached_property
+    def _about_the_ends(self) -> Floats:
+        """(N, m) draws of the curve about the line through its ends at the first series, mm."""
         curve, ends = self.estimate.curve, self.estimate.series.reading[self.estimate.series.series == 0][[0, -1]]
         draws = curve.draws.copy()
         if self.estimate.scale_known:
             draws -= self.estimate.scale[:, None] * (curve.position - ends[0])
-        return Quantity.of_draws(np.ptp(draws, axis=1) / MICROMETRE, "µm", _ptp(draws.mean(axis=0)))
+        return np.asarray(draws, dtype=np.float64)
+
+    @cached_property
+    def disagreement_um(self) -> tuple[float, float]:
+        """Root mean square of what the placings disagree by, without and with the curve, µm."""
+        without, with_curve = (rms_um(values) for values in self.estimate.residuals)
+        return without, with_curve
 
     @property
     def repeatability(self) -> Quantity:
         """Standard uncertainty of one reading, µm."""
         return Quantity.of_draws(self.estimate.sigma / MICROMETRE, "µm")
+
+
+def rms_um(values: Floats) -> float:
+    """Root mean square of mm, in µm."""
+    return float((values**2).mean() ** 0.5) / MICROMETRE
 
 
 def _ptp(values: Floats) -> float:
@@ -99,25 +143,31 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
     """
     check_facts(job)
     facts, stated = shift_facts(job), job.facts.recording.u_coordinate_um
-    if facts.axis is None:
-        raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
-                         fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip
-    if not facts.shifts_mm:
-        raise CmmUqError("is missing", where="job.toml [artefact] shifts_mm",
-                         fix="Give one shift a series, 0.0 for the first")  # fmt: skip
-    series = shifted_series(
-        job.points,
-        facts.axis,
-        np.array(facts.shifts_mm, dtype=np.float64),
-        facts.u_shift_um * MICROMETRE,
-        job.recording_path,
-    )
+    series = recorded_series(facts, job.points, job.recording_path)
     known = None if facts.known is None else _known(facts.known, series)
     estimate = estimate_curve(
         series, known, sigma=None if stated is None else stated * MICROMETRE, seed=seed, progress=progress
     )
     return ShiftResult(
         job, estimate, undetermined(series, scale_known=estimate.scale_known), _integrated(series, estimate, known)
+    )
+
+
+def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSeries:
+    """Readings of a shift job along an axis.
+
+    Raises
+    ------
+    CmmUqError : the job names no axis or no shifts, or the readings are no series of these shifts.
+    """
+    if facts.axis is None:
+        raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
+                         fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip
+    if not facts.shifts_mm:
+        raise CmmUqError("is missing", where="job.toml [artefact] shifts_mm",
+                         fix="Give one shift a series, 0.0 for the first")  # fmt: skip
+    return shifted_series(
+        points, facts.axis, np.array(facts.shifts_mm, dtype=np.float64), facts.u_shift_um * MICROMETRE, where
     )
 
 

@@ -56,6 +56,17 @@ class Curve:
         return np.asarray(low), np.asarray(high)
 
     @cached_property
+    def expanded(self) -> Floats:
+        """(m,) U: at each position the larger distance from the error to an end of its 95 % interval, mm."""
+        low, high = self.interval95
+        return np.maximum(high - self.error, self.error - low)
+
+    @cached_property
+    def band(self) -> Floats:
+        """(m,) half width of the band that holds the whole curve with 95 % probability, mm."""
+        return self.simultaneous_factor * self.u
+
+    @cached_property
     def simultaneous_factor(self) -> float:
         """The k for which error ± k·u holds the whole curve in 95 % of draws."""
         moving = self.u > 1e-9 * max(self.u.max(), 1e-12)
@@ -113,6 +124,14 @@ class CurveEstimate:
         """(N,) draws of the mean of e' between the first and last reading of the first series."""
         ends = self._raw(self._ends)
         return np.asarray((ends[:, 1] - ends[:, 0]) / (self._ends[1] - self._ends[0]))
+
+    @cached_property
+    def shifts(self) -> Floats:
+        """(N, s) draws of the shift of each series against the first, mm; the nominal ones where they are known exactly."""
+        nominal = np.tile(self.series.shifts, (len(self.sigma), 1))
+        if self.series.u_shift > 0:
+            nominal[:, 1:] += self.coefficients.columns[:, : len(self.series.shifts) - 1]
+        return nominal
 
     @property
     def sigma(self) -> Floats:

@@ -96,13 +96,11 @@ def _curve(result: ShiftResult) -> Section:
             f"the band is at most {k * fine.u.max() / MICROMETRE:.1f} µm to each side."
         ),
     )  # fmt: skip
-    low, high = curve.interval95
-    U = np.maximum(high - curve.error, curve.error - low)
     rows = tuple(
-        (f"{x:.3f}", *rounded(e / MICROMETRE, max(one, 1e-6) / MICROMETRE), f"{k * u / MICROMETRE:.2f}")
+        (f"{x:.3f}", *rounded(e / MICROMETRE, max(one, 1e-6) / MICROMETRE), f"{band / MICROMETRE:.2f}")
         if one > 0
         else (f"{x:.3f}", "0", "0", "0")
-        for x, e, one, u in _sparse(curve.position, curve.error, U, curve.u)
+        for x, e, one, band in _sparse(curve.position, curve.error, curve.expanded, curve.band)
     )
     columns = (Column("Reading", "mm"), Column("Error", "µm"), Column("U", "µm"), Column("Band", "µm"))
     notes = (
@@ -153,14 +151,14 @@ def _open(result: ShiftResult) -> Section:
 def _residuals(result: ShiftResult) -> Section:
     series = result.estimate.series
     before, after = (r / MICROMETRE for r in result.estimate.residuals)
+    size = result.disagreement_um
     U = 2 * result.repeatability.value * series.noise_scale
     plot = length_plot(
         series.numbers[series.point], before, after, expanded_before_um=U, expanded_after_um=U,
         reference="the artefact's point", position_label="Point of the artefact", before_label="Without a curve",
         after_label="With the curve", caption="What the placings disagree by, without and with the curve, and U (k = 2).",
         alternative=(
-            f"The placings disagree by {np.sqrt(np.mean(before**2)):.2f} µm rms without and "
-            f"{np.sqrt(np.mean(after**2)):.2f} µm with the curve."
+            f"The placings disagree by {size[0]:.2f} µm rms without and {size[1]:.2f} µm with the curve."
         ),
     )  # fmt: skip
     return Section("Residuals", (plot,))
@@ -168,7 +166,6 @@ def _residuals(result: ShiftResult) -> Section:
 
 def _artefact(result: ShiftResult) -> Section:
     facts, estimate = shift_facts(result.job), result.estimate
-    mean, u = estimate.artefact.mean(axis=0), estimate.artefact.std(axis=0, ddof=1)
     known = facts.known
     rows = [("Artefact", facts.name or "Uncalibrated artefact, shifted"), ("Serial number", facts.serial)]
     if known is not None:
@@ -178,10 +175,10 @@ def _artefact(result: ShiftResult) -> Section:
         rows.append(("Its certificate", f"{facts.certificate.number} {facts.certificate.laboratory}".strip()))
     rows.append(("Shifts", f"{', '.join(f'{s:g}' for s in facts.shifts_mm)} mm, u = {facts.u_shift_um:g} µm"))
     blocks: list[Block] = [Facts(tuple((label, value) for label, value in rows if value))]
-    if estimate.scale_known:
+    if result.distances is not None:
         cells = tuple(
             (str(n), *(rounded(x, 2 * s) if s > 0 else (f"{x:.4f}", "0")))
-            for n, x, s in zip(estimate.series.numbers, mean, u, strict=True)
+            for n, x, s in zip(estimate.series.numbers, *result.distances, strict=True)
         )
         columns = (Column("Point"), Column("Distance from the first", "mm"), Column("U", "mm"))
         blocks.append(Table("The artefact's own dimensions (k = 2)", columns, cells[:_MOST_ROWS]))
@@ -203,13 +200,11 @@ def _method(result: ShiftResult) -> Section:
                         "steps"),
     ]  # fmt: skip
     blocks: list[Block] = [text, Facts(tuple(rows))]
-    if result.integrated:
+    if (joint := result.beside_integrations) is not None:
         curves = list(result.integrated.values())
-        at = curves[0].position
-        joint = estimate.at(at)
         rows_ = tuple(
             (f"{x[0]:.3f}", *(f"{v / MICROMETRE:.2f}" for v in x[1:]))
-            for x in _sparse(at, *(v for c in curves for v in (c.error, c.u)), joint.error, joint.u)
+            for x in _sparse(joint.position, *(v for c in curves for v in (c.error, c.u)), joint.error, joint.u)
         )
         columns = (
             Column("Reading", "mm"), Column("Integrated", "µm"), Column("u", "µm"), Column("Improved", "µm"),

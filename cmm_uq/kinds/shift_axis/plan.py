@@ -8,13 +8,12 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.gauge_lines.patterns import faces_of
-from cmm_uq.kinds.shift_axis.series import shifted_series
+from cmm_uq.kinds.shift_axis.analysis import recorded_series
 from cmm_uq.kinds.shift_axis.undetermined import undetermined
 from cmm_uq.kinds.shifting.facts import ShiftFacts
 from cmm_uq.planning.placing import Pattern, Placing
 from cmm_uq.planning.setting import Planning, Setting, Start
 from cmm_uq.points import AXES, Points
-from cmm_uq.units import MICROMETRE
 
 
 def shift_series(setting: Setting) -> tuple[Placing, ...]:
@@ -69,9 +68,7 @@ def free(setting: Setting, points: Points, where: str) -> tuple[str, ...]:
     CmmUqError : the readings are no series of the job's shifts.
     """
     facts = _facts(setting)
-    series = shifted_series(
-        points, facts.axis or "x", np.array(facts.shifts_mm, dtype=np.float64), facts.u_shift_um * MICROMETRE, where
-    )
+    series = recorded_series(facts, points, where)
     left = undetermined(series, scale_known=facts.known is not None)
     found = [
         f"errors that repeat every {left.period:.4g} mm, or a half, a third … of it: every shift is a multiple of it"

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
-from cmm_uq.documents.results_file import head
+from cmm_uq.documents.results_file import covariance_data, head, quantity_data
 from cmm_uq.inference.ensembles import Chains
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats
-from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
 
@@ -22,10 +20,13 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
     estimates = {f"linearity_{axis}": {"peak_to_valley_um": quantity_data(result.linearity)}}
     if result.scale is not None:
         estimates[SCALE[axis].name] = {"ppm": quantity_data(result.scale)}
-    before, after = estimate.residuals
+    before, after = result.disagreement_um
+    joint, distances = result.beside_integrations, result.distances
     return {
         **head(job, effects=False),
         "estimates": estimates,
+        "covariance": covariance_data(result.covariance),
+        "observations": len(estimate.series.reading),
         "noise": {
             "stated_coordinate_um": job.facts.recording.u_coordinate_um,
             "coordinate_um": quantity_data(result.repeatability),
@@ -36,9 +37,15 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
             method: {"position_mm": curve.position.tolist(), "error_um": _um(curve.error), "u_um": _um(curve.u)}
             for method, curve in result.integrated.items()
         },
+        "beside_integrations": None if joint is None else curve_data(joint, MICROMETRE, "um"),
         "artefact": {"point": estimate.series.numbers.tolist(),
-                     "distance_mm": estimate.artefact.mean(axis=0).tolist() if estimate.scale_known else None,
-                     "u_um": _um(estimate.artefact.std(axis=0, ddof=1)) if estimate.scale_known else None},
+                     "distance_mm": None if distances is None else distances[0].tolist(),
+                     "u_um": None if distances is None else _um(distances[1]),
+                     "U_mm": None if distances is None else (2 * distances[1]).tolist()},
+        "shifts": [
+            {"nominal_mm": nominal, "mm": quantity_data(shift)}
+            for nominal, shift in zip(estimate.series.shifts.tolist(), result.shifts, strict=True)
+        ],
         "identifiability": {
             "scale_determined": estimate.scale_known,
             "period_not_seen_mm": result.undetermined.period,
@@ -47,14 +54,9 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
                 for pattern in result.undetermined.patterns.T
             ],
         },
-        "improvement": {"rms_before_um": rms_um(before), "rms_after_um": rms_um(after)},
+        "improvement": {"rms_before_um": before, "rms_after_um": after},
         "conformity": [],
     }  # fmt: skip
-
-
-def quantity_data(quantity: Quantity) -> dict[str, Any]:
-    """Value, u and interval of a quantity; its unit is in the key that it stands under."""
-    return {key: value for key, value in asdict(quantity).items() if key != "unit"}
 
 
 def sampling_data(chains: Chains, seed: int, draws: int) -> dict[str, Any]:
@@ -72,13 +74,9 @@ def curve_data(curve: Curve, unit: float, suffix: str) -> dict[str, Any]:
         "position_mm": curve.position.tolist(), f"error_{suffix}": (curve.error / unit).tolist(),
         f"u_{suffix}": (curve.u / unit).tolist(),
         f"interval95_{suffix}": [(low / unit).tolist(), (high / unit).tolist()],
+        f"U_{suffix}": (curve.expanded / unit).tolist(), f"band_{suffix}": (curve.band / unit).tolist(),
         "simultaneous_factor95": curve.simultaneous_factor,
     }  # fmt: skip
-
-
-def rms_um(values: Floats) -> float:
-    """Root mean square of mm, in µm."""
-    return float((values**2).mean() ** 0.5) / MICROMETRE
 
 
 def _um(values: Floats) -> list[float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
-from cmm_uq.kinds.shift_axis.analysis import check_facts, check_known, known_points
+from cmm_uq.kinds.shift_axis.analysis import check_facts, check_known, known_points, rms_um
 from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
 from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate, placed_plate
@@ -18,7 +18,8 @@ from cmm_uq.kinds.shifting.correction_table import plane_correction_table
 from cmm_uq.kinds.shifting.facts import KnownLength, shift_facts
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
-from cmm_uq.points import AXES
+from cmm_uq.points import AXES, Floats
+from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
 
@@ -51,17 +52,31 @@ class PlaneShiftResult:
     @cached_property
     def scalars(self) -> dict[str, dict[str, Quantity]]:
         """Squareness, scales and sizes of the curves, by name and parameter; what is not determined is left out."""
-        free, found = self.estimate.free.names, {}
+        found: dict[str, dict[str, Quantity]] = {}
+        for (name, parameter), (draws, unit, value) in self._draws.items():
+            found.setdefault(name, {})[parameter] = Quantity.of_draws(draws, unit, value)
+        return found
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Of them all."""
+        return Covariance.of_draws({".".join(key): (draws, unit) for key, (draws, unit, _) in self._draws.items()})
+
+    @cached_property
+    def _draws(self) -> dict[tuple[str, str], tuple[Floats, str, float | None]]:
+        """Draws (N,), unit, and estimate where that is not their mean."""
+        free = self.estimate.free.names
+        found: dict[tuple[str, str], tuple[Floats, str, float | None]] = {}
         square = SQUARENESS[self.plane].name
         if square not in free:
-            found[square] = {"angle_arcsec": Quantity.of_draws(self.estimate.squareness / ARCSECOND, "″")}
+            found[square, "angle_arcsec"] = self.estimate.squareness / ARCSECOND, "″", None
         axes = [AXES[axis] for axis in self.estimate.plate.axes]
         for axis, draws in zip(axes, self.estimate.scales, strict=True):
             if SCALE[axis].name not in free:
-                found[SCALE[axis].name] = {"ppm": Quantity.of_draws(draws / PPM, "ppm")}
+                found[SCALE[axis].name, "ppm"] = draws / PPM, "ppm", None
         if (SCALE[axes[0]].name, SCALE[axes[1]].name) in self.estimate.free.combinations:
             difference = self.estimate.scales[1] - self.estimate.scales[0]
-            found[f"{SCALE[axes[1]].name}_minus_{axes[0]}"] = {"ppm": Quantity.of_draws(difference / PPM, "ppm")}
+            found[f"{SCALE[axes[1]].name}_minus_{axes[0]}", "ppm"] = difference / PPM, "ppm", None
         for name, curve in self.curves.items():
             if name not in free:
                 draws = curve.draws
@@ -69,10 +84,19 @@ class PlaneShiftResult:
                     part = (curve.position - curve.position[0]) / np.ptp(curve.position)
                     draws = draws - draws[:, -1:] * part
                 value = float(np.ptp(draws.mean(axis=0))) / MICROMETRE
-                found[name] = {
-                    "peak_to_valley_um": Quantity.of_draws(np.ptp(draws, axis=1) / MICROMETRE, "µm", value)
-                }  # fmt: skip
+                found[name, "peak_to_valley_um"] = np.ptp(draws, axis=1) / MICROMETRE, "µm", value
         return found
+
+    @cached_property
+    def balls(self) -> tuple[Floats, Floats]:
+        """(p, 2) places of the balls from the first, mm, and their standard uncertainties."""
+        return self.estimate.balls.mean(axis=0), self.estimate.balls.std(axis=0, ddof=1)
+
+    @cached_property
+    def disagreement_um(self) -> tuple[float, float]:
+        """Root mean square of what the placings disagree by, without and with the curves, µm."""
+        without, with_curves = (rms_um(values) for values in self.estimate.residuals)
+        return without, with_curves
 
     @property
     def repeatability(self) -> Quantity:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cmm_uq.documents.document import Block, Column, Facts, Paragraph, Plot, Section, Table
 from cmm_uq.documents.plots import curve_with_band
 from cmm_uq.documents.vector_plot import vector_plot
@@ -105,16 +103,15 @@ def _curves(result: PlaneShiftResult) -> Section:
 
 def _picture(name: str, curve: Curve, unit: float, text: str, result: PlaneShiftResult) -> Plot:
     axis = name.split("_")[1]
-    k = curve.simultaneous_factor
     words = title(name)
     free = " These placings do not determine it." if name in result.estimate.free.names else ""
     return curve_with_band(
-        curve.position, curve.error / unit, k * curve.u / unit, x_label=f"Scale reading {axis} / mm",
+        curve.position, curve.error / unit, curve.band / unit, x_label=f"Scale reading {axis} / mm",
         y_label=f"Error / {text}",
         caption=f"{words[0].upper()}{words[1:]}, with the band that holds the whole curve with 95 % probability.{free}",
         alternative=(
             f"{words[0].upper()}{words[1:]} runs from {curve.error.min() / unit:.1f} to {curve.error.max() / unit:.1f} "
-            f"{text}; the band is at most {k * curve.u.max() / unit:.1f} {text} to each side."
+            f"{text}; the band is at most {curve.band.max() / unit:.1f} {text} to each side."
         ),
     )  # fmt: skip
 
@@ -128,8 +125,7 @@ def _table(result: PlaneShiftResult, which: int) -> Table:
     for name, curve, unit, text in own:
         kind = name.split("_")[0]
         columns += [Column(f"{kind[0].upper()}{kind[1:]}", text), Column("U", text)]
-        low, high = curve.interval95
-        U = np.maximum(high - curve.error, curve.error - low) / unit
+        U = curve.expanded / unit
         pairs = [
             rounded(e, half) if half > 1e-9 else ("0", "0")
             for e, half in zip((curve.error / unit)[::_ROWS], U[::_ROWS], strict=True)
@@ -174,7 +170,7 @@ def _open(result: PlaneShiftResult) -> Section:
 def _residuals(result: PlaneShiftResult) -> Section:
     plate = result.estimate.plate
     before, after = (r / MICROMETRE for r in result.estimate.residuals)
-    size = [float(np.sqrt(np.mean(r**2))) for r in (before, after)]
+    size = result.disagreement_um
     plot = vector_plot(
         plate.flat, [("Without curves", before), ("With the curves", after)],
         axis_labels=(f"{plate.plane[0]} / mm", f"{plate.plane[1]} / mm"),
@@ -189,7 +185,7 @@ def _placings(result: PlaneShiftResult) -> Section:
     rows = tuple(
         (str(number), f"{turn:.2f}".replace("-", "−"), *(f"{m:.2f}".replace("-", "−") for m in middle), str(int(count)))
         for number, turn, middle, count in zip(
-            plate.placings, plate.turned_deg, plate.middles, np.bincount(plate.placing), strict=True
+            plate.placings, plate.turned_deg, plate.middles, plate.counts, strict=True
         )
     )
     columns = (Column("Placing"), Column("Turned", "°"), Column(f"Middle {plate.plane[0]}", "mm"),
@@ -207,7 +203,7 @@ def _plate(result: PlaneShiftResult) -> Section:
         rows.append(("Its certificate", f"{facts.certificate.number} {facts.certificate.laboratory}".strip()))
     blocks: list[Block] = [Facts(tuple((label, value) for label, value in rows if value))]
     if estimate.free.square_known:
-        mean, u = estimate.balls.mean(axis=0), estimate.balls.std(axis=0, ddof=1)
+        mean, u = result.balls
         cells = tuple(
             (str(number), *(text for x, s in zip(place, spread, strict=True) for text in _coordinate(x, s)))
             for number, place, spread in zip(estimate.plate.numbers, mean, u, strict=True)

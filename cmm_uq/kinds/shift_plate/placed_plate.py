@@ -65,6 +65,11 @@ class PlacedPlate:
         return np.asarray(self.reading[:, self.axes])
 
     @property
+    def counts(self) -> Ints:
+        """(s,) balls read in each placing."""
+        return np.bincount(self.placing, minlength=len(self.placings)).astype(np.int64)
+
+    @property
     def middle(self) -> Floats:
         """(3,) middle of what was read, mm."""
         return np.asarray((self.reading.min(axis=0) + self.reading.max(axis=0)) / 2)

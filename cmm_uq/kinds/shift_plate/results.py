@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from cmm_uq.documents.results_file import head
-from cmm_uq.kinds.shift_axis.results import curve_data, quantity_data, rms_um, sampling_data
+from cmm_uq.documents.results_file import covariance_data, head, quantity_data
+from cmm_uq.kinds.shift_axis.results import curve_data, sampling_data
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.points import AXES
 from cmm_uq.units import ARCSECOND, MICROMETRE
@@ -15,14 +15,17 @@ def plane_shift_results(result: PlaneShiftResult) -> dict[str, Any]:
     """A result as plain data, in the layout of the schema ``cmm-uq/results/1``; no diagnosis, no accuracy of lengths."""
     job, estimate = result.job, result.estimate
     plate, free = estimate.plate, estimate.free
-    before, after = estimate.residuals
-    balls, u = estimate.balls.mean(axis=0), estimate.balls.std(axis=0, ddof=1) / MICROMETRE
+    before, after = result.disagreement_um
+    balls, u = result.balls
+    u_um, U = u / MICROMETRE, 2 * u
     return {
         **head(job, effects=False),
         "estimates": {
             name: {parameter: quantity_data(q) for parameter, q in parameters.items()}
             for name, parameters in result.scalars.items()
         },
+        "covariance": covariance_data(result.covariance),
+        "observations": len(plate.ball),
         "noise": {
             "stated_coordinate_um": job.facts.recording.u_coordinate_um,
             "coordinate_um": quantity_data(result.repeatability),
@@ -34,16 +37,20 @@ def plane_shift_results(result: PlaneShiftResult) -> dict[str, Any]:
         },
         "artefact": {
             "point": plate.numbers.tolist(), "first_mm": balls[:, 0].tolist(), "second_mm": balls[:, 1].tolist(),
-            "u_first_um": u[:, 0].tolist(), "u_second_um": u[:, 1].tolist(), "size_determined": free.size_known,
+            "u_first_um": u_um[:, 0].tolist(), "u_second_um": u_um[:, 1].tolist(), "U_first_mm": U[:, 0].tolist(),
+            "U_second_mm": U[:, 1].tolist(), "size_determined": free.size_known,
         },
         "placings": [
-            {"measurement": int(number), "turned_deg": float(turn), "middle_mm": middle.tolist()}
-            for number, turn, middle in zip(plate.placings, plate.turned_deg, plate.middles, strict=True)
+            {"measurement": int(number), "turned_deg": float(turn), "middle_mm": middle.tolist(),
+             "balls": int(count)}
+            for number, turn, middle, count in zip(
+                plate.placings, plate.turned_deg, plate.middles, plate.counts, strict=True
+            )
         ],
         "identifiability": {
             "not_determined": [list(combination) for combination in free.combinations],
             "period_not_seen_mm": {AXES[axis]: p for axis, p in zip(plate.axes, free.periods, strict=True)},
         },
-        "improvement": {"rms_before_um": rms_um(before), "rms_after_um": rms_um(after)},
+        "improvement": {"rms_before_um": before, "rms_after_um": after},
         "conformity": [],
     }  # fmt: skip

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import cast
 
-import numpy as np
-
 from cmm_uq.documents.document import Column, Plot, Section, Table
 from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot, volume_plot
-from cmm_uq.documents.residual_volume import flagged
 from cmm_uq.documents.result import Result
+from cmm_uq.kinds.sphere.analysis import about_centre, deviations_um, results
 from cmm_uq.kinds.sphere.observe import Sphere
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
@@ -49,13 +47,12 @@ def _table(result: Result, sphere: Sphere) -> Table:
 
 def _by_point(result: Result, sphere: Sphere) -> Plot:
     size = sphere.sizes[0]
-    radius = size.nominal * sphere.per_size * sphere.expansion
-    deviations = (sphere.distances(sphere.points.xyz, None) - radius) / MICROMETRE
+    deviations = deviations_um(sphere)
     residuals, expanded = result.residuals / MICROMETRE, 2 * result.noise.coordinate.value
     name = "certified radius" if size.certified else "mean radius"
     return length_plot(
         sphere.points.point, deviations, residuals, expanded_before_um=expanded, expanded_after_um=expanded,
-        reference=name, reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0, flagged=flagged(result),
+        reference=name, reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0, flagged=result.flagged,
         position_label="Point on the sphere",
         caption=f"Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = 2).",
         alternative=(
@@ -67,12 +64,11 @@ def _by_point(result: Result, sphere: Sphere) -> Plot:
 
 def _over(result: Result, sphere: Sphere) -> Plot:
     residuals = result.residuals / MICROMETRE
-    about = sphere.size_change() * sphere.sizes[0].nominal * sphere.directions(sphere.points.xyz)
     return volume_plot(
-        np.asarray(about), residuals,
+        about_centre(sphere), residuals,
         caption="Residuals after the fitted model over the sphere (all spheres, about their centres).",
         alternative=f"Three projections of the sphere; residuals of {residuals.min():.1f} to {residuals.max():.1f} µm.",
     )  # fmt: skip
 
 
-PAGE = Page(sections)
+PAGE = Page(sections, results)

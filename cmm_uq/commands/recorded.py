@@ -1,0 +1,40 @@
+"""A recording screened and joined with the model that its job names: what every command asks of it alike."""
+
+from __future__ import annotations
+
+from cmm_uq.commands.estimation import model_of
+from cmm_uq.jobs.job import Job
+from cmm_uq.kinds import kind_of
+from cmm_uq.model import MeasurementModel
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.screening.screened import Finding, screened
+from cmm_uq.screening.shape import Screening
+
+
+def recorded_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
+    """The model that a job names, of what the screening leaves of its recording, and what it found.
+
+    Raises
+    ------
+    CmmUqError : the recording is damaged, or does not fit the artefact or the model.
+    """
+    kind = kind_of(job)
+    where, observe = job.recording_path, kind.observing("screened")
+    acting = effects(job.facts.model.effects, where="job.toml [model] effects")
+    recording = screened(
+        job.points, job.facts.artefact, kind.offers("screen", Screening), observe,
+        needed={column for effect in acting for column in effect.columns},
+        set_aside=job.facts.recording.set_aside, where=where,
+    )  # fmt: skip
+    return model_of(job, observe(job.facts.artefact, recording.points, where=where)), recording.findings
+
+
+def refuse_unfit(job: Job) -> None:
+    """Refuse a recording that no certificate could be made of; one that holds planned coordinates, or none, is let through.
+
+    Raises
+    ------
+    CmmUqError : see :func:`recorded_model`.
+    """
+    if len(job.points) and not job.planned and kind_of(job).observe is not None:
+        recorded_model(job)

@@ -1,0 +1,77 @@
+"""What the certificate of a ballbar states beside the estimates: lengths, the budget of one, adjustment, second way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from cmm_uq.documents.result import Result
+from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.ballbar.observe import Ballbar
+from cmm_uq.kinds.distances.adjustment import Setting, settings
+from cmm_uq.kinds.distances.equations import DistanceSolution, second_way_data, solve_distances
+from cmm_uq.kinds.distances.lengths import Lengths, lengths_of
+from cmm_uq.uncertainty.budget import Budget, Line
+from cmm_uq.uncertainty.budget_results import budget_data
+from cmm_uq.units import MICROMETRE
+
+
+@dataclass(frozen=True, eq=False)
+class BallbarFigures:
+    """Lengths against the certified one, or their mean; the budget of one; what to adjust, and the second way to it."""
+
+    lengths: Lengths
+    budget: Budget
+    settings: tuple[Setting, ...]
+    second_way: DistanceSolution | str
+
+
+def figures(result: Result) -> BallbarFigures:
+    """Of a result."""
+    bar = cast("Ballbar", result.artefact)
+    lengths = bar.lengths()
+    reference = bar.sizes[0].nominal if bar.sizes[0].certified else float(lengths.mean())
+    return BallbarFigures(
+        lengths_of(result, lengths, reference), _budget(result, bar), settings(result), _second_way(result, bar)
+    )
+
+
+def results(result: Result) -> dict[str, Any]:
+    """The same for results.json."""
+    found = figures(result)
+    return {
+        "lengths": found.lengths.as_data(),
+        "length_budget": budget_data(found.budget),
+        "adjustments": [setting.as_data() for setting in found.settings],
+        "distance_equations": second_way_data(found.second_way),
+    }
+
+
+def _budget(result: Result, bar: Ballbar) -> Budget:
+    """What one length's deviation from the reference is uncertain by: the readings, and the certified length."""
+    coordinate = result.noise.coordinate
+    origin = "residuals of this recording" if coordinate.u > 0 else "stated in the job"
+    dof = float(result.least_squares.degrees_of_freedom) if coordinate.u > 0 else np.inf
+    lines = [
+        Line("Coordinate of a ball, along the bar, twice", coordinate.value, origin, unit="µm", dof=max(dof, 1.0),
+             sensitivity=float(bar.noise_scale[0]))
+    ]  # fmt: skip
+    size = bar.sizes[0]
+    if size.certified and size.sd > 0:
+        chain = result.job.facts.artefact.certificate
+        source = " ".join(filter(None, ("certificate", chain.number if chain else "")))
+        lines.append(Line("Certified length", size.sd / MICROMETRE, source, unit="µm", sensitivity=-1.0))
+    return Budget("deviation of one length", lines, unit="µm")
+
+
+def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | str:
+    """The distance equations of all used lengths, or why they have no solution."""
+    size, ends, used = bar.sizes[0], bar.ends(), result.model.used
+    if not size.certified:
+        return "The length of the bar is not certified."
+    try:
+        return solve_distances((ends[:, 1] - ends[:, 0])[used], (size.nominal * bar.expansion)[used])
+    except CmmUqError as refusal:
+        return str(refusal)

@@ -1,0 +1,73 @@
+"""Indicated lengths of a bar at 20 °C against the length that they are compared with, one by one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.documents.result import Result
+from cmm_uq.points import Floats, Ints
+from cmm_uq.units import MICROMETRE
+
+
+@dataclass(frozen=True, eq=False)
+class Lengths:
+    """Every recorded length, used or not.
+
+    Parameters
+    ----------
+    measurement, repeat : (m,).
+    length : (m,) as indicated, at 20 °C, mm.
+    reference : that it is compared with, mm.
+    residual_um : (m,) what the fitted model leaves, µm.
+    expanded_um : U (k = 2) of each for the noise of its points, µm.
+    used, flagged : (m,) whether the error factors rest on it, and whether the screening found its measurement odd.
+    """
+
+    measurement: Ints
+    repeat: Ints
+    length: Floats
+    reference: float
+    residual_um: Floats
+    expanded_um: float
+    used: NDArray[np.bool_]
+    flagged: NDArray[np.bool_]
+
+    @property
+    def deviation_um(self) -> Floats:
+        """(m,) from the reference, µm."""
+        return np.asarray((self.length - self.reference) / MICROMETRE, dtype=np.float64)
+
+    def as_data(self) -> dict[str, Any]:
+        """For results.json."""
+        return {
+            "reference_mm": self.reference,
+            "U_um": self.expanded_um,
+            "each": [
+                {"measurement": int(m), "repeat": int(r), "length_mm": length, "deviation_um": deviation,
+                 "residual_um": residual, "used": bool(used), "flagged": bool(flagged)}
+                for m, r, length, deviation, residual, used, flagged in zip(
+                    self.measurement, self.repeat, self.length.tolist(), self.deviation_um.tolist(),
+                    self.residual_um.tolist(), self.used, self.flagged, strict=True,
+                )
+            ],
+        }  # fmt: skip
+
+
+def lengths_of(result: Result, length: Floats, reference: float) -> Lengths:
+    """Of a result.
+
+    Parameters
+    ----------
+    length : (m,) of every observation at 20 °C, mm.
+    reference : that it is compared with, mm.
+    """
+    artefact = result.artefact
+    expanded = 2 * result.noise.coordinate.value * float(artefact.noise_scale[0])
+    return Lengths(
+        artefact.measurement, artefact.repeat, length, reference, result.residuals / MICROMETRE, expanded,
+        result.model.used, result.flagged,
+    )  # fmt: skip

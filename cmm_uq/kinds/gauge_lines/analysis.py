@@ -1,0 +1,87 @@
+"""What the certificate of a gauge states beside the estimates: each line by itself, and positions of the standard."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from cmm_uq.conformity.measurement_lines import position_on, share_of_travel
+from cmm_uq.conformity.plans import ISO_10360_2
+from cmm_uq.documents.result import Result
+from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
+from cmm_uq.units import MICROMETRE, PPM
+
+
+@dataclass(frozen=True, eq=False)
+class LineFigures:
+    """One line with what the noise and the certificate leave uncertain of it.
+
+    Parameters
+    ----------
+    line : as recorded.
+    position : in words.
+    share : of the travel along it; ``None`` where no travel is stated.
+    expanded_scale_ppm, expanded_gap_um : U (k = 2) of slope and bidirectional error; the latter ``None`` without one.
+    """
+
+    line: GaugeLine
+    position: str
+    share: float | None
+    expanded_scale_ppm: float
+    expanded_gap_um: float | None
+
+    @property
+    def short(self) -> bool:
+        """Whether it is shorter than the standard asks for (ISO 10360-2:2009)."""
+        return self.share is not None and self.share < ISO_10360_2.least_share
+
+    def as_data(self) -> dict[str, Any]:
+        """For results.json."""
+        line, periodic = self.line, self.line.periodic
+        return {
+            "measurement": line.measurement, "position": self.position, "length_mm": line.length, "faces": line.faces,
+            "slope_ppm": {"value": line.scale_ppm, "U": self.expanded_scale_ppm},
+            "off_slope_um": line.linearity / MICROMETRE,
+            "bidirectional_um": None if line.gap is None else {
+                "value": line.gap / MICROMETRE, "U": self.expanded_gap_um
+            },
+            "periodic": None if periodic is None else {
+                "amplitude_um": periodic.amplitude / MICROMETRE, "period_mm": periodic.period, "p_value": periodic.p_value
+            },
+            "share_of_travel": self.share,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class GaugeFigures:
+    """Every line, and which of the seven positions of ISO 10360-2:2009 were not measured."""
+
+    lines: tuple[LineFigures, ...]
+    missing: tuple[str, ...]
+
+
+def figures(result: Result) -> GaugeFigures:
+    """Of a result."""
+    gauge, sigma = cast("StepGauge", result.artefact), result.noise.coordinate.value * MICROMETRE
+    size, machine = gauge.sizes[0], gauge.points.machine
+    relative = size.sd / size.nominal if size.certified else 0.0
+    lines = tuple(
+        LineFigures(
+            line, position_on(machine, line.middle, line.direction),
+            share_of_travel(machine, line.middle, line.direction, line.length),
+            2 * float(np.hypot(line.scale_noise * sigma, relative / PPM)),
+            None if line.gap is None else 2 * line.gap_noise * sigma / MICROMETRE,
+        )
+        for line in lines_of(gauge)
+    )  # fmt: skip
+    found = {one.position for one in lines}
+    return GaugeFigures(lines, tuple(position for position in ISO_10360_2.positions if position not in found))
+
+
+def results(result: Result) -> dict[str, Any]:
+    """The same for results.json."""
+    found = figures(result)
+    return {"lines": [line.as_data() for line in found.lines], "positions_not_measured": list(found.missing)}

@@ -1,0 +1,176 @@
+"""What the certificate of a triangle states beside the estimates: the standard, its sides, two ways to the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+
+from cmm_uq.documents.result import Result
+from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds.triangle.equations import PARAMETERS, solve_equations
+from cmm_uq.kinds.triangle.observe import Triangle
+from cmm_uq.kinds.triangle.standard import DRAWS
+from cmm_uq.physics.catalogue import every
+from cmm_uq.points import Floats, Ints
+from cmm_uq.units import ARCSECOND, MICROMETRE
+
+SIDES = ("1–2", "2–3", "3–1")
+
+ALIKE = 0.9
+"""Correlation from which on two estimates are hardly told apart."""
+
+
+@dataclass(frozen=True)
+class Standard:
+    """Figures of the standard at 20 °C, each with U (k = 2) by Monte Carlo: sides and height, mm; angles, rad."""
+
+    sides: tuple[tuple[float, float], ...]
+    angles: tuple[tuple[float, float], ...]
+    height: tuple[float, float]
+    draws: int
+
+    def as_data(self) -> dict[str, Any]:
+        """For results.json."""
+        return {
+            "sides_mm": {name: {"value": value, "U": U} for name, (value, U) in zip(SIDES, self.sides, strict=True)},
+            "angles": {
+                str(corner): {"value_deg": float(np.degrees(value)), "U_arcsec": U / ARCSECOND}
+                for corner, (value, U) in enumerate(self.angles, 1)
+            },
+            "height_mm": {"value": self.height[0], "U": self.height[1]},
+            "draws": self.draws,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Sides 1–2, 2–3, 3–1 of every placing against the certified ones, µm.
+
+    Parameters
+    ----------
+    measurement : (r,) of each (measurement, repeat).
+    before_um, after_um : (r, 3) as recorded, and after the fitted model.
+    expanded_um : U (k = 2) of a side for the noise of its ends.
+    """
+
+    measurement: Ints
+    before_um: Floats
+    after_um: Floats
+    expanded_um: float
+
+
+@dataclass(frozen=True)
+class ByEquations:
+    """A parameter by the source's equations, in the unit of its effect, with its standard uncertainty."""
+
+    effect: str
+    value: float
+    u: float
+
+    @property
+    def title(self) -> str:
+        """Of the effect."""
+        return every()[self.effect].title
+
+    @property
+    def parameter(self) -> str:
+        """Name of it, a key with its unit."""
+        return every()[self.effect].reported[0].name
+
+    @property
+    def unit(self) -> str:
+        """As printed."""
+        return every()[self.effect].reported[0].unit
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleFigures:
+    """All of these of a result."""
+
+    result: Result
+
+    @property
+    def _triangle(self) -> Triangle:
+        return cast("Triangle", self.result.artefact)
+
+    @cached_property
+    def standard(self) -> Standard:
+        """Of the dimensions of blocks and cylinders."""
+        standard = self._triangle.standard
+        figures, draws = standard.figures(), standard.draws(self.result.posterior.seed)
+        sides, angles = (
+            tuple((float(values[i]), 2 * float(drawn[:, i].std())) for i in range(3))
+            for values, drawn in ((figures.sides, draws.sides), (figures.angles, draws.angles))
+        )
+        return Standard(sides, angles, (float(figures.height), 2 * float(draws.height.std())), DRAWS)
+
+    @cached_property
+    def sides(self) -> Sides:
+        """Of every placing."""
+        triangle, points = self._triangle, self._triangle.points
+        found = _lengths(triangle, points.xyz)
+        predicted = self.result.model.predicted(self.result.posterior.draws.mean(axis=0))
+        before = (found - triangle.standard.sides) / MICROMETRE
+        after = (found - _lengths(triangle, predicted)) / MICROMETRE
+        measurement = points.measurement[np.lexsort((points.point, points.group))].reshape(-1, 3)[:, 0]
+        return Sides(measurement, before, after, 2 * float(np.sqrt(2)) * self.result.noise.coordinate.value)
+
+    @cached_property
+    def equations(self) -> tuple[ByEquations, ...] | str:
+        """Parameters by the source's equations, or why there are none."""
+        triangle = self._triangle
+        try:
+            solution = solve_equations(triangle)
+        except CmmUqError as refusal:
+            return str(refusal)
+        u = solution.u(self.result.noise.coordinate.value * MICROMETRE, triangle.standard.u)
+        return tuple(
+            ByEquations(name, float(value), float(own))
+            for name, value, own in zip(PARAMETERS, solution.values, u, strict=True)
+        )
+
+    @cached_property
+    def alike(self) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of effects that these placings hardly tell apart, with the correlation of their estimates."""
+        result = self.result
+        names = [u.key[0] for u in result.posterior.unknowns if u.key[0] in result.parameters]
+        correlation = np.atleast_2d(np.corrcoef(result.posterior.draws[:, : len(names)], rowvar=False))
+        return tuple(
+            (names[j], names[i], float(correlation[i, j]))
+            for i in range(len(names))
+            for j in range(i)
+            if abs(correlation[i, j]) > ALIKE
+        )
+
+
+def results(result: Result) -> Mapping[str, Any]:
+    """The same for results.json."""
+    found = TriangleFigures(result)
+    equations, sides = found.equations, found.sides
+    return {
+        "standard": found.standard.as_data(),
+        "sides": [
+            {"measurement": int(number), "before_um": before, "after_um": after}
+            for number, before, after in zip(
+                sides.measurement, sides.before_um.tolist(), sides.after_um.tolist(), strict=True
+            )
+        ],
+        "equations": {"refused": equations} if isinstance(equations, str) else {
+            one.effect: {one.parameter: {"value": one.value, "u": one.u, "U": 2 * one.u}} for one in equations
+        },
+        "hardly_told_apart": [
+            {"effects": [one, other], "correlation": correlation} for one, other, correlation in found.alike
+        ],
+    }  # fmt: skip
+
+
+def _lengths(triangle: Triangle, xyz: Floats) -> Floats:
+    """Sides 1–2, 2–3, 3–1 of every (measurement, repeat) in order, (r, 3) mm at 20 °C."""
+    points = triangle.points
+    order = np.lexsort((points.point, points.group))
+    corner = (xyz / triangle.expansion[:, None])[order].reshape(-1, 3, 3)
+    return np.asarray(np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2), dtype=np.float64)
