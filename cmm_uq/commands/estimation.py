@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,12 +12,15 @@ from cmm_uq.conformity.accuracy import with_uncertainty
 from cmm_uq.documents.result import LACK_OF_FIT, Influence, Noise
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import OBSERVATIONS
+from cmm_uq.inference.draws import Draws, by_chain
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.physics.effect import Effect
+from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -99,14 +102,37 @@ def influences(model: MeasurementModel, estimate: Estimate, findings: tuple[Find
 
 def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
     """Reported parameters of each effect, by effect and name."""
-    found, column = {}, 0
+    return {
+        effect.name: {p.name: Quantity.of_draws(reported[p.name], p.unit) for p in effect.reported if p.name in reported}
+        for effect, reported in _reported(model, posterior)
+    }
+
+
+def _reported(model: MeasurementModel, posterior: Posterior) -> Iterator[tuple[Effect, Mapping[str, Floats]]]:
+    """Each effect with the draws (N,) of what is reported of it."""
+    column = 0
     for effect in model.effects:
         draws = posterior.draws[:, column : column + len(effect.coefficients)]
         column += len(effect.coefficients)
-        units = {parameter.name: parameter.unit for parameter in effect.reported}
-        reported = effect.to_reported(draws, np.zeros((len(draws), 0)))
-        found[effect.name] = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
-    return found
+        yield effect, effect.to_reported(draws, np.zeros((len(draws), 0)))
+
+
+def named_draws(model: MeasurementModel, posterior: Posterior) -> Draws:
+    """The posterior of all that is reported: of each effect, of the artefact's sizes, and of the noise if it is estimated."""
+    units, columns = {}, []
+    for effect, reported in _reported(model, posterior):
+        for parameter in effect.reported:
+            units[f"{effect.name}.{parameter.name}"] = parameter.unit
+            columns.append(reported[parameter.name])
+    place = {u.key: i for i, u in enumerate(posterior.unknowns)}
+    for size in model.artefact.sizes:
+        units[f"{ARTEFACT}.{size.name}"] = size.unit
+        columns.append(posterior.draws[:, place[ARTEFACT, size.name]])
+    if model.sigma is None:
+        units["noise.coordinate_um"] = "µm"
+        columns.append(posterior.sigma / MICROMETRE)
+    values = np.column_stack(columns) if columns else np.zeros((len(posterior.draws), 0))
+    return Draws(units, by_chain(values, posterior.steps))
 
 
 def sizes(artefact: Artefact, posterior: Posterior) -> dict[str, Quantity]:

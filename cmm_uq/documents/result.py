@@ -9,6 +9,7 @@ from functools import cached_property
 from cmm_uq.conformity.consequences import Consequences
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.inference.draws import Draws
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
@@ -91,7 +92,8 @@ class Result:
     findings : of the screening.
     influences : of findings whose measurements are used all the same.
     estimate : least squares.
-    posterior : draws.
+    posterior : draws of the model's own parameters.
+    draws : of all that is reported, by name and chain.
     parameters : reported parameters of each effect, by effect and name.
     sizes : of the artefact, by name.
     noise : of a coordinate.
@@ -106,6 +108,7 @@ class Result:
     influences: tuple[Influence, ...]
     estimate: Estimate
     posterior: Posterior
+    draws: Draws
     parameters: Mapping[str, Mapping[str, Quantity]]
     sizes: Mapping[str, Quantity]
     noise: Noise

@@ -1,0 +1,41 @@
+"""The draws of a posterior as a file beside results.json, for histories and parts that need more than a covariance."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import Any
+
+from cmm_uq.documents.origin import file_name
+from cmm_uq.inference.draws import Draws
+
+MOST_BYTES = 2**19
+"""Of the draws in the file: several thousand effective ones of eight quantities, and certificates that can still be mailed."""
+
+
+@dataclass(frozen=True)
+class PosteriorFile:
+    """The file, and what results.json says of it."""
+
+    name: str
+    content: bytes
+    entry: dict[str, Any]
+
+
+def posterior_name(origin: str) -> str:
+    """Of the file."""
+    return file_name("posterior.npz", origin)
+
+
+def posterior_file(draws: Draws, origin: str) -> PosteriorFile:
+    """Draws as a file, thinned to a size that a certificate can carry.
+
+    ``rhat_max`` and ``ess_bulk_min`` are those of all draws, each walker a chain, as ArviZ computes them.
+    """
+    kept = draws.thinned(MOST_BYTES)
+    content, name = kept.as_npz(), posterior_name(origin)
+    chains, count, _ = kept.values.shape
+    return PosteriorFile(name, content, {
+        "file": name, "sha256": hashlib.sha256(content).hexdigest(), "parameters": kept.names, "units": dict(kept.units),
+        "chains": chains, "draws": count, "every": kept.every, "rhat_max": draws.rhat_max, "ess_bulk_min": draws.ess_bulk_min,
+    })  # fmt: skip
