@@ -68,8 +68,9 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     ]
     result = Result(
         job, model, findings, influences(model, estimate, findings), estimate, posterior, named_draws(model, posterior),
-        parameters(model, posterior), sizes(model.artefact, posterior), noise(posterior, job.facts.recording.u_coordinate_um, p_value), figures,
-        tuple(statements), diagnosed(job, screened, findings, seed=seed),
+        parameters(model, posterior), sizes(model.artefact, posterior),
+        noise(posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
+        diagnosed(job, screened, findings, seed=seed),
     )  # fmt: skip
     for name, quantity in result.quantities():
         must_be_finite(

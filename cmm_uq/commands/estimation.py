@@ -103,7 +103,9 @@ def influences(model: MeasurementModel, estimate: Estimate, findings: tuple[Find
 def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
     """Reported parameters of each effect, by effect and name."""
     return {
-        effect.name: {p.name: Quantity.of_draws(reported[p.name], p.unit) for p in effect.reported if p.name in reported}
+        effect.name: {
+            p.name: Quantity.of_draws(reported[p.name], p.unit) for p in effect.reported if p.name in reported
+        }
         for effect, reported in _reported(model, posterior)
     }
 

@@ -29,7 +29,9 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent) -> Outcome
     ------
     CmmUqError : the job cannot be analysed.
     """
-    found = analysis.analyse_job(job, seed=seed, progress=lambda part: stage("Sampling the posterior", 0.1 + 0.4 * part))
+    found = analysis.analyse_job(
+        job, seed=seed, progress=lambda part: stage("Sampling the posterior", 0.1 + 0.4 * part)
+    )
     stage("Composing the certificate", 0.5)
     return analysis.outcome_of(found, seed)
 

@@ -117,7 +117,9 @@ class Form:
         for name in self._names(job):
             pdf = name.endswith(".pdf")
             rendered[name] = (
-                render_pdf(document, {**job.inputs, RESULTS: data, **outcome.files}) if pdf else render_html(document).encode()
+                render_pdf(document, {**job.inputs, RESULTS: data, **outcome.files})
+                if pdf
+                else render_html(document).encode()
             )
         return {**rendered, RESULTS: data, **outcome.files}
 

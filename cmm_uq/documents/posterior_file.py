@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 from cmm_uq.documents.origin import file_name
@@ -37,5 +38,10 @@ def posterior_file(draws: Draws, origin: str) -> PosteriorFile:
     chains, count, _ = kept.values.shape
     return PosteriorFile(name, content, {
         "file": name, "sha256": hashlib.sha256(content).hexdigest(), "parameters": kept.names, "units": dict(kept.units),
-        "chains": chains, "draws": count, "every": kept.every, "rhat_max": draws.rhat_max, "ess_bulk_min": draws.ess_bulk_min,
+        "chains": chains, "draws": count, "every": kept.every,
+        "rhat_max": _finite(draws.rhat_max), "ess_bulk_min": _finite(draws.ess_bulk_min),
     })  # fmt: skip
+
+
+def _finite(figure: float) -> float | None:
+    return figure if isfinite(figure) else None

@@ -26,6 +26,8 @@ def bulk_ess(chains: Floats) -> float:
 def _effective(values: Floats) -> float:
     """Of one quantity, (c, n): the draws over their integrated autocorrelation time (equations 10 and 11)."""
     c, n = values.shape
+    if np.ptp(values) == 0:
+        return float(c * n)  # what does not vary is known from any draw
     correlation = _autocorrelation(values)
     pairs = correlation[: (n - 1) // 2 * 2].reshape(-1, 2).sum(axis=1)
     ends = np.flatnonzero(pairs <= 0)  # Geyer's initial positive sequence: its sums of pairs are all positive
