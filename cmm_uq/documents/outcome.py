@@ -55,8 +55,10 @@ class Outcome:
 
     @property
     def provenance(self) -> Mapping[str, Any]:
-        """What it was made from and by what: ``software`` with the plugins that took part, ``job`` with the hashes of its
-        inputs and where its recording comes from, ``seed`` where something was sampled.
+        """What it was made from and by what.
+
+        ``software`` with the plugins that took part, ``job`` with the hashes of its inputs and where its recording comes from,
+        and ``seed`` where a posterior was sampled.
         """
         sampling = self.results.get("sampling", {})
         return {key: self.results[key] for key in ("software", "job") if key in self.results} | (

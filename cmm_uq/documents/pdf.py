@@ -39,8 +39,8 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
 
     Parameters
     ----------
-    attachments : by name, what is embedded byte for byte: ``.json``, ``.npz`` and ``.xml`` files as *data* of the document, others
-        as its *source* (the relationships of ISO 19005-3).
+    attachments : by name, what is embedded byte for byte: ``.json``, ``.npz`` and ``.xml`` files as *data* of the
+        document, others as its *source* (the relationships of ISO 19005-3).
 
     Raises
     ------

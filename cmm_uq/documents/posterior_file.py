@@ -35,7 +35,7 @@ def posterior_file(draws: Draws, origin: str) -> PosteriorFile:
     """
     kept = draws.thinned(MOST_BYTES)
     content, name = kept.as_npz(), posterior_name(origin)
-    chains, count, _ = kept.values.shape
+    chains, count, _ = kept.array.shape
     return PosteriorFile(name, content, {
         "file": name, "sha256": hashlib.sha256(content).hexdigest(), "parameters": kept.names, "units": dict(kept.units),
         "chains": chains, "draws": count, "every": kept.every,

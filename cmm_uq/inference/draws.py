@@ -33,19 +33,19 @@ class Draws(Mapping[str, Floats]):
 
     Parameters
     ----------
-    units : of each quantity, as printed, by its name; in the order of ``values``.
-    values : (chain, draw, quantity). Chains of one ensemble follow each other.
+    units : of each quantity, as printed, by its name; in the order of ``array``.
+    array : (chain, draw, quantity). Chains of one ensemble follow each other.
     every : which of the draws were kept: each, or each second, …
     """
 
     units: Mapping[str, str]
-    values: Floats
+    array: Floats
     every: int = 1
 
     def __getitem__(self, name: str) -> Floats:
         if name not in self.units:
             raise KeyError(f"{name!r}: {suggestion(name, self.names)}")
-        return np.asarray(self.values[:, :, self.names.index(name)])
+        return np.asarray(self.array[:, :, self.names.index(name)])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.units)
@@ -54,7 +54,7 @@ class Draws(Mapping[str, Floats]):
         return len(self.units)
 
     def __repr__(self) -> str:
-        chains, draws, _ = self.values.shape
+        chains, draws, _ = self.array.shape
         return f"Draws of {', '.join(self.names)}: {chains} chains of {draws}"
 
     @property
@@ -65,31 +65,31 @@ class Draws(Mapping[str, Floats]):
     @cached_property
     def rhat_max(self) -> float:
         """Largest rank-normalised split R-hat, each walker a chain; ``nan`` with nothing drawn."""
-        return rhat(self.values) if len(self) else float("nan")
+        return rhat(self.array) if len(self) else float("nan")
 
     @cached_property
     def ess_bulk_min(self) -> float:
         """Smallest bulk effective sample size, each walker a chain; ``nan`` with nothing drawn."""
-        return bulk_ess(self.values) if len(self) else float("nan")
+        return bulk_ess(self.array) if len(self) else float("nan")
 
     @cached_property
     def covariance(self) -> pd.DataFrame:
         """Covariance of the quantities, each in its unit."""
         import pandas as pd
 
-        flat = self.values.reshape(-1, len(self))
+        flat = self.array.reshape(-1, len(self))
         matrix = np.atleast_2d(np.cov(flat, rowvar=False)) if len(self) else np.zeros((0, 0))
         return pd.DataFrame(matrix, index=self.names, columns=self.names)
 
     def thinned(self, most_bytes: int) -> Draws:
-        """Every so many-th draw of each chain, so that the values take at most so many bytes."""
-        every = max(1, -(-self.values.nbytes // most_bytes))
-        return Draws(self.units, np.ascontiguousarray(self.values[:, ::every]), every * self.every)
+        """Every so many-th draw of each chain, so that they take at most so many bytes."""
+        every = max(1, -(-self.array.nbytes // most_bytes))
+        return Draws(self.units, np.ascontiguousarray(self.array[:, ::every]), every * self.every)
 
     def as_npz(self) -> bytes:
         """NumPy's archive of ``draws`` (chain, draw, quantity), ``names``, ``units`` and ``every``; always the same bytes."""
         arrays = {
-            "draws": np.ascontiguousarray(self.values, dtype="<f8"), "names": _texts(self.units),
+            "draws": np.ascontiguousarray(self.array, dtype="<f8"), "names": _texts(self.units),
             "units": _texts(self.units.values()), "every": np.array(self.every, dtype="<i8"),
         }  # fmt: skip
         archive = io.BytesIO()

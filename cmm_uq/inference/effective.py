@@ -1,6 +1,7 @@
-"""How many independent draws chains are worth: the bulk effective sample size of Vehtari, Gelman, Simpson, Carpenter and
-Bürkner (2021), "Rank-normalization, folding, and localization: an improved R-hat", Bayesian Analysis 16(2), sections 3.2
-and 4.3.
+"""How many independent draws chains are worth.
+
+The bulk effective sample size of Vehtari, Gelman, Simpson, Carpenter and Bürkner (2021), "Rank-normalization, folding, and
+localization: an improved R-hat", Bayesian Analysis 16(2), sections 3.2 and 4.3.
 """
 
 from __future__ import annotations
