@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -12,13 +11,13 @@ import numpy as np
 from pydantic import create_model
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.earlier import against_earlier
-from cmm_uq.jobs.file_names import check_distinct, inside
+from cmm_uq.jobs.file_names import check_distinct
 from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, MachineFacts, Tables, job_file_of
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
+from cmm_uq.jobs.source import InFolder, InMemory, Source
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
 from cmm_uq.writing import finish_interrupted
@@ -38,9 +37,30 @@ def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *
     CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
-    folder = path.parent
-    finish_interrupted(folder)
-    content = content_of(path, JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
+    finish_interrupted(path.parent)
+    return _read(InFolder(path), tables, known, recorded=recorded)
+
+
+def job_of(
+    files: Mapping[str, bytes], tables: Tables, known: Callable[[], Sequence[str]], *, recorded: bool = True
+) -> Job:
+    """Read and check a job that lies in no folder yet.
+
+    Parameters
+    ----------
+    files : contents of job.toml and of all that it names, by name.
+    tables, known, recorded : see :func:`read_job`.
+
+    Raises
+    ------
+    CmmUqError : a file is missing, or says something unknown or contradictory.
+    """
+    return _read(InMemory(files), tables, known, recorded=recorded)
+
+
+def _read(source: Source, tables: Tables, known: Callable[[], Sequence[str]], *, recorded: bool) -> Job:
+    path, folder = source.toml, source.toml.parent
+    content = source.job_file(JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
     facts = checked(content, path, lambda data: _model_for(data, tables, known))
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
@@ -56,14 +76,14 @@ def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *
             raise CmmUqError(f"a job of kind {facts.artefact.kind!r} has no recording of points",
                              where=f"{path}: [recording] file",
                              fix="Leave [recording] out, and name what is measured under [machine]")  # fmt: skip
-        return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path, MAP_BYTES))
-    if not recorded and not os.path.lexists(inside(folder, facts.recording.file, str(path))):
+        return Job(folder, facts, _no_points(machine), inputs | _contents(source, maps, MAP_BYTES))
+    if not recorded and not source.has(facts.recording.file):
         return Job(folder, facts, _no_points(machine), inputs)
     derived = facts.job.derived_from
-    inputs |= _contents(folder, recordings, path, TABLE_BYTES) | _contents(folder, maps, path, MAP_BYTES)
+    inputs |= _contents(source, recordings, TABLE_BYTES) | _contents(source, maps, MAP_BYTES)
     if derived is not None:
         others = [name for name in derived.files if name not in inputs]
-        inputs |= _contents(folder, others, path, TABLE_BYTES, written=True)
+        inputs |= _contents(source, others, TABLE_BYTES, written=True)
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     points = read_recording(inputs[facts.recording.file], where, machine)
@@ -91,11 +111,9 @@ def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:
     return {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
 
 
-def _contents(
-    folder: Path, names: Sequence[str], toml: Path, limit: Limit, *, written: bool = False
-) -> dict[str, bytes]:  # fmt: skip
-    fix = f"Put it beside job.toml, or mend its name in {toml}"
-    return {name: content_of(inside(folder, name, str(toml), written=written), limit, fix) for name in names}
+def _contents(source: Source, names: Sequence[str], limit: Limit, *, written: bool = False) -> dict[str, bytes]:
+    fix = f"Put it beside job.toml, or mend its name in {source.toml}"
+    return {name: source.content(name, limit, fix, written=written) for name in names}
 
 
 def _no_points(machine: Machine) -> Points:
