@@ -83,7 +83,9 @@ class Draws(Mapping[str, Floats]):
 
     def thinned(self, most_bytes: int) -> Draws:
         """Every so many-th draw of each chain, so that they take at most so many bytes."""
-        every = max(1, -(-self.array.nbytes // most_bytes))
+        draws = self.array.shape[1]
+        kept = max(1, most_bytes * draws // max(self.array.nbytes, 1))
+        every = -(-draws // kept)
         return Draws(self.units, np.ascontiguousarray(self.array[:, ::every]), every * self.every)
 
     def as_npz(self) -> bytes:
