@@ -10,8 +10,8 @@ from typing import Any
 from cmm_uq.documents.origin import file_name
 from cmm_uq.inference.draws import Draws
 
-MOST_BYTES = 2**19
-"""Of the draws in the file: several thousand effective ones of eight quantities, and certificates that can still be mailed."""
+MOST_NUMBERS = 2**16
+"""In the file, of four bytes each: several thousand effective draws of eight quantities, and a certificate to be mailed."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ def posterior_file(draws: Draws, origin: str) -> PosteriorFile:
 
     ``rhat_max`` and ``ess_bulk_min`` are those of all draws, each walker a chain, as ArviZ computes them.
     """
-    kept = draws.thinned(MOST_BYTES)
+    kept = draws.thinned(MOST_NUMBERS)
     content, name = kept.as_npz(), posterior_name(origin)
     chains, count, _ = kept.array.shape
     return PosteriorFile(name, content, {

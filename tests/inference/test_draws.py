@@ -55,19 +55,21 @@ def test_the_covariance_is_that_of_all_draws() -> None:
 
 def test_thinning_keeps_every_so_manyth_draw_of_each_chain_and_stays_below_its_limit() -> None:
     draws = some()
-    kept = draws.thinned(draws.array.nbytes // 3)
+    third = draws.array.size // 3
+    kept = draws.thinned(third)
     assert kept.every == 4  # every third would leave 14 of 40, more than a third
     assert np.array_equal(kept.array, draws.array[:, ::4])
-    assert kept.array.nbytes <= draws.array.nbytes // 3
-    assert draws.thinned(draws.array.nbytes).every == 1
+    assert kept.array.size <= third
+    assert draws.thinned(draws.array.size).every == 1
 
 
 def test_the_file_reads_back_with_numpy_alone_and_is_the_same_on_every_run() -> None:
-    draws = some().thinned(2000)
+    draws = some().thinned(250)
     content = draws.as_npz()
-    assert content == some().thinned(2000).as_npz()
+    assert content == some().thinned(250).as_npz()
     with np.load(io.BytesIO(content), allow_pickle=False) as read:
-        assert np.array_equal(read["draws"], draws.array)
+        off = np.abs(read["centre"] + read["draws"] - draws.array) / draws.array.std(axis=(0, 1))
+        assert off.max() < 2.0**-22  # single precision of deviations below 4 u: 2⁻²⁴ of them
         assert read["names"].tolist() == draws.names
         assert read["units"].tolist() == ["ppm", "mm"]
         assert read["every"] == draws.every
