@@ -1,3 +1,37 @@
-"""Uncertainty of coordinate measuring machines, and the certificates that state it."""
+"""Uncertainty of coordinate measuring machines, and the certificates that state it.
+
+The public API: each name is imported when it is first used, so that ``import cmm_uq`` costs nothing.
+
+>>> import cmm_uq
+>>> job = cmm_uq.read("examples/iota-1102-20C")
+>>> job.origin
+'measured'
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cmm_uq.api.calls import budget, compensate, diagnose, job, plan, read, report, simulate
+    from cmm_uq.errors import CmmUqError
 
 __version__ = "0.2.0"
+
+__all__ = [
+    "CmmUqError", "__version__", "budget", "compensate", "diagnose", "job", "plan", "read", "report", "simulate",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    found = getattr(import_module("cmm_uq.errors" if name == "CmmUqError" else "cmm_uq.api.calls"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return __all__

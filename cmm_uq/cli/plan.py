@@ -30,13 +30,13 @@ def command(
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with shown(quiet=quiet or json) as stage:
-        from cmm_uq.commands.plan import write_plan
+        from cmm_uq.commands.plan import plan_of, write_plan
 
         written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage)
     if json:
         put(written.results.decode())
     elif not quiet:
-        _summarise(written.plan)
+        _summarise(plan_of(written.outcome))
         for path in written.files.values():
             say(str(path))
     if strict and not written.conforming:

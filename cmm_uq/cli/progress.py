@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
-    from cmm_uq.commands.report import Stage
+    from cmm_uq.commands.written import Stage
 
 
 @contextmanager

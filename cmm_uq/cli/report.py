@@ -13,7 +13,7 @@ from cmm_uq.cli.printing import put, table
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
-    from cmm_uq.commands.report import Report
+    from cmm_uq.commands.written import Written
 
 
 def command(
@@ -38,11 +38,11 @@ def command(
         raise typer.Exit(NOT_CONFORMING)
 
 
-def _summarise(report: Report) -> None:
+def _summarise(report: Written) -> None:
     from cmm_uq.documents.origin import BANNERS
     from cmm_uq.jobs.origin import MEASURED
 
-    job = report.result.job
+    job = report.found.job
     derived = [] if job.origin == MEASURED else [(BANNERS[job.origin], "", "")]
     rows = [*derived, *report.summary, *((name, str(path), "") for name, path in report.files.items())]
     table(rows, separator="  ", title=job.facts.job.id, bold=1)

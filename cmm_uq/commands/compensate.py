@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
-from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.refusals import refuse_planned
 from cmm_uq.commands.simulate import recording
 from cmm_uq.errors import CmmUqError
@@ -71,6 +72,31 @@ def write_compensated(
     OutputError : the folder cannot be written to.
     """
     read = read_job(job)
+    _refuse(read)
+    text = {} if map_text_c is None else _map_text(read, map_text_c, beyond)
+    owner = Owner("compensate", read.facts.job.id, read.origin)
+    with staged(out, owner, inputs=read.paths, force=force, expected=(*read.inputs, *text, PROVENANCE)) as place:
+        return place.write(_files(read, beyond, text))
+
+
+def compensated_job(job: Job, *, beyond: Beyond = "refuse") -> Job:
+    """The job that :func:`write_compensated` writes, in memory.
+
+    Parameters
+    ----------
+    job : with ``[machine] error_map``.
+    beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
+
+    Raises
+    ------
+    CmmUqError : the job has no error map, or it does not serve these points.
+    """
+    _refuse(job)
+    return job_of(_files(job, beyond, {}))
+
+
+def _refuse(read: Job) -> None:
+    """Refuse what is not compensated, or not in one go."""
     if is_compensated(read):
         raise CmmUqError("is compensated already", where=f"{read.folder / 'job.toml'} [job] origin",
                          fix="Compensate the measured recording")  # fmt: skip
@@ -78,19 +104,20 @@ def write_compensated(
         raise CmmUqError("the recordings of two dates are not compensated together",
                          where=f"{read.folder / 'job.toml'} [recording] earlier",
                          fix="Compensate each as a job of its own, then name the earlier result")  # fmt: skip
-    text = {} if map_text_c is None else _map_text(read, map_text_c, beyond)
-    owner = Owner("compensate", read.facts.job.id, read.origin)
-    with staged(out, owner, inputs=read.paths, force=force, expected=(*read.inputs, *text, PROVENANCE)) as place:
-        points, provenance = compensate_job(read, beyond=beyond)
-        told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
-        files = {
-            **{name: data for name, data in read.inputs.items() if name != "job.toml"},
-            read.facts.recording.file: first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
-            **text,
-            PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
-        }  # fmt: skip
-        toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec", *IN_THE_RECORDING))
-        return place.write({"job.toml": toml, **files})
+
+
+def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Every file of the compensated job; ``text`` are maps written in the contractors' form."""
+    points, provenance = compensate_job(read, beyond=beyond)
+    told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
+    files = {
+        **{name: data for name, data in read.inputs.items() if name != "job.toml"},
+        read.facts.recording.file: first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
+        **text,
+        PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
+    }  # fmt: skip
+    toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec", *IN_THE_RECORDING))
+    return {"job.toml": toml, **files}
 
 
 def _map_text(job: Job, temperature: float, beyond: Beyond) -> dict[str, bytes]:

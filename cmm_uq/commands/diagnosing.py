@@ -113,7 +113,7 @@ def diagnosed(
     return Diagnosed(job, findings, diagnosis, next_ones, changes)
 
 
-def diagnosis_outcome(found: Found, seed: int) -> Outcome:
+def outcome_of(found: Found, seed: int = 0) -> Outcome:
     """What there is to write of what :func:`diagnose_folder` found."""
     return recipe_of(found.job).outcome(found, seed)
 

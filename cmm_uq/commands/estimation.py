@@ -12,6 +12,7 @@ from cmm_uq.conformity.accuracy import with_uncertainty
 from cmm_uq.documents.result import LACK_OF_FIT, Influence, Noise
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import OBSERVATIONS
+from cmm_uq.inference.draws import Draws, by_chain
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import Estimate, MeasurementModel
@@ -101,6 +102,19 @@ def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[
     """Reported parameters of each effect, by effect and name."""
     found = _quantities(model, posterior)
     return {effect.name: found[effect.name] for effect in model.effects}
+
+
+def named_draws(model: MeasurementModel, posterior: Posterior) -> Draws:
+    """The posterior of all that is reported: of each effect, of the artefact's sizes, and of the noise if it is estimated."""
+    units, columns = {}, []
+    for (owner, name), (draws, unit) in model.reported(posterior.draws).items():
+        units[f"{owner}.{name}"] = unit
+        columns.append(draws)
+    if model.sigma is None:
+        units["noise.coordinate_um"] = "µm"
+        columns.append(posterior.sigma / MICROMETRE)
+    values = np.column_stack(columns) if columns else np.zeros((len(posterior.draws), 0))
+    return Draws(units, by_chain(values, posterior.steps))
 
 
 def sizes(model: MeasurementModel, posterior: Posterior) -> dict[str, Quantity]:

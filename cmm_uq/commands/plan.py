@@ -1,31 +1,52 @@
-"""From a job still to be measured to its written plan."""
+"""From a job still to be measured to its plan: search and compose, then write."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.commands.planning import Plan, Progress, make_plan
+from cmm_uq.commands.planning import Plan, make_plan
 from cmm_uq.commands.reading import read_job
-from cmm_uq.commands.report import REPORTS
-from cmm_uq.documents.origin import file_name, marked
+from cmm_uq.commands.written import Form, Stage, Written, silent
+from cmm_uq.documents.outcome import Outcome
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import PLANNED
 from cmm_uq.planning.placing import joined
-from cmm_uq.writing import Owner, staged
+
+TO_FILL_IN = "plan.csv"
+PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
 
 
-@dataclass(frozen=True, eq=False)
-class WrittenPlan:
-    """What was planned, contents of results.json, and what was written, by name."""
+def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent) -> Outcome:
+    """Plan a job that was read, whose recording may be missing; nothing is written.
 
-    plan: Plan
-    results: bytes
-    files: dict[str, Path]
+    Parameters
+    ----------
+    job : that was read.
+    power : whether to predict what the diagnosis would find, which takes most of the time.
+    seed : of the recordings drawn for that.
+    stage : told of progress.
 
-    @property
-    def conforming(self) -> bool:
-        """Whether the plan has all that the standard it is named after asks for."""
-        return all(condition.met for condition in self.plan.conditions)
+    Raises
+    ------
+    CmmUqError : the plan is impossible.
+    """
+    plan = make_plan(job, power=power, seed=seed, progress=stage)
+    from cmm_uq.commands.plan_page import placing_rows, plan_document, plan_results
+
+    stage("Drawing the placings", 0.95)
+    document = plan_document(plan)
+    return Outcome(
+        plan, document, plan_results(plan), tuple(placing_rows(plan)), document.warnings,
+        {TO_FILL_IN: _recording_to_be(plan)} if plan.to_measure else {},
+        conforming=all(condition.met for condition in plan.conditions),
+    )  # fmt: skip
+
+
+def plan_of(outcome: Outcome) -> Plan:
+    """The plan in its outcome."""
+    if not isinstance(outcome.found, Plan):
+        raise TypeError("an outcome of another command")
+    return outcome.found
 
 
 def write_plan(
@@ -35,8 +56,8 @@ def write_plan(
     power: bool = True,
     seed: int = 0,
     force: bool = False,
-    stage: Progress | None = None,
-) -> WrittenPlan:
+    stage: Stage | None = None,
+) -> Written:
     """Plan a job and write ``plan.csv``, ``plan.html`` and ``results.json``, all or none.
 
     ``plan.csv`` has the columns of a recording of the artefact, at nominal coordinates; it is left out where nothing is left
@@ -56,25 +77,10 @@ def write_plan(
     CmmUqError : the plan is impossible, or something in the folder that this command did not write for this job.
     OutputError : the folder cannot be written to.
     """
-    tell = stage or (lambda what, part: None)
-    read = read_job(job, recorded=False)
-    owner = Owner("plan", read.facts.job.id, read.origin)
-    page = file_name("plan.html", read.origin)
-    folder = out or REPORTS / owner.job / "plan"
-    with staged(folder, owner, inputs=read.paths, force=force, expected=(page, "plan.csv", "results.json")) as place:
-        plan = make_plan(read, power=power, seed=seed, progress=tell)
-        from cmm_uq.commands.plan_page import plan_document, plan_results
-        from cmm_uq.documents.html import render_html
-        from cmm_uq.documents.results_file import as_json
-
-        tell("Drawing the placings", 0.95)
-        data = as_json(plan_results(plan))
-        contents = {page: render_html(marked(plan_document(plan), plan.job)).encode(), "results.json": data}
-        if plan.to_measure:
-            contents["plan.csv"] = _recording_to_be(plan)
-        files = place.write(contents)
-    tell("Done", 1.0)
-    return WrittenPlan(plan, data, files)
+    read, tell = read_job(job, recorded=False), stage or silent
+    return PLAN.write(
+        read, lambda: plan_outcome(read, power=power, seed=seed, stage=tell), out, force=force, stage=tell
+    )
 
 
 def _recording_to_be(plan: Plan) -> bytes:

@@ -1,7 +1,8 @@
-"""Jobs of every kind there is, read from their folders."""
+"""Jobs of every kind there is, read from their folders or from memory."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from cmm_uq.jobs import reading
@@ -27,3 +28,18 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
 def read_machine(folder: Path) -> Job:
     """A job for its machine alone; see :func:`cmm_uq.jobs.reading.read_machine`."""
     return reading.read_machine(folder, table_of, names)
+
+
+def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
+    """Read and check a job that lies in no folder yet; see :func:`cmm_uq.jobs.reading.job_of`.
+
+    Parameters
+    ----------
+    files : contents of job.toml and of all that it names, by name.
+    recorded : whether the recording must be there; otherwise a job still to be measured has no points.
+
+    Raises
+    ------
+    CmmUqError : a file is missing, or says something unknown or contradictory.
+    """
+    return reading.job_of(files, table_of, names, recorded=recorded)

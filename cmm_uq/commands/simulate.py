@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.recorded import refuse_unfit
 from cmm_uq.documents.program import program
 from cmm_uq.errors import CmmUqError, suggestion
@@ -19,7 +21,7 @@ from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import first_line
 from cmm_uq.jobs.table import LONGEST_MM
-from cmm_uq.jobs.toml_file import checked
+from cmm_uq.jobs.toml_file import as_toml, checked
 from cmm_uq.jobs.truth import Truth
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel, Noise
@@ -33,6 +35,7 @@ from cmm_uq.writing import Owner, staged
 TRUTH = "truth.toml"
 """Name of the truth in the folder of a simulated job."""
 
+_TRUTH_GIVES = "It gives the effects, the noise and the seed"
 _FIX = "Give effects, sizes and noise that a machine can have"
 
 
@@ -86,18 +89,43 @@ def write_simulation(
     """
     read = read_job(job)
     kind_of(read).observing("simulated")
-    content = content_of(truth, JOB_BYTES, "It gives the effects, the noise and the seed")
-    drawn = checked(content, truth, Truth)
+    content = content_of(truth, JOB_BYTES, _TRUTH_GIVES)
+    checked(content, truth, Truth)
     owner = Owner("simulate", read.facts.job.id, read.origin)
     with staged(out, owner, inputs=(*read.paths, truth), force=force, expected=(*read.inputs, TRUTH)) as place:
-        points = simulate(read, drawn, seed=seed, truth_path=str(truth))
-        how = f", seed {drawn.seed if seed is None else seed}, from {TRUTH}"
-        files = {
-            **{name: data for name, data in read.inputs.items() if name != "job.toml"},
-            read.facts.recording.file: first_line("simulate", program(drawn.effects), how).encode() + recording(points),
-            TRUTH: content,
-        }
-        return place.write({"job.toml": derived_toml(read, "simulate", files, without=IN_THE_RECORDING), **files})
+        return place.write(_files(read, content, truth, seed))
+
+
+def simulated_job(job: Job, truth: Path | Mapping[str, Any], *, seed: int | None = None) -> Job:
+    """The job that :func:`write_simulation` writes, in memory.
+
+    Parameters
+    ----------
+    job : whose recording gives the placings and the columns.
+    truth : what acts, as the path of a ``truth.toml``, or as what such a file says.
+    seed : instead of the one in ``truth``.
+
+    Raises
+    ------
+    CmmUqError : bad input.
+    """
+    kind_of(job).observing("simulated")
+    if isinstance(truth, Path):
+        return job_of(_files(job, content_of(truth, JOB_BYTES, _TRUTH_GIVES), truth, seed))
+    return job_of(_files(job, as_toml(truth, TRUTH), Path(TRUTH), seed))
+
+
+def _files(job: Job, content: bytes, truth: Path, seed: int | None) -> dict[str, bytes]:
+    """Every file of the simulated job; ``truth`` is where ``content`` was read, for messages."""
+    drawn = checked(content, truth, Truth)
+    points = simulate(job, drawn, seed=seed, truth_path=str(truth))
+    how = f", seed {drawn.seed if seed is None else seed}, from {TRUTH}"
+    files = {
+        **{name: data for name, data in job.inputs.items() if name != "job.toml"},
+        job.facts.recording.file: first_line("simulate", program(drawn.effects), how).encode() + recording(points),
+        TRUTH: content,
+    }
+    return {"job.toml": derived_toml(job, "simulate", files, without=IN_THE_RECORDING), **files}
 
 
 def recording(points: Points) -> bytes:

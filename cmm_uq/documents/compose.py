@@ -10,6 +10,7 @@ from cmm_uq.documents.diagnosis_page import diagnosis_sections
 from cmm_uq.documents.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
 from cmm_uq.documents.origin import CERTIFICATE, came_about
 from cmm_uq.documents.outcome import Outcome, Page
+from cmm_uq.documents.posterior_file import posterior_file, posterior_name
 from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.results_file import results
@@ -42,9 +43,12 @@ def certified(result: Result, page: Page) -> Outcome:
     page : what its kind adds.
     """
     told = warnings(result)
+    draws = posterior_file(result.draws, result.job.origin) if len(result.draws) else None
+    data = results(result) if draws is None else {**results(result), "posterior": draws.entry}
     passed = all(statement.outcome == "pass" for statement in result.statements)
     return Outcome(
-        result, _certificate(result, page, told), page.with_further(result, results(result)), tuple(summary(result)), told,
+        result, _certificate(result, page, told), page.with_further(result, data), tuple(summary(result)), told,
+        {draws.name: draws.content} if draws else {}, draws=result.draws,
         conforming=passed and result.diagnosed.diagnosis.verdict == "consistent",
     )  # fmt: skip
 
@@ -57,7 +61,8 @@ def _certificate(result: Result, page: Page, told: tuple[str, ...]) -> Document:
         sections += diagnosis_sections(result.diagnosed)
     sections += [_posterior(result), _method(result)]
     produced_by = f"{program()}, {result.posterior.sampler}, seed {result.posterior.seed}"
-    return certificate_of(result.job, sections, told, produced_by)
+    files = (posterior_name(result.job.origin),) if len(result.draws) else ()
+    return certificate_of(result.job, sections, told, produced_by, files)
 
 
 def certificate_of(

@@ -9,7 +9,9 @@ from typing import Any, Protocol
 from cmm_uq.documents.document import Document, Section
 from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.draws import Draws
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import Origin
 
 
 class Found(Protocol):
@@ -34,6 +36,7 @@ class Outcome:
     warnings : what the reader must know before using a figure.
     files : further ones, by name.
     conforming : whether every statement of conformity is a pass, and the recording agrees with the model that the job names.
+    draws : of the posterior of all that is reported, where the kind's analysis draws from one.
     """
 
     found: Found
@@ -43,6 +46,24 @@ class Outcome:
     warnings: tuple[str, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
     conforming: bool = True
+    draws: Draws | None = None
+
+    @property
+    def origin(self) -> Origin:
+        """Of the recording."""
+        return self.found.job.origin
+
+    @property
+    def provenance(self) -> Mapping[str, Any]:
+        """What it was made from and by what.
+
+        ``software`` with the plugins that took part, ``job`` with the hashes of its inputs and where its recording comes from,
+        and ``seed`` where a posterior was sampled.
+        """
+        sampling = self.results.get("sampling", {})
+        return {key: self.results[key] for key in ("software", "job") if key in self.results} | (
+            {"seed": sampling["seed"]} if "seed" in sampling else {}
+        )
 
 
 @dataclass(frozen=True)

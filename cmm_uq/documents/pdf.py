@@ -26,6 +26,7 @@ _TYPES = {
     ".csv": "text/csv",
     ".html": "text/html",
     ".json": "application/json",
+    ".npz": "application/zip",
     ".pdf": "application/pdf",
     ".toml": "application/toml",
     ".txt": "text/plain",
@@ -38,8 +39,8 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
 
     Parameters
     ----------
-    attachments : by name, what is embedded byte for byte: ``.json`` and ``.xml`` files as *data* of the document, others
-        as its *source* (the relationships of ISO 19005-3).
+    attachments : by name, what is embedded byte for byte: ``.json``, ``.npz`` and ``.xml`` files as *data* of the
+        document, others as its *source* (the relationships of ISO 19005-3).
 
     Raises
     ------
@@ -57,7 +58,7 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
 
 def _attachment(name: str, data: bytes) -> dict[str, Any]:
     suffix = PurePosixPath(name).suffix.lower()
-    outcome = suffix in {".json", ".xml"}
+    outcome = suffix in {".json", ".npz", ".xml"}
     try:
         body: str | list[int] = data.decode("utf-8")
     except UnicodeDecodeError:

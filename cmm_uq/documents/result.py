@@ -13,6 +13,7 @@ from cmm_uq.conformity.consequences import Consequences
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.conformity.tolerances import Judged
 from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.inference.draws import Draws
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
@@ -105,7 +106,8 @@ class Result:
     findings : of the screening.
     influences : of findings whose measurements are used all the same.
     estimate : least squares.
-    posterior : draws.
+    posterior : draws of the model's own parameters.
+    draws : of all that is reported, by name and chain.
     parameters : reported parameters of each effect, by effect and name.
     sizes : of the artefact, by name.
     noise : of a coordinate.
@@ -120,6 +122,7 @@ class Result:
     influences: tuple[Influence, ...]
     estimate: Estimate
     posterior: Posterior
+    draws: Draws
     parameters: Mapping[str, Mapping[str, Quantity]]
     sizes: Mapping[str, Quantity]
     noise: Noise

@@ -197,10 +197,10 @@ def rhat(chains: Floats) -> float:
     half = chains.shape[1] // 2
     split = np.concatenate([chains[:, :half], chains[:, -half:]])
     folded = np.abs(split - np.median(split, axis=(0, 1)))
-    return max(float(_split_rhat(_normal_scores(values)).max()) for values in (split, folded))
+    return max(float(_split_rhat(normal_scores(values)).max()) for values in (split, folded))
 
 
-def _normal_scores(values: Floats) -> Floats:
+def normal_scores(values: Floats) -> Floats:
     """Normal quantiles of the ranks of (c, n, d) values, for each parameter over all chains; ties share their rank."""
     flat = values.reshape(-1, values.shape[2])
     ranks = np.empty_like(flat)

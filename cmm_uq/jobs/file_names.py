@@ -12,7 +12,7 @@ from cmm_uq.files.limits import FILE_NAME
 
 _WRITTEN = re.compile(
     r"job\.toml|results\.json|manifest\.json|truth\.toml|compensation\.json|(certificate|diagnosis|plan).*\.(html|pdf)"
-    r"|budget\..*|\.unfinished-.*",
+    r"|posterior.*\.npz|budget\..*|\.unfinished-.*",
     re.IGNORECASE,
 )
 """Names that commands write, or attach to a certificate, beside the recording of a job."""
@@ -41,8 +41,7 @@ def inside(folder: Path, name: str, where: str, *, written: bool = False) -> Pat
     ------
     CmmUqError : the name is none that every system can read, is reserved, or leads out of the folder.
     """
-    if problem := _name_problem(name, written):
-        raise CmmUqError(problem[0], where=where, fix=problem[1])
+    check_name(name, where, written=written)
     try:
         path = (folder / name).resolve()
         within = path.is_relative_to(folder.resolve())
@@ -54,6 +53,17 @@ def inside(folder: Path, name: str, where: str, *, written: bool = False) -> Pat
         raise CmmUqError(f"file {name!r} is not inside the job folder", where=where,
                          fix="Copy the file into the folder and name it there: a job must be complete by itself")  # fmt: skip
     return path
+
+
+def check_name(name: str, where: str, *, written: bool = False) -> None:
+    """Refuse a name that no file of a job can have; see :func:`inside`.
+
+    Raises
+    ------
+    CmmUqError : the name is none that every system can read, is reserved, or leads out of the folder.
+    """
+    if problem := _name_problem(name, written):
+        raise CmmUqError(problem[0], where=where, fix=problem[1])
 
 
 def check_distinct(names: Iterable[str], where: str) -> None:

@@ -6,6 +6,7 @@ import datetime as dt
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from html import escape
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -28,6 +29,7 @@ from cmm_uq.jobs.table import (
     at_least,
 )
 from cmm_uq.points import Points
+from cmm_uq.writing import Owner, staged
 
 Standard = Literal["ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617"]
 
@@ -312,13 +314,13 @@ def job_file_of(table: type[ArtefactFacts]) -> type[JobFile]:
     return create_model("JobFile", __base__=JobFile, artefact=(table, ...))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Job:
     """A job as read: its facts, its recording, and the bytes of every file it was read from.
 
     Parameters
     ----------
-    folder : where it lies.
+    folder : where it lies; the empty path for a job that lies in no folder yet.
     facts : job.toml.
     points : the recording.
     inputs : contents of each input by its path inside the folder, for hashes and attachments.
@@ -347,3 +349,41 @@ class Job:
     def recording_path(self) -> str:
         """The recording, as messages name it."""
         return str(self.folder / self.facts.recording.file)
+
+    def write(self, folder: str | Path, *, force: bool = False) -> dict[str, Path]:
+        """Write the job as a folder that reads back to it.
+
+        Parameters
+        ----------
+        folder : to write to.
+        force : keep what stands in the way as ``NAME.previous`` instead of refusing.
+
+        Returns
+        -------
+        path of each file, by its name.
+
+        Raises
+        ------
+        CmmUqError : something stands in the folder that was not written for this job.
+        OutputError : the folder cannot be written to.
+        """
+        derived = self.facts.job.derived_from
+        owner = Owner("job" if derived is None else derived.by, self.facts.job.id, self.origin)
+        with staged(Path(folder), owner, inputs=self.paths, force=force, expected=self.inputs) as place:
+            return place.write(self.inputs)
+
+    def __repr__(self) -> str:
+        facts = self.facts
+        return f"<Job {facts.job.id}: {facts.artefact.kind} on {facts.machine.name}, {len(self.points)} points, {self.origin}>"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            ("Job", self.facts.job.id),
+            ("Machine", self.facts.machine.name),
+            ("Artefact", self.facts.artefact.kind),
+            ("Points", len(self.points)),
+            ("Recording", self.origin),
+            ("Effects", ", ".join(self.facts.model.effects)),
+        )
+        cells = "".join(f"<tr><th>{escape(head)}</th><td>{escape(str(cell))}</td></tr>" for head, cell in rows)
+        return f"<table>{cells}</table>"

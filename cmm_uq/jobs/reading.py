@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -12,15 +11,15 @@ import numpy as np
 from pydantic import create_model
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.earlier import against_earlier
-from cmm_uq.jobs.file_names import check_distinct, inside
+from cmm_uq.jobs.file_names import check_distinct
 from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
+from cmm_uq.jobs.source import InFolder, InMemory, Source
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
 from cmm_uq.writing import finish_interrupted
@@ -39,8 +38,31 @@ def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *
     ------
     CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
     """
-    path, content, facts = _facts(folder, tables, known)
-    folder = path.parent
+    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    finish_interrupted(path.parent)
+    return _read(InFolder(path), tables, known, recorded=recorded)
+
+
+def job_of(
+    files: Mapping[str, bytes], tables: Tables, known: Callable[[], Sequence[str]], *, recorded: bool = True
+) -> Job:
+    """Read and check a job that lies in no folder yet.
+
+    Parameters
+    ----------
+    files : contents of job.toml and of all that it names, by name.
+    tables, known, recorded : see :func:`read_job`.
+
+    Raises
+    ------
+    CmmUqError : a file is missing, or says something unknown or contradictory.
+    """
+    return _read(InMemory(files), tables, known, recorded=recorded)
+
+
+def _read(source: Source, tables: Tables, known: Callable[[], Sequence[str]], *, recorded: bool) -> Job:
+    path, folder = source.toml, source.toml.parent
+    content, facts = _facts(source, tables, known)
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
     if earlier is not None and not facts.artefact.with_earlier:
@@ -52,14 +74,14 @@ def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *
     check_distinct([*recordings, *maps, *logs], str(path))
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
-        return Job(folder, facts, _no_points(machine), inputs | _contents(folder, maps, path, MAP_BYTES))
-    if not recorded and not os.path.lexists(inside(folder, facts.recording.file, str(path))):
+        return Job(folder, facts, _no_points(machine), inputs | _contents(source, maps, MAP_BYTES))
+    if not recorded and not source.has(facts.recording.file):
         return Job(folder, facts, _no_points(machine), inputs)
     derived = facts.job.derived_from
-    inputs |= _contents(folder, [*recordings, *logs], path, TABLE_BYTES) | _contents(folder, maps, path, MAP_BYTES)
+    inputs |= _contents(source, [*recordings, *logs], TABLE_BYTES) | _contents(source, maps, MAP_BYTES)
     if derived is not None:
         others = [name for name in derived.files if name not in inputs]
-        inputs |= _contents(folder, others, path, TABLE_BYTES, written=True)
+        inputs |= _contents(source, others, TABLE_BYTES, written=True)
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     points = read_recording(inputs[facts.recording.file], where, machine)
@@ -89,20 +111,20 @@ def read_machine(folder: Path, tables: Tables, known: Callable[[], Sequence[str]
     ------
     CmmUqError : see :func:`read_job`.
     """
-    path, content, facts = _facts(folder, tables, known)
+    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    finish_interrupted(path.parent)
+    source = InFolder(path)
+    content, facts = _facts(source, tables, known)
     maps, logs = _of_the_machine(facts.machine)
     check_distinct([*maps, *logs], str(path))
-    inputs = {"job.toml": content} | _contents(path.parent, maps, path, MAP_BYTES)
-    inputs |= _contents(path.parent, logs, path, TABLE_BYTES)
+    inputs = {"job.toml": content} | _contents(source, maps, MAP_BYTES) | _contents(source, logs, TABLE_BYTES)
     return Job(path.parent, facts, _no_points(_machine(facts.machine)), inputs)
 
 
-def _facts(folder: Path, tables: Tables, known: Callable[[], Sequence[str]]) -> tuple[Path, bytes, JobFile]:
-    """job.toml: where it lies, its bytes, and what it says."""
-    path = folder if folder.suffix == ".toml" else folder / "job.toml"
-    finish_interrupted(path.parent)
-    content = content_of(path, JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
-    return path, content, checked(content, path, lambda data: _model_for(data, tables, known))
+def _facts(source: Source, tables: Tables, known: Callable[[], Sequence[str]]) -> tuple[bytes, JobFile]:
+    """job.toml: its bytes, and what it says."""
+    content = source.job_file(JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
+    return content, checked(content, source.toml, lambda data: _model_for(data, tables, known))
 
 
 def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str]]:
@@ -128,11 +150,9 @@ def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:
     return {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
 
 
-def _contents(
-    folder: Path, names: Sequence[str], toml: Path, limit: Limit, *, written: bool = False
-) -> dict[str, bytes]:  # fmt: skip
-    fix = f"Put it beside job.toml, or mend its name in {toml}"
-    return {name: content_of(inside(folder, name, str(toml), written=written), limit, fix) for name in names}
+def _contents(source: Source, names: Sequence[str], limit: Limit, *, written: bool = False) -> dict[str, bytes]:
+    fix = f"Put it beside job.toml, or mend its name in {source.toml}"
+    return {name: source.content(name, limit, fix, written=written) for name in names}
 
 
 def _no_points(machine: Machine) -> Points:

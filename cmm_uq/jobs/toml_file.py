@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+import numpy as np
+import tomlkit
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
+from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq.errors import CmmUqError, shortened, suggestion
 from cmm_uq.files.content import text_of
@@ -45,6 +48,34 @@ def checked(content: bytes, path: Path, model: type[Facts] | Callable[[dict[str,
         return wanted.model_validate(data)
     except ValidationError as error:
         raise _located(error.errors(include_url=False)[0], text, path, wanted) from None
+
+
+def as_toml(data: Mapping[str, Any], where: str) -> bytes:
+    """What a TOML file says, as its bytes.
+
+    Parameters
+    ----------
+    data : tables, lists, texts, numbers, dates, truth values; ``None`` leaves its key out.
+    where : for messages.
+
+    Raises
+    ------
+    CmmUqError : something in it is none of these.
+    """
+    try:
+        return tomlkit.dumps(_plain(data)).encode()
+    except (TOMLKitError, TypeError, ValueError) as error:
+        raise CmmUqError(f"holds what TOML cannot say: {error}", where=where,
+                         fix="Give texts, numbers, dates, lists and tables") from None  # fmt: skip
+
+
+def _plain(value: Any) -> Any:
+    """Without keys that say nothing, and with Python's numbers instead of NumPy's."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
 def _located(error: ErrorDetails, text: str, path: Path, model: type[BaseModel]) -> CmmUqError:

@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from math import inf
 
 import numpy as np
@@ -22,6 +23,7 @@ from cmm_uq.uncertainty.distributions import constant
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.uncertainty.monte_carlo import HIGHEST_COVERAGE, LARGEST, Simulated, simulate, simulate_adaptively
 from cmm_uq.uncertainty.propagation import Propagated
+from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.uncertainty.validation import simulate_to_validate
 
 METHODS = ("first", "second", "monte_carlo", "auto")
@@ -82,7 +84,7 @@ class Stated:
     budget: Budget
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Evaluation:
     """All outputs of a model.
 
@@ -97,6 +99,23 @@ class Evaluation:
     stated: Mapping[str, Stated]
     correlation: Floats
     ways: Ways
+
+    def __repr__(self) -> str:
+        said = [(name, *rounded(found.value, found.u), found.budget.unit) for name, found in self.stated.items()]
+        told = (
+            f"{name} = {value}, u = {u}{f' {unit}' if unit not in ('', '1') else ''}" for name, value, u, unit in said
+        )
+        return f"<Evaluation: {'; '.join(told)}>"
+
+    def _repr_html_(self) -> str:
+        from cmm_uq.uncertainty.budget_results import SUMMARY, summary_rows
+
+        rows = (SUMMARY, *summary_rows(self))
+        return f"<table>{''.join(f'<tr>{_cells(row)}</tr>' for row in rows)}</table>"
+
+
+def _cells(row: Sequence[str]) -> str:
+    return "".join(f"<td>{escape(cell)}</td>" for cell in row)
 
 
 def evaluate(model: MeasurementModel, request: Request | None = None, labels: Labels | None = None) -> Evaluation:

@@ -15,7 +15,7 @@ import pytest
 
 from tests.cli.process import COMMAND, run
 
-FILES = ["certificate.html", "certificate.pdf", "manifest.json", "results.json"]
+FILES = ["certificate.html", "certificate.pdf", "manifest.json", "posterior.npz", "results.json"]
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +50,7 @@ def test_the_pdf_carries_the_job_and_the_results(
     with pikepdf.open(report / "certificate.pdf") as pdf:
         attached = {name: pdf.attachments[name].get_file().read_bytes() for name in pdf.attachments}
     assert attached["results.json"] == (report / "results.json").read_bytes()
+    assert attached["posterior.npz"] == (report / "posterior.npz").read_bytes()
     assert attached["job.toml"] == (iota / "job.toml").read_bytes()
     assert attached["ballbar.csv"] == (iota / "ballbar.csv").read_bytes()
 

@@ -1,0 +1,246 @@
+"""The calls: each computes what the command of its name computes, and writes nothing."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cmm_uq.api.outcomes import Diagnosis, Plan, Report
+from cmm_uq.commands.compensate import compensated_job
+from cmm_uq.commands.frames import job_from_frames
+from cmm_uq.commands.plan import plan_outcome
+from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.report import diagnosis_outcome, report_outcome
+from cmm_uq.commands.simulate import simulated_job
+from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import Job
+from cmm_uq.physics.map_interpolation import Beyond
+from cmm_uq.uncertainty.distributions import Distribution, normal
+from cmm_uq.uncertainty.evaluation import Evaluation, Request, evaluate
+from cmm_uq.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.uncertainty.model_file import read_model_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def read(folder: str | Path) -> Job:
+    """Read and check a job.
+
+    Parameters
+    ----------
+    folder : the job folder, or its job.toml. The recording may be missing for a job that is only to be planned.
+
+    Raises
+    ------
+    CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
+
+    Examples
+    --------
+    >>> import cmm_uq
+    >>> cmm_uq.read("examples/iota-1102-20C")
+    <Job iota-1102-20C: ballbar on DEA Iota 1102, 40 points, measured>
+    """
+    return read_job(Path(folder), recorded=False)
+
+
+def job(
+    points: pd.DataFrame | None = None,
+    *,
+    machine: Mapping[str, Any] | str,
+    artefact: Mapping[str, Any] | str,
+    effects: Sequence[str],
+    id: str = "job",  # noqa: A002
+    date: dt.date | str | None = None,
+    recording: Mapping[str, Any] | None = None,
+    conformity: Sequence[Mapping[str, Any]] = (),
+    files: Mapping[str, pd.DataFrame] | None = None,
+    **tables: Mapping[str, Any],
+) -> Job:
+    """A job from DataFrames, checked as a job folder is. ``job.write(folder)`` makes it one.
+
+    Parameters
+    ----------
+    points : the recording: one row a point, with the columns of a recording's CSV (mm, µm, °C as their names say).
+    machine, artefact : the tables of job.toml; a text is the machine's name, or the artefact's kind.
+    effects : names of the effects that the simulation is told about.
+    id, date : of the job; without a date it has 1970-01-01 and says that none was given.
+    recording : further keys of ``[recording]``, as ``u_coordinate_um``.
+    conformity : a table for each statement of conformity.
+    files : error maps and other tables that job.toml names, by name.
+    tables : further tables of job.toml: ``job``, ``laboratory``, ``model``, ``plan``.
+
+    Raises
+    ------
+    CmmUqError : a table says something unknown, missing or contradictory: it names the key, or column and line.
+
+    Examples
+    --------
+    >>> import cmm_uq, pandas
+    >>> frame = pandas.read_csv("examples/iota-1102-20C/ballbar.csv")
+    >>> cmm_uq.job(frame, machine="DEA Iota 1102", artefact="ballbar", effects=["squareness_xy"])
+    <Job job: ballbar on DEA Iota 1102, 40 points, measured>
+    """
+    told = {
+        **tables,
+        "job": {
+            "id": id,
+            "date": dt.date.fromisoformat(date) if isinstance(date, str) else date,
+            **tables.get("job", {}),
+        },
+        "machine": {"name": machine} if isinstance(machine, str) else machine,
+        "artefact": {"kind": artefact} if isinstance(artefact, str) else artefact,
+        "recording": recording,
+        "model": {"effects": list(effects), **tables.get("model", {})},
+        "conformity": list(conformity),
+    }
+    return job_from_frames(points, told, files or {})
+
+
+def report(job: Job | str | Path, *, seed: int = 0) -> Report:
+    """Estimate the errors that a job names, decide, and diagnose what it leaves out.
+
+    Parameters
+    ----------
+    job : a job, or its folder.
+    seed : of everything random; the same seed gives the same figures.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be analysed as it stands.
+
+    Examples
+    --------
+    >>> import cmm_uq
+    >>> found = cmm_uq.report("examples/iota-1102-20C", seed=0)
+    >>> found
+    <Report of iota-1102-20C: 8 estimates, ASME B89.4.1-1997 fail, consistent>
+    >>> found.figures.loc["b89_range_um", "value"].round(1)
+    np.float64(339.9)
+    """
+    return Report(report_outcome(_job(job), seed=seed))
+
+
+def diagnose(job: Job | str | Path, *, seed: int = 0, alpha: float = FALSE_ALARMS) -> Diagnosis:
+    """Say where recording and model differ, and what was left out.
+
+    Parameters
+    ----------
+    job : a job, or its folder.
+    seed : of everything random.
+    alpha : rate of false alarms.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be diagnosed as it stands.
+    """
+    return Diagnosis(diagnosis_outcome(_job(job), seed=seed, alpha=alpha))
+
+
+def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0) -> Plan:
+    """Say what placings of the artefact determine, and search for better ones.
+
+    Parameters
+    ----------
+    job : a job, or its folder; its recording may be missing.
+    power : whether to predict what the diagnosis would find, which takes most of the time.
+    seed : of the recordings drawn for that.
+
+    Raises
+    ------
+    CmmUqError : the plan is impossible.
+    """
+    return Plan(plan_outcome(_job(job), power=power, seed=seed))
+
+
+def simulate(job: Job | str | Path, truth: Mapping[str, Any] | str | Path, *, seed: int | None = None) -> Job:
+    """A job like this one whose recording is drawn from known errors; it is marked as simulated and has an id of its own.
+
+    Parameters
+    ----------
+    job : a job, or its folder; its recording gives the placings.
+    truth : path of a truth.toml, or what such a file says.
+    seed : instead of the one in ``truth``.
+
+    Raises
+    ------
+    CmmUqError : an unknown effect, parameter or size, or what an effect needs is missing.
+
+    Examples
+    --------
+    >>> import cmm_uq
+    >>> drawn = cmm_uq.simulate("examples/iota-1102-20C", {"seed": 1, "effects": {"scale_x": {"ppm": 12.0}}})
+    >>> drawn.origin
+    'simulated'
+    """
+    return simulated_job(_job(job), truth if isinstance(truth, Mapping) else Path(truth), seed=seed)
+
+
+def compensate(job: Job | str | Path, *, beyond: Beyond = "refuse") -> Job:
+    """A job like this one whose recording is corrected by the machine's error maps; marked, with an id of its own.
+
+    Parameters
+    ----------
+    job : a job with error maps, or its folder.
+    beyond : ``"refuse"`` points outside the maps, or ``"extrapolate"`` and flag them.
+
+    Raises
+    ------
+    CmmUqError : the job has no error map, or it does not serve these points.
+    """
+    return compensated_job(_job(job), beyond=beyond)
+
+
+def budget(
+    model: str | Path | Callable[..., Any],
+    inputs: Mapping[str, Distribution | tuple[float, float]] | None = None,
+    *,
+    outputs: Sequence[str] = ("y",),
+    correlation: Mapping[tuple[str, str], float] | None = None,
+    method: str = "auto",
+    coverage: float = 0.95,
+    digits: int = 2,
+    seed: int | None = None,
+) -> Evaluation:
+    """The uncertainty of a measurement model: of a file, or of a function of its inputs by name.
+
+    Parameters
+    ----------
+    model : path of a model file, which says all else but the seed; or a function written with NumPy's functions, which gives
+        its output, or a mapping from the names of its outputs.
+    inputs : of a function: a distribution (:mod:`cmm_uq.uncertainty.distributions`), or value and standard uncertainty.
+    outputs : names of the function's outputs.
+    correlation : of a function's inputs, by pairs of names.
+    method : ``"first"``, ``"second"``, ``"monte_carlo"``, or ``"auto"``: the simplest that Monte Carlo confirms.
+    coverage : probability of the intervals.
+    digits : significant digits of u that Monte Carlo must support.
+    seed : of the random numbers; a file's own, or 0, by default.
+
+    Raises
+    ------
+    CmmUqError : the model cannot be evaluated.
+
+    Examples
+    --------
+    >>> import cmm_uq
+    >>> cmm_uq.budget(lambda a, b: a + b, {"a": (1.0, 0.3), "b": (2.0, 0.4)}, method="first")
+    <Evaluation: y = 3.00, u = 0.50>
+    """
+    if not callable(model):
+        if inputs is not None:
+            raise CmmUqError("inputs belong to a function; a model file has its own", where=str(model),
+                             fix="Leave them out")  # fmt: skip
+        return read_model_file(Path(model)).evaluate(seed)
+    if not inputs:
+        raise CmmUqError("a function needs its inputs", where="budget",
+                         fix='Give each a distribution, or value and u: {"a": (1.0, 0.1)}')  # fmt: skip
+    known = {name: given if isinstance(given, Distribution) else normal(*given) for name, given in inputs.items()}
+    asked = Request(method, coverage, digits, 0 if seed is None else seed)
+    return evaluate(MeasurementModel(model, known, tuple(outputs), dict(correlation or {})), asked)
+
+
+def _job(job: Job | str | Path) -> Job:
+    return job if isinstance(job, Job) else read(job)

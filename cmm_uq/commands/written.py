@@ -1,0 +1,133 @@
+"""From an outcome to the files of a command: rendered, and written as one set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from cmm_uq.documents.outcome import Found, Outcome
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import Job
+from cmm_uq.writing import Owner, staged
+
+Stage = Callable[[str, float], None]
+"""Told what is being done, and the part of the whole that is done."""
+
+REPORTS, RESULTS = Path("reports"), "results.json"
+
+
+def silent(what: str, part: float) -> None:
+    """Nobody is told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """What a command found and wrote.
+
+    Parameters
+    ----------
+    outcome : what was found.
+    results : contents of results.json.
+    files : what was written, by name.
+    """
+
+    outcome: Outcome
+    results: bytes
+    files: dict[str, Path]
+
+    @property
+    def found(self) -> Found:
+        """In the kind's own terms."""
+        return self.outcome.found
+
+    @property
+    def summary(self) -> tuple[tuple[str, ...], ...]:
+        """Rows of what, figure and remark."""
+        return self.outcome.summary
+
+    @property
+    def conforming(self) -> bool:
+        """See :class:`~cmm_uq.documents.outcome.Outcome`."""
+        return self.outcome.conforming
+
+
+@dataclass(frozen=True)
+class Form:
+    """In which files a command writes an outcome, and where.
+
+    Parameters
+    ----------
+    command : of ``cmm-uq``.
+    documents : their names; those of a recording that was not measured carry its origin.
+    below : folder in ``reports/<job id>`` that is written to by default.
+    further : names of files that come with it.
+    """
+
+    command: str
+    documents: tuple[str, ...]
+    below: str = ""
+    further: tuple[str, ...] = ()
+
+    def write(
+        self,
+        job: Job,
+        outcome: Callable[[], Outcome],
+        out: Path | None = None,
+        *,
+        force: bool = False,
+        stage: Stage = silent,
+    ) -> Written:
+        """Make sure of the folder, then compute, render and write, all or none.
+
+        Parameters
+        ----------
+        job : that the outcome is of.
+        outcome : computes it.
+        out : folder to write to.
+        force : keep what stands in the way as ``NAME.previous`` instead of refusing.
+        stage : told of progress.
+
+        Raises
+        ------
+        CmmUqError : as computing does, or something in the folder that this command did not write for this job.
+        OutputError : the folder cannot be written to.
+        """
+        owner = Owner(self.command, job.facts.job.id, job.origin)
+        folder = out or REPORTS / owner.job / self.below
+        expected = (*self._names(job), RESULTS, *self.further)
+        with staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place:
+            found = outcome()
+            contents = self.contents(found, stage)
+            stage("Writing", 0.95)
+            files = place.write(contents)
+        stage("Done", 1.0)
+        return Written(found, contents[RESULTS], files)
+
+    def contents(self, outcome: Outcome, stage: Stage = silent) -> dict[str, bytes]:
+        """Bytes of every file, by name."""
+        from cmm_uq.documents.html import render_html
+        from cmm_uq.documents.origin import marked
+        from cmm_uq.documents.pdf import render_pdf
+        from cmm_uq.documents.results_file import as_json
+
+        job, data = outcome.found.job, as_json(outcome.results)
+        document = marked(outcome.document, job)
+        for name in outcome.files.keys() & job.inputs.keys():
+            raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
+                             fix="Rename it, in job.toml too")  # fmt: skip
+        rendered = {}
+        stage("Rendering", 0.8)
+        for name in self._names(job):
+            pdf = name.endswith(".pdf")
+            rendered[name] = (
+                render_pdf(document, {**job.inputs, RESULTS: data, **outcome.files})
+                if pdf
+                else render_html(document).encode()
+            )
+        return {**rendered, RESULTS: data, **outcome.files}
+
+    def _names(self, job: Job) -> list[str]:
+        from cmm_uq.documents.origin import file_name
+
+        return [file_name(document, job.origin) for document in self.documents]
