@@ -10,8 +10,7 @@ The public API: each name is imported when it is first used, so that ``import cm
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # typing alone would cost ten times as much as all of this
 if TYPE_CHECKING:
     from cmm_uq.api.calls import budget, compensate, diagnose, job, plan, read, report, simulate
     from cmm_uq.errors import CmmUqError
@@ -23,7 +22,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
