@@ -94,9 +94,11 @@ def test_a_triangle_without_one_of_its_corners_is_refused(row: int, tmp_path: Pa
 
 def test_more_observations_than_memory_holds_are_refused_before_the_estimate(tmp_path: Path) -> None:
     """Each point of a probed plane is an observation; a flat grid of them passes everything else."""
-    rows = np.arange(OBSERVATIONS.most + 1)
-    noise = np.random.default_rng(3).normal(0, 1e-3, len(rows))
-    columns = {"measurement": 1, "point": rows + 1, "x_mm": rows % 150 * 2.0 + 100, "y_mm": rows // 150 * 2.0 + 100}
+    rows = np.arange(OBSERVATIONS.most + 2)  # point 0 comes before contact and is none
+    noise = np.random.default_rng(3).normal(0, 1e-3, len(rows)) + 8.0 * (rows == 0)
+    columns = {"measurement": 1, "point": rows, "x_mm": rows % 150 * 2.0 + 100, "y_mm": rows // 150 * 2.0 + 100}
     job = job_with("plane-simulated", lambda _: pd.DataFrame({**columns, "z_mm": noise - 300}), tmp_path)
-    with pytest.raises(CmmUqError, match=f"{len(rows)} observations are more than are estimated from at once"):
+    with pytest.raises(
+        CmmUqError, match=f"{OBSERVATIONS.most + 1} observations are more than are estimated from at once"
+    ):
         diagnose_job(job)
