@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.errors import CmmUqError, OutputError
 from cmm_uq.files.content import check_file
 from cmm_uq.physics.cloud_csv import csv_blocks, csv_header, csv_length, written_csv
 from cmm_uq.points import Floats
@@ -61,6 +61,7 @@ def transform_cloud(
     Raises
     ------
     CmmUqError : a file cannot be read or is no such cloud, or the transformation refuses a point (with its row).
+    OutputError : the target cannot be written.
     """
     unfinished = target.with_name(f".unfinished-{target.name}")
     writer = {".parquet": _written_parquet, ".csv": written_csv}.get(target.suffix, _written_npy)
@@ -80,8 +81,8 @@ def transform_cloud(
                     progress(min(1.0, count / max(length, 1.0)))
         unfinished.replace(target)
     except OSError as error:
-        raise CmmUqError(
-            f"cannot be written: {error.strerror}", where=str(target), fix="Choose another place"
+        raise OutputError(
+            f"cannot be written: {error.strerror}", where=str(target), fix="Free the disk, or choose another place"
         ) from error
     finally:
         unfinished.unlink(missing_ok=True)
