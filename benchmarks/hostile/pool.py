@@ -37,7 +37,7 @@ class Worker:
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, pass_fds=[writing], cwd=ROOT,
                                          stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
         os.close(writing)
-        self._replies = os.fdopen(reading, "r")
+        self._replies = os.fdopen(reading, "rb", buffering=0)  # two replies may come at once, and both must wake select
         self.cases = 0
 
     def run(self, number: int) -> dict[str, object] | str:
