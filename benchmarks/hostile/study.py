@@ -28,6 +28,7 @@ from benchmarks.hostile.page import PARTS, Tally, load, page
 from benchmarks.hostile.processes import COMMANDS, memory
 
 ROOT = Path(__file__).parents[2]
+SAVED_EVERY = 20
 PAGE = ROOT / "docs" / "hostile-study.md"
 RANDOM_SHARES = {"simulate": 6.0, "compensate": 4.0, "budget": 4.0, "plan": 2.0, "diagnose": 1.0, "report": 2.0}
 """How often each command is hit at a random moment: the cheap ones more often."""
@@ -92,6 +93,8 @@ def processes(
     with ThreadPoolExecutor(options.workers) as workers:
         for number, (kind, what, _), outcome, found in workers.map(one, enumerate(given)):
             tally.add(number, kind, what, outcome.code, found, outcome.stderr)
+            if number % SAVED_EVERY == 0:
+                tally.save(options.keep)  # what was found stays where the study is stopped
             tick()
 
 
