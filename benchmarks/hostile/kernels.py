@@ -19,9 +19,12 @@ EXAMPLES = ("gauge-blocks-simulated", "iota-1102-20C")
 KERNELS = ("Prescott", "Nehalem", "Sandybridge", "Haswell", "SkylakeX", "Cooperlake", "Zen")
 RELATIVE = 1e-9
 """Agreement of closed forms: far below the last digit of any printed figure."""
-SAMPLED = (".estimates", ".noise", ".accuracy_uncertainty")
+SAMPLED = (".estimates", ".noise", ".accuracy_uncertainty", ".artefact", ".adjustments", ".differences", ".tolerances")
 """What follows from a posterior whose noise is sampled."""
-SPREADS = (".u_um", ".guard_band_um", ".prior_share", ".probability_conforming")
+SPREADS = (
+    ".u_um", ".guard_band_um", ".prior_share", ".probability_conforming", ".covariance.", ".lengths.", ".length_budget.",
+    ".posterior.", ".k",
+)  # fmt: skip
 """Standard deviations and variances of the draws, and what follows from them."""
 OF_SPREAD = 0.04
 """How far those may move: three standard errors of a variance, √(2/N), of N = 13 000 effective draws."""
@@ -68,7 +71,7 @@ def differences(one: object, other: object, where: str = "") -> Iterator[str]:
     if isinstance(one, Mapping) and isinstance(other, Mapping) and one.keys() == other.keys():
         u = one.get("u") if where.startswith(SAMPLED) else None
         for key in one:
-            if isinstance(u, float):
+            if isinstance(u, float) and key != "k":
                 yield from _sampled(one[key], other[key], u, f"{where}.{key}")
             else:
                 yield from differences(one[key], other[key], f"{where}.{key}")
@@ -79,7 +82,7 @@ def differences(one: object, other: object, where: str = "") -> Iterator[str]:
         spread = any(name in where for name in SPREADS)
         if abs(one - other) > (OF_SPREAD * abs(one) if spread else RELATIVE * max(1.0, abs(one))):
             yield f"{where}: {one!r} and {other!r}"
-    elif one != other:
+    elif one != other and where != ".posterior.sha256":  # the draws themselves are not the same bytes
         yield f"{where}: {one!r} and {other!r}"
 
 

@@ -94,7 +94,7 @@ def test_results_keep_their_contract(result: ShiftResult) -> None:
     assert found["sampling"]["converged"]
     curve = found["curves"]["linearity_x"]
     assert len(curve["position_mm"]) == len(curve["error_um"]) == len(curve["u_um"]) == 47
-    assert set(found["estimates"]["scale_x"]["ppm"]) == {"value", "u", "interval95"}
+    assert set(found["estimates"]["scale_x"]["ppm"]) == {"value", "u", "interval95", "U", "k"}
     assert found["improvement"]["rms_after_um"] < found["improvement"]["rms_before_um"]
     assert "accuracy" not in found  # no lengths are measured
     assert "diagnosis" not in found

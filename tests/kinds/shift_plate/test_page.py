@@ -102,7 +102,7 @@ def test_results_keep_their_contract(result: PlaneShiftResult) -> None:
     }  # fmt: skip
     assert len(found["curves"]["linearity_x"]["error_um"]) == len(found["curves"]["linearity_x"]["position_mm"])
     assert "error_arcsec" in found["curves"]["rotation_x_z"]
-    assert set(found["estimates"]["squareness_xy"]["angle_arcsec"]) == {"value", "u", "interval95"}
+    assert set(found["estimates"]["squareness_xy"]["angle_arcsec"]) == {"value", "u", "interval95", "U", "k"}
     assert found["identifiability"] == {"not_determined": [], "period_not_seen_mm": {"x": None, "y": None}}
     assert found["improvement"]["rms_after_um"] < 0.5 < found["improvement"]["rms_before_um"]
     assert "diagnosis" not in found
