@@ -26,7 +26,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 def main() -> None:
     """Run the command; whatever happens ends with one line and a documented exit code, never with a traceback."""
-    from cmm_uq.writing.interruption import give_way, watch
+    from cmm_uq.writing.interruption import done, watch
 
     watch()
     for variable in THREADS:
@@ -43,7 +43,7 @@ def main() -> None:
         code = code or NO_OUTPUT
         _say(str(closed()))
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter would complain once more at its end
-    give_way()
+    done()
     sys.exit(code)
 
 

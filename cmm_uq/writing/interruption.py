@@ -75,9 +75,16 @@ def watch() -> None:
 
 
 def give_way() -> None:
-    """Before a normal end: where a signal came, it decides how the process ends."""
+    """Where a signal came, it decides how the process ends."""
     if _signalled:
         time.sleep(2 * PATIENCE_S)
+
+
+def done() -> None:
+    """Before a normal end: from here on a signal changes nothing, not even while the interpreter shuts down."""
+    give_way()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _stand_still(number: int, frame: FrameType | None) -> None:

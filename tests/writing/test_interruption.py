@@ -91,3 +91,15 @@ def test_a_second_signal_changes_nothing(tmp_path: Path) -> None:
         process.wait(timeout=10)
     assert process.returncode == 128 + signal.SIGTERM
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["manifest.json", "x"]
+
+
+def test_a_signal_while_the_interpreter_shuts_down_changes_nothing() -> None:
+    """What was done was done: the exit code says so."""
+    lines = (
+        "import os, signal, sys", "from cmm_uq.writing import interruption", "interruption.watch()", "class Late:",
+        "    def __del__(self):", "        os.kill(os.getpid(), signal.SIGTERM)", "        os.kill(os.getpid(), signal.SIGINT)",
+        "sys.late = Late()", "interruption.done()", "sys.exit(0)",
+    )  # fmt: skip
+    program = "\n".join(lines)
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
