@@ -97,7 +97,9 @@ def test_a_signal_while_the_interpreter_shuts_down_changes_nothing() -> None:
     """What was done was done: the exit code says so."""
     lines = (
         "import os, signal, sys", "from cmm_uq.writing import interruption", "interruption.watch()", "class Late:",
-        "    def __del__(self):", "        os.kill(os.getpid(), signal.SIGTERM)", "        os.kill(os.getpid(), signal.SIGINT)",
+        "    def __del__(self):",
+        "        os.kill(os.getpid(), signal.SIGTERM)",
+        "        os.kill(os.getpid(), signal.SIGINT)",
         "sys.late = Late()", "interruption.done()", "sys.exit(0)",
     )  # fmt: skip
     program = "\n".join(lines)
