@@ -65,9 +65,11 @@ def _ended() -> int:
         _say("the memory does not suffice for this input. Split it, or use a machine with more memory")
         return NO_OUTPUT
     except Exception as error:
-        _say(
-            f"a fault of the program: {type(error).__name__}: {error}. Nothing was changed; please report it with the input"
-        )
+        from cmm_uq.writing.interruption import written
+
+        there = ", ".join(map(str, written()))
+        state = f"The files are written in {there}" if there else "Nothing was written"
+        _say(f"a fault of the program: {type(error).__name__}: {error}. {state}; please report it with the input")
         return NO_OUTPUT
 
 

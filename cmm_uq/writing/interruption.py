@@ -43,13 +43,13 @@ def staged(place: Staged) -> Iterator[None]:
 @contextlib.contextmanager
 def placing(folder: Path) -> Iterator[None]:
     """While files are put in place, a signal waits; afterwards it says that they were written."""
-    with _placing:
-        _going_in.append(folder)
-        try:
+    _going_in.append(folder)  # before the lock: a signal in between must not stop whoever holds it
+    try:
+        with _placing:
             yield
             _written.append(folder)
-        finally:
-            _going_in.remove(folder)
+    finally:
+        _going_in.remove(folder)
 
 
 def written() -> tuple[Path, ...]:
@@ -111,7 +111,8 @@ def _end(number: int) -> None:
     elif alone:
         said = "interrupted; nothing was written"
     else:
-        said = f"interrupted while files were put in place; the next command in {_going_in[0]} completes that"
+        where = ", ".join(map(str, _going_in))
+        said = f"interrupted while files were put in place; the next command in {where} completes it or takes it back"
     with contextlib.suppress(OSError, ValueError, AttributeError):
         if sys.stderr.isatty():
             sys.stderr.write("\r\x1b[2K\x1b[?25h")  # a progress bar hides the cursor

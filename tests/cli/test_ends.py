@@ -90,7 +90,23 @@ def test_a_fault_of_the_program_is_one_line_too(budget: Path, tmp_path: Path) ->
     assert done.stderr.count("\n") == 1
     assert len(done.stderr) < 320
     assert "RuntimeError" in done.stderr
+    assert "Nothing was written" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_fault_after_the_files_are_written_says_that_they_are(budget: Path, tmp_path: Path) -> None:
+    """Here the summary breaks, as a library on a terminal may."""
+    program = (
+        "import sys\nfrom cmm_uq.cli import main, printing\n"
+        "def broken(text=''):\n    raise RuntimeError('broken')\n"
+        "printing.say = broken\nsys.argv = ['cmm-uq', *sys.argv[1:]]\nmain()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program, "budget", str(budget), "--out", str(tmp_path / "out")],
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 3
+    assert f"The files are written in {tmp_path / 'out'}" in done.stderr
+    assert "Nothing was written" not in done.stderr
+    assert (tmp_path / "out" / "manifest.json").is_file()
 
 
 def _files(folder: Path) -> dict[str, bytes]:
