@@ -80,8 +80,12 @@ CHEAP = ("simulate", "compensate", "budget")
 
 
 def environment(more: Mapping[str, str] | None = None) -> dict[str, str]:
-    """What a process sees: this project first on the path, no bytecode written."""
-    return {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1", **(more or {})}
+    """What a process sees: this project first on the path, no bytecode written, no coverage measured.
+
+    Coverage writes a file of its own when a process ends, which in a bad place fails with a traceback of its own.
+    """
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_")}
+    return {**kept, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1", **(more or {})}
 
 
 def run(arguments: Sequence[str], cwd: Path, *, prefix: Sequence[str] = (), kill: tuple[int, float] | None = None,
