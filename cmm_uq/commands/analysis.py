@@ -15,9 +15,11 @@ from cmm_uq.conformity.standards import statement
 from cmm_uq.documents.compose import certified
 from cmm_uq.documents.outcome import Found, Outcome, OwnAnalysis, Page, Recipe
 from cmm_uq.documents.result import Result
-from cmm_uq.inference.posterior import Progress, sample
+from cmm_uq.inference.posterior import Progress
+from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
+from cmm_uq.model.noise import noise_of
 from cmm_uq.overflow import must_be_finite, refusing_overflow
 
 __all__ = ["Result", "analyse", "analyse_job", "analyse_observations", "outcome_of"]
@@ -60,17 +62,19 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     kind = kind_of(job)
     screened, findings = screened_model(job)
     model, estimate, p_value = with_noise(screened)
-    posterior = sample(estimate.linear, seed, progress)
+    components = noise_of(model)
+    posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, progress)
     figures = accuracy(model, estimate, posterior, seed)
     statements = [
         statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.standards)
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
     result = Result(
-        job, model, findings, influences(model, estimate, findings), estimate, posterior, named_draws(model, posterior),
+        job, model, findings, influences(model, estimate, findings), estimate, posterior,
+        named_draws(model, components, posterior),
         parameters(model, posterior), sizes(model, posterior),
-        noise(posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
-        diagnosed(job, screened, findings, seed=seed),
+        noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
+        diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None),
     )  # fmt: skip
     for name, quantity in result.quantities():
         must_be_finite(

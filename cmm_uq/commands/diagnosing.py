@@ -15,7 +15,7 @@ from cmm_uq.documents.diagnosis_page import diagnosed_outcome
 from cmm_uq.documents.outcome import Found, Outcome, OwnAnalysis, Recipe
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.errors import CmmUqError
-from cmm_uq.inference.posterior import Progress
+from cmm_uq.inference.posterior import NoisyPosterior, Progress
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel
@@ -102,10 +102,11 @@ def diagnosed(
     seed: int,
     alpha: float = FALSE_ALARMS,
     progress: Progress | None = None,
+    known: NoisyPosterior | None = None,
 ) -> Diagnosed:
-    """Diagnose the screened model of a job."""
+    """Diagnose the screened model of a job; ``known`` is its posterior where it was sampled already."""
     stated = job.facts.recording.u_coordinate_um
-    diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress)
+    diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known)
     kind, facts = kind_of(job), job.facts.artefact
     observe = kind.observing("diagnosed")
     changes = consequences(job, diagnosis, partial(observe, facts, where=job.recording_path), kind.standards, seed)

@@ -8,6 +8,7 @@ from cmm_uq.documents import tolerance_section
 from cmm_uq.documents.corner import corner_plot
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
 from cmm_uq.documents.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
+from cmm_uq.documents.noise_words import noise_found
 from cmm_uq.documents.origin import CERTIFICATE, came_about
 from cmm_uq.documents.outcome import Outcome, Page
 from cmm_uq.documents.posterior_file import posterior_file, posterior_name
@@ -261,11 +262,8 @@ def _posterior(result: Result) -> Section:
 def _method(result: Result) -> Section:
     ls, posterior, noise = result.least_squares, result.posterior, result.noise
     sigma, (low, high) = noise.coordinate.value, noise.coordinate.interval95
-    spread = (
-        f"{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the residuals"
-        if noise.coordinate.u > 0
-        else f"{sigma:.3g} µm, as stated"
-    )
+    source = "from the residuals" if noise.stated_um is None else f"stated {noise.stated_um:.3g} µm, and the residuals"
+    spread = f"{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, {source}"
     sd = None if ls.residual_sd is None else ls.residual_sd * 1e3
     test = f"; residuals under the stated figure: p = {noise.p_value:.2g}" if noise.p_value is not None else ""
     rows = (
@@ -275,6 +273,7 @@ def _method(result: Result) -> Section:
         ("Degrees of freedom", str(ls.degrees_of_freedom)),
         ("Residual standard deviation", "" if sd is None else f"{sd:.1f} µm"),
         ("Standard uncertainty of a coordinate", f"{spread}{test}"),
+        ("Noise", noise_found(noise)),
         ("Sampler", f"{posterior.sampler}, seed {posterior.seed}, {len(posterior.draws)} draws"),
         ("Convergence",
          f"{'reached' if posterior.converged else 'NOT reached'}: at least {posterior.ess_min:.0f} effective samples in every "

@@ -35,7 +35,7 @@ class _Noise:
     the determinant.
     """
 
-    whitening: sparse.csr_array | Floats
+    whitening: sparse.csr_array
     rows: Floats
     log: float
 
@@ -114,7 +114,7 @@ class Comparison:
 
     def noise(self, kind: Kind, random: np.random.Generator, draws: int) -> Floats:
         """What the baseline leaves (m, draws) of noise of one kind, a reading's standard deviation being one."""
-        found = kind.noise(random.standard_normal((len(self.observed), draws)))
+        found = kind.noise(random, draws)
         if self.certified.size:
             found += self.certified @ random.standard_normal((self.certified.shape[1], draws))
         return self.rest(found)
@@ -126,8 +126,9 @@ class Comparison:
             Q, R = np.linalg.qr(kind.white(self._reached))
             log = float(np.log(kind.probability)) + kind.log_factor + kind.log_whitening - _log_diagonal(R)
             rows = kind.whitening.T @ Q
-            if self.certified.size:
-                white = kind.white(self.certified)
+            shared = [columns for columns in (self.certified, kind.slow) if columns.size]
+            if shared:
+                white = kind.white(np.hstack(shared))
                 white -= Q @ (Q.T @ white)
                 factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white)
                 log -= _log_diagonal(factor)
@@ -192,6 +193,17 @@ class Comparison:
             for noise, squares in zip(self._noises, self.squares, strict=True)
         ])  # fmt: skip
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
+
+    def nothing(self, random: np.random.Generator, draws: int) -> Floats:
+        """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, as probable as their noise is."""
+        weight = self.noise_posterior()
+        chosen = random.choice(weight.size, draws, p=weight.ravel() / weight.sum())
+        kind, size = np.unravel_index(chosen, weight.shape)
+        found = np.empty((len(self.left), draws))
+        for g in np.unique(kind):
+            columns = np.flatnonzero(kind == g)
+            found[:, columns] = self.sigma[size[columns]] * self.noise(self.kinds[g], random, len(columns))
+        return found
 
     def log_evidence(
         self,

@@ -20,8 +20,9 @@ from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanatio
 from cmm_uq.diagnosis.comparison.lack_of_fit import lack_of_fit
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.diagnosis.comparison.unknown_functions import smooth_functions
-from cmm_uq.diagnosis.noise import kinds, tails
+from cmm_uq.diagnosis.noise import tails
 from cmm_uq.kinds.error_maps.columns import MapColumn, roughness
+from cmm_uq.kinds.error_maps.noise import kinds_along
 from cmm_uq.physics.thermal import EXPANSION, SCALE_EXPANSION
 from cmm_uq.points import Floats
 from cmm_uq.units import REFERENCE_TEMPERATURE
@@ -101,10 +102,7 @@ class ColumnComparison:
         left = self.observed - Q @ (Q.T @ self.observed)
         sigma = np.geomspace(rough / 10, 4 * max(rough, float(left.std())), _SIGMAS)
         contrast = np.repeat(np.arange(m // p), p)
-        noises = kinds(
-            np.arange(m), np.tile(np.arange(p, dtype=np.float64), m // p), np.column_stack([contrast, np.zeros((m, 2))]),
-            white=_WHITE, correlations=_CORRELATIONS,
-        )  # fmt: skip
+        noises = kinds_along(contrast, _WHITE, _CORRELATIONS)
         explanations = [
             Explanation(
                 rival.name, EFFECT if rival.effect else UNKNOWN,
