@@ -125,9 +125,10 @@ def diagnose(
         gain = improvement(model, model)
     joint = joint_posterior(found, seed, progress, known)
     noise = _noise(found, joint, stated)
+    after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     return Diagnosis(
         _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha), _left_out(found, joint),
-        _indistinguishable(found), _rivals(found.first), noise, gain, model, found.model,
+        _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
         joint.components, joint.posterior,
     )  # fmt: skip
 

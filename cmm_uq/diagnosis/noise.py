@@ -19,7 +19,7 @@ from cmm_uq.inference.marginal import Marginal
 from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.points import Floats
 
-SHAPES, KEPT = 512, 10
+SHAPES, KEPT = 512, 7
 """How many are drawn, and how many stand for them."""
 
 TAILS = 0.05

@@ -73,13 +73,13 @@ class Sizes:
     @property
     def coordinate(self) -> Floats:
         """(w,) root mean square of the axes' reading noise."""
-        return np.asarray(np.sqrt(np.mean(self.reading**2, axis=1)))
+        return np.asarray(np.sqrt(np.mean(self.reading**2, axis=1)), dtype=np.float64)
 
     @property
     def typical(self) -> Sizes:
         """A single draw of median sizes; what is more probably absent than not is absent."""
-        reading = np.median(self.reading, axis=0)[None]
-        return Sizes(reading, *(np.median(part)[None] for part in (self.placing, self.growth, self.slow, self.rate)))
+        others = (self.placing, self.growth, self.slow, self.rate)
+        return Sizes(np.median(self.reading, axis=0, keepdims=True), *(np.median(part, keepdims=True) for part in others))
 
     def at(self, chosen: Ints | slice) -> Sizes:
         """Some of the draws."""
@@ -142,7 +142,7 @@ class Components:
 
     def log_prior(self, latent: Floats) -> Floats:
         """(w,) of the standard normal numbers; ln σ is uniform, or near what is stated."""
-        return -0.5 * np.sum(latent[:, 1:] ** 2, axis=1) + self.log_prior_of_sigma(latent[:, 0])
+        return np.asarray(self.log_prior_of_sigma(latent[:, 0]) - 0.5 * np.sum(latent[:, 1:] ** 2, axis=1))
 
     def log_prior_of_sigma(self, log_sigma: Floats) -> Floats:
         """A stated value is good to a fifth (as if from a dozen readings), or now and then simply wrong."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.conformity.accuracy import figures, with_uncertainty
+from cmm_uq.conformity.accuracy import Repeated, figures, with_uncertainty
 
 # Lengths printed in figures C 1/C 2 (uncompensated) and C 3/C 4 (compensated) of Harris 2004, mm.
 UNCOMPENSATED = [
@@ -16,6 +16,11 @@ COMPENSATED = [
     404.2388, 404.2404, 404.2273, 404.2286, 404.2571, 404.2565, 404.2508, 404.2162, 404.2173, 404.2407, 404.2312, 404.2521,
     404.2437, 404.2311, 404.2384, 404.2115, 404.2418, 404.2311, 404.2310, 404.2280,
 ]  # fmt: skip
+
+
+def white(sigma: float, n: int) -> Repeated:
+    """Independent noise of ``n`` lengths."""
+    return lambda chosen, times, random: sigma * random.standard_normal((len(chosen), times, n))
 
 
 @pytest.mark.parametrize(
@@ -37,7 +42,7 @@ def test_the_uncertainty_of_mean_and_scatter_is_the_textbook_one() -> None:
     """Pure noise: u(mean) = σ/√n, u(s) = σ·√(1 − c4²) with c4 of twenty lengths 0.98693 (ISO 7870-2)."""
     sigma, n = 5e-3, 20
     lengths = 404 + sigma * np.random.default_rng(1).standard_normal(n)
-    found = with_uncertainty(lengths, np.full((500, n), 404.0), np.full((500, n), sigma), seed=3)
+    found = with_uncertainty(lengths, np.full((500, n), 404.0), white(sigma, n), seed=3)
     assert found["mean_length_mm"].u == pytest.approx(sigma / np.sqrt(n), rel=0.02)
     assert found["rms_accuracy_error_um"].u == pytest.approx(5.0 * np.sqrt(1 - 0.98693**2), rel=0.02)
     assert found["b89_range_um"].u == pytest.approx(5.0 * 0.7287, rel=0.02)  # d3 of twenty (ISO 7870-2)
@@ -46,7 +51,7 @@ def test_the_uncertainty_of_mean_and_scatter_is_the_textbook_one() -> None:
 def test_the_value_is_that_of_the_recording_and_lies_in_its_interval() -> None:
     lengths = np.array(COMPENSATED)
     predicted = np.tile(lengths.mean(), (100, 20))
-    for name, quantity in with_uncertainty(lengths, predicted, np.full((100, 20), 12e-3), seed=0).items():
+    for name, quantity in with_uncertainty(lengths, predicted, white(12e-3, 20), seed=0).items():
         assert quantity.value == figures(lengths)[name]
         assert quantity.interval95[0] < quantity.value < quantity.interval95[1]
 
@@ -59,7 +64,7 @@ def test_intervals_cover_the_figure_that_repetitions_would_show() -> None:
     hits = dict.fromkeys(many, 0)
     for seed in range(400):
         lengths = true + noise * random.standard_normal(20)
-        found = with_uncertainty(lengths, np.tile(true, (20, 1)), np.full((20, 20), noise), seed)
+        found = with_uncertainty(lengths, np.tile(true, (20, 1)), white(noise, 20), seed)
         for name, quantity in found.items():
             hits[name] += quantity.interval95[0] <= many[name].mean() <= quantity.interval95[1]
     for name, count in hits.items():

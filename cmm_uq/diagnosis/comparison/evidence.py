@@ -173,9 +173,19 @@ class Comparison:
         return {}
 
     def over_sigma(self, squares: Floats) -> Floats:
-        """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape, from a table over ln(squares)."""
-        nodes, values = self._table
-        return np.interp(np.log(np.maximum(squares, 1e-300)), nodes, values)
+        """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape: in closed form if ln σ is uniform, else from a table."""
+        found = np.log(np.maximum(squares, 1e-300))
+        if np.ptp(self.log_sigma) > 0:
+            return np.interp(found, *self._table)
+        half = 0.5 * self.degrees_of_freedom
+        found *= -half
+        return found + self._uniform
+
+    @cached_property
+    def _uniform(self) -> float:
+        """Constant of the gamma integral over a uniform ln σ."""
+        half, step = 0.5 * self.degrees_of_freedom, float(np.log(self.sigma[1] / self.sigma[0]))
+        return float(special.gammaln(half) + (half - 1) * np.log(2) + self.log_sigma[0] - np.log(step))
 
     @cached_property
     def _table(self) -> tuple[Floats, Floats]:
@@ -195,7 +205,7 @@ class Comparison:
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
     def nothing(self, random: np.random.Generator, draws: int) -> Floats:
-        """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, as probable as their noise is."""
+        """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, their noise by its posterior."""
         weight = self.noise_posterior()
         chosen = random.choice(weight.size, draws, p=weight.ravel() / weight.sum())
         kind, size = np.unravel_index(chosen, weight.shape)

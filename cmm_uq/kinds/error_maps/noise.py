@@ -35,9 +35,5 @@ def _correlated(phi: float, chain: Ints, probability: float) -> Kind:
     after = np.flatnonzero(follows)
     rows, columns = np.append(np.arange(m), after), np.append(np.arange(m), after - 1)
     values = np.append(diagonal, np.full(len(after), -phi / innovation))
-    return Kind(
-        "correlated",
-        sparse.csr_array((values, (rows, columns)), shape=(m, m)),
-        float(np.log(diagonal).sum()),
-        probability,
-    )
+    whitening = sparse.csr_array((values, (rows, columns)), shape=(m, m))
+    return Kind("correlated", whitening, float(np.log(diagonal).sum()), probability)
