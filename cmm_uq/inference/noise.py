@@ -47,6 +47,9 @@ FASTEST = 200.0
 """Largest rate of slow noise, over the duration of the recording."""
 
 _CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]).T / np.sqrt([6.0, 2.0])
+_FARTHEST = 5.0
+"""Largest logarithm of an axis' noise over the mean of all."""
+
 _MOST_CLASSES, _STEPS = 48, 20
 _VARIANCES = 6
 """Columns of ``shares``: reading noise along x, y, z; set-up offset; growing noise; the fast part of slow noise."""
@@ -79,7 +82,9 @@ class Sizes:
     def typical(self) -> Sizes:
         """A single draw of median sizes; what is more probably absent than not is absent."""
         others = (self.placing, self.growth, self.slow, self.rate)
-        return Sizes(np.median(self.reading, axis=0, keepdims=True), *(np.median(part, keepdims=True) for part in others))
+        return Sizes(
+            np.median(self.reading, axis=0, keepdims=True), *(np.median(part, keepdims=True) for part in others)
+        )
 
     def at(self, chosen: Ints | slice) -> Sizes:
         """Some of the draws."""
@@ -125,8 +130,9 @@ class Components:
         reading = np.repeat(sigma[:, None], 3, axis=1)
         if AXES in self.possible:
             spread = _half_normal(column["spread"], ABSENT[AXES], AXES_SPREAD)
-            apart = np.column_stack([column["first"], column["second"]]) @ _CONTRASTS.T
-            reading = reading * np.exp(np.clip(spread[:, None] * apart, -5, 5))
+            apart = spread[:, None] * (np.column_stack([column["first"], column["second"]]) @ _CONTRASTS.T)
+            most = np.abs(apart).max(axis=1, keepdims=True)
+            reading = reading * np.exp(apart * np.minimum(1.0, _FARTHEST / np.maximum(most, 1e-9)))
         ratios = {
             name: sigma * _half_cauchy(column[name], ABSENT[name], RATIO[name]) if name in self.possible else nothing
             for name in (PLACING, GROWTH, SLOW)
@@ -206,14 +212,14 @@ def slow_variances(sd: Floats, rate: Floats, frequency: Floats) -> tuple[Floats,
     """Variances (w, c) of the cosines of slow noise, and of what is faster than the fastest of them (w,).
 
     An Ornstein–Uhlenbeck process of standard deviation ``sd`` (w,) and ``rate`` (w,), over the duration, has the spectral
-    density 2·rate·sd²/(rate² + ω²); the constant is the mean over the recording.
+    density 2·rate·sd²/(rate² + ω²), of which Σ over all half turns is coth(rate) − 1/rate; the constant has the rest of sd².
     """
     if not len(frequency):
         return np.zeros((len(sd), 0)), np.zeros_like(sd)
     rate = rate[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         cosine = 2 * rate / (rate**2 + (np.pi * frequency) ** 2)
-        mean = 2 / rate * (1 + np.expm1(-rate) / rate)
+        mean = 1 - 1 / np.tanh(rate) + 1 / rate
     each = np.where(frequency == 0, mean, cosine)
     shown = each[:, np.unique(frequency, return_index=True)[1]].sum(axis=1)
     return sd[:, None] ** 2 * each, sd**2 * np.maximum(1 - shown, 0.0)

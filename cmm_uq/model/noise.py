@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from cmm_uq.inference.noise import AXES, FREQUENCIES, GROWTH, PLACING, SLOW, Components
+from cmm_uq.model.drawn_noise import distances_in_placing
 from cmm_uq.model.measurement import MeasurementModel
 from cmm_uq.points import Floats, Ints
 
@@ -157,11 +158,7 @@ def _lengths(model: MeasurementModel, xyz: Floats) -> Floats:
     artefact, rows = model.artefact, model.artefact.rows
     if rows.shape[1] == 2:
         return np.asarray(np.linalg.norm(xyz[rows[:, 1]] - xyz[rows[:, 0]], axis=1))
-    order = np.lexsort((artefact.points.point, artefact.points.measurement))
-    _, starts, index = np.unique(artefact.points.measurement[order], return_index=True, return_inverse=True)
-    first = np.empty(len(order), dtype=np.int64)
-    first[order] = order[starts][index.ravel()]
-    return np.asarray(np.linalg.norm(xyz - xyz[first], axis=1)[rows[:, 0]])
+    return distances_in_placing(xyz, artefact.points)[rows[:, 0]]
 
 
 def _slow(model: MeasurementModel, chosen: np.ndarray, sensitivity: Floats) -> tuple[Floats, Floats]:
