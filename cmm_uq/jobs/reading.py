@@ -162,4 +162,5 @@ def _no_points(machine: Machine) -> Points:
 
 def _machine(facts: MachineFacts) -> Machine:
     travel = np.array([getattr(facts.travel_mm, axis) or [np.nan, np.nan] for axis in AXES], dtype=np.float64)
-    return Machine(facts.name, facts.chain, travel, np.array(facts.origin_mm, dtype=np.float64))
+    axes = tuple(axis for axis in AXES if axis.upper() in facts.chain)
+    return Machine(facts.name, facts.chain, travel, np.array(facts.origin_mm, dtype=np.float64), axes=axes)

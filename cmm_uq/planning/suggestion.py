@@ -95,7 +95,7 @@ def suggestions(
         facts = facts.model_copy(update={"length_mm": artefact.sizes[0].nominal})
     try:
         points = artefact.points
-        volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.readings)
+        volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.carriages)
         places = planning.elsewhere(artefact, volume, _CANDIDATES)
         known = _information(diagnosis.after, model, partial(observe, facts), places, shared_freedoms=planning.shared)
     except CmmUqError:  # nowhere else to put it

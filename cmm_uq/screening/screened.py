@@ -124,7 +124,7 @@ def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
         if np.any(rows := outside[:, i]):
             low, high = points.machine.travel_mm[i]
             why = (
-                f"scale readings of {axis.upper()} ({axis}_mm + origin) of {span(points.readings[rows, i])} mm lie outside "
+                f"scale readings of {axis.upper()} ({axis}_mm + origin) of {span(points.readings[axis][rows])} mm lie outside "
                 f"the travel {low:g} to {high:g} mm{_hint(points, i)}"
             )
             found.append(finding("impossible", points, rows, why, f"{axis}_mm"))

@@ -37,7 +37,7 @@ def test_the_example_is_read_with_its_machine_and_points(iota: Path) -> None:
     assert job.facts.job.id == "iota-1102-20C"
     assert job.points.xyz.shape == (40, 3)
     assert job.points.machine.travel("z") == (-500.0, 0.0)
-    np.testing.assert_allclose(job.points.readings[0], [-496.6823 + 805, -134.2409 + 303, 27.7912 - 294])
+    np.testing.assert_allclose(job.points.carriages[0], [-496.6823 + 805, -134.2409 + 303, 27.7912 - 294])
     assert set(job.points.columns) == {"radius_mm", "fit_rms_um", "n_points"}
 
 
