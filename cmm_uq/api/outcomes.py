@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import pandas as pd
 
-from cmm_uq.api.tables import html_table, quantities, quantity_frame, shown
+from cmm_uq.api.tables import quantities, quantity_frame, shown
 from cmm_uq.commands.plan import PLAN
 from cmm_uq.commands.report import DIAGNOSE, REPORT
 from cmm_uq.commands.written import Form
@@ -19,6 +19,7 @@ from cmm_uq.documents.outcome import Outcome
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
 from cmm_uq.jobs.job import Job
+from cmm_uq.notebook import html_table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,16 +72,7 @@ class Found:
         Parameters
         ----------
         folder : to write to; without one, that of the command: below ``reports/<job id>``.
-        force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-
-        Returns
-        -------
-        path of each file, by its name.
-
-        Raises
-        ------
-        CmmUqError : something stands in the folder that was not written for this job.
-        OutputError : the folder cannot be written to.
+        force : as of :meth:`cmm_uq.jobs.job.Job.write`, which says too what is given back, and what is refused.
         """
         out = None if folder is None else Path(folder)
         return self.form.write(self.job, lambda: self.outcome, out, force=force).files

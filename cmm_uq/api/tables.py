@@ -1,9 +1,8 @@
-"""Results as tables: frames for computing, HTML for notebooks."""
+"""Results as tables: frames for computing, and rows of text."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from html import escape
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import pandas as pd
@@ -49,10 +48,3 @@ def shown(frame: pd.DataFrame) -> Iterator[tuple[str, ...]]:
     for name, value, u, lower, upper, unit in frame.itertuples():
         text, expanded = rounded(value, max(upper - value, value - lower)) if u > 0 else (f"{value:.6g}", "0")
         yield str(name), f"{text} ± {expanded}", str(unit)
-
-
-def html_table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table for a notebook; every text is escaped. Empty without rows."""
-    body = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
-    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
-    return f"<table><caption>{escape(caption)}</caption><tr>{head}</tr>{body}</table>" if body else ""

@@ -59,7 +59,7 @@ def write_report(
     tell = stage or silent
     tell("Reading the job", 0.0)
     read = read_job(job)
-    analysis.recipe_of(read)  # refused before anything is made
+    analysis.report_recipe(read)  # refused before anything is made
     return REPORT.write(read, lambda: report_outcome(read, seed=seed, stage=tell), out, force=force, stage=tell)
 
 

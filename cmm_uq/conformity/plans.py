@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from cmm_uq.conformity.measurement_lines import FACE_DIAGONALS, PARALLELS, SPACE_DIAGONALS
-from cmm_uq.jobs.job import Standard
+from cmm_uq.jobs.conformity import Standard
 from cmm_uq.points import Floats
 
 

@@ -12,7 +12,7 @@ from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import PLANS
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ConformityFacts, needed
+from cmm_uq.jobs.conformity import ConformityFacts, needed
 from cmm_uq.model.artefact import Artefact, Forms
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity

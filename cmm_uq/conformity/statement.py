@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from cmm_uq.conformity.decision import Decision
-from cmm_uq.jobs.job import CHARACTERISTICS, ConformityFacts
+from cmm_uq.jobs.conformity import CHARACTERISTICS, ConformityFacts
 
 StatementOutcome = Literal["pass", "fail", "undecided", "incomplete"]
 

@@ -12,9 +12,10 @@ from pydantic import create_model
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.file_names import check_distinct
-from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, Tables, job_file_of
+from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned

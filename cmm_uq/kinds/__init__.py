@@ -14,7 +14,8 @@ from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts, Job
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.job import Job
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import Kind
 from cmm_uq.points import Points

@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TypeVar
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Points
 

@@ -17,7 +17,7 @@ import numpy as np
 from cmm_uq.diagnosis.comparison.explanations import shapes
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Observe, Observed

@@ -17,7 +17,7 @@ from scipy import linalg, special
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.linear_model import LinearModel
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.model.kind import Observe
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.screening.columns import SENSORS, about_whole_column, column_findings

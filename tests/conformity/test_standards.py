@@ -10,14 +10,7 @@ import pytest
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import (
-    ConformityFacts,
-    FalseAccept,
-    GuardBand,
-    MaximumPermissibleError,
-    Rule,
-    Standard,
-)
+from cmm_uq.jobs.conformity import ConformityFacts, FalseAccept, GuardBand, MaximumPermissibleError, Rule, Standard
 from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.gauge_lines.observe import StepGauge

@@ -12,7 +12,7 @@ import pytest
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ConformityFacts
+from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.kinds import artefact_facts
 

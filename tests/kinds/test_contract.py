@@ -21,7 +21,7 @@ from cmm_uq.commands.simulate import write_simulation
 from cmm_uq.documents.origin import file_name
 from cmm_uq.documents.outcome import OwnAnalysis, Page
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import BUILT_IN, kind_named, names
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import Kind

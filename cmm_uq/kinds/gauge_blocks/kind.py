@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.jobs.job import ReferencedFacts
+from cmm_uq.jobs.artefact import ReferencedFacts
 from cmm_uq.model.kind import Kind
 
 KIND = Kind(

@@ -17,6 +17,7 @@ from cmm_uq.kinds.shift_axis.shift_integration import Method
 from cmm_uq.kinds.shift_axis.undetermined import Undetermined, undetermined
 from cmm_uq.kinds.shifting.correction_table import correction_table
 from cmm_uq.kinds.shifting.facts import KnownLength, ShiftFacts, shift_facts
+from cmm_uq.kinds.shifting.found import ShiftFound
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats, Ints, Points
@@ -31,18 +32,15 @@ _MISREAD = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class ShiftResult:
-    """All that is known of a shift job after its analysis.
+class ShiftResult(ShiftFound):
+    """All that is known of a shift job after its analysis; see also :class:`~cmm_uq.kinds.shifting.found.ShiftFound`.
 
     Parameters
     ----------
-    job : what was analysed.
-    estimate : curve with its posterior.
     undetermined : what no reading shows.
     integrated : the paper's integrations of two complete series, by method; empty otherwise.
     """
 
-    job: Job
     estimate: CurveEstimate
     undetermined: Undetermined
     integrated: dict[Method, IntegratedCurve]
@@ -106,22 +104,6 @@ class ShiftResult:
         if self.estimate.scale_known:
             draws -= self.estimate.scale[:, None] * (curve.position - ends[0])
         return np.asarray(draws, dtype=np.float64)
-
-    @cached_property
-    def disagreement_um(self) -> tuple[float, float]:
-        """Root mean square of what the placings disagree by, without and with the curve, µm."""
-        without, with_curve = (rms_um(values) for values in self.estimate.residuals)
-        return without, with_curve
-
-    @property
-    def repeatability(self) -> Quantity:
-        """Standard uncertainty of one reading, µm."""
-        return Quantity.of_draws(self.estimate.sigma / MICROMETRE, "µm")
-
-
-def rms_um(values: Floats) -> float:
-    """Root mean square of mm, in µm."""
-    return float((values**2).mean() ** 0.5) / MICROMETRE
 
 
 def _ptp(values: Floats) -> float:
