@@ -65,7 +65,7 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     posterior = sample(estimate.linear, seed, progress)
     figures = accuracy(model, estimate, posterior, seed)
     statements = [
-        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.standards)
+        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested)
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
     result = Result(

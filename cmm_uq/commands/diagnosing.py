@@ -110,7 +110,7 @@ def diagnosed(
     diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress)
     kind, facts = kind_of(job), job.facts.artefact
     observe = kind.observing("diagnosed")
-    changes = consequences(job, diagnosis, partial(observe, facts, where=job.recording_path), kind.standards, seed)
+    changes = consequences(job, diagnosis, partial(observe, facts, where=job.recording_path), kind.tested, seed)
     next_ones = suggestions(diagnosis, facts, observe, kind.offers("plan", Planning), job.facts.plan)
     return Diagnosed(job, findings, diagnosis, next_ones, changes)
 

@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal, Protocol, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from cmm_uq.errors import suggestion
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.table import Limit, Table, Uncertainty, at_least
-
-Standard = Literal["ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617"]
-
-CHARACTERISTICS: Mapping[Standard, str] = {
-    "ASME B89.4.1-1997": "volumetric performance", "ISO 10360-2:2009": "E0", "ISO 10360-5:2010": "P_FTU",
-    "VDI/VDE 2617": "E0",
-}  # fmt: skip
-"""The characteristic that is decided of each standard, of all that it has."""
-
-LENGTH_STANDARDS: tuple[Standard, ...] = ("ISO 10360-2:2009", "VDI/VDE 2617")
-"""Standards that compare with calibrated lengths."""
-
-FORM_STANDARD: Standard = "ISO 10360-5:2010"
-"""Compares the form of a calibrated sphere."""
 
 
 class MaximumPermissibleError(Table):
@@ -50,11 +38,19 @@ Rule = Literal["simple", "ISO 14253-1"] | GuardBand | FalseAccept
 class ConformityFacts(Table):
     """One ``[[conformity]]``: a standard, a limit and a decision rule."""
 
-    standard: Standard
+    standard: str
     characteristic: str | None = None
     limit_um: Limit | None = None
     mpe: MaximumPermissibleError | None = None
     rule: Rule = "ISO 14253-1"
+
+    @field_validator("standard")
+    @classmethod
+    def _known(cls, name: str, info: ValidationInfo) -> str:
+        standards = standards_in(info)
+        if standards is not None and standards.named(name) is None:
+            raise ValueError(f"no such standard is decided. {suggestion(name, standards.names())}")
+        return name
 
     @model_validator(mode="after")
     def _one_limit(self) -> Self:
@@ -63,22 +59,45 @@ class ConformityFacts(Table):
         return self
 
     @model_validator(mode="after")
-    def _decided_here(self) -> Self:
-        known = CHARACTERISTICS[self.standard]
-        if self.characteristic not in (None, known):
-            raise ValueError(
-                f"characteristic = {self.characteristic!r} of {self.standard} is not decided here: only {known}"
-            )
+    def _decided_here(self, info: ValidationInfo) -> Self:
+        if asked := _asked(self, standards_in(info)):
+            asked.characteristic(self.characteristic)
         return self
 
-    def uncertainty_missing(self, artefact: ArtefactFacts) -> str | None:
+
+class Asked(Protocol):
+    """What the check of a job must know of a standard."""
+
+    def characteristic(self, name: str | None) -> object:
+        """One that it decides; ``ValueError`` for a name that it does not."""
+        ...
+
+    def uncertainty_missing(self, wish: ConformityFacts, artefact: ArtefactFacts) -> str | None:
         """The key of ``[artefact]`` whose uncertainty the rule needs and does not have; ``None`` when nothing is missing."""
-        if self.rule == "simple":
-            return None
-        if self.standard in LENGTH_STANDARDS:
-            return "u_um" if artefact.certified and not artefact.u_um else None
-        key = artefact.form_key if self.standard == FORM_STANDARD else None
-        return key if key is not None and not getattr(artefact, key) else None
+        ...
+
+
+@dataclass(frozen=True)
+class Standards:
+    """The standards that a job may name: what is asked of each, and their names."""
+
+    named: Callable[[str], Asked | None]
+    names: Callable[[], Sequence[str]]
+
+
+def standards_in(info: ValidationInfo) -> Standards | None:
+    """The standards that a job is checked against; ``None`` for a table that is made by itself, without a job."""
+    return info.context if isinstance(info.context, Standards) else None
+
+
+def uncertainty_missing(wish: ConformityFacts, artefact: ArtefactFacts, standards: Standards | None) -> str | None:
+    """See :meth:`Asked.uncertainty_missing`; ``None`` where there is nothing to check against."""
+    asked = _asked(wish, standards)
+    return asked.uncertainty_missing(wish, artefact) if asked else None
+
+
+def _asked(wish: ConformityFacts, standards: Standards | None) -> Asked | None:
+    return None if standards is None else standards.named(wish.standard)
 
 
 def needed(key: str, wish: ConformityFacts) -> tuple[str, str]:

@@ -14,7 +14,7 @@ from pydantic import Field, ValidationInfo, create_model, field_validator, model
 from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.conformity import ConformityFacts, needed
+from cmm_uq.jobs.conformity import ConformityFacts, needed, standards_in, uncertainty_missing
 from cmm_uq.jobs.file_names import device_name
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
@@ -135,7 +135,7 @@ class JobFile(Table):
     ) -> list[ConformityFacts]:  # fmt: skip
         artefact = info.data.get("artefact")
         for wish in wishes:
-            key = wish.uncertainty_missing(artefact) if artefact is not None else None
+            key = uncertainty_missing(wish, artefact, standards_in(info)) if artefact is not None else None
             if key is not None:
                 raise ValueError(". ".join(needed(key, wish)))
         return wishes

@@ -11,7 +11,7 @@ import pytest
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.physics.catalogue import EVERY, effects, every, plugins
-from cmm_uq.physics.plugins import BrokenPluginError
+from cmm_uq.plugins import BrokenPluginError
 from cmm_uq.points import Machine
 from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
 from tests.recordings import TRAVEL, bars

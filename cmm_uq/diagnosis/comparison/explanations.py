@@ -15,7 +15,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect, Nonparametric
-from cmm_uq.physics.plugins import BrokenPluginError
+from cmm_uq.plugins import BrokenPluginError
 from cmm_uq.points import Floats, Points
 
 EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
