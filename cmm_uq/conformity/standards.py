@@ -48,7 +48,8 @@ def statement(
 
     Raises
     ------
-    CmmUqError : there is no such standard, the recording is not what the standard is decided on, or the rule needs an uncertainty that is not stated.
+    CmmUqError : there is no such standard, the recording is not what it is decided on, or the rule needs an uncertainty
+        that is not stated.
     """
     standard = standard_named(facts.standard)
     if standard is None:

@@ -16,11 +16,10 @@ from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate, placed_plate
 from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
 from cmm_uq.kinds.shifting.correction_table import plane_correction_table
 from cmm_uq.kinds.shifting.facts import KnownLength, shift_facts
-from cmm_uq.kinds.shifting.found import ShiftFound
+from cmm_uq.kinds.shifting.found import Reported, ShiftFound, listed_draws
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.points import AXES, Floats
-from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
 
@@ -58,9 +57,21 @@ class PlaneShiftResult(ShiftFound):
         return found
 
     @cached_property
-    def covariance(self) -> Covariance:
-        """Of them all."""
-        return Covariance.of_draws({".".join(key): (draws, unit) for key, (draws, unit, _) in self._draws.items()})
+    def reported(self) -> Reported:
+        """See :attr:`ShiftFound.reported`."""
+        return {".".join(key): (draws, unit) for key, (draws, unit, _) in self._draws.items()}
+
+    @cached_property
+    def listed(self) -> Reported:
+        """See :attr:`ShiftFound.listed`: the curves, and the places of the balls."""
+        found: dict[str, tuple[Floats, str]] = {}
+        for name, curve in self.curves.items():
+            found |= listed_draws(f"curves.{name}.error_um", curve.draws / MICROMETRE, "µm")
+        for name, curve in self.rotations.items():
+            found |= listed_draws(f"curves.{name}.error_arcsec", curve.draws / ARCSECOND, "″")
+        for k, name in enumerate(("first_mm", "second_mm")):
+            found |= listed_draws(f"artefact.{name}", self.estimate.balls[:, :, k], "mm")
+        return found
 
     @cached_property
     def _draws(self) -> dict[tuple[str, str], tuple[Floats, str, float | None]]:
