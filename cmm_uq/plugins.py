@@ -143,9 +143,15 @@ def naming_package() -> Iterator[None]:
     except CmmUqError:
         raise
     except Exception as error:
-        if at_fault := _at_fault(error):
-            raise _broken(at_fault, f"fails with {type(error).__name__}: {error}") from error
+        if (told := told_with_package(error)) is not None:
+            raise told from error
         raise
+
+
+def told_with_package(error: Exception) -> BrokenPluginError | None:
+    """An error with the name of the package whose code it came through; ``None`` where it came through none."""
+    at_fault = _at_fault(error)
+    return _broken(at_fault, f"fails with {type(error).__name__}: {error}") if at_fault else None
 
 
 def _at_fault(error: Exception) -> tuple[Plugin, ...]:

@@ -11,11 +11,13 @@ from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import PLANNED
 from cmm_uq.planning.placing import joined
+from cmm_uq.plugins import naming_package
 
 TO_FILL_IN = "plan.csv"
 PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
 
 
+@naming_package()
 def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent) -> Outcome:
     """Plan a job that was read, whose recording may be missing; nothing is written.
 

@@ -12,11 +12,13 @@ from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import Nameable
 from cmm_uq.kinds import names, table_of
+from cmm_uq.plugins import naming_package
 
 NAMEABLE = Nameable(table_of, names, Standards(standard_named, standard_names))
 """Every kind and every standard that there is, of other packages too."""
 
 
+@naming_package()
 def read_job(folder: Path, *, recorded: bool = True) -> Job:
     """Read and check a job; see :func:`cmm_uq.jobs.reading.read_job`.
 
@@ -32,11 +34,13 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
     return reading.read_job(folder, NAMEABLE, recorded=recorded)
 
 
+@naming_package()
 def read_machine(folder: Path) -> Job:
     """A job for its machine alone; see :func:`cmm_uq.jobs.reading.read_machine`."""
     return reading.read_machine(folder, NAMEABLE)
 
 
+@naming_package()
 def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
     """Read and check a job that lies in no folder yet; see :func:`cmm_uq.jobs.reading.job_of`.
 
