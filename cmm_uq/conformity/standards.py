@@ -5,7 +5,7 @@ Another package offers one as an entry point of the group ``cmm_uq.standards``, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from functools import partial
 from types import MappingProxyType
 
@@ -14,7 +14,7 @@ import numpy as np
 from cmm_uq.conformity.copies import copied
 from cmm_uq.conformity.decision import decide
 from cmm_uq.conformity.plan_conditions import conditions
-from cmm_uq.conformity.plans import B89, ISO_10360_2, ISO_10360_5, Condition, Plan
+from cmm_uq.conformity.plans import B89, ISO_10360_2, ISO_10360_5
 from cmm_uq.conformity.standard import Characteristic, Standard, Test, characteristic_of
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.errors import CmmUqError, suggestion
@@ -131,11 +131,6 @@ def _form_error(test: Test) -> Statement:
     return test.stated("probing form error", "points", (item,), remarks)
 
 
-def _held_to(plan: Plan) -> Callable[..., tuple[Condition, ...]]:
-    """What a plan asks for, of an artefact as :attr:`Characteristic.conditions` has it."""
-    return partial(conditions, plan)
-
-
 def _length_unstated(artefact: ArtefactFacts) -> str | None:
     return "u_um" if artefact.certified and not artefact.u_um else None
 
@@ -145,14 +140,14 @@ def _form_unstated(artefact: ArtefactFacts) -> str | None:
     return key if key is not None and not getattr(artefact, key) else None
 
 
-_E0 = Characteristic("E0", LENGTHS, _errors_of_indication, _held_to(ISO_10360_2), _length_unstated)
+_E0 = Characteristic("E0", LENGTHS, _errors_of_indication, partial(conditions, ISO_10360_2), _length_unstated)
 
 BUILT_IN: Mapping[str, Standard] = MappingProxyType({standard.name: standard for standard in (
     Standard("ASME B89.4.1-1997",
-             (Characteristic("volumetric performance", BARS, _volumetric_performance, _held_to(B89)),)),
+             (Characteristic("volumetric performance", BARS, _volumetric_performance, partial(conditions, B89)),)),
     Standard("ISO 10360-2:2009", (_E0,)),
     Standard("ISO 10360-5:2010",
-             (Characteristic("P_FTU", FORMS, _form_error, _held_to(ISO_10360_5), _form_unstated),)),
+             (Characteristic("P_FTU", FORMS, _form_error, partial(conditions, ISO_10360_5), _form_unstated),)),
     Standard("VDI/VDE 2617", (_E0,), (
         "VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions.",
     )),
