@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import Any, ClassVar
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from cmm_uq.api.tables import quantities, quantity_frame, shown
 from cmm_uq.commands.plan import PLAN
@@ -20,6 +18,9 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
 from cmm_uq.jobs.job import Job
 from cmm_uq.notebook import html_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -135,6 +136,8 @@ class Report(Found):
     @cached_property
     def conformity(self) -> pd.DataFrame:
         """Statements of conformity, one a row, with the columns of results.json; lengths and remarks as lists."""
+        import pandas as pd
+
         return pd.DataFrame(list(self.results.get("conformity", [])))
 
     @property
@@ -197,6 +200,8 @@ class Plan(Found):
     @cached_property
     def placings(self) -> pd.DataFrame:
         """What is to be measured: title, minutes and number of points, by measurement."""
+        import pandas as pd
+
         frame = pd.DataFrame(list(self.results["placings"]), columns=["measurement", "title", "minutes", "points"])
         return frame.set_index("measurement")
 

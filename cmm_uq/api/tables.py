@@ -1,14 +1,15 @@
-"""Results as tables: frames for computing, and rows of text."""
+"""Results as tables: frames for computing, and rows of text. Whoever asks for no frame does not wait for pandas."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import printed_unit
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 QUANTITY = ("value", "u", "lower", "upper", "unit")
 
@@ -32,6 +33,8 @@ def quantities(results: Mapping[str, Any], units: Mapping[str, str]) -> pd.DataF
 
 def quantity_frame(found: Mapping[str, Mapping[str, Any]], units: Mapping[str, str]) -> pd.DataFrame:
     """Quantities of results.json as rows of value, u, ends of the 95 % interval, and unit."""
+    import pandas as pd
+
     rows = [
         (item["value"], item["u"], *item["interval95"], units.get(name, printed_unit(name)))
         for name, item in found.items()
