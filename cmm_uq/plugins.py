@@ -10,7 +10,8 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from functools import lru_cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from traceback import walk_tb
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -102,8 +103,14 @@ def offered(group: str, of: type[Of]) -> tuple[Of, ...]:
     group : one of :data:`WHAT`.
     of : what makes each of package, version and entry point.
     """
-    found = sorted(entry_points(group=group), key=lambda entry: (entry.name, entry.value))
+    found = sorted(_entries(group, tuple(sys.path)), key=lambda entry: (entry.name, entry.value))
     return tuple(of(*((e.dist.name, e.dist.version) if e.dist else (e.module, "")), e) for e in found)
+
+
+# What is installed follows from where packages are looked for, so that is the key; looking takes milliseconds.
+@lru_cache(maxsize=12)
+def _entries(group: str, path: tuple[str, ...]) -> EntryPoints:
+    return entry_points(group=group)
 
 
 def named(plugins: Iterable[Of], name: str) -> Of | None:
