@@ -18,7 +18,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.inference.effective import bulk_ess
-from cmm_uq.inference.ensembles import ENSEMBLES, rhat
+from cmm_uq.inference.ensembles import ENSEMBLES, normal_scores, rhat, split
 from cmm_uq.points import Floats, Ints
 
 if TYPE_CHECKING:
@@ -64,14 +64,18 @@ class Draws(Mapping[str, Floats]):
         return list(self.units)
 
     @cached_property
+    def _scores(self) -> Floats:
+        return normal_scores(split(self.array))
+
+    @cached_property
     def rhat_max(self) -> float:
         """Largest rank-normalised split R-hat, each walker a chain; ``nan`` with nothing drawn."""
-        return rhat(self.array) if len(self) else float("nan")
+        return rhat(self.array, self._scores) if len(self) else float("nan")
 
     @cached_property
     def ess_bulk_min(self) -> float:
         """Smallest bulk effective sample size, each walker a chain; ``nan`` with nothing drawn."""
-        return bulk_ess(self.array) if len(self) else float("nan")
+        return bulk_ess(self.array, self._scores) if len(self) else float("nan")
 
     @cached_property
     def covariance(self) -> pd.DataFrame:
