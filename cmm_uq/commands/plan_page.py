@@ -96,7 +96,7 @@ def plan_document(plan: Plan) -> Document:
         warnings=_warnings(plan),
         sections=_sections(plan),
         attachments=("plan.csv", "results.json") if plan.to_measure else ("results.json",),
-        produced_by=program(),
+        produced_by=program(plan.job),
         end="End of plan",
     )  # fmt: skip
 

@@ -28,6 +28,7 @@ from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.plugins import naming_package
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE
 from cmm_uq.writing import Owner, staged
@@ -39,6 +40,7 @@ _TRUTH_GIVES = "It gives the effects, the noise and the seed"
 _FIX = "Give effects, sizes and noise that a machine can have"
 
 
+@naming_package()
 def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str = TRUTH) -> Points:
     """The points of a recording with the placings of the job's own.
 
@@ -122,7 +124,7 @@ def _files(job: Job, content: bytes, truth: Path, seed: int | None) -> dict[str,
     how = f", seed {drawn.seed if seed is None else seed}, from {TRUTH}"
     files = {
         **{name: data for name, data in job.inputs.items() if name != "job.toml"},
-        job.facts.recording.file: first_line("simulate", program(drawn.effects), how).encode() + recording(points),
+        job.facts.recording.file: first_line("simulate", program(job, drawn.effects), how).encode() + recording(points),
         TRUTH: content,
     }
     return {"job.toml": derived_toml(job, "simulate", files, without=IN_THE_RECORDING), **files}

@@ -35,7 +35,7 @@ class Consequences:
 
 
 def consequences(
-    job: Job, diagnosis: Diagnosis, observe: Observed, standards: Collection[str], seed: int
+    job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int
 ) -> Consequences | None:
     """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
 
@@ -44,7 +44,7 @@ def consequences(
     Parameters
     ----------
     observe : makes the artefact of points.
-    standards : that may be stated of its kind.
+    tested : what of its kind a standard may be decided on.
     seed : of the figures' repetitions.
     """
     found = {item.effect for item in diagnosis.effects}
@@ -77,8 +77,8 @@ def consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(
             (
-                statement(wish, artefact, before, key, standards),
-                statement(wish, corrected, after, key, standards, artefact),
+                statement(wish, artefact, before, key, tested),
+                statement(wish, corrected, after, key, tested, artefact),
             )
             for i, wish in enumerate(job.facts.conformity, 1)
             for key in [f"[[conformity]] {i}"]

@@ -12,7 +12,7 @@ from typing import Literal
 
 from scipy import optimize, special
 
-from cmm_uq.jobs.job import FalseAccept, GuardBand, Rule
+from cmm_uq.jobs.conformity import FalseAccept, GuardBand, Rule
 
 Outcome = Literal["pass", "fail", "undecided"]
 

@@ -13,7 +13,6 @@ from types import MappingProxyType
 import numpy as np
 
 from cmm_uq.conformity.measurement_lines import FACE_DIAGONALS, PARALLELS, SPACE_DIAGONALS
-from cmm_uq.jobs.job import Standard
 from cmm_uq.points import Floats
 
 
@@ -118,12 +117,6 @@ a longer volume needs, what nearly cubic is, and the distance are this project's
 
 ISO_10360_5 = SpherePlan(25, 45.0)
 """Twenty-five points (Renishaw's summary of ISO 10360), spread over a hemisphere; the reach is this project's figure."""
-
-PLANS: Mapping[Standard, Plan] = MappingProxyType({
-    "ASME B89.4.1-1997": B89, "ISO 10360-2:2009": ISO_10360_2, "ISO 10360-5:2010": ISO_10360_5,
-    "VDI/VDE 2617": ISO_10360_2,
-})  # fmt: skip
-"""By standard; VDI/VDE 2617 is held to that of ISO 10360-2."""
 
 READY: Mapping[str, Plan] = MappingProxyType(
     {"ASME B89.4.1": B89, "ISO 10360-2": ISO_10360_2, "ISO 10360-5": ISO_10360_5}

@@ -61,7 +61,7 @@ def _certificate(result: Result, page: Page, told: tuple[str, ...]) -> Document:
     if result.job.facts.job.diagnosis_on_certificate:
         sections += diagnosis_sections(result.diagnosed)
     sections += [_posterior(result), _method(result)]
-    produced_by = f"{program()}, {result.posterior.sampler}, seed {result.posterior.seed}"
+    produced_by = f"{program(result.job)}, {result.posterior.sampler}, seed {result.posterior.seed}"
     files = (posterior_name(result.job.origin),) if len(result.draws) else ()
     return certificate_of(result.job, sections, told, produced_by, files)
 

@@ -46,7 +46,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
         ),
         warnings=(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
         sections=diagnosis_sections(found),
-        produced_by=f"{program()}, {d.posterior.sampler}, seed {d.posterior.seed}",
+        produced_by=f"{program(found.job)}, {d.posterior.sampler}, seed {d.posterior.seed}",
     )  # fmt: skip
 
 

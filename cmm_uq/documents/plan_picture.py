@@ -74,7 +74,7 @@ def _seen(xyz: Floats) -> Floats:
 
 def _draw(ax: Axes, placing: Placing, box: Floats) -> None:
     _frame(ax, box)
-    readings = placing.points.readings[placing.points.repeat == placing.points.repeat.min()]
+    readings = placing.points.machine_xyz[placing.points.repeat == placing.points.repeat.min()]
     floor = readings.copy()
     floor[:, 2] = box[2, 0]
     outline = _outline(readings)

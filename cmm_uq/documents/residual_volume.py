@@ -18,7 +18,7 @@ def residual_volume(result: Result, what: str) -> Plot:
     what : the points in words, as ``faces``.
     """
     artefact, residuals = result.artefact, result.residuals / MICROMETRE
-    readings, travel = artefact.points.readings, artefact.points.machine.travel_mm
+    readings, travel = artefact.points.machine_xyz, artefact.points.machine.travel_mm
     ends = readings[artefact.rows]
     return volume_plot(
         ends[:, 0], residuals, end_mm=ends[:, -1] if ends.shape[1] > 1 else None,

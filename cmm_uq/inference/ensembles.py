@@ -248,17 +248,24 @@ def _effective_samples(chains: Floats) -> tuple[float, float]:
     return time, steps * ensembles * walkers / time
 
 
-def rhat(chains: Floats) -> float:
+def rhat(chains: Floats, scores: Floats | None = None) -> float:
     """Largest rank-normalised split R-hat of the parameters, bulk or tail (Vehtari et al. 2021, section 4).
 
     Parameters
     ----------
     chains : (c, n, d) independent chains.
+    scores : of the chains' halves, where they are known already.
     """
+    halves = split(chains)
+    folded = np.abs(halves - np.median(halves, axis=(0, 1)))
+    bulk = normal_scores(halves) if scores is None else scores
+    return max(float(_split_rhat(values).max()) for values in (bulk, normal_scores(folded)))
+
+
+def split(chains: Floats) -> Floats:
+    """The first and the last half of each chain as chains (2c, n // 2, d)."""
     half = chains.shape[1] // 2
-    split = np.concatenate([chains[:, :half], chains[:, -half:]])
-    folded = np.abs(split - np.median(split, axis=(0, 1)))
-    return max(float(_split_rhat(normal_scores(values)).max()) for values in (split, folded))
+    return np.concatenate([chains[:, :half], chains[:, -half:]])
 
 
 def normal_scores(values: Floats) -> Floats:

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.model.artefact import Artefact, Size
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import check_length, place

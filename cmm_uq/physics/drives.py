@@ -31,7 +31,7 @@ class PeriodicScale(Harmonic):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
         (period,) = shape
-        angle = 2 * np.pi * points.readings[:, AXES.index(self.axis)] / period
+        angle = 2 * np.pi * points.readings[self.axis] / period
         return np.concatenate(
             [along(self.axis, MICROMETRE * np.sin(angle)), along(self.axis, MICROMETRE * np.cos(angle))], axis=2
         )

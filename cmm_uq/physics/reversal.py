@@ -94,7 +94,7 @@ class WindUp(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, high = points.machine.travel(self.axis)
-        place = (points.readings[:, AXES.index(self.axis)] - 0.5 * (low + high)) / METRE
+        place = (points.readings[self.axis] - 0.5 * (low + high)) / METRE
         return along(self.axis, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}") * place)
 
 

@@ -33,7 +33,7 @@ class Scale(Effect):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return along(self.axis, PPM * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, PPM * points.readings[self.axis])
 
 
 class Squareness(Effect):
@@ -53,7 +53,7 @@ class Squareness(Effect):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return along(self.moved, -ARCSECOND * points.readings[:, AXES.index(self.lever)])
+        return along(self.moved, -ARCSECOND * points.readings[self.lever])
 
 
 class Straightness(Effect):
@@ -75,7 +75,7 @@ class Straightness(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, high = points.machine.travel(self.axis)
-        place = 2 * (points.readings[:, AXES.index(self.axis)] - low) / (high - low) - 1
+        place = 2 * (points.readings[self.axis] - low) / (high - low) - 1
         return along(self.direction, MICROMETRE * (1 - place**2))
 
 
@@ -97,7 +97,7 @@ class Rotation(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, _ = points.machine.travel(self.axis)
-        angle = ARCSECOND * (points.readings[:, AXES.index(self.axis)] - low) / METRE
+        angle = ARCSECOND * (points.readings[self.axis] - low) / METRE
         return turned(points, self.axis, self.about, angle)
 
 
@@ -106,7 +106,7 @@ def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
     chain = Chain.of(points.machine.chain)
     tip = np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
     acts_on_tip = points.machine.tip_on_every_carriage or axis == AXES[chain.order[-1]]
-    carried = carried_offset(axis, points.readings, tip if acts_on_tip else None, chain)
+    carried = carried_offset(axis, points.carriages, tip if acts_on_tip else None, chain)
     rotation = np.zeros((len(points), 3))
     rotation[:, AXES.index(about)] = angle
     return np.cross(rotation, carried)[:, :, None]

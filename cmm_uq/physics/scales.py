@@ -45,7 +45,7 @@ class ScaleCurvature(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, high = points.machine.travel(self.axis)
-        place = 2 * (points.readings[:, AXES.index(self.axis)] - low) / (high - low) - 1
+        place = 2 * (points.readings[self.axis] - low) / (high - low) - 1
         return along(self.axis, MICROMETRE * (1 - place**2))
 
 
@@ -72,7 +72,7 @@ class AirScale(Effect):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return along(self.axis, -index_change(points) * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, -index_change(points) * points.readings[self.axis])
 
 
 class DeadPath(Effect):

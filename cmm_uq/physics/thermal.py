@@ -36,7 +36,7 @@ class ThermalScale(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         excess = points.column(f"temp_{self.axis}_c") - REFERENCE_TEMPERATURE
-        return along(self.axis, excess * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, excess * points.readings[self.axis])
 
 
 class ThermalArtefact(Effect):
@@ -74,7 +74,7 @@ class ThermalGradient(Effect):
         """See :meth:`Effect.basis`."""
         low, _ = points.machine.travel("x")
         gradient = points.column("temp_table_top_c") - points.column("temp_table_bottom_c")
-        angle = ARCSECOND * gradient * (points.readings[:, 0] - low) / METRE
+        angle = ARCSECOND * gradient * (points.readings["x"] - low) / METRE
         return turned(points, "x", "y", angle)
 
 

@@ -45,7 +45,7 @@ class ScaleDrift(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         hours = points.column("time_s") / HOUR
-        return along(self.axis, PPM * hours * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, PPM * hours * points.readings[self.axis])
 
 
 class Settling(Effect):
@@ -95,7 +95,7 @@ class ScaleSettling(Effect):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return along(self.axis, PPM * _settled(points, shape) * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, PPM * _settled(points, shape) * points.readings[self.axis])
 
 
 class ThermalSquareness(Effect):
@@ -122,7 +122,7 @@ class ThermalSquareness(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         excess = np.mean([points.column(name) for name in self.columns], axis=0) - REFERENCE_TEMPERATURE
-        return along(self.moved, -ARCSECOND * excess * points.readings[:, AXES.index(self.lever)])
+        return along(self.moved, -ARCSECOND * excess * points.readings[self.lever])
 
 
 class CarriageGradient(Effect):
@@ -147,7 +147,7 @@ class CarriageGradient(Effect):
         """See :meth:`Effect.basis`."""
         low, _ = points.machine.travel(self.axis)
         gradient = points.column(self.columns[0]) - points.column(self.columns[1])
-        angle = ARCSECOND * gradient * (points.readings[:, AXES.index(self.axis)] - low) / METRE
+        angle = ARCSECOND * gradient * (points.readings[self.axis] - low) / METRE
         return turned(points, self.axis, self.about, angle)
 
 

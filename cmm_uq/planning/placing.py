@@ -38,13 +38,13 @@ class Placing:
     @cached_property
     def middle(self) -> Floats:
         """(3,) of the points, in scale readings, mm."""
-        readings = self.points.readings
+        readings = self.points.machine_xyz
         return np.asarray(0.5 * (readings.min(axis=0) + readings.max(axis=0)))
 
     @property
     def ends(self) -> str:
         """Scale readings of the first point and of the farthest from it, mm: ``(250, 0, −40) → (650, 0, −40)``."""
-        readings = self.points.readings
+        readings = self.points.machine_xyz
         far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
         first, last = (", ".join(f"{value:.0f}" for value in readings[row]).replace("-", "−") for row in (0, far))
         return f"({first}) → ({last})" if far else f"({first})"
@@ -71,7 +71,9 @@ class Pattern:
     @classmethod
     def of_recording(cls, points: Points) -> tuple[Pattern, Floats, Floats]:
         """The pattern of one recorded placing, with its attitude (3, 3) and its middle (3,) in scale readings."""
-        about = points.readings - points.readings.mean(axis=0)
+        xyz = points.machine_xyz
+        middle = np.asarray(xyz.mean(axis=0))
+        about = xyz - middle
         attitude = _attitude(about)
         turned = {
             key: np.column_stack([points.columns[name.format(a)] for a in AXES]) @ attitude
@@ -81,7 +83,7 @@ class Pattern:
         taken = {name.format(a) for key, name in VECTORS.items() if key in turned for a in AXES}
         columns = {name: values for name, values in points.columns.items() if name not in taken}
         pattern = cls(about @ attitude, points.point, points.repeat, columns, turned)
-        return pattern, attitude, np.asarray(points.readings.mean(axis=0))
+        return pattern, attitude, middle
 
     def once(self) -> Pattern:
         """Without its repeats."""
@@ -114,7 +116,7 @@ class Pattern:
             if key == "approach":
                 values = np.where(np.abs(values) > _LEVEL, np.sign(values), 0.0)
             columns |= {VECTORS[key].format(a): values[:, i] for i, a in enumerate(AXES)}
-        xyz = middle + self.turned(attitude) - machine.origin_mm
+        xyz = machine.coordinates(middle + self.turned(attitude))
         one = np.ones(len(xyz), dtype=np.int64)
         return Placing(title, Points(xyz, one, self.point, self.repeat, machine, columns))
 

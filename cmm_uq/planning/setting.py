@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts, Job
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
@@ -94,7 +95,7 @@ class Setting:
         if not facts.model.effects and planning.free is None:
             raise CmmUqError("no effect is named, so there is nothing to determine", where="job.toml [model] effects",
                              fix="Name the error factors that the measurement shall determine")  # fmt: skip
-        recorded = job.points.readings if len(job.points) else None
+        recorded = job.points.carriages if len(job.points) else None
         stated = facts.recording.u_coordinate_um
         return cls(
             facts.artefact, observe, planning, plan, Volume.of(job.points.machine, plan, recorded),

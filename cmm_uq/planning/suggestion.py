@@ -17,7 +17,7 @@ import numpy as np
 from cmm_uq.diagnosis.comparison.explanations import shapes
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Observe, Observed
@@ -95,7 +95,7 @@ def suggestions(
         facts = facts.model_copy(update={"length_mm": artefact.sizes[0].nominal})
     try:
         points = artefact.points
-        volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.readings)
+        volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.carriages)
         places = planning.elsewhere(artefact, volume, _CANDIDATES)
         known = _information(diagnosis.after, model, partial(observe, facts), places, shared_freedoms=planning.shared)
     except CmmUqError:  # nowhere else to put it

@@ -17,7 +17,7 @@ from scipy import linalg, special
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.linear_model import LinearModel
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.model.kind import Observe
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.screening.columns import SENSORS, about_whole_column, column_findings
@@ -124,7 +124,7 @@ def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
         if np.any(rows := outside[:, i]):
             low, high = points.machine.travel_mm[i]
             why = (
-                f"scale readings of {axis.upper()} ({axis}_mm + origin) of {span(points.readings[rows, i])} mm lie outside "
+                f"scale readings of {axis.upper()} ({axis}_mm + origin) of {span(points.readings[axis][rows])} mm lie outside "
                 f"the travel {low:g} to {high:g} mm{_hint(points, i)}"
             )
             found.append(finding("impossible", points, rows, why, f"{axis}_mm"))

@@ -83,7 +83,7 @@ class Search:
 
     def _wrong(self, misfit: Floats) -> NDArray[np.bool_]:
         low, high = self.points.machine.travel_mm.T
-        beyond = np.maximum(low - self.points.readings, self.points.readings - high)
+        beyond = np.maximum(low - self.points.carriages, self.points.carriages - high)
         astray = np.any(beyond > high - low, axis=1)
         missed = misfit > self.shape.tolerance
         return np.asarray(missed | astray if astray.mean() <= MOST else missed)
@@ -239,5 +239,5 @@ class Search:
 def outside_travel(points: Points) -> NDArray[np.bool_]:
     """(n, 3) whether a scale reading lies outside its travel."""
     low, high = points.machine.travel_mm.T
-    readings = points.readings
+    readings = points.carriages
     return np.asarray((readings < low - _TRAVEL_TOLERANCE) | (readings > high + _TRAVEL_TOLERANCE))

@@ -58,7 +58,9 @@ def test_draws_given_the_sizes_have_the_mean_and_covariance_of_generalised_least
     right = A.T @ inverse @ linear.observed
     right[:2] += linear.prior_mean / linear.prior_sd**2
     mean, spread = np.linalg.solve(precision, right)[:2], np.linalg.inv(precision)[:2, :2]
-    draws = Marginal(linear, noise, solve(linear)).draw(sizes.at(np.zeros(100_000, dtype=np.int64)), np.random.default_rng(7))
+    draws = Marginal(linear, noise, solve(linear)).draw(
+        sizes.at(np.zeros(100_000, dtype=np.int64)), np.random.default_rng(7)
+    )
     u = np.sqrt(np.diag(spread))
     assert np.all(np.abs(draws.mean(axis=0) - mean) < 4.5 * u / np.sqrt(100_000))
     assert np.allclose(np.cov(draws, rowvar=False) / np.outer(u, u), spread / np.outer(u, u), atol=0.02)
@@ -70,14 +72,20 @@ def test_a_direct_run_of_emcee_over_all_parameters_agrees() -> None:
     linear = model(noise)
     sampled = sample_with_noise(linear, noise, solve(linear), seed=1)
 
-    def density(theta: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def density(
+        theta: np.ndarray[tuple[int, int], np.dtype[np.float64]],
+    ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         value = np.empty(len(theta))
         for i, row in enumerate(theta):
             sizes = noise.sizes(row[None, 2:])
             left = linear.observed - linear.design @ row[:2]
             prior = np.sum(((row[:2] - linear.prior_mean) / linear.prior_sd) ** 2) + row[3] ** 2
             inside = -13 < row[2] < 2
-            value[i] = stats.multivariate_normal.logpdf(left, None, covariance(noise, sizes)) - 0.5 * prior if inside else -np.inf
+            value[i] = (
+                stats.multivariate_normal.logpdf(left, None, covariance(noise, sizes)) - 0.5 * prior
+                if inside
+                else -np.inf
+            )
         return value
 
     centre, factor = start(Marginal(linear, noise, solve(linear)))
@@ -97,6 +105,8 @@ def test_a_direct_run_of_emcee_over_all_parameters_agrees() -> None:
 def test_a_recording_that_is_explained_to_the_last_digit_still_has_a_density() -> None:
     noise = components()
     linear = model(noise)
-    exact = LinearModel(linear.design @ [1.0, 1.0], linear.design, linear.unknowns, linear.placing, linear.noise_scale, None)
+    exact = LinearModel(
+        linear.design @ [1.0, 1.0], linear.design, linear.unknowns, linear.placing, linear.noise_scale, None
+    )
     found = Marginal(exact, noise, solve(exact)).log_density(np.zeros((3, noise.dimension)) + np.log(1e-3))
     assert np.all(np.isfinite(found))

@@ -91,7 +91,9 @@ def test_slow_noise_is_an_ornstein_uhlenbeck_process(rate: float) -> None:
 
 def test_a_stated_noise_is_good_to_a_fifth_or_now_and_then_wrong() -> None:
     """The prior of ln σ as a density: one in ten of standard deviation one, the rest of 0.2, about what is stated."""
-    noise = Components(*[getattr(components(), name) for name in ("turn", "shares", "slow", "frequency")], (), stated=2e-3)
+    noise = Components(
+        *[getattr(components(), name) for name in ("turn", "shares", "slow", "frequency")], (), stated=2e-3
+    )
     off = np.linspace(-8, 8, 20_001)
     density = np.exp(noise.log_prior_of_sigma(np.log(2e-3) + off)) / np.sqrt(2 * np.pi)
     assert np.trapezoid(density, off) == pytest.approx(1.0, abs=1e-6)

@@ -15,8 +15,8 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect, Nonparametric
-from cmm_uq.physics.plugins import BrokenPluginError
-from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.plugins import BrokenPluginError
+from cmm_uq.points import Floats, Points
 
 EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
 
@@ -123,7 +123,7 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
     over = effect.idealised_over
     if over is None:
         return
-    along = points.readings[:, AXES.index(over)] if over in AXES else points.column(over)
+    along = points.readings[over] if over in points.readings else points.column(over)
     span = float(np.ptp(along))
     if span == 0:
         return
@@ -183,7 +183,7 @@ def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
     if axis is None:
         yield from effect.trials()
         return
-    readings = points.readings[:, AXES.index(axis)]
+    readings = points.readings[axis]
     span = float(np.ptp(readings))
     if span <= 2 * _SHORTEST_PERIOD:
         return

@@ -55,8 +55,7 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
 
 def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
     """Errors along each axis as functions of each reading."""
-    for i, axis in enumerate(AXES):
-        readings = points.readings[:, i]
+    for axis, readings in points.readings.items():
         if np.ptp(readings) < 1.0:
             continue
         functions = list(_functions(readings))
@@ -69,9 +68,9 @@ def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Ite
 
 def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
     """Errors along each axis as functions of the place in the volume."""
-    if np.sum(np.ptp(points.readings, axis=0) > 1.0) < 2:
+    if np.sum(np.ptp(points.machine_xyz, axis=0) > 1.0) < 2:
         return
-    factors = list(_smooth_in_space(points.readings))
+    factors = list(_smooth_in_space(points.machine_xyz))
     for j, direction in enumerate(AXES):
         members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
         yield Explanation(f"error along {direction.upper()} as a function of the place", UNKNOWN, members)
@@ -83,7 +82,7 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
     if time is None or len(np.unique(time)) < 3:
         return
     for i, axis in enumerate(AXES):
-        readings = points.readings[:, i]
+        readings = points.readings[axis]
         half = 0.5 * float(np.ptp(readings))
         if half < 1.0:
             continue
@@ -110,9 +109,10 @@ def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:
 
 def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
     """One scale of all axes, about their zero or their middle, as a function of each further column."""
-    middle = 0.5 * (points.readings.min(axis=0) + points.readings.max(axis=0))
-    span = 0.5 * float(np.ptp(points.readings, axis=0).max())
-    levers = [(points.readings - about) / span for about in (np.zeros(3), middle)]
+    readings = points.carriages
+    middle = 0.5 * (readings.min(axis=0) + readings.max(axis=0))
+    span = 0.5 * float(np.ptp(readings, axis=0).max())
+    levers = [(readings - about) / span for about in (np.zeros(3), middle)]
     for name, column in points.columns.items():
         if name.startswith(_PLACED) or len(np.unique(column)) < 3:
             continue

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.model.artefact import Artefact, Indications, Size
 from cmm_uq.model.recorded import check_length, expansion
 from cmm_uq.points import Floats, Points

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds.distances.equations import DistanceSolution, solve_distances
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.radial import Radial

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ReferencedFacts
+from cmm_uq.jobs.artefact import ReferencedFacts
 from cmm_uq.model.artefact import Artefact, Indications, Size
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place

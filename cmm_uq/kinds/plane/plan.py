@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.kinds.plane.facts import PlaneFacts
 from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, across_planes

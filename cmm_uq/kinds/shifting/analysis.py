@@ -5,6 +5,7 @@ from __future__ import annotations
 from cmm_uq import __version__
 from cmm_uq.documents.compose import certificate_of
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
+from cmm_uq.documents.posterior_file import posterior_file
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.shift_axis import page as axis_page
@@ -38,9 +39,12 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
         sections, warnings, rows = plane_page.sections(found), plane_page.warnings(found), plane_page.summary(found)
         results = plane_shift_results(found)
     chains, table = found.estimate.chains, axis_page.table_file(found.job)
+    draws = posterior_file(found.draws, found.job.origin)
     produced_by = f"cmm-uq {__version__}, {chains.sampler}, seed {found.estimate.seed}"
-    document = certificate_of(found.job, sections, warnings, produced_by, (table,))
-    return Outcome(found, document, results, tuple(rows), warnings, {table: table_text(found.table)})
+    document = certificate_of(found.job, sections, warnings, produced_by, (table, draws.name))
+    files = {table: table_text(found.table), draws.name: draws.content}
+    results["posterior"] = draws.entry
+    return Outcome(found, document, results, tuple(rows), warnings, files, draws=found.draws)
 
 
 OWN = OwnAnalysis(report=Recipe(analyse, outcome))

@@ -95,7 +95,7 @@ def placed_triangle(
     n = 3 * repeats * len(placings)
     readings, offsets = np.vstack(xyz), np.vstack(tips)
     return Points(
-        readings - machine.origin_mm, np.repeat(np.arange(1, len(placings) + 1), 3 * repeats),
+        machine.coordinates(readings), np.repeat(np.arange(1, len(placings) + 1), 3 * repeats),
         np.tile([1, 2, 3], n // 3), np.tile(np.repeat(np.arange(1, repeats + 1), 3), len(placings)), machine,
         {f"tip_{axis}_mm": offsets[:, i] for i, axis in enumerate(AXES)},
     )  # fmt: skip

@@ -21,5 +21,5 @@ class BeamTwist(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, high = points.machine.travel("y")
-        place = 2 * (points.readings[:, 1] - low) / (high - low) - 1
+        place = 2 * (points.readings["y"] - low) / (high - low) - 1
         return turned(points, "y", "y", ARCSECOND * (1 - place**2))

@@ -10,7 +10,7 @@ import numpy as np
 from cmm_uq.documents.document import Column, Section, Table
 from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.result import Result
-from cmm_uq.jobs.job import ReferencedFacts
+from cmm_uq.jobs.artefact import ReferencedFacts
 from cmm_uq.jobs.table import Uncertainty
 from cmm_uq.model.artefact import Artefact, Size
 from cmm_uq.model.kind import Kind
