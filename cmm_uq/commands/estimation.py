@@ -15,13 +15,14 @@ from cmm_uq.files.limits import OBSERVATIONS
 from cmm_uq.inference.draws import Draws, by_chain
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
+from cmm_uq.messages import say
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
@@ -55,7 +56,13 @@ def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Fi
         used[i] = False
         measurement, repeat = int(artefact.measurement[i]), int(artefact.repeat[i])
         rows = (artefact.points.measurement == measurement) & (artefact.points.repeat == repeat)
-        why = f"measurement {measurement}, repeat {repeat} is {times:.1f} of its standard deviations off what the others say"
+        why = say(
+            "measurement {measurement}, repeat {repeat} is {times:.1f} of its standard deviations off "
+            "what the others say",
+            measurement=measurement,
+            repeat=repeat,
+            times=times,
+        )
         lines = tuple(artefact.points.lines[rows].tolist()) if len(artefact.points.lines) else ()
         found.append(Finding("outlier", (measurement,), lines, why, set_aside=True))
     return replace(model, used=used), found
@@ -107,11 +114,11 @@ def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[
 def named_draws(model: MeasurementModel, posterior: Posterior) -> Draws:
     """The posterior of all that is reported: of each effect, of the artefact's sizes, and of the noise if it is estimated."""
     units, columns = {}, []
-    for (owner, name), (draws, unit) in model.reported(posterior.draws).items():
-        units[f"{owner}.{name}"] = unit
+    for (owner, name), (draws, own) in model.reported(posterior.draws).items():
+        units[f"{owner}.{name}"] = own
         columns.append(draws)
     if model.sigma is None:
-        units["noise.coordinate_um"] = "µm"
+        units["noise.coordinate_um"] = unit("µm")
         columns.append(posterior.sigma / MICROMETRE)
     values = np.column_stack(columns) if columns else np.zeros((len(posterior.draws), 0))
     return Draws(units, by_chain(values, posterior.steps))
@@ -124,14 +131,14 @@ def sizes(model: MeasurementModel, posterior: Posterior) -> dict[str, Quantity]:
 
 def _quantities(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
     found: dict[str, dict[str, Quantity]] = {}
-    for (owner, name), (draws, unit) in model.reported(posterior.draws).items():
-        found.setdefault(owner, {})[name] = Quantity.of_draws(draws, unit)
+    for (owner, name), (draws, own) in model.reported(posterior.draws).items():
+        found.setdefault(owner, {})[name] = Quantity.of_draws(draws, own)
     return found
 
 
 def noise(posterior: Posterior, stated_um: float | None, p_value: float | None) -> Noise:
     """Noise of a coordinate."""
-    return Noise(Quantity.of_draws(posterior.sigma / MICROMETRE, "µm"), stated_um, p_value)
+    return Noise(Quantity.of_draws(posterior.sigma / MICROMETRE, unit("µm")), stated_um, p_value)
 
 
 def accuracy(model: MeasurementModel, estimate: Estimate, posterior: Posterior, seed: int) -> Mapping[str, Quantity]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from cmm_uq.conformity.measurement_lines import FACE_DIAGONALS, PARALLELS, SPACE_DIAGONALS
 from cmm_uq.jobs.job import Standard
+from cmm_uq.messages import Text
 from cmm_uq.points import Floats
 
 
@@ -30,7 +31,7 @@ class LengthPlan:
     shortest_mm : largest that the shortest length may be.
     """
 
-    positions: tuple[str, ...]
+    positions: tuple[Text, ...]
     lengths: int
     repeats: int
     least_share: float
@@ -56,7 +57,7 @@ class BarPlan:
     """
 
     positions: int
-    directions: tuple[str, ...]
+    directions: tuple[Text, ...]
     further: int
     nearly_cubic: float
     apart_mm: float
@@ -98,8 +99,8 @@ class Condition:
     missing : what is not there, each in words; nothing when the condition is met.
     """
 
-    what: str
-    missing: tuple[str, ...] = ()
+    what: Text
+    missing: tuple[Text, ...] = ()
 
     @property
     def met(self) -> bool:

@@ -13,12 +13,13 @@ from cmm_uq.conformity.plans import PLANS
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ConformityFacts, needed
+from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Forms
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
-NOT_CONSIDERED = (
+NOT_CONSIDERED = say(
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
 )
 
@@ -65,7 +66,7 @@ def _volumetric_performance(
     limit = float(_limits_um(facts, np.array([bar]))[0])
     decision = decide(measured.value, measured.u, limit, facts.rule, signed=False)
     item = Decided(measured.value, measured.u, limit, decision, length_mm=bar)
-    return _stated(facts, "range of the ballbar lengths", "lengths", (item,), recorded, ())
+    return _stated(facts, say("range of the ballbar lengths"), say("lengths"), (item,), recorded, ())
 
 
 def _errors_of_indication(facts: ConformityFacts, artefact: Artefact, key: str, recorded: Artefact) -> Statement:
@@ -93,13 +94,24 @@ def _errors_of_indication(facts: ConformityFacts, artefact: Artefact, key: str, 
     )  # fmt: skip
     worst = least_favourable(items)
     remarks = [
-        f"u is the test uncertainty (ISO/TS 23165), from the calibrated length: {worst.u_um:.3g} µm."
-        if worst.u_um > 0
-        else "u_um is not stated: no uncertainty is considered, and no probability can be given.",
-        f"{len(items)} {'length' if len(items) == 1 else 'lengths'} decided, each by its own u and limit; least favourable: "
-        f"measurement {worst.measurement}, repeat {worst.repeat}, {worst.length_mm:.5g} mm.",
+        (
+            say("u is the test uncertainty (ISO/TS 23165), from the calibrated length: {u_um:.3g} µm.", u_um=worst.u_um)
+            if worst.u_um > 0
+            else say("u_um is not stated: no uncertainty is considered, and no probability can be given.")
+        ),
+        say(
+            "{count} {part} decided, each by its own u and limit; least favourable: measurement "
+            "{measurement}, repeat {repeat}, {length_mm:.5g} mm.",
+            count=len(items),
+            part=say("length") if len(items) == 1 else say("lengths"),
+            measurement=worst.measurement or 0,
+            repeat=worst.repeat or 0,
+            length_mm=worst.length_mm or 0.0,
+        ),
     ]
-    return _stated(facts, "error of indication of length, worst against its limit", "lengths", items, recorded, remarks)
+    return _stated(
+        facts, say("error of indication of length, worst against its limit"), say("lengths"), items, recorded, remarks
+    )
 
 
 def _form_error(
@@ -117,29 +129,37 @@ def _form_error(
     item = Decided(value, u, limit, decision, int(probed.measurement[worst]), int(probed.repeat[worst]),
                    sphere.sizes[0].nominal)  # fmt: skip
     remarks = [
-        f"u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm."
-        if u > 0
-        else "The test sphere is taken as perfectly round: its form deviation (form_um) is not given."
+        (
+            say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm.", u=u)
+            if u > 0
+            else say("The test sphere is taken as perfectly round: its form deviation (form_um) is not given.")
+        )
     ]
     if len(probed.form) > 1:
-        remarks.append(f"The largest of {len(probed.form)} spheres: measurement {probed.measurement[worst]}.")
-    return _stated(facts, "probing form error", "points", (item,), recorded, remarks)
+        remarks.append(
+            say(
+                "The largest of {count} spheres: measurement {measurement}.",
+                count=len(probed.form),
+                measurement=probed.measurement[worst],
+            )
+        )
+    return _stated(facts, say("probing form error"), say("points"), (item,), recorded, remarks)
 
 
 def _stated(
-    facts: ConformityFacts, quantity: str, measured: str, items: tuple[Decided, ...], recorded: Artefact,
-    remarks: Sequence[str],
+    facts: ConformityFacts, quantity: Text, measured: Text, items: tuple[Decided, ...], recorded: Artefact,
+    remarks: Sequence[Text],
 ) -> Statement:  # fmt: skip
     """With what the test lacks, and what the rule leaves out."""
     missing = tuple(
         text for condition in conditions(PLANS[facts.standard], recorded, recorded=True) for text in condition.missing
     )
-    more = []
+    more: list[Text] = []
     if facts.rule == "simple" and items[0].u_um > 0:
         more.append(NOT_CONSIDERED)
     if facts.standard == "VDI/VDE 2617":
         more.append(
-            "VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions."
+            say("VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions.")
         )
     if copies := copies_in_words(recorded.points):
         more.append(copies)

@@ -8,6 +8,7 @@ from typing import Literal
 
 from cmm_uq.conformity.decision import Decision
 from cmm_uq.jobs.job import CHARACTERISTICS, ConformityFacts
+from cmm_uq.messages import Text
 
 StatementOutcome = Literal["pass", "fail", "undecided", "incomplete"]
 
@@ -50,11 +51,11 @@ class Statement:
     """
 
     facts: ConformityFacts
-    quantity: str
-    measured: str
+    quantity: Text
+    measured: Text
     errors: tuple[Decided, ...]
-    missing: tuple[str, ...]
-    remarks: tuple[str, ...]
+    missing: tuple[Text, ...]
+    remarks: tuple[Text, ...]
 
     @property
     def characteristic(self) -> str:

@@ -17,10 +17,11 @@ from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.posterior import Posterior, Progress
+from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 FALSE_ALARMS = 0.01
 """Default rate at which a recording without any fault is found to have one."""
@@ -45,12 +46,12 @@ class LeftOut:
     """
 
     effect: str
-    title: str
+    title: Text
     probability: float
     parameters: Mapping[str, Quantity]
     explained: float
     together: float
-    points_to: str
+    points_to: Text
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class Diagnosis:
     where: tuple[Place, ...]
     effects: tuple[LeftOut, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
-    rivals: tuple[tuple[str, float], ...]
+    rivals: tuple[tuple[Text, float], ...]
     noise: NoiseFound
     improvement: Improvement
     before: MeasurementModel
@@ -133,7 +134,7 @@ def _verdict(found: Found, alpha: float) -> str:
 
 
 def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
-    index = {found.first.explanations[i].name: i for i in found.chosen}
+    index = {str.__str__(found.first.explanations[i].name): i for i in found.chosen}
     posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
     linear, first = found.model.estimate().linear, _squares(found.first.model.estimate().linear, ())
@@ -183,7 +184,7 @@ def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
     return tuple(groups)
 
 
-def _rivals(compared: ModelComparison) -> tuple[tuple[str, float], ...]:
+def _rivals(compared: ModelComparison) -> tuple[tuple[Text, float], ...]:
     order = np.argsort(-compared.probability)
     return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
 
@@ -220,7 +221,7 @@ def _summary(values: Floats, weight: Floats) -> Quantity:
     cumulative = np.cumsum(w[order])
     low, high = (float(flat[order][min(int(np.searchsorted(cumulative, q)), len(flat) - 1)]) for q in (0.025, 0.975))
     return Quantity(
-        mean, float(np.sqrt(max(float(w @ (flat - mean) ** 2), 0.0))), (min(low, mean), max(high, mean)), "µm"
+        mean, float(np.sqrt(max(float(w @ (flat - mean) ** 2), 0.0))), (min(low, mean), max(high, mean)), unit("µm")
     )
 
 
