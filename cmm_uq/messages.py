@@ -73,7 +73,8 @@ class Message(Text):
     def __new__(cls, pattern: str, arguments: Mapping[str, Argument]) -> Self:
         """The pattern, filled in."""
         message = super().__new__(cls, _ENGLISH.vformat(pattern, (), arguments))
-        message.pattern, message.arguments = pattern, MappingProxyType(dict(arguments))
+        kept = {name: value if isinstance(value, Text) else _plain(value) for name, value in arguments.items()}
+        message.pattern, message.arguments = pattern, MappingProxyType(kept)
         return message
 
     def __reduce__(self) -> tuple[type[Message], tuple[str, dict[str, Argument]]]:
@@ -106,6 +107,12 @@ class Plural(Message):
     def __reduce__(self) -> tuple[type[Plural], tuple[int, Message, Message]]:  # type: ignore[override]
         """For pickling."""
         return Plural, (self.number, self.one, self.many)
+
+
+def _plain(value: float) -> float:
+    """A number without the sort that an array gave it."""
+    item: Callable[[], float] | None = getattr(value, "item", None)
+    return value if item is None else item()
 
 
 class _English(string.Formatter):

@@ -130,7 +130,9 @@ def test_every_pattern_is_a_literal_whose_placeholders_are_the_arguments(path: P
     assert not {call.lineno: fault for call in sayings(path) if (fault := wrong(call))}
 
 
-@pytest.mark.parametrize("source", ['say(f"{a} lengths")', "say(words)", 'say("{a} lengths")', 'say("lengths", a=1)', "say()"])
+@pytest.mark.parametrize(
+    "source", ['say(f"{a} lengths")', "say(words)", 'say("{a} lengths")', 'say("lengths", a=1)', "say()"]
+)
 def test_a_pattern_that_no_catalogue_could_hold_would_be_found(source: str) -> None:
     (call,) = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
     assert wrong(call)

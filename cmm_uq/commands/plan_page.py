@@ -131,7 +131,7 @@ def plan_document(plan: Plan) -> Document:
         attachments=(Verbatim("plan.csv"), Verbatim("results.json"))
         if plan.to_measure
         else (Verbatim("results.json"),),
-        produced_by=program(),
+        produced_by=program(plan.job.plugins),
         end=say("End of plan"),
     )
 

@@ -82,11 +82,24 @@ def unit_of(parameter: Determined) -> Text:
     return unit("µm") if parameter.unknown.unit == "mm" else parameter.unknown.unit
 
 
+def _size_words(name: str) -> Text:
+    """A size of the artefact by its name, which a kind of another package may choose as it likes."""
+    plain = name.removesuffix("_mm")
+    what, _, which = plain.partition("_")
+    if plain == "length":
+        return say("length")
+    if which.isdigit() and what == "block":
+        return say("block {which}", which=Verbatim(which))
+    if which.isdigit() and what == "cylinder":
+        return say("cylinder {which}", which=Verbatim(which))
+    return Verbatim(plain.replace("_", " "))
+
+
 def named(parameter: Determined) -> Text:
     """A parameter in words."""
     owner, name = parameter.unknown.key
     if owner == ARTEFACT:
-        return say("Artefact, {name}", name=Verbatim(name.removesuffix("_mm").replace("_", " ")))
+        return say("Artefact, {size}", size=_size_words(name))
     effect = every()[owner]
     return (
         effect.title

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from cmm_uq.jobs import reading
 from cmm_uq.jobs.job import Job
-from cmm_uq.kinds import names, table_of
+from cmm_uq.kinds import names, plugins, table_of
 
 
 def read_job(folder: Path, *, recorded: bool = True) -> Job:
@@ -22,12 +23,12 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
     ------
     CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
     """
-    return reading.read_job(folder, table_of, names, recorded=recorded)
+    return _with_plugins(reading.read_job(folder, table_of, names, recorded=recorded))
 
 
 def read_machine(folder: Path) -> Job:
     """A job for its machine alone; see :func:`cmm_uq.jobs.reading.read_machine`."""
-    return reading.read_machine(folder, table_of, names)
+    return _with_plugins(reading.read_machine(folder, table_of, names))
 
 
 def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
@@ -42,4 +43,8 @@ def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
     ------
     CmmUqError : a file is missing, or says something unknown or contradictory.
     """
-    return reading.job_of(files, table_of, names, recorded=recorded)
+    return _with_plugins(reading.job_of(files, table_of, names, recorded=recorded))
+
+
+def _with_plugins(job: Job) -> Job:
+    return replace(job, plugins=plugins(job.facts.artefact.kind))

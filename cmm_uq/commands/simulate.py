@@ -122,7 +122,8 @@ def _files(job: Job, content: bytes, truth: Path, seed: int | None) -> dict[str,
     how = f", seed {drawn.seed if seed is None else seed}, from {TRUTH}"
     files = {
         **{name: data for name, data in job.inputs.items() if name != "job.toml"},
-        job.facts.recording.file: first_line("simulate", program(drawn.effects), how).encode() + recording(points),
+        job.facts.recording.file: first_line("simulate", program(job.plugins, drawn.effects), how).encode()
+        + recording(points),
         TRUTH: content,
     }
     return {"job.toml": derived_toml(job, "simulate", files, without=IN_THE_RECORDING), **files}

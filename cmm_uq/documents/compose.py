@@ -69,7 +69,7 @@ def _certificate(result: Result, page: Page, told: tuple[Text, ...]) -> Document
     sections += [_posterior(result), _method(result)]
     produced_by = say(
         "{program}, {sampler}, seed {seed}",
-        program=program(),
+        program=program(result.job.plugins),
         sampler=Verbatim(result.posterior.sampler),
         seed=result.posterior.seed,
     )

@@ -61,7 +61,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
         sections=diagnosis_sections(found),
         produced_by=say(
             "{program}, {sampler}, seed {seed}",
-            program=program(),
+            program=program(found.job.plugins),
             sampler=Verbatim(d.posterior.sampler),
             seed=d.posterior.seed,
         ),

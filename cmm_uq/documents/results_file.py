@@ -39,7 +39,7 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
     derived = facts.derived_from
     return {
         "schema": schema,
-        "software": software(effects=effects),
+        "software": software(job.plugins, effects=effects),
         "job": {
             "id": facts.id,
             "origin": facts.origin,

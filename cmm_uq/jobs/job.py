@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -326,6 +326,7 @@ class Job:
     inputs : contents of each input by its path inside the folder, for hashes and attachments.
     altered : names of files that were changed after a command derived them.
     planned : whether the recording holds the nominal coordinates of a plan.
+    plugins : version of the package that brings its kind, by its name; empty for a kind of the project itself.
     """
 
     folder: Path
@@ -334,6 +335,7 @@ class Job:
     inputs: Mapping[str, bytes]
     altered: tuple[str, ...] = ()
     planned: bool = False
+    plugins: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def origin(self) -> Origin:

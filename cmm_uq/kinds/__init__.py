@@ -47,9 +47,14 @@ def kind_named(name: str) -> Kind | None:
         return found
     offers = [entry for entry in _offered() if entry.name == name]
     if len(offers) > 1:
-        given = " and ".join(_package(entry) for entry in offers)
+        given = " and ".join(_named(entry) for entry in offers)
         raise CmmUqError(f"the kind {name!r} comes from {given}", fix="Uninstall one of them")
     return _loaded(offers[0]) if offers else None
+
+
+def plugins(name: str) -> dict[str, str]:
+    """Version of the package that brings a kind, by its name; empty for a built-in kind."""
+    return {} if name in BUILT_IN else dict(_package(entry) for entry in _offered() if entry.name == name)
 
 
 def kind_of(job: Job) -> Kind:
@@ -94,8 +99,12 @@ def _offered() -> list[EntryPoint]:
     return list(entry_points(group=GROUP))
 
 
-def _package(entry: EntryPoint) -> str:
-    return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.module
+def _package(entry: EntryPoint) -> tuple[str, str]:
+    return (entry.dist.name, entry.dist.version) if entry.dist else (entry.module, "")
+
+
+def _named(entry: EntryPoint) -> str:
+    return " ".join(_package(entry)).strip()
 
 
 def _loaded(entry: EntryPoint) -> Kind:
@@ -104,8 +113,8 @@ def _loaded(entry: EntryPoint) -> Kind:
         found = entry.load()
     except Exception as error:
         raise CmmUqError(f"the kind {entry.name!r} cannot be loaded: {type(error).__name__}: {error}",
-                         where=f"package {_package(entry)}", fix="Mend the package, or uninstall it") from error  # fmt: skip
+                         where=f"package {_named(entry)}", fix="Mend the package, or uninstall it") from error  # fmt: skip
     if not isinstance(found, Kind) or found.name != entry.name:
-        raise CmmUqError(f"{entry.value!r} is no Kind of the name {entry.name!r}", where=f"package {_package(entry)}",
+        raise CmmUqError(f"{entry.value!r} is no Kind of the name {entry.name!r}", where=f"package {_named(entry)}",
                          fix="Mend the package, or uninstall it")  # fmt: skip
     return found

@@ -16,7 +16,7 @@ NO_TEXT = {"language", "svg", "tone", "outcome", "date", "lettering"}
 """Fields of blocks that no reader sees as text."""
 
 _WORD = re.compile(r"[^\W\d_]{2,}")
-_NUMBER = re.compile(r"[<>\s±]*[+−-]?[\d.,\s]*(?:e[+-]\d+|×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?[%\s]*|[–∞¼½¾]|nan|inf")
+_NUMBER = re.compile(r"[<>\s±]*[+−-]?[\d.,\s]*(?:e[+−-]\d+|×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?[%\s]*|[–∞¼½¾]|nan|inf")
 _LETTERING = re.compile(r"<text[^>]*>(.*?)</text>", re.DOTALL)
 
 

@@ -20,6 +20,7 @@ from cmm_uq.jobs.job import CHARACTERISTICS
 from cmm_uq.messages import Message, Number, Verbatim, say
 from cmm_uq.physics.catalogue import every
 from cmm_uq.uncertainty.model_file import read_model_file
+from cmm_uq.units import unit
 from tests.conftest import ROOT
 from tests.documents.saying import leaves, strangers
 
@@ -30,15 +31,22 @@ SAMPLER = "emcee affine-invariant ensemble sampler exact draws"
 def known_to(folder: Path) -> str:
     """The user's own words, and names that are the same in every language: of effects, parameters, standards, the program."""
     own = [path.name + "\n" + path.read_text(encoding="utf-8") for path in folder.iterdir() if path.is_file()]
-    effects = [" ".join((name, *(p.name for p in effect.reported), *effect.columns)) for name, effect in every().items()]
+    effects = [
+        " ".join((name, *(p.name for p in effect.reported), *effect.columns)) for name, effect in every().items()
+    ]
     return "\n".join([*own, *effects, *READY, *CHARACTERISTICS, NAME, SAMPLER])
 
 
 def documents(folder: Path) -> list[Document]:
     """All that the commands make of a job."""
-    job, found = read_job(folder, recorded=False), []
-    for make in (report_outcome, diagnosis_outcome, lambda job: plan_outcome(job, power=False)):
+    found = []
+    for make, recorded in (
+        (report_outcome, True),
+        (diagnosis_outcome, True),
+        (lambda job: plan_outcome(job, power=False), False),
+    ):
         try:
+            job = read_job(folder, recorded=recorded)
             found.append(marked(make(job).document, job))
         except CmmUqError:  # what this kind does not offer, or needs a recording
             continue
@@ -50,8 +58,10 @@ def test_every_text_of_every_document_is_a_message_or_the_user_s(name: str) -> N
     folder = ROOT / "examples" / name
     made, known = documents(folder), known_to(folder)
     assert made
-    assert {document.title: strangers(document, known) for document in made} == {document.title: [] for document in made}
-    assert all(sum(isinstance(text, Message) for text in leaves(document)) > 20 for document in made)
+    assert {document.title: strangers(document, known) for document in made} == {
+        document.title: [] for document in made
+    }
+    assert all(sum(isinstance(text, Message) for text in leaves(document)) > 5 for document in made)
 
 
 def test_the_page_of_a_model_file_is_translatable_too(tmp_path: Path) -> None:
@@ -102,7 +112,9 @@ WORD = "length"
 def test_an_f_string_anywhere_in_a_document_would_be_found(block: Paragraph | Table | Plot) -> None:
     assert strangers(PLAIN, "Iota") == []
     assert strangers(replace(PLAIN, sections=(Section(say("Results"), (block,)),)), "Iota") == (
-        ["see one length more"] if isinstance(block, Paragraph) and block.text.startswith("see") else ["one length more"]
+        ["see one length more"]
+        if isinstance(block, Paragraph) and block.text.startswith("see")
+        else ["one length more"]
     )
 
 
@@ -113,5 +125,5 @@ def test_what_the_user_wrote_stands_as_it_is() -> None:
 
 def test_the_words_in_a_picture_are_messages() -> None:
     drawing = "<svg><text>Error / µm</text><text>−0.5</text></svg>"
-    plot = Plot(say("Curve"), say("A curve."), drawing, (say("Error / {unit}", unit=Verbatim("µm")),))
+    plot = Plot(say("Curve"), say("A curve."), drawing, (say("Error / {unit}", unit=unit("µm")),))
     assert strangers(replace(PLAIN, sections=(Section(say("Results"), (plot,)),)), "Iota") == []
