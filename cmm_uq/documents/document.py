@@ -14,6 +14,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
+from cmm_uq.documents.view_words import label
 from cmm_uq.messages import NOTHING, Text, say
 
 Outcome = Literal["pass", "fail", "undecided", "incomplete"]
@@ -159,15 +160,15 @@ class Document:
             for block, plain_block in zip(section.blocks, plain["blocks"], strict=True):
                 plain_block["kind"] = block.kind
                 plain_block.pop("lettering", None)
-                if word := _NUMBERED.get(block.kind):
-                    counted[word] += 1
-                    plain_block["label"] = f"{word} {counted[word]}"
+                if block.kind in _NUMBERED:
+                    counted[block.kind] += 1
+                    plain_block["label"] = str.__str__(label(block.kind, counted[block.kind]))
                 if block.kind == "table":
                     _measure(plain_block)
         return data
 
 
-_NUMBERED = {"table": "Table", "plot": "Figure"}
+_NUMBERED = ("table", "plot")
 
 
 def _measure(table: dict[str, Any]) -> None:
