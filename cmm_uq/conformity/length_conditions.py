@@ -151,7 +151,9 @@ def _repeated(plan: LengthPlan, places: _Places) -> Condition:
     """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks."""
     repeats = {line: sorted((m.repeats for m in found), reverse=True) for line, found in places.items()}
     total = sum(sum(counts) for counts in repeats.values())
-    lost = (f"{plan.total - total} of {plan.total} lengths",) if total < plan.total else ()
+    lost: tuple[Text, ...] = ()
+    if total < plan.total:
+        lost = (say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total),)
     missing = tuple(
         say(
             "{repeats} repetitions of each length along {line} ({counts})",
