@@ -242,7 +242,8 @@ def _determined(plan: Plan) -> tuple[Block, ...]:
     if found.unseen:
         blocks.append(
             Paragraph(
-                say("Nothing would show of: {list}.", list=commas(title_of(name) for name in found.unseen)), tone="note"
+                say("Nothing would show of: {effects}.", effects=commas(title_of(name) for name in found.unseen)),
+                tone="note",
             )
         )
     return tuple(blocks)
@@ -258,18 +259,18 @@ def _gain(plan: Plan) -> tuple[Block, ...]:
     blocks: list[Block] = [
         Paragraph(
             say(
-                "Searched for: {criteria}, by greedy choice and exchange. {before} placings before, {count} "
-                "in the better plan, {kept} of them kept. Pairs that could not be told apart: {count_2} "
-                "before, {count_3} after; effects of which nothing shows, or that pass for named ones: "
-                "{count_4} before, {count_5} after.",
+                "Searched for: {criteria}, by greedy choice and exchange. {before} placings before, {better} "
+                "in the better plan, {kept} of them kept. Pairs that could not be told apart: {alike_before} "
+                "before, {alike_after} after; effects of which nothing shows, or that pass for named ones: "
+                "{hidden_before} before, {hidden_after} after.",
                 criteria=CRITERIA[criterion],
                 before=before,
-                count=count,
+                better=count,
                 kept=plan.kept,
-                count_2=len(start.alike),
-                count_3=len(better.alike),
-                count_4=len(start.unseen) + len(start.absorbed),
-                count_5=len(better.unseen) + len(better.absorbed),
+                alike_before=len(start.alike),
+                alike_after=len(better.alike),
+                hidden_before=len(start.unseen) + len(start.absorbed),
+                hidden_after=len(better.unseen) + len(better.absorbed),
             )
         )
     ]

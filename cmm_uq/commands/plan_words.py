@@ -123,9 +123,9 @@ def absorbed(found: Identifiability) -> list[Text]:
     own = say("the artefact's own size")
     return [
         say(
-            "{title_of} for {part}",
-            title_of=title_of(name),
-            part=listed([own if other == ARTEFACT else title_of(other) for other in others]),
+            "{effect} for {others}",
+            effect=title_of(name),
+            others=listed([own if other == ARTEFACT else title_of(other) for other in others]),
         )
         for name, others in found.absorbed
         if others

@@ -36,12 +36,14 @@ def copies_in_words(points: Points) -> Text:
         )
         for one, first, two, repeat in sorted(told)
     ]
-    more = say(" and {count} more", count=len(said) - _NAMED) if len(said) > _NAMED else NOTHING
-    return (
-        say("Copies to the last digit, which do not count: {list}{more}.", list=semicolons(said[:_NAMED]), more=more)
-        if said
-        else NOTHING
-    )
+    if not said:
+        return NOTHING
+    if len(said) <= _NAMED:
+        return say("Copies to the last digit, which do not count: {copies}.", copies=semicolons(said))
+    return say(
+        "Copies to the last digit, which do not count: {copies} and {count} more.",
+        copies=semicolons(said[:_NAMED]), count=len(said) - _NAMED,
+    )  # fmt: skip
 
 
 def run_of(points: Points, group: int) -> tuple[int, int]:

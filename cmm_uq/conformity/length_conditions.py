@@ -24,19 +24,18 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
         measured.setdefault(found.position, []).append(found)
     absent = tuple(line for line in plan.positions if line not in measured)
     return (
-        Condition(
-            say(
-                "four space diagonals and three axes{part}{list}",
-                part=say("; missing: ") if absent else NOTHING,
-                list=commas(absent),
-            ),
-            absent,
-        ),
+        Condition(_positions(absent), absent),
         _long_enough(plan, artefact.points.machine, measured),
         _different(plan, measured),
         _shortest(plan, measured),
         _repeated(plan, measured),
     )
+
+
+def _positions(absent: tuple[Text, ...]) -> Text:
+    if not absent:
+        return say("four space diagonals and three axes")
+    return say("four space diagonals and three axes; missing: {absent}", absent=commas(absent))
 
 
 @dataclass(frozen=True)
@@ -166,10 +165,10 @@ def _repeated(plan: LengthPlan, places: _Places) -> Condition:
     )
     return Condition(
         say(
-            "{repeats} repetitions of each, {total} lengths in all: {total_2}",
+            "{repeats} repetitions of each, {wanted} lengths in all: {total}",
             repeats=plan.repeats,
-            total=plan.total,
-            total_2=total,
+            wanted=plan.total,
+            total=total,
         ),
         (*missing, *lost),
     )

@@ -36,11 +36,11 @@ def sphere_points(
         if not count == plan.points == len(rows):
             lacking.append(
                 say(
-                    "{points} points on the sphere of {name} ({count} recorded, {count_2} different)",
+                    "{points} points on the sphere of {name} ({recorded} recorded, {different} different)",
                     points=plan.points,
                     name=name,
-                    count=len(rows),
-                    count_2=count,
+                    recorded=len(rows),
+                    different=count,
                 )
             )
         elif (gap := _farthest(directions[rows])) > plan.reach_deg:

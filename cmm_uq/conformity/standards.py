@@ -13,7 +13,7 @@ from cmm_uq.conformity.plans import PLANS
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import ConformityFacts, needed
-from cmm_uq.messages import Text, say
+from cmm_uq.messages import Text, plural, say
 from cmm_uq.model.artefact import Artefact, Forms
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
@@ -99,19 +99,26 @@ def _errors_of_indication(facts: ConformityFacts, artefact: Artefact, key: str, 
             if worst.u_um > 0
             else say("u_um is not stated: no uncertainty is considered, and no probability can be given.")
         ),
-        say(
-            "{count} {part} decided, each by its own u and limit; least favourable: measurement "
-            "{measurement}, repeat {repeat}, {length_mm:.5g} mm.",
-            count=len(items),
-            part=say("length") if len(items) == 1 else say("lengths"),
-            measurement=worst.measurement or 0,
-            repeat=worst.repeat or 0,
-            length_mm=worst.length_mm or 0.0,
+        plural(
+            len(items),
+            one=say(
+                "{count} length decided, each by its own u and limit; {worst}.", count=len(items), worst=_least(worst)
+            ),
+            many=say(
+                "{count} lengths decided, each by its own u and limit; {worst}.", count=len(items), worst=_least(worst)
+            ),
         ),
     ]
     return _stated(
         facts, say("error of indication of length, worst against its limit"), say("lengths"), items, recorded, remarks
     )
+
+
+def _least(worst: Decided) -> Text:
+    return say(
+        "least favourable: measurement {measurement}, repeat {repeat}, {length:.5g} mm",
+        measurement=worst.measurement or 0, repeat=worst.repeat or 0, length=worst.length_mm or 0.0,
+    )  # fmt: skip
 
 
 def _form_error(

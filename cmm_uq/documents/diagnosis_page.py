@@ -79,7 +79,7 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
         Section(say("Candidate explanations"), (_rivals(found),)),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise)),
         Section(say("What to measure next"), tuple(
-            Paragraph(say("{list}: {what}", list=together(names(s.separates)), what=s.what)) for s in found.suggestions
+            Paragraph(say("{effects}: {what}", effects=together(names(s.separates)), what=s.what)) for s in found.suggestions
         )),
     )  # fmt: skip
     return tuple(section for section in sections if section.blocks)
@@ -90,7 +90,7 @@ def _left_out(found: Diagnosed) -> tuple[Block, ...]:
     blocks: list[Block] = [Paragraph(VERDICTS[d.verdict])]
     blocks += [Paragraph(sentence(item, d.improvement)) for item in d.effects]
     blocks += [
-        Paragraph(say("This recording cannot tell apart: {list}.", list=commas(names(group))), tone="warning")
+        Paragraph(say("This recording cannot tell apart: {effects}.", effects=commas(names(group))), tone="warning")
         for group in d.indistinguishable
     ]
     return tuple(blocks)
@@ -226,7 +226,7 @@ def _where(found: Diagnosed) -> tuple[Block, ...]:
         (
             place.what,
             Verbatim(place.covariate),
-            say("{region:.4g} … {region_2:.4g}", region=place.region[0], region_2=place.region[1]),
+            say("{low:.4g} … {high:.4g}", low=place.region[0], high=place.region[1]),
             number(place.amplitude_um, ".3g"),
             number(place.p_value, ".1g"),
         )

@@ -43,10 +43,12 @@ def lines(found: Diagnosed) -> list[Text]:
     d = found.diagnosis
     said = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
     said += [
-        say("Cannot be told apart by this recording: {list}.", list=commas(names(group)))
+        say("Cannot be told apart by this recording: {effects}.", effects=commas(names(group)))
         for group in d.indistinguishable
     ]
-    said += [say("To part {list}: {what}", list=together(names(s.separates)), what=s.what) for s in found.suggestions]
+    said += [
+        say("To part {effects}: {what}", effects=together(names(s.separates)), what=s.what) for s in found.suggestions
+    ]
     return said + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
 
 
@@ -68,18 +70,18 @@ def sentence(item: LeftOut, gain: Improvement) -> Text:
         else NOTHING
     )
     return say(
-        "{title}: {list}. What it points to: {points_to}. Probability {probability}{together}; "
+        "{title}: {sizes}. What it points to: {points_to}. Probability {probability}{together}; "
         "explains {explained:.0f}\u00a0% of the misfit; on {unseen} that the fit had not seen the "
-        "rms falls from {heldout_rms_before_um:.1f} to {heldout_rms_after_um:.1f}\u00a0µm.",
+        "rms falls from {before:.1f} to {after:.1f}\u00a0µm.",
         title=item.title,
-        list=commas(words),
+        sizes=commas(words),
         points_to=item.points_to,
         probability=probability(item.probability),
         together=together,
         explained=100 * item.explained,
         unseen=gain.unseen,
-        heldout_rms_before_um=gain.heldout_rms_before_um,
-        heldout_rms_after_um=gain.heldout_rms_after_um,
+        before=gain.heldout_rms_before_um,
+        after=gain.heldout_rms_after_um,
     )
 
 

@@ -82,5 +82,5 @@ def origin_warnings(job: Job) -> list[Text]:
         )  # fmt: skip
         texts = [after(what, told)]
     if job.altered:
-        texts.append(say("Changed after it was derived: {list}.", list=commas(names(job.altered))))
+        texts.append(say("Changed after it was derived: {files}.", files=commas(names(job.altered))))
     return texts

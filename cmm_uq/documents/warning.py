@@ -85,8 +85,8 @@ def _noise(result: Result) -> list[Text]:
 def _undetermined(result: Result) -> list[Text]:
     texts: list[Text] = [
         say(
-            "Not determined by this recording: the common part of {part}.",
-            part=listed([title_of(key, result) for key in combination]),
+            "Not determined by this recording: the common part of {parameters}.",
+            parameters=listed([title_of(key, result) for key in combination]),
         )
         for combination in result.undetermined
     ]
@@ -96,9 +96,9 @@ def _undetermined(result: Result) -> list[Text]:
         if share > ASSUMED and unknown.key not in free and not unknown.known:
             texts.append(
                 say(
-                    "{title_of} is hardly determined by this recording: {share:.0f} % of its variance is the "
+                    "{parameter} is hardly determined by this recording: {share:.0f} % of its variance is the "
                     "assumption that it lies within about ±{prior_sd:g} {unit}.",
-                    title_of=title_of(unknown.key, result),
+                    parameter=title_of(unknown.key, result),
                     share=100 * share,
                     prior_sd=2 * unknown.prior_sd,
                     unit=unknown.unit,
@@ -123,11 +123,11 @@ def _screening(result: Result) -> list[Text]:
         texts.append(
             say(
                 "Without measurement {measurement}: {sd}largest change of an estimate {largest_change:.2g} "
-                "of its standard uncertainty ({title_of}).",
+                "of its standard uncertainty ({parameter}).",
                 measurement=influence.measurement,
                 sd=sd,
                 largest_change=influence.largest_change,
-                title_of=title_of(influence.parameter, result),
+                parameter=title_of(influence.parameter, result),
             )
         )
     return texts
@@ -155,7 +155,7 @@ def _missing(result: Result) -> list[Text]:
     )
     missing = [name for given, name in wanted if not given]
     return (
-        [say("Not complete by ISO/IEC 17025:2017; the job does not state: {list}.", list=commas(missing))]
+        [say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=commas(missing))]
         if missing
         else []
     )

@@ -155,13 +155,13 @@ def _best(
             odds = float(np.exp(min(log_odds[best], 50.0)))
             times = say("once") if repetitions == 1 else say("{repetitions} times", repetitions=repetitions)
             what = say(
-                "Place the {title} at {ends} mm in scale readings and measure it {times}: odds of {round} : "
-                "1 for the true one are to be expected, {round_2} : 1 without it.",
+                "Place the {title} at {ends} mm in scale readings and measure it {times}: odds of {odds} : "
+                "1 for the true one are to be expected, {before} : 1 without it.",
                 title=title,
                 ends=places[best].ends,
                 times=times,
-                round=_round(odds),
-                round_2=_round(float(np.exp(min(before, 50.0)))),
+                odds=_round(odds),
+                before=_round(float(np.exp(min(before, 50.0)))),
             )
             return Suggestion(pair, what, repetitions, odds)
     return None

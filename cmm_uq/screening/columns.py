@@ -210,9 +210,9 @@ def _slipped(points: Points) -> Iterator[Finding]:
         if ways:
             why = say(
                 "{column} changes inside every placing and would be the same for all points of each if it "
-                "were moved back: it is shifted {list} by one row against the other columns: move it back",
+                "were moved back: it is shifted {ways} by one row against the other columns: move it back",
                 column=Verbatim(column),
-                list=alternatives(ways),
+                ways=alternatives(ways),
             )
             yield finding("shifted column", points, np.ones(len(points), dtype=bool), why, column)
 

@@ -125,10 +125,10 @@ def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
         if np.any(rows := outside[:, i]):
             low, high = points.machine.travel_mm[i]
             why = say(
-                "scale readings of {axis} ({axis_2}_mm + origin) of {span} mm lie outside the travel {low:g} "
+                "scale readings of {axis} ({column}_mm + origin) of {span} mm lie outside the travel {low:g} "
                 "to {high:g} mm{hint}",
                 axis=Verbatim(axis.upper()),
-                axis_2=Verbatim(axis),
+                column=Verbatim(axis),
                 span=span(points.readings[rows, i]),
                 low=low,
                 high=high,

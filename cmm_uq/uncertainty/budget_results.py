@@ -165,7 +165,7 @@ def comparison_rows(evaluation: Evaluation, output: str) -> list[tuple[Text, ...
         if found := told[method]:
             value, u = rounded(found["value"], found["u"])
             ends = [rounded(end, found["u"])[0] for end in found["interval"] or ()]
-            interval = say("[{list}]", list=commas(ends)) if ends else NOTHING
+            interval = say("[{ends}]", ends=commas(ends)) if ends else NOTHING
             rows.append((say("{name:capital}", name=name), value, u, interval, number(found.get("trials", ""))))
     return rows
 

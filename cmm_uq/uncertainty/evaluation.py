@@ -168,7 +168,7 @@ def _with_validation(model: MeasurementModel, ways: Ways, asked: Request) -> Way
     without = [name for name, given in model.inputs.items() if not np.isfinite(given.standard_deviation)]
     if without:
         problem = say(
-            "{list} has too few degrees of freedom for a standard deviation (ν ≤ 2)", list=commas(names(without))
+            "{inputs} has too few degrees of freedom for a standard deviation (ν ≤ 2)", inputs=commas(names(without))
         )
     elif asked.coverage > HIGHEST_COVERAGE:
         problem = say(

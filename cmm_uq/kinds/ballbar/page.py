@@ -39,13 +39,13 @@ def sections(result: Result) -> list[Section]:
         ),
         alternative=say(
             "{count} lengths: as recorded they deviate by {low:.0f} to {high:.0f} µm from the {name}; "
-            "after the fitted model {low_2:.0f} to {high_2:.0f} µm remain.",
+            "after the fitted model {low_after:.0f} to {high_after:.0f} µm remain.",
             count=len(deviations),
             low=deviations.min(),
             high=deviations.max(),
             name=name,
-            low_2=residuals.min(),
-            high_2=residuals.max(),
+            low_after=residuals.min(),
+            high_after=residuals.max(),
         ),
     )
     volume = residual_volume(result, say("bars"))

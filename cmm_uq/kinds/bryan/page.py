@@ -36,12 +36,12 @@ def sections(result: Result) -> list[Section]:
         ),
         alternative=say(
             "{count} positions: about the best centre the distances deviate by {low:.1f} to {high:.1f} "
-            "µm; after the fitted model {low_2:.1f} to {high_2:.1f} µm remain.",
+            "µm; after the fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
             count=len(deviations),
             low=deviations.min(),
             high=deviations.max(),
-            low_2=residuals.min(),
-            high_2=residuals.max(),
+            low_after=residuals.min(),
+            high_after=residuals.max(),
         ),
     )
     return [

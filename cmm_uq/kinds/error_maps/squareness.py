@@ -33,9 +33,9 @@ def squareness_findings(maps: Sequence[ErrorMap]) -> list[Finding]:
             (),
             (),
             say(
-                "squareness: the maps at {list} °C give the same figures. They were measured once, and say "
+                "squareness: the maps at {temperatures} °C give the same figures. They were measured once, and say "
                 "nothing of how it changes; measure it at each temperature",
-                list=commas(number(t, "g") for t in temperatures),
+                temperatures=commas(number(t, "g") for t in temperatures),
             ),
         )
         for temperatures in same.values()

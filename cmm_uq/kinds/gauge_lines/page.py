@@ -46,14 +46,14 @@ def _plot(result: Result, gauge: StepGauge) -> Block:
             "with U (k = 2)."
         ),
         alternative=say(
-            "{count} faces on {count_2} lines: as recorded they deviate by {low:.1f} to {high:.1f} µm "
-            "from the mean of their line; after the fitted model {low_2:.1f} to {high_2:.1f} µm remain.",
-            count=len(deviations),
-            count_2=len(set(gauge.measurement.tolist())),
+            "{faces} faces on {lines} lines: as recorded they deviate by {low:.1f} to {high:.1f} µm "
+            "from the mean of their line; after the fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
+            faces=len(deviations),
+            lines=len(set(gauge.measurement.tolist())),
             low=deviations.min(),
             high=deviations.max(),
-            low_2=residuals.min(),
-            high_2=residuals.max(),
+            low_after=residuals.min(),
+            high_after=residuals.max(),
         ),
     )
 
@@ -131,7 +131,7 @@ def _periodic(lines: tuple[LineFigures, ...]) -> list[Block]:
         for line in (one.line for one in lines)
         if line.periodic is not None
     ]
-    text = say("Periodic along the line, beyond what scatter explains: {list}.", list=semicolons(found))
+    text = say("Periodic along the line, beyond what scatter explains: {lines}.", lines=semicolons(found))
     return [Paragraph(text)] if found else []
 
 
@@ -145,7 +145,9 @@ def _positions(found: GaugeFigures) -> list[Block]:
     texts = []
     if found.missing:
         texts.append(
-            say("Not measured of the seven positions of ISO 10360-2:2009: {list}.", list=listed(found.missing))
+            say(
+                "Not measured of the seven positions of ISO 10360-2:2009: {positions}.", positions=listed(found.missing)
+            )
         )
     if short:
         least = say("{least_share:.0f} %", least_share=100 * ISO_10360_2.least_share)

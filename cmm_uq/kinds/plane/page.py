@@ -83,12 +83,12 @@ def _by_point(result: Result, plane: PlaneSurface) -> Block:
         caption=say("Distance of each point from its plane, as recorded and after the fitted model, with U (k = 2)."),
         alternative=say(
             "{count} points: as recorded they lie {low:.1f} to {high:.1f} µm from their plane; after the "
-            "fitted model {low_2:.1f} to {high_2:.1f} µm remain.",
+            "fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
             count=len(off),
             low=off.min(),
             high=off.max(),
-            low_2=residuals.min(),
-            high_2=residuals.max(),
+            low_after=residuals.min(),
+            high_after=residuals.max(),
         ),
     )
 

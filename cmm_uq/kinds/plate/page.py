@@ -87,11 +87,10 @@ def _picture(one: Arrows, titles: Sequence[Text]) -> Block:
             measurement=one.measurement,
         ),
         alternative=say(
-            "Arrows at {count} balls: up to {largest:.1f} µm as recorded, up to {largest_2:.1f} µm after "
-            "the fitted model.",
+            "Arrows at {count} balls: up to {before:.1f} µm as recorded, up to {after:.1f} µm after the fitted model.",
             count=len(one.place),
-            largest=largest[0],
-            largest_2=largest[1],
+            before=largest[0],
+            after=largest[1],
         ),
     )
 

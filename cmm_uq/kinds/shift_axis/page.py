@@ -72,11 +72,11 @@ def summary(result: ShiftResult) -> list[tuple[Text, Text, Text]]:
         (
             say("Measured"),
             say(
-                "{name}, axis {axis}, {count} points in {count_2} placings",
+                "{name}, axis {axis}, {points} points in {placings} placings",
                 name=Verbatim(facts.machine.name),
                 axis=Verbatim(result.axis),
-                count=len(series.numbers),
-                count_2=len(series.shifts),
+                points=len(series.numbers),
+                placings=len(series.shifts),
             ),
             day(facts.job.date),
         )
@@ -182,9 +182,9 @@ def _open(result: ShiftResult) -> Section:
             say(
                 "Every shift is a multiple of {period:.4g} mm, so an error of that period, or of a half, a "
                 "third of it, is the same in all placings and shows in no reading: it looks like another "
-                "artefact. A placing shifted by another length, such as {period_2:.3g} mm, would show it.",
+                "artefact. A placing shifted by another length, such as {other:.3g} mm, would show it.",
                 period=free.period,
-                period_2=0.618 * free.period,
+                other=0.618 * free.period,
             )
         )
     ]
@@ -247,9 +247,9 @@ def _residuals(result: ShiftResult) -> Section:
         after_label=say("With the curve"),
         caption=say("What the placings disagree by, without and with the curve, and U (k = 2)."),
         alternative=say(
-            "The placings disagree by {size:.2f} µm rms without and {size_2:.2f} µm with the curve.",
-            size=size[0],
-            size_2=size[1],
+            "The placings disagree by {before:.2f} µm rms without and {after:.2f} µm with the curve.",
+            before=size[0],
+            after=size[1],
         ),
     )
     return Section(say("Residuals"), (plot,))
@@ -309,12 +309,12 @@ def _method(result: ShiftResult) -> Section:
         (
             say("Convergence"),
             say(
-                "{part}: {ess_min:.0f} effective samples, R-hat {rhat_max:.4f}, autocorrelation time "
-                "{autocorrelation_time:.1f} of {steps} steps",
-                part=say("reached") if chains.converged else say("NOT reached"),
-                ess_min=chains.ess_min,
-                rhat_max=chains.rhat_max,
-                autocorrelation_time=chains.autocorrelation_time,
+                "{reached}: {ess:.0f} effective samples, R-hat {rhat:.4f}, autocorrelation time "
+                "{time:.1f} of {steps} steps",
+                reached=say("reached") if chains.converged else say("NOT reached"),
+                ess=chains.ess_min,
+                rhat=chains.rhat_max,
+                time=chains.autocorrelation_time,
                 steps=chains.steps,
             ),
         ),

@@ -58,9 +58,9 @@ def warnings(result: PlaneShiftResult) -> tuple[Text, ...]:
     if free.combinations:
         found.append(
             say(
-                "Not determined by these placings: {part}. Curves of these names rest on the assumption that "
+                "Not determined by these placings: {names}. Curves of these names rest on the assumption that "
                 "they are small and smooth.",
-                part=listed([_with_each_other(c) for c in free.combinations]),
+                names=listed([_with_each_other(c) for c in free.combinations]),
             )
         )
     return tuple(found)
@@ -80,11 +80,11 @@ def summary(result: PlaneShiftResult) -> list[tuple[Text, Text, Text]]:
         (
             say("Measured"),
             say(
-                "{name}, plane {plane}, {count} balls in {count_2} placings",
+                "{name}, plane {plane}, {balls} balls in {placings} placings",
                 name=Verbatim(result.job.facts.machine.name),
                 plane=Verbatim(result.plane),
-                count=len(plate.numbers),
-                count_2=len(plate.placings),
+                balls=len(plate.numbers),
+                placings=len(plate.placings),
             ),
             day(result.job.facts.job.date),
         )
@@ -176,13 +176,13 @@ def _picture(name: str, curve: Curve, size: float, text: Unit, result: PlaneShif
             free=free,
         ),
         alternative=say(
-            "{words:capital} runs from {low:.1f} to {high:.1f} {text}; the band is at most {high_2:.1f} "
-            "{text} to each side.",
+            "{words:capital} runs from {low:.1f} to {high:.1f} {unit}; the band is at most {band:.1f} "
+            "{unit} to each side.",
             words=words,
             low=curve.error.min() / size,
             high=curve.error.max() / size,
-            text=text,
-            high_2=curve.band.max() / size,
+            unit=text,
+            band=curve.band.max() / size,
         ),
     )
 
@@ -285,9 +285,9 @@ def _residuals(result: PlaneShiftResult) -> Section:
         ),
         caption=say("What the placings disagree by, with scales and squareness alone, and with the curves."),
         alternative=say(
-            "The placings disagree by {size:.2f} µm rms without and {size_2:.2f} µm with the curves.",
-            size=size[0],
-            size_2=size[1],
+            "The placings disagree by {before:.2f} µm rms without and {after:.2f} µm with the curves.",
+            before=size[0],
+            after=size[1],
         ),
     )
     return Section(say("Residuals"), (plot,))
@@ -368,12 +368,12 @@ def _method(result: PlaneShiftResult) -> Section:
         (
             say("Convergence"),
             say(
-                "{part}: {ess_min:.0f} effective samples, R-hat {rhat_max:.4f}, autocorrelation time "
-                "{autocorrelation_time:.1f} of {steps} steps",
-                part=say("reached") if chains.converged else say("NOT reached"),
-                ess_min=chains.ess_min,
-                rhat_max=chains.rhat_max,
-                autocorrelation_time=chains.autocorrelation_time,
+                "{reached}: {ess:.0f} effective samples, R-hat {rhat:.4f}, autocorrelation time "
+                "{time:.1f} of {steps} steps",
+                reached=say("reached") if chains.converged else say("NOT reached"),
+                ess=chains.ess_min,
+                rhat=chains.rhat_max,
+                time=chains.autocorrelation_time,
                 steps=chains.steps,
             ),
         ),

@@ -72,13 +72,13 @@ def _by_point(result: Result, sphere: Sphere) -> Plot:
         ),
         alternative=say(
             "{count} points: as recorded they deviate by {low:.1f} to {high:.1f} µm from the {name}; "
-            "after the fitted model {low_2:.1f} to {high_2:.1f} µm remain.",
+            "after the fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
             count=len(deviations),
             low=deviations.min(),
             high=deviations.max(),
             name=name,
-            low_2=residuals.min(),
-            high_2=residuals.max(),
+            low_after=residuals.min(),
+            high_after=residuals.max(),
         ),
     )
 

@@ -59,12 +59,12 @@ def _sides(sides: Sides) -> Plot:
         caption=say("Each side minus its certified length, as recorded and after the fitted model, with U (k = 2)."),
         alternative=say(
             "{count} sides: as recorded they deviate by {low:.1f} to {high:.1f} µm; after the fitted "
-            "model {low_2:.1f} to {high_2:.1f} µm remain.",
+            "model {low_after:.1f} to {high_after:.1f} µm remain.",
             count=len(before),
             low=before.min(),
             high=before.max(),
-            low_2=after.min(),
-            high_2=after.max(),
+            low_after=after.min(),
+            high_after=after.max(),
         ),
     )
 
@@ -113,7 +113,7 @@ def _alike(result: Result, found: TriangleFigures) -> list[Block]:
         )
         for one, other, correlation in found.alike
     ]
-    text = say("Hardly told apart by these placings (correlation): {list}.", list=semicolons(pairs))
+    text = say("Hardly told apart by these placings (correlation): {pairs}.", pairs=semicolons(pairs))
     return [Paragraph(text, tone="note")] if pairs else []
 
 
