@@ -95,12 +95,14 @@ UNITS: Mapping[str, Unit] = MappingProxyType({row[0]: Unit(*row) for row in (
 
 
 def unit(symbol: str) -> Unit:
-    """The unit of a symbol.
+    """The unit of a symbol; a unit itself, such as one of another package, as it is.
 
     Raises
     ------
     CmmUqError : the table has none.
     """
+    if isinstance(symbol, Unit):
+        return symbol
     if symbol not in UNITS:
         raise CmmUqError(f"{symbol!r} is no unit of the table", fix=f"Known: {', '.join(UNITS)}")
     return UNITS[symbol]

@@ -12,6 +12,7 @@ import pytest
 from cmm_uq.conformity.accuracy import UNITS as OF_FIGURES
 from cmm_uq.errors import CmmUqError
 from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.physics.effect import Parameter
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM, PRINTED, UNITS, Unit, printed_unit, unit, unit_as_written
 from tests.conftest import ROOT
 
@@ -68,6 +69,12 @@ def test_every_parameter_of_every_effect_has_one(name: str) -> None:
 def test_every_ending_of_a_name_and_every_figure_of_performance_has_one() -> None:
     assert all(isinstance(found, Unit) for found in (*PRINTED.values(), *OF_FIGURES.values()))
     assert (printed_unit("b89_range_um"), printed_unit("length_budget.count")) == ("µm", "")
+
+
+def test_another_package_may_bring_a_unit_of_its_own() -> None:
+    furlong = Unit("furlong", r"\metre", "furlong", 201.168)
+    assert Parameter("length_furlong", furlong, 1.0).unit is furlong
+    assert Parameter("length_mm", "mm", 1.0).unit is UNITS["mm"]  # type: ignore[arg-type]
 
 
 def test_an_unknown_unit_is_refused_with_those_that_there_are() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from cmm_uq.jobs.job import CHARACTERISTICS
 from cmm_uq.messages import Message, Number, Verbatim, say
 from cmm_uq.physics.catalogue import every
 from cmm_uq.uncertainty.model_file import read_model_file
-from cmm_uq.units import unit
+from cmm_uq.units import Unit, unit
 from tests.conftest import ROOT
 from tests.documents.saying import leaves, strangers
 
@@ -53,6 +54,14 @@ def documents(folder: Path) -> list[Document]:
     return found
 
 
+def units(document: Document) -> Iterator[str]:
+    """What stands where tables have units: under a heading, and in the cells of a column of units."""
+    for table in (block for section in document.sections for block in section.blocks if isinstance(block, Table)):
+        for place, column in enumerate(table.columns):
+            yield column.unit
+            yield from (row[place] for row in table.rows if column.heading == "Unit")
+
+
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_every_text_of_every_document_is_a_message_or_the_user_s(name: str) -> None:
     folder = ROOT / "examples" / name
@@ -61,6 +70,7 @@ def test_every_text_of_every_document_is_a_message_or_the_user_s(name: str) -> N
     assert {document.title: strangers(document, known) for document in made} == {
         document.title: [] for document in made
     }
+    assert [text for document in made for text in units(document) if not isinstance(text, Unit) and text] == []
     assert all(sum(isinstance(text, Message) for text in leaves(document)) > 5 for document in made)
 
 
