@@ -46,7 +46,9 @@ def position_on(machine: Machine, middle: Floats, direction: Floats) -> Text:
         return named
     if np.all(crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(machine.travel_mm, axis=1)):
         return say("space diagonal {axes}", axes=_signed(u, np.ones(3, dtype=bool)))
-    return say("oblique {axes}", axes=named.arguments["axes"]) if "axes" in named.arguments else named
+    if named.startswith("space diagonal"):
+        return say("oblique {axes}", axes=named.arguments["axes"])
+    return named
 
 
 def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float | None:
