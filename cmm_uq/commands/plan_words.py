@@ -50,22 +50,22 @@ def combination(parts: Mapping[tuple[str, str], float]) -> Text:
 
 
 def _families(titles: Sequence[Text]) -> list[Text]:
-    """Titles that differ in their last word alone as one: ``scale error of X, Y and Z``."""
-    families: dict[tuple[object, ...], list[Message]] = {}
-    others: list[Text] = []
+    """Titles that differ in their last argument alone as one, in the order of the first: ``scale error of X, Y and Z``."""
+    families: dict[tuple[object, ...], list[Text]] = {}
     for title in titles:
-        if isinstance(title, Message) and title.arguments and title.pattern.endswith("}"):
-            *before, _ = title.arguments.values()
-            families.setdefault((title.pattern, *before), []).append(title)
-        else:
-            others.append(title)
-    return [*(_family(members) for members in families.values()), *others]
+        key: tuple[object, ...] = (title,)
+        if isinstance(title, Message) and title.pattern.endswith("}"):
+            key = (title.pattern, *list(title.arguments.values())[:-1])
+        families.setdefault(key, []).append(title)
+    return [_family(members) for members in families.values()]
 
 
-def _family(members: Sequence[Message]) -> Text:
+def _family(members: Sequence[Text]) -> Text:
     first = members[0]
+    if len(members) == 1 or not isinstance(first, Message):
+        return first
     name = first.pattern.rpartition("{")[2].removesuffix("}")
-    last = [member.arguments[name] for member in members]
+    last = [member.arguments[name] for member in members if isinstance(member, Message)]
     merged = listed([one for one in last if isinstance(one, Text)])
     return Message(first.pattern, {**first.arguments, name: merged})
 

@@ -49,7 +49,7 @@ class Squareness(Effect):
     def __init__(self, plane: str, moved: str, lever: str) -> None:
         self.moved, self.lever = moved, lever
         self.name = f"squareness_{plane}"
-        self.title = say("Squareness {one}–{other}", one=Verbatim(plane[0].upper()), other=Verbatim(plane[1].upper()))
+        self.title = say("Squareness {plane}", plane=Verbatim("–".join(plane.upper())))
         self.imitated_by = (Nonparametric(f"{lever}_mm", moved),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:

@@ -64,7 +64,7 @@ class ThermalGradient(Effect):
     """Table bent by a gradient: carriage x turns about y."""
 
     name = "thermal_gradient"
-    title = say("Bending by the temperature gradient in the table")
+    title = say("Bending by the temperature gradient in the {what}", what=say("table"))
     formula = "e = ε × what carriage x carries, ε_y = k·(temp_table_top − temp_table_bottom)·(x − x0)"
     mechanism = "temperature"
     points_to = say("the table bends: top and bottom differ in temperature")
