@@ -16,6 +16,7 @@ from cmm_uq.inference.draws import Draws, by_chain
 from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.jobs.job import Job
+from cmm_uq.messages import say
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.measurement import ARTEFACT
@@ -24,7 +25,7 @@ from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
@@ -58,7 +59,13 @@ def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Fi
         used[i] = False
         measurement, repeat = int(artefact.measurement[i]), int(artefact.repeat[i])
         rows = (artefact.points.measurement == measurement) & (artefact.points.repeat == repeat)
-        why = f"measurement {measurement}, repeat {repeat} is {times:.1f} of its standard deviations off what the others say"
+        why = say(
+            "measurement {measurement}, repeat {repeat} is {times:.1f} of its standard deviations off "
+            "what the others say",
+            measurement=measurement,
+            repeat=repeat,
+            times=times,
+        )
         lines = tuple(artefact.points.lines[rows].tolist()) if len(artefact.points.lines) else ()
         found.append(Finding("outlier", (measurement,), lines, why, set_aside=True))
     return replace(model, used=used), found
@@ -110,11 +117,11 @@ def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[
 def named_draws(model: MeasurementModel, components: Components, posterior: NoisyPosterior) -> Draws:
     """The posterior of all that is reported: of each effect, of the artefact's sizes, and of the noise."""
     units, columns = {}, []
-    for (owner, name), (draws, unit) in model.reported(posterior.draws).items():
-        units[f"{owner}.{name}"] = unit
+    for (owner, name), (draws, own) in model.reported(posterior.draws).items():
+        units[f"{owner}.{name}"] = own
         columns.append(draws)
     for name, values in sizes_of_noise(components, posterior).items():
-        units[f"noise.{name}_um"] = "µm"
+        units[f"noise.{name}_um"] = unit("µm")
         columns.append(values / MICROMETRE)
     values = np.column_stack(columns) if columns else np.zeros((len(posterior.draws), 0))
     return Draws(units, by_chain(values, posterior.steps))
@@ -127,8 +134,8 @@ def sizes(model: MeasurementModel, posterior: Posterior) -> dict[str, Quantity]:
 
 def _quantities(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
     found: dict[str, dict[str, Quantity]] = {}
-    for (owner, name), (draws, unit) in model.reported(posterior.draws).items():
-        found.setdefault(owner, {})[name] = Quantity.of_draws(draws, unit)
+    for (owner, name), (draws, own) in model.reported(posterior.draws).items():
+        found.setdefault(owner, {})[name] = Quantity.of_draws(draws, own)
     return found
 
 
@@ -151,7 +158,7 @@ def noise(
 ) -> Noise:
     """What the noise is, by component, and what it does to the uncertainties."""
     found = {
-        name: Component(Quantity.of_draws(values / MICROMETRE, "µm"), float(np.mean(values > 0)))
+        name: Component(Quantity.of_draws(values / MICROMETRE, unit("µm")), float(np.mean(values > 0)))
         for name, values in sizes_of_noise(components, posterior).items()
     }
     coordinate = found.pop("coordinate").size

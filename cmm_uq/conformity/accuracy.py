@@ -12,19 +12,18 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from cmm_uq.messages import Text, say
 from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, PRINTED, Unit
 
-TITLES: Mapping[str, str] = {
-    "mean_length_mm": "Mean length",
-    "rms_accuracy_error_um": "rms accuracy error (standard deviation of the lengths)",
-    "b89_range_um": "Range of the lengths (ASME B89.4.1 volumetric performance)",
-    "b89_max_deviation_um": "Largest deviation from the mean length",
+TITLES: Mapping[str, Text] = {
+    "mean_length_mm": say("Mean length"),
+    "rms_accuracy_error_um": say("rms accuracy error (standard deviation of the lengths)"),
+    "b89_range_um": say("Range of the lengths (ASME B89.4.1 volumetric performance)"),
+    "b89_max_deviation_um": say("Largest deviation from the mean length"),
 }
-UNITS: Mapping[str, str] = {
-    "mean_length_mm": "mm", "rms_accuracy_error_um": "µm", "b89_range_um": "µm", "b89_max_deviation_um": "µm",
-}  # fmt: skip
+UNITS: Mapping[str, Unit] = {name: PRINTED[name.rpartition("_")[2]] for name in TITLES}
 
 _DRAWS = 1000
 _NUMBERS = 3_000_000

@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from cmm_uq.conformity.measurement_lines import FACE_DIAGONALS, PARALLELS, SPACE_DIAGONALS
+from cmm_uq.messages import Text
 from cmm_uq.points import Floats
 
 
@@ -29,7 +30,7 @@ class LengthPlan:
     shortest_mm : largest that the shortest length may be.
     """
 
-    positions: tuple[str, ...]
+    positions: tuple[Text, ...]
     lengths: int
     repeats: int
     least_share: float
@@ -55,7 +56,7 @@ class BarPlan:
     """
 
     positions: int
-    directions: tuple[str, ...]
+    directions: tuple[Text, ...]
     further: int
     nearly_cubic: float
     apart_mm: float
@@ -97,8 +98,8 @@ class Condition:
     missing : what is not there, each in words; nothing when the condition is met.
     """
 
-    what: str
-    missing: tuple[str, ...] = ()
+    what: Text
+    missing: tuple[Text, ...] = ()
 
     @property
     def met(self) -> bool:

@@ -18,11 +18,12 @@ from cmm_uq.conformity.statement import Decided, Statement
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.conformity import ConformityFacts, needed
+from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 
-NOT_CONSIDERED = (
+NOT_CONSIDERED = say(
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
 )
 
@@ -70,7 +71,7 @@ class Standard:
 
     name: str
     characteristics: tuple[Characteristic, ...]
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Text, ...] = ()
 
     def characteristic(self, name: str | None) -> Characteristic:
         """One of them by name; without one the first.
@@ -150,7 +151,7 @@ class Test:
             problem, fix = needed(name, self.facts)
             raise CmmUqError(problem, where=f"job.toml {self.key} rule", fix=fix)
 
-    def stated(self, quantity: str, measured: str, items: tuple[Decided, ...], remarks: Sequence[str]) -> Statement:
+    def stated(self, quantity: Text, measured: Text, items: tuple[Decided, ...], remarks: Sequence[Text]) -> Statement:
         """What was decided, with what the test lacks, and what the rule leaves out.
 
         Parameters
@@ -161,7 +162,7 @@ class Test:
         remarks : what the reader must know of this use of the standard.
         """
         asked = self.characteristic.conditions(self.recorded, recorded=True)
-        more = []
+        more: list[Text] = []
         if self.facts.rule == "simple" and items[0].u_um > 0:
             more.append(NOT_CONSIDERED)
         more += self.standard.remarks

@@ -20,6 +20,7 @@ from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.messages import Text, plural, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.plugins import STANDARDS, Plugin, named, offered
@@ -71,7 +72,7 @@ def _volumetric_performance(test: Test) -> Statement:
     limit = float(test.limits_um(np.array([bar]))[0])
     decision = decide(measured.value, measured.u, limit, facts.rule, signed=False)
     item = Decided(measured.value, measured.u, limit, decision, length_mm=bar)
-    return test.stated("range of the ballbar lengths", "lengths", (item,), ())
+    return test.stated(say("range of the ballbar lengths"), say("lengths"), (item,), ())
 
 
 def _errors_of_indication(test: Test) -> Statement:
@@ -96,13 +97,34 @@ def _errors_of_indication(test: Test) -> Statement:
     )  # fmt: skip
     worst = least_favourable(items)
     remarks = [
-        f"u is the test uncertainty (ISO/TS 23165), from the calibrated length: {worst.u_um:.3g} µm."
-        if worst.u_um > 0
-        else "u_um is not stated: no uncertainty is considered, and no probability can be given.",
-        f"{len(items)} {'length' if len(items) == 1 else 'lengths'} decided, each by its own u and limit; least favourable: "
-        f"measurement {worst.measurement}, repeat {worst.repeat}, {worst.length_mm:.5g} mm.",
+        (
+            say("u is the test uncertainty (ISO/TS 23165), from the calibrated length: {u_um:.3g} µm.", u_um=worst.u_um)
+            if worst.u_um > 0
+            else say("u_um is not stated: no uncertainty is considered, and no probability can be given.")
+        ),
+        plural(
+            len(items),
+            one=say(
+                "{count} length decided, each by its own u and limit; {worst}.", count=len(items), worst=_least(worst)
+            ),
+            many=say(
+                "{count} lengths decided, each by its own u and limit; {worst}.", count=len(items), worst=_least(worst)
+            ),
+        ),
     ]
-    return test.stated("error of indication of length, worst against its limit", "lengths", items, remarks)
+    quantity = say("error of indication of length, worst against its limit")
+    return test.stated(quantity, say("lengths"), items, remarks)
+
+
+def _least(worst: Decided) -> Text:
+    return say(
+        "least favourable: measurement {measurement}, repeat {repeat}, {length:.5g} mm",
+        measurement=worst.measurement or 0, repeat=worst.repeat or 0, length=worst.length_mm or 0.0,
+    )  # fmt: skip
+
+
+def _length_unstated(artefact: ArtefactFacts) -> str | None:
+    return "u_um" if artefact.certified and not artefact.u_um else None
 
 
 def _form_error(test: Test) -> Statement:
@@ -122,17 +144,21 @@ def _form_error(test: Test) -> Statement:
     item = Decided(value, u, limit, decision, int(probed.measurement[worst]), int(probed.repeat[worst]),
                    sphere.sizes[0].nominal)  # fmt: skip
     remarks = [
-        f"u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm."
-        if u > 0
-        else "The test sphere is taken as perfectly round: its form deviation (form_um) is not given."
+        (
+            say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm.", u=u)
+            if u > 0
+            else say("The test sphere is taken as perfectly round: its form deviation (form_um) is not given.")
+        )
     ]
     if len(probed.form) > 1:
-        remarks.append(f"The largest of {len(probed.form)} spheres: measurement {probed.measurement[worst]}.")
-    return test.stated("probing form error", "points", (item,), remarks)
-
-
-def _length_unstated(artefact: ArtefactFacts) -> str | None:
-    return "u_um" if artefact.certified and not artefact.u_um else None
+        remarks.append(
+            say(
+                "The largest of {count} spheres: measurement {measurement}.",
+                count=len(probed.form),
+                measurement=probed.measurement[worst],
+            )
+        )
+    return test.stated(say("probing form error"), say("points"), (item,), remarks)
 
 
 def _form_unstated(artefact: ArtefactFacts) -> str | None:
@@ -149,7 +175,7 @@ BUILT_IN: Mapping[str, Standard] = MappingProxyType({standard.name: standard for
     Standard("ISO 10360-5:2010",
              (Characteristic("P_FTU", FORMS, _form_error, partial(conditions, ISO_10360_5), _form_unstated),)),
     Standard("VDI/VDE 2617", (_E0,), (
-        "VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions.",
+        say("VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions."),
     )),
 )})  # fmt: skip
 """The standards that are decided here, by name; VDI/VDE 2617 is held to the plan of ISO 10360-2."""

@@ -8,6 +8,7 @@ from typing import Literal
 
 from cmm_uq.conformity.decision import Decision
 from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.messages import Text
 
 StatementOutcome = Literal["pass", "fail", "undecided", "incomplete"]
 
@@ -52,11 +53,11 @@ class Statement:
 
     facts: ConformityFacts
     characteristic: str
-    quantity: str
-    measured: str
+    quantity: Text
+    measured: Text
     errors: tuple[Decided, ...]
-    missing: tuple[str, ...]
-    remarks: tuple[str, ...]
+    missing: tuple[Text, ...]
+    remarks: tuple[Text, ...]
 
     @property
     def scope(self) -> Literal["complete", "partial"]:

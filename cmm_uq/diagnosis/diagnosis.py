@@ -17,10 +17,11 @@ from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.noise import Components
 from cmm_uq.inference.posterior import NoisyPosterior, Progress
+from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 FALSE_ALARMS = 0.01
 """Default rate at which a recording without any fault is found to have one."""
@@ -45,12 +46,12 @@ class LeftOut:
     """
 
     effect: str
-    title: str
+    title: Text
     probability: float
     parameters: Mapping[str, Quantity]
     explained: float
     together: float
-    points_to: str
+    points_to: Text
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class Diagnosis:
     where: tuple[Place, ...]
     effects: tuple[LeftOut, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
-    rivals: tuple[tuple[str, float], ...]
+    rivals: tuple[tuple[Text, float], ...]
     noise: NoiseFound
     improvement: Improvement
     before: MeasurementModel
@@ -142,7 +143,7 @@ def _verdict(found: Found, alpha: float) -> str:
 
 
 def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
-    index = {found.first.explanations[i].name: i for i in found.chosen}
+    index = {str.__str__(found.first.explanations[i].name): i for i in found.chosen}
     posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
     linear, first = found.model.estimate().linear, _squares(found.first.model.estimate().linear, ())
@@ -192,7 +193,7 @@ def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
     return tuple(groups)
 
 
-def _rivals(compared: ModelComparison) -> tuple[tuple[str, float], ...]:
+def _rivals(compared: ModelComparison) -> tuple[tuple[Text, float], ...]:
     order = np.argsort(-compared.probability)
     return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
 
@@ -203,7 +204,8 @@ def _noise(found: Found, joint: Joint, stated: float | None) -> NoiseFound:
     estimate = found.model.estimate()
     residuals = joint.components.white(sizes.typical)(estimate.least_squares.residuals[:, None])[:, 0]
     return NoiseFound(
-        Quantity.of_draws(sizes.coordinate / MICROMETRE, "µm"), Quantity.of_draws(sizes.placing / MICROMETRE, "µm"),
+        Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
+        Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
         float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
         named(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or _heavy(residuals),
         stated is not None

@@ -18,6 +18,7 @@ from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.inference.marginal import Marginal
 from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.points import Floats
+from cmm_uq.units import unit
 
 SHAPES, KEPT = 512, 7
 """How many are drawn, and how many stand for them."""
@@ -153,7 +154,7 @@ def _shape(components: Components, sizes: Sizes, noise_scale: Floats, probabilit
 
 
 def _with_rivals(linear: LinearModel, rivals: Floats) -> LinearModel:
-    more = tuple(Unknown(("rival", str(i)), "1", 0.0, 1.0, 1.0) for i in range(rivals.shape[1]))
+    more = tuple(Unknown(("rival", str(i)), unit("1"), 0.0, 1.0, 1.0) for i in range(rivals.shape[1]))
     return replace(linear, design=np.hstack([linear.design, rivals]), unknowns=(*linear.unknowns, *more))
 
 

@@ -27,6 +27,7 @@ from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.kind import Observed
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
+from cmm_uq.units import Unit
 
 POWER = 0.8
 
@@ -59,7 +60,7 @@ class Power:
 
     effect: str
     parameter: str
-    unit: str
+    unit: Unit
     allowed: float
     per_unit: float
     detected_at: Floats

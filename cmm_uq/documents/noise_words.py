@@ -2,41 +2,60 @@
 
 from __future__ import annotations
 
-from cmm_uq.documents.result import Component, Noise
-from cmm_uq.documents.wording import listed
+from cmm_uq.documents.result import Noise
+from cmm_uq.messages import Text, after, listed, say
 
 _SHOWN = 0.5
 """Probability from which a component is said to be there."""
 
 _WIDER = 1.05
 
-_NAMES = {
-    "placing": "an offset of each set-up, shared by its repeats, of",
-    "growth": "scatter that grows with length, at the longest",
-    "slow": "slow noise in time of",
-}
 
-
-def noise_found(noise: Noise) -> str:
+def noise_found(noise: Noise) -> Text:
     """What was found, what could not show, and what it does to the uncertainties."""
-    there = [
-        f"{what} {_size(noise.components[name])}"
-        for name, what in _NAMES.items()
-        if name in noise.components and noise.components[name].probability > _SHOWN
-    ]
+    there = _found(noise)
+    found: Text = (
+        say("independent readings, and {what}", what=listed(there))
+        if there
+        else say("independent readings, nothing else")
+    )
+    if noise.wider >= _WIDER:
+        found = say(
+            "{found}; standard uncertainties are up to {times:.2f} times those under white noise",
+            found=found, times=noise.wider,
+        )  # fmt: skip
+    hidden: list[Text] = []
+    if "placing" not in noise.components:
+        hidden.append(say("set-up offsets (no repeats)"))
+    if "slow" not in noise.components:
+        hidden.append(say("slow noise (no time_s)"))
+    return after(found, say("Not to be seen in this recording: {what}", what=listed(hidden))) if hidden else found
+
+
+def _found(noise: Noise) -> list[Text]:
+    """The components that are more probably there than not."""
+    there: list[Text] = []
+    components = noise.components
     if noise.axes_apart > _SHOWN:
-        axes = [f"{axis.upper()} {noise.components[axis].size.value:.2g}" for axis in "xyz"]
-        there.insert(0, f"readings that scatter by axis ({', '.join(axes)} µm)")
-    found = f"beside independent readings {listed(there)}" if there else "independent readings, nothing else"
-    times = f"; standard uncertainties are up to {noise.wider:.2f} times those under white noise"
-    wider = times if noise.wider >= _WIDER else ""
-    hidden = [what for name, what in _COULD_NOT.items() if name not in noise.components]
-    missing = f". Not to be seen in this recording: {listed(hidden)}" if hidden else ""
-    return f"{found}{wider}{missing}"
-
-
-_COULD_NOT = {"placing": "set-up offsets (no repeats)", "slow": "slow noise (no time)"}
-
-
-def _size(component: Component) -> str:
-    return f"{component.size.value:.2g} µm (probability {component.probability:.2f})"
+        x, y, z = (components[axis].size.value for axis in "xyz")
+        there.append(say("a scatter that differs by axis (X {x:.2g}, Y {y:.2g}, Z {z:.2g} µm)", x=x, y=y, z=z))
+    size = {name: components[name].size.value for name in ("placing", "growth", "slow") if name in components}
+    p = {name: components[name].probability for name in size}
+    if p.get("placing", 0.0) > _SHOWN:
+        there.append(
+            say(
+                "an offset of {size:.2g} µm of each set-up, shared by its repeats (probability {p:.2f})",
+                size=size["placing"], p=p["placing"],
+            )
+        )  # fmt: skip
+    if p.get("growth", 0.0) > _SHOWN:
+        there.append(
+            say(
+                "scatter that grows with length to {size:.2g} µm (probability {p:.2f})",
+                size=size["growth"],
+                p=p["growth"],
+            )
+        )
+    if p.get("slow", 0.0) > _SHOWN:
+        there.append(say("slow noise in time of {size:.2g} µm (probability {p:.2f})", size=size["slow"], p=p["slow"]))
+    return there

@@ -16,6 +16,7 @@ import numpy as np
 from scipy import linalg
 
 from cmm_uq.points import Floats
+from cmm_uq.units import Unit
 
 Whiten = Callable[[Floats], Floats]
 
@@ -34,7 +35,7 @@ class Unknown:
     """
 
     key: tuple[str, str]
-    unit: str
+    unit: Unit
     prior_mean: float
     prior_sd: float
     scale: float

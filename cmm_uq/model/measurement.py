@@ -25,6 +25,7 @@ from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
+from cmm_uq.units import Unit
 
 ARTEFACT = "artefact"
 """First part of the key of a size of the artefact."""
@@ -80,8 +81,9 @@ class MeasurementModel:
             if effect.shape and effect.name not in self.shapes:
                 raise CmmUqError(
                     f"{effect.name} has the nonlinear parameter {effect.shape[0].name}, which a report does not estimate",
-                    where="job.toml [model] effects", fix="Leave it out",
-                )  # fmt: skip
+                    where="job.toml [model] effects",
+                    fix="Leave it out",
+                )
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -97,7 +99,7 @@ class MeasurementModel:
         )
         return coefficients + sizes
 
-    def reported(self, draws: Floats) -> dict[tuple[str, str], tuple[Floats, str]]:
+    def reported(self, draws: Floats) -> dict[tuple[str, str], tuple[Floats, Unit]]:
         """Draws (N,), and unit, of every parameter as it is reported, then of the artefact's sizes, by key.
 
         Parameters

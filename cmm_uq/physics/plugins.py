@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import foreign
 from cmm_uq.physics.effect import Effect, Parameter, Shape
 from cmm_uq.plugins import EFFECTS, Plugin, offered
 from cmm_uq.points import Floats, Points
@@ -43,8 +44,8 @@ class _Outside(Effect):
 
     def __init__(self, effect: Effect, plugin: EffectPlugin) -> None:
         self._effect, self._plugin = effect, plugin
-        self.name, self.title, self.formula = effect.name, effect.title, effect.formula
-        self.mechanism, self.points_to = effect.mechanism, effect.points_to
+        self.name, self.title, self.formula = effect.name, foreign(effect.title), effect.formula
+        self.mechanism, self.points_to = effect.mechanism, foreign(effect.points_to)
         self.coefficients, self.shape, self.columns = effect.coefficients, effect.shape, effect.columns
         self.tier, self.idealised_over, self.imitated_by = effect.tier, effect.idealised_over, effect.imitated_by
 

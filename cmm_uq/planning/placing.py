@@ -6,13 +6,14 @@ placing in the machine's scale readings.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Message, Text, commas, say, signed
 from cmm_uq.points import AXES, Floats, Ints, Machine, Points
 
 VECTORS: Mapping[str, str] = {"approach": "approach_{}", "normal": "n{}"}
@@ -32,7 +33,7 @@ class Placing:
     points : everything measured there, as one measurement.
     """
 
-    title: str
+    title: Text
     points: Points
 
     @cached_property
@@ -42,12 +43,12 @@ class Placing:
         return np.asarray(0.5 * (readings.min(axis=0) + readings.max(axis=0)))
 
     @property
-    def ends(self) -> str:
+    def ends(self) -> Text:
         """Scale readings of the first point and of the farthest from it, mm: ``(250, 0, −40) → (650, 0, −40)``."""
         readings = self.points.machine_xyz
         far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
-        first, last = (", ".join(f"{value:.0f}" for value in readings[row]).replace("-", "−") for row in (0, far))
-        return f"({first}) → ({last})" if far else f"({first})"
+        first, last = (commas(signed(value, ".0f") for value in readings[row]) for row in (0, far))
+        return say("({first}) → ({last})", first=first, last=last) if far else say("({first})", first=first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +109,7 @@ class Pattern:
         """Body (n, 3) along the machine's axes for an attitude (3, 3), whose columns are the artefact's axes."""
         return np.asarray(self.body @ attitude.T)
 
-    def placed(self, machine: Machine, attitude: Floats, middle: Floats, title: str) -> Placing:
+    def placed(self, machine: Machine, attitude: Floats, middle: Floats, title: Text) -> Placing:
         """Set up with its middle at scale readings ``middle`` (3,)."""
         columns = dict(self.columns)
         for key, vectors in self.vectors.items():
@@ -174,10 +175,14 @@ def _concatenated(parts: Sequence[Points]) -> Points:
     )  # fmt: skip
 
 
-def split(points: Points, title: str = "measurement {}") -> tuple[Placing, ...]:
+def _measurement(number: int) -> Message:
+    return say("measurement {number}", number=number)
+
+
+def split(points: Points, title: Callable[[int], Message] = _measurement) -> tuple[Placing, ...]:
     """The placings of a recording, in ascending order of their numbers."""
     return tuple(
-        Placing(title.format(number), points.select(points.measurement == number))
+        Placing(title(number), points.select(points.measurement == number))
         for number in np.unique(points.measurement).tolist()
     )
 

@@ -9,6 +9,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import Kind, Observe
@@ -54,7 +55,7 @@ class Planning:
     candidates: Callable[[Setting, Start | None], tuple[Placing, ...]]
     elsewhere: Callable[[Artefact, Volume, int], tuple[Placing, ...]] | None = None
     shared: bool = False
-    free: Callable[[Setting, Points, str], tuple[str, ...]] | None = None
+    free: Callable[[Setting, Points, str], tuple[Text, ...]] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,6 +37,7 @@ EXAMPLE = {
     "triangle": "triangle-simulated", "sphere": "sphere-simulated", "plane": "plane-simulated",
 }  # fmt: skip
 OUTSIDE = "tracker_length"
+PLUGINS = {OUTSIDE: {"outside-kinds": "0.1.0"}}
 TRUTH = "seed = 7\n[noise]\ncoordinate_um = 0.5\n"
 TRACKER_JOB = """
 [job]
@@ -114,6 +115,7 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
     if kind.offers("plan", Planning):
         plan = write_plan(job, out, power=False)
         assert json.loads(plan.results)["schema"] == "cmm-uq/plan/1"
+        assert json.loads(plan.results)["software"].get("plugins", {}) == PLUGINS.get(name, {})
     else:
         refused(kind, "planned", lambda: write_plan(job, out, power=False), out)
 
@@ -132,6 +134,8 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
         page, pdf = (file_name(document, read_job(job).origin) for document in CERTIFICATE)
         assert {page, pdf, "results.json"} <= set(report.files)
         assert report.summary[0][0] == "Measured"
+        assert results["software"].get("plugins", {}) == PLUGINS.get(name, {})
+        assert ("with outside-kinds 0.1.0" in report.files[page].read_text(encoding="utf-8")) == (name == OUTSIDE)
         if name == OUTSIDE:
             assert results["tracker"] == {"distances": 26}
             assert "Distances by laser tracker" in report.files[page].read_text(encoding="utf-8")
@@ -140,7 +144,9 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
 
     out = tmp_path / "diagnosis"
     if own.diagnose or observed:
-        verdict = json.loads(write_diagnosis(job, out).results)["diagnosis"]["verdict"]
+        diagnosis = json.loads(write_diagnosis(job, out).results)
+        verdict = diagnosis["diagnosis"]["verdict"]
+        assert diagnosis["software"].get("plugins", {}) == PLUGINS.get(name, {})
         assert verdict in ("consistent", "explained", "partial", "unexplained")
         assert verdict == "consistent" or not observed  # nothing but white noise was drawn
     else:

@@ -22,7 +22,7 @@ from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE, PPM
+from cmm_uq.units import MICROMETRE, PPM, unit
 
 KNOWN = "job.toml [artefact] known"
 _FINE = 101
@@ -62,13 +62,13 @@ class ShiftResult(ShiftFound):
     @cached_property
     def scale(self) -> Quantity | None:
         """Mean sensitivity error, ppm; ``None`` where nothing determines it."""
-        return Quantity.of_draws(self.estimate.scale / PPM, "ppm") if self.estimate.scale_known else None
+        return Quantity.of_draws(self.estimate.scale / PPM, unit("ppm")) if self.estimate.scale_known else None
 
     @cached_property
     def linearity(self) -> Quantity:
         """Linearity error: peak to valley of the curve about the line through its ends at the first series, µm."""
         about = self._about_the_ends
-        return Quantity.of_draws(np.ptp(about, axis=1) / MICROMETRE, "µm", _ptp(about.mean(axis=0)))
+        return Quantity.of_draws(np.ptp(about, axis=1) / MICROMETRE, unit("µm"), _ptp(about.mean(axis=0)))
 
     @cached_property
     def reported(self) -> Reported:
@@ -92,7 +92,7 @@ class ShiftResult(ShiftFound):
     @cached_property
     def shifts(self) -> tuple[Quantity, ...]:
         """Of each series against the first, mm."""
-        return tuple(Quantity.of_draws(draws, "mm") for draws in self.estimate.shifts.T)
+        return tuple(Quantity.of_draws(draws, unit("mm")) for draws in self.estimate.shifts.T)
 
     @cached_property
     def distances(self) -> tuple[Floats, Floats] | None:

@@ -21,7 +21,7 @@ from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.points import AXES, Floats
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
+from cmm_uq.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,8 @@ class PlaneShiftResult(ShiftFound):
     def scalars(self) -> dict[str, dict[str, Quantity]]:
         """Squareness, scales and sizes of the curves, by name and parameter; what is not determined is left out."""
         found: dict[str, dict[str, Quantity]] = {}
-        for (name, parameter), (draws, unit, value) in self._draws.items():
-            found.setdefault(name, {})[parameter] = Quantity.of_draws(draws, unit, value)
+        for (name, parameter), (draws, own, value) in self._draws.items():
+            found.setdefault(name, {})[parameter] = Quantity.of_draws(draws, own, value)
         return found
 
     @cached_property
@@ -74,20 +74,20 @@ class PlaneShiftResult(ShiftFound):
         return found
 
     @cached_property
-    def _draws(self) -> dict[tuple[str, str], tuple[Floats, str, float | None]]:
+    def _draws(self) -> dict[tuple[str, str], tuple[Floats, Unit, float | None]]:
         """Draws (N,), unit, and estimate where that is not their mean."""
         free = self.estimate.free.names
-        found: dict[tuple[str, str], tuple[Floats, str, float | None]] = {}
+        found: dict[tuple[str, str], tuple[Floats, Unit, float | None]] = {}
         square = SQUARENESS[self.plane].name
         if square not in free:
-            found[square, "angle_arcsec"] = self.estimate.squareness / ARCSECOND, "″", None
+            found[square, "angle_arcsec"] = (self.estimate.squareness / ARCSECOND, unit("″"), None)
         axes = [AXES[axis] for axis in self.estimate.plate.axes]
         for axis, draws in zip(axes, self.estimate.scales, strict=True):
             if SCALE[axis].name not in free:
-                found[SCALE[axis].name, "ppm"] = draws / PPM, "ppm", None
+                found[SCALE[axis].name, "ppm"] = (draws / PPM, unit("ppm"), None)
         if (SCALE[axes[0]].name, SCALE[axes[1]].name) in self.estimate.free.combinations:
             difference = self.estimate.scales[1] - self.estimate.scales[0]
-            found[f"{SCALE[axes[1]].name}_minus_{axes[0]}", "ppm"] = difference / PPM, "ppm", None
+            found[f"{SCALE[axes[1]].name}_minus_{axes[0]}", "ppm"] = (difference / PPM, unit("ppm"), None)
         for name, curve in self.curves.items():
             if name not in free:
                 draws = curve.draws
@@ -95,7 +95,7 @@ class PlaneShiftResult(ShiftFound):
                     part = (curve.position - curve.position[0]) / np.ptp(curve.position)
                     draws = draws - draws[:, -1:] * part
                 value = float(np.ptp(draws.mean(axis=0))) / MICROMETRE
-                found[name, "peak_to_valley_um"] = np.ptp(draws, axis=1) / MICROMETRE, "µm", value
+                found[name, "peak_to_valley_um"] = (np.ptp(draws, axis=1) / MICROMETRE, unit("µm"), value)
         return found
 
     @cached_property

@@ -16,7 +16,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 Reported = Mapping[str, tuple[Floats, str]]
 """Draws (N,) of something that is reported, and its unit, by its name."""
@@ -87,7 +87,7 @@ class ShiftFound(ABC):
         """
         found = dict(self.reported)
         if self.job.facts.recording.u_coordinate_um is None:
-            found["noise.coordinate_um"] = self.estimate.sigma / MICROMETRE, "µm"
+            found["noise.coordinate_um"] = self.estimate.sigma / MICROMETRE, unit("µm")
         found |= self.listed
         chains = self.estimate.chains
         values = np.column_stack([draws for draws, _ in found.values()])
@@ -98,7 +98,7 @@ class ShiftFound(ABC):
     @property
     def repeatability(self) -> Quantity:
         """Standard uncertainty of one reading, µm."""
-        return Quantity.of_draws(self.estimate.sigma / MICROMETRE, "µm")
+        return Quantity.of_draws(self.estimate.sigma / MICROMETRE, unit("µm"))
 
 
 def _rms_um(values: Floats) -> float:

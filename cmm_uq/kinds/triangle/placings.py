@@ -14,6 +14,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.triangle.standard import corners
+from cmm_uq.messages import Text, say
 from cmm_uq.points import AXES, Floats, Machine, Points
 
 PLANES: Mapping[str, tuple[int, int]] = MappingProxyType({"XY": (0, 1), "YZ": (1, 2), "ZX": (0, 2)})
@@ -32,23 +33,23 @@ class Placing:
     long_tip : whether the longer of two tips is mounted.
     """
 
-    title: str
+    title: Text
     plane: str
     place: tuple[float, float, float]
     long_tip: bool = False
 
 
 SEVEN_PLACINGS = (
-    Placing("horizontal, low", "XY", (0.0, 0.5, 0.0)),
-    Placing("horizontal, high", "XY", (0.0, 0.5, 1.0)),
-    Placing("vertical in YZ, left", "YZ", (0.0, 0.5, 0.0)),
-    Placing("vertical in YZ, right", "YZ", (1.0, 0.5, 0.0)),
-    Placing("vertical in YZ, right, longer tip", "YZ", (1.0, 0.5, 0.0), long_tip=True),
-    Placing("vertical in ZX", "ZX", (0.5, 0.5, 0.0)),
-    Placing("vertical in ZX, longer tip", "ZX", (0.5, 0.5, 0.0), long_tip=True),
+    Placing(say("horizontal, low"), "XY", (0.0, 0.5, 0.0)),
+    Placing(say("horizontal, high"), "XY", (0.0, 0.5, 1.0)),
+    Placing(say("vertical in YZ, left"), "YZ", (0.0, 0.5, 0.0)),
+    Placing(say("vertical in YZ, right"), "YZ", (1.0, 0.5, 0.0)),
+    Placing(say("vertical in YZ, right, longer tip"), "YZ", (1.0, 0.5, 0.0), long_tip=True),
+    Placing(say("vertical in ZX"), "ZX", (0.5, 0.5, 0.0)),
+    Placing(say("vertical in ZX, longer tip"), "ZX", (0.5, 0.5, 0.0), long_tip=True),
 )
 
-SHIFTED = Placing("horizontal, low, shifted along X", "XY", (1.0, 0.5, 0.0))
+SHIFTED = Placing(say("horizontal, low, shifted along X"), "XY", (1.0, 0.5, 0.0))
 """The eighth."""
 
 

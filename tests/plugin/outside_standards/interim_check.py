@@ -7,6 +7,7 @@ from cmm_uq.conformity.plans import Condition
 from cmm_uq.conformity.standard import Characteristic, Standard, Test
 from cmm_uq.conformity.statement import Decided, Statement
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import LENGTHS
 from cmm_uq.units import MICROMETRE
@@ -26,16 +27,17 @@ def mean_errors(test: Test) -> Statement:
         decision = decide(error, u, limit, test.facts.rule, signed=True)
         measurement = int(test.artefact.points.measurement[found.rows[rows[0], 0]])
         items.append(Decided(error, u, limit, decision, measurement, length_mm=length))
-    remarks = [f"{len(items)} lengths decided, each by the mean error of its repeats."]
-    return test.stated("mean error of repeated lengths, worst against its limit", "lengths", tuple(items), remarks)
+    remarks = [say("{count} lengths decided, each by the mean error of its repeats.", count=len(items))]
+    quantity = say("mean error of repeated lengths, worst against its limit")
+    return test.stated(quantity, say("lengths"), tuple(items), remarks)
 
 
 def repeated(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     """Each length is measured three times."""
     counts = [len(rows) for rows in _repeats(artefact)]
     missing = sum(max(0, REPEATS - count) for count in counts)
-    told = (f"{missing} repeats of {len(counts)} lengths",) if missing else ()
-    return (Condition(f"{REPEATS} repeats of each length", told),)
+    told = (say("{missing} repeats of {count} lengths", missing=missing, count=len(counts)),) if missing else ()
+    return (Condition(say("{count} repeats of each length", count=REPEATS), told),)
 
 
 def unstated(artefact: ArtefactFacts) -> str | None:
