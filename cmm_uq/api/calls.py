@@ -114,7 +114,7 @@ def report(job: Job | str | Path, *, seed: int = 0) -> Report:
     >>> import cmm_uq
     >>> found = cmm_uq.report("examples/iota-1102-20C", seed=0)
     >>> found
-    <Report of iota-1102-20C: 8 estimates, ASME B89.4.1-1997 fail, consistent>
+    <Report of iota-1102-20C: 11 estimates, ASME B89.4.1-1997 fail, consistent>
     >>> found.figures.loc["b89_range_um", "value"].round(1)
     np.float64(339.9)
     """

@@ -83,19 +83,19 @@ def kinds(
     rivals : (m, r) columns, mm, of what could be missing, for coefficients of standard deviation one.
     residuals : (m,) of the estimate, mm.
     """
-    shapes = _drawn(components)
+    shapes = drawn_shapes(components)
     wide = Marginal(_with_rivals(linear, rivals), components, _without_rivals(estimate, rivals.shape[1]))
     share = np.mean([_probability(Marginal(linear, components, estimate), shapes), _probability(wide, shapes)], axis=0)
     kept, weight = _representative(components.sizes(shapes), share)
     scale = linear.noise_scale
     found = [
-        _shape(components, components.sizes(shapes[[i]]), scale, (1 - TAILS) * w)
+        shape_of(components, components.sizes(shapes[[i]]), scale, (1 - TAILS) * w)
         for i, w in zip(kept, weight, strict=True)
     ]
     return [*found, tails(residuals / scale)]
 
 
-def _drawn(components: Components) -> Floats:
+def drawn_shapes(components: Components) -> Floats:
     """Latent numbers (n, d) of shapes for a reading noise of 1 mm, spread evenly over their prior; the first is white."""
     d = components.dimension
     found = np.zeros((SHAPES, d))
@@ -121,7 +121,7 @@ def _probability(marginal: Marginal, shapes: Floats) -> Floats:
 
 
 def _representative(sizes: Sizes, share: Floats) -> tuple[list[int], Floats]:
-    """Shapes, and weights whose expectation is that of all shapes being equally probable (systematic resampling)."""
+    """Shapes that stand for all, and their weights: those of what each stands for (systematic resampling)."""
     table = np.column_stack(
         [sizes.reading, sizes.placing, sizes.growth, sizes.slow, np.where(sizes.slow > 0, sizes.rate, 0)]
     )
@@ -144,7 +144,8 @@ def _representative(sizes: Sizes, share: Floats) -> tuple[list[int], Floats]:
     return first[chosen].tolist(), weight[chosen]
 
 
-def _shape(components: Components, sizes: Sizes, noise_scale: Floats, probability: float) -> Kind:
+def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probability: float) -> Kind:
+    """A single draw of sizes as a kind of noise, over the noise scale (m,), for a reading noise of one."""
     variances, slow = components.variances(sizes)
     v = (variances @ components.shares.T)[0]
     whitening = sparse.diags_array(1 / np.sqrt(v)) @ components.turn @ sparse.diags_array(noise_scale)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from cmm_uq.documents.result import Noise
 from cmm_uq.messages import Text, after, listed, say
 
-_SHOWN = 0.5
-"""Probability from which a component is said to be there."""
+_SHOWN = 0.8
+"""Probability from which a component is said to be there; beforehand it is at most one half."""
 
 _WIDER = 1.05
 
@@ -33,7 +33,7 @@ def noise_found(noise: Noise) -> Text:
 
 
 def _found(noise: Noise) -> list[Text]:
-    """The components that are more probably there than not."""
+    """The components that are probably there."""
     there: list[Text] = []
     components = noise.components
     if noise.axes_apart > _SHOWN:

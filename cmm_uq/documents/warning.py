@@ -12,6 +12,9 @@ from cmm_uq.uncertainty.rounding import significant
 ASSUMED = 0.25
 """Share of the prior in a parameter's variance from which on the reader is told."""
 
+IMPLAUSIBLE = 4.0
+"""Standard deviations of what was known beforehand from which on an estimate is held to be a mistake."""
+
 
 def warnings(result: Result) -> tuple[Text, ...]:
     """All warnings, the gravest first."""
@@ -21,6 +24,7 @@ def warnings(result: Result) -> tuple[Text, ...]:
             _convergence(result),
             _mismatch(result),
             _noise(result),
+            _implausible(result),
             _undetermined(result),
             _screening(result),
             _missing(result),
@@ -80,6 +84,24 @@ def _noise(result: Result) -> list[Text]:
         for size in result.artefact.sizes
         if size.certified and size.sd == 0
     ]
+
+
+def _implausible(result: Result) -> list[Text]:
+    """Parameters far beyond what was known of them: a certified length that is wrong looks like scale errors of all axes."""
+    texts: list[Text] = []
+    means = result.posterior.draws.mean(axis=0)
+    for unknown, mean in zip(result.posterior.unknowns, means, strict=True):
+        off = mean - unknown.prior_mean
+        if 0 < unknown.prior_sd < abs(off) / IMPLAUSIBLE:
+            texts.append(
+                say(
+                    "{parameter}: {off:.4g} {unit} is {times:.0f} times the standard uncertainty with which it was known "
+                    "beforehand ({sd:.3g} {unit}). Before it is used, rule out a wrong certified length, unit or expansion.",
+                    parameter=title_of(unknown.key, result), off=off, unit=unknown.unit, times=abs(off) / unknown.prior_sd,
+                    sd=unknown.prior_sd,
+                )
+            )  # fmt: skip
+    return texts
 
 
 def _undetermined(result: Result) -> list[Text]:

@@ -119,8 +119,9 @@ class Marginal:
         inside = (latent[:, 0] > low) & (latent[:, 0] < high)
         held = np.where(np.isfinite(latent), latent, 0.0)
         held[:, 0] = np.clip(held[:, 0], low, high)
-        log, squares = self.log_likelihood(self.noise.sizes(held))
-        value = log - 0.5 * squares + self.noise.log_prior(held)
+        sizes = self.noise.sizes(held)
+        log, squares = self.log_likelihood(sizes)
+        value = log - 0.5 * squares + self.noise.log_prior(held, sizes)
         return np.where(inside & np.isfinite(value), value, -np.inf)
 
     def log_likelihood(self, sizes: Sizes) -> tuple[Floats, Floats]:

@@ -146,9 +146,10 @@ class Components:
         each = [*(sizes.reading.T**2), sizes.placing**2, sizes.growth**2, fast]
         return np.column_stack(each), slow
 
-    def log_prior(self, latent: Floats) -> Floats:
-        """(w,) of the standard normal numbers; ln σ is uniform, or near what is stated."""
-        return np.asarray(self.log_prior_of_sigma(latent[:, 0]) - 0.5 * np.sum(latent[:, 1:] ** 2, axis=1))
+    def log_prior(self, latent: Floats, sizes: Sizes) -> Floats:
+        """(w,) of the standard normal numbers; that of a coordinate has a uniform logarithm, or is near what is stated."""
+        known = self.log_prior_of_sigma(np.log(sizes.coordinate))
+        return np.asarray(known - 0.5 * np.sum(latent[:, 1:] ** 2, axis=1))
 
     def log_prior_of_sigma(self, log_sigma: Floats) -> Floats:
         """A stated value is good to a fifth (as if from a dozen readings), or now and then simply wrong."""

@@ -35,6 +35,7 @@ def sample_with_noise(
         seed,
         progress,
         effective_samples=LEAST_EFFECTIVE_SAMPLES,
+        steps_at_once=100,
         least_walkers=16,
     )  # everything but the noise is drawn independently, given it
     sizes = noise.sizes(chains.draws)

@@ -31,7 +31,7 @@ def noise_of(model: MeasurementModel, used: np.ndarray | None = None) -> Compone
     sensitivity = sensitivities(model, xyz)[chosen]
     rows = artefact.rows[chosen]
     turn, along = _machine_axes(rows, sensitivity)
-    block = repeated_quantity(model, along, chosen)
+    block = repeated_quantity(model, chosen)
     helmert, count = _helmert(block)
     turn = sparse.csr_array(helmert @ turn)
     axes = np.asarray(abs(helmert).power(2) @ _squares(along, artefact.noise_scale[chosen]))
@@ -99,7 +99,7 @@ def _machine_axes(rows: Ints, sensitivity: Floats) -> tuple[sparse.csr_array, Fl
     return sparse.csr_array((np.concatenate(values), where), shape=(m, m)), along
 
 
-def repeated_quantity(model: MeasurementModel, along: Floats, chosen: np.ndarray) -> Ints:
+def repeated_quantity(model: MeasurementModel, chosen: np.ndarray) -> Ints:
     """Numbers (m,) that observations share when they repeat one quantity: the same points of one placing, seen alike."""
     artefact = model.artefact
     points = np.sort(artefact.points.point[artefact.rows], axis=1)
