@@ -19,6 +19,7 @@ from cmm_uq.documents.warning import warnings
 from cmm_uq.documents.wording import expanded, listed, measured, probability, title_of
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.uncertainty.rounding import rounded, significant
 from cmm_uq.units import MICROMETRE
 
@@ -225,13 +226,14 @@ def _traceability(result: Result) -> Section:
         ("Serial number", artefact.serial),
     ]
     compared = result.job.facts.recording.earlier
-    certified = [] if compared else [size for size in result.artefact.sizes if size.certified]
+    dimensions = [size for size in result.artefact.sizes if size.role == "dimension"]
+    certified = [] if compared else [size for size in dimensions if size.certified]
     for size in certified:
         what = size.title.split(" of ")[0].lower()
         rows.append((f"Certified {what} at 20 °C", f"{size.nominal:.10g} {size.unit}, u = {size.sd / MICROMETRE:g} µm"))
     if compared:
         rows.append(("References", f"the earlier recording {compared}"))
-    elif result.artefact.sizes and not certified:
+    elif dimensions and not certified:
         rows.append(("Certified length", "none: uncalibrated artefact (auto-calibration)"))
     if artefact.cte_per_k:
         rows.append(("Coefficient of thermal expansion", f"{artefact.cte_per_k * 1e6:g} × 10⁻⁶ /K"))
@@ -246,12 +248,13 @@ def _traceability(result: Result) -> Section:
 
 def _posterior(result: Result) -> Section:
     posterior = result.posterior
-    if not posterior.unknowns:
+    set_up = {(ARTEFACT, size.name) for size in result.artefact.sizes if size.role == "set-up"}
+    shown = [i for i, unknown in enumerate(posterior.unknowns) if unknown.key not in set_up]
+    if not shown:
         return Section("Posterior distribution", ())
-    names = [title_of(unknown.key, result) for unknown in posterior.unknowns]
+    names, draws = [title_of(posterior.unknowns[i].key, result) for i in shown], posterior.draws[:, shown]
     plot = corner_plot(
-        posterior.draws, names, units=[unknown.unit for unknown in posterior.unknowns],
-        estimates=posterior.draws.mean(axis=0),
+        draws, names, units=[posterior.unknowns[i].unit for i in shown], estimates=draws.mean(axis=0),
         caption="Posterior distribution: each parameter, and each pair.",
         alternative=f"Marginal and pairwise posterior densities of {listed(names)}.",
     )  # fmt: skip

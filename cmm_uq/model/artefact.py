@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -55,6 +56,9 @@ class Forms:
     directions: Floats
 
 
+Role = Literal["dimension", "sought", "set-up"]
+
+
 @dataclass(frozen=True)
 class Size:
     """A dimension of the artefact at 20 °C, itself to be estimated.
@@ -65,6 +69,8 @@ class Size:
     unit : as printed.
     nominal : where to start, in mm.
     sd : standard uncertainty of the certificate, mm; infinite without a certificate.
+    role : a dimension of the artefact; a size that the measurement is made for; or what is known of how it was set up
+        (``nominal`` and ``sd`` are then in ``unit``).
     """
 
     name: str
@@ -72,6 +78,7 @@ class Size:
     unit: str
     nominal: float
     sd: float
+    role: Role = "dimension"
 
     @property
     def certified(self) -> bool:
