@@ -223,7 +223,7 @@ def plane() -> Simulated:
 
 def digitizer() -> Simulated:
     """A digitizer scans a reference sphere in the source's three attitudes, twice each; the machine moves along w."""
-    offset, centre, radius, parts = np.array([1.001, 264.505, 129.575]), MIDDLE + [-150, -120, -180], 12.7, []
+    offset, centre, radius, parts = np.array([1.001, 264.505, 129.575]), MIDDLE + np.array([-150, -120, -180]), 12.7, []
     for number, angles in enumerate(THREE, 1):
         seen, moved = scan(euler_313(*np.radians(angles)), offset, radius)
         count = 2 * len(seen)

@@ -23,7 +23,9 @@ MOST = 100.0
 _SAME = 1e-9
 """Degrees by which the rows of one measurement may differ."""
 
-_TURN_MORE = "Align in three attitudes that differ by turns about two axes, such as γ = 0° and 90°, and α = 90° and 180°"
+_TURN_MORE = (
+    "Align in three attitudes that differ by turns about two axes, such as γ = 0° and 90°, and α = 90° and 180°"
+)
 
 
 def attitudes(points: Points) -> Floats:
@@ -71,12 +73,16 @@ def alignments(points: Points, where: str | None) -> tuple[Alignment, ...]:
     scan, poses, found = scan_of(points), Placings.of(points.measurement), []
     for i, number in enumerate(poses.numbers.tolist()):
         rows = poses.index == i
-        angles = np.radians([float(points.columns[name][rows][0]) for name in ANGLES])
+        alpha, beta, gamma = (float(np.radians(points.columns[name][rows][0])) for name in ANGLES)
         if scan is None:
-            found.append(Alignment(*angles, points.xyz[rows].mean(axis=0), MICROMETRE**2 * np.eye(3) / int(rows.sum())))
+            found.append(
+                Alignment(
+                    alpha, beta, gamma, points.xyz[rows].mean(axis=0), MICROMETRE**2 * np.eye(3) / int(rows.sum())
+                )
+            )
             continue
         try:
-            found.append(align_on_sphere(scan[rows], points.xyz[rows], *angles, u_point=MICROMETRE))
+            found.append(align_on_sphere(scan[rows], points.xyz[rows], alpha, beta, gamma, u_point=MICROMETRE))
         except CmmUqError as error:
             raise CmmUqError(f"measurement {number}: {error.problem}", where=place(points, rows, where),
                              fix="Scan as much of the sphere as the digitizer sees, moving the machine across it",

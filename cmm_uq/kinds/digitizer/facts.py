@@ -28,4 +28,4 @@ class AlignmentFacts(ArtefactFacts):
 
     offset_mm: Triple | None = None
     u_attitude_arcsec: Annotated[float, Field(ge=0, le=36_000)] = 0.0
-    u_centre_um: Uncertainties = [0.0, 0.0, 0.0]
+    u_centre_um: Uncertainties = Field(default_factory=lambda: [0.0, 0.0, 0.0])

@@ -1,9 +1,9 @@
 """Laser digitizer on a reference sphere, in several attitudes: where its mount lies (Harris 2004 sections 4.4 and 5.3).
 
-With the mount at true coordinates D, a point of the scan plane lies at D + q, q = E·([u v 0] − [U1 V1 W1]). Recorded are the
-points of the sphere (``u_mm``, ``v_mm``, and the scale readings as x, y, z), or the readings with the origin of the scan plane at
-its centre (u = v = 0). The offset [U1 V1 W1] is what is sought, the sphere's place is free; the rotations of the carriages turn q
-(eq. 35), so q is the stylus tip offset of each point.
+With the mount at true coordinates D, a point of the scan plane lies at D + q, q = E·([u v 0] − [U1 V1 W1]). Recorded are
+the points of the sphere (``u_mm``, ``v_mm``, and the scale readings as x, y, z), or the readings with the origin of the scan
+plane at its centre (u = v = 0). The offset [U1 V1 W1] is what is sought, the sphere's place is free; the rotations of the
+carriages turn q (eq. 35), so q is the stylus tip offset of each point.
 """
 
 from __future__ import annotations

@@ -40,9 +40,9 @@ def _offset(found: DigitizerFigures) -> Table:
     notes = (
         MEANING,
         "U is the expanded uncertainty for a coverage probability of 95 %; k = U/u.",
-        "Centre of the reference sphere: ({:.4f}, {:.4f}, {:.4f}) mm in the recorded frame.".format(*found.sphere).replace(
-            "-", "−"
-        ),
+        "Centre of the reference sphere: ({:.4f}, {:.4f}, {:.4f}) mm in the recorded frame.".format(
+            *found.sphere
+        ).replace("-", "−"),
     )
     return Table("Offset of the mount", columns, tuple(rows), notes)
 
