@@ -26,7 +26,7 @@ class DigitizerOffset(Effect):
     name = "digitizer_offset"
     title = "Alignment of the digitizer"
     formula = "e = du·u + dv·v"
-    mechanism = "digitizer"
+    mechanism = "optical probe"
     points_to = (
         "the digitizer is out of alignment, or has moved in its mount: tighten the mount and align it on the reference sphere "
         "again, in every pose"
@@ -46,7 +46,7 @@ class DigitizerDepth(Effect):
     name = "digitizer_depth"
     title = "Depth bias of the digitizer"
     formula = "e = k·depth·v"
-    mechanism = "digitizer"
+    mechanism = "optical probe"
     points_to = "the digitizer's depth scale is wrong: calibrate it over its range, and scan in its middle until then"
     coefficients = (Parameter("um_per_mm", "µm/mm", 1.0),)
     columns = ("gamma_deg", "depth_mm")
@@ -66,7 +66,7 @@ class DigitizerIncidence(Effect):
     name = "digitizer_incidence"
     title = "Incidence of the digitizer's light"
     formula = "e = (kᵢ·incident + kₚ·projected)·v"
-    mechanism = "digitizer"
+    mechanism = "optical probe"
     points_to = (
         "the digitizer errs where its light meets the surface askew: turn it square to the surface, or correct its readings "
         "for the angle"

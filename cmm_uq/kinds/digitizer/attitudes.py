@@ -10,7 +10,6 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import columns_needed, place
 from cmm_uq.physics.alignment import Alignment, align_on_sphere
-from cmm_uq.physics.digitizer import euler_313
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import MICROMETRE
 
@@ -23,15 +22,12 @@ MOST = 100.0
 _SAME = 1e-9
 """Degrees by which the rows of one measurement may differ."""
 
+_LITTLE = 0.005
+"""Part of a direction that is not told."""
+
 _TURN_MORE = (
     "Align in three attitudes that differ by turns about two axes, such as γ = 0° and 90°, and α = 90° and 180°"
 )
-
-
-def attitudes(points: Points) -> Floats:
-    """(n, 3, 3) of each point: columns u, v, w in machine axes, from the recorded Euler angles."""
-    angles = np.radians(np.column_stack([points.columns[name] for name in ANGLES]))
-    return np.ascontiguousarray(euler_313(*angles.T).transpose(2, 0, 1))
 
 
 def scan_of(points: Points) -> Floats | None:
@@ -108,11 +104,19 @@ def refuse_undetermined(found: Sequence[Alignment], where: str | None) -> None:
     ------
     CmmUqError : with the direction that they do not determine.
     """
-    (u, v, w), times = worst_direction(found)
+    direction, times = worst_direction(found)
     if times <= MOST:
         return
-    along = f"along {u:.2f} u + {v:.2f} v + {w:.2f} w".replace("+ -", "− ").replace("-", "−")
-    told = "not at all" if np.isinf(times) else f"{times:.0f} times worse than a centre"
+    told = "" if np.isinf(times) else f", {times:.0f} times as uncertain as a centre"
     raise CmmUqError(
-        f"{len(found)} attitudes determine the offset of the mount {along} {told}", where=where, fix=_TURN_MORE
-    )
+        f"{len(found)} attitudes leave the offset of the mount along {words(direction)} open{told}", where=where, fix=_TURN_MORE
+    )  # fmt: skip
+
+
+def words(direction: Floats) -> str:
+    """A direction (3,) in the digitizer's frame: ``w``, or ``0.37 u + 0.66 v − 0.66 w``."""
+    parts = [(float(part), axis) for part, axis in zip(direction, "uvw", strict=True) if abs(part) > _LITTLE]
+    if len(parts) == 1:
+        return parts[0][1]
+    text = " ".join(f"{'−' if part < 0 else '+'} {abs(part):.2f} {axis}" for part, axis in parts)
+    return text.removeprefix("+ ").replace("− ", "−", 1) if text.startswith("−") else text.removeprefix("+ ")

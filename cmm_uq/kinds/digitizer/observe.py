@@ -14,12 +14,13 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.kinds.digitizer.attitudes import alignments, attitudes, check_angles, refuse_undetermined, scan_of
+from cmm_uq.kinds.digitizer.attitudes import alignments, check_angles, refuse_undetermined, scan_of
 from cmm_uq.kinds.digitizer.facts import AlignmentFacts
 from cmm_uq.kinds.digitizer.target import Centre, ScannedSphere, Target
 from cmm_uq.model.artefact import Artefact, Size
 from cmm_uq.model.placings import Placings
 from cmm_uq.physics.alignment import Alignment, MountOffset, mount_offset
+from cmm_uq.physics.scanning import attitudes
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import ARCSECOND, MICROMETRE
 

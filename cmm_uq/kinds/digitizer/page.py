@@ -10,6 +10,7 @@ from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
 from cmm_uq.kinds.digitizer.analysis import DigitizerFigures, results
+from cmm_uq.kinds.digitizer.attitudes import words
 from cmm_uq.kinds.digitizer.observe import OFFSET, Digitizer
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
@@ -100,12 +101,11 @@ def _attitudes(found: DigitizerFigures) -> Table:
         *(Column(f"{name}0", "mm") for name in "DEF"), *(Column(f"Off {axis}", "µm") for axis in "xyz"),
         Column("Rms", "µm"),
     )  # fmt: skip
-    (u, v, w), times = found.times
-    along = f"{u:.2f} u + {v:.2f} v + {w:.2f} w".replace("+ -", "− ").replace("-", "−")
+    direction, times = found.times
     notes = (
         "D0, E0, F0: scale reading with the origin of the scan plane at the centre of the sphere, from this attitude by "
         "itself. Off: this minus what the fitted offset gives. Rms: of the residuals.",
-        f"These attitudes tell least of the offset along {along}: {times:.2g} times the uncertainty of one centre.",
+        f"These attitudes tell least of the offset along {words(direction)}: {times:.2g} times the uncertainty of one centre.",
     )
     return Table("Every attitude", columns, tuple(rows), notes)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.kinds.digitizer.attitudes import ANGLES, attitudes, scan_of
+from cmm_uq.kinds.digitizer.attitudes import ANGLES, scan_of
 from cmm_uq.kinds.digitizer.facts import AlignmentFacts
+from cmm_uq.physics.scanning import attitudes
 from cmm_uq.points import Floats, Points
 from cmm_uq.screening.shape import TOLERANCE_MM, Screening, Shape, ball_misfit, rows_by, samples_of, spread
 
