@@ -149,9 +149,15 @@ def test_the_jacobian_of_every_size_is_that_of_differences(form: str) -> None:
     ("attitudes", "told"),
     [
         (THREE[:2], "2 attitudes leave the offset of the mount along w open. Align in three"),
-        ([(90.0, 90.0, g) for g in (0.0, 45.0, 90.0, 180.0)], "4 attitudes leave the offset of the mount along w open. Align"),
+        (
+            [(90.0, 90.0, g) for g in (0.0, 45.0, 90.0, 180.0)],
+            "4 attitudes leave the offset of the mount along w open. Align",
+        ),
         (THREE[:1], "1 attitudes leave"),
-        ([(90.0, 90.0, 0.0), (90.0, 90.0, 90.0), (90.2, 90.0, 0.0)], "along w open, 405 times as uncertain as a centre"),
+        (
+            [(90.0, 90.0, 0.0), (90.0, 90.0, 90.0), (90.2, 90.0, 0.0)],
+            "along w open, 405 times as uncertain as a centre",
+        ),
     ],
 )
 def test_attitudes_that_turn_about_one_axis_are_refused_with_what_they_leave_open(attitudes: object, told: str) -> None:
