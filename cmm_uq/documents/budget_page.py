@@ -9,11 +9,12 @@ from cmm_uq.uncertainty.budget import HEADINGS, Budget
 from cmm_uq.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
 from cmm_uq.uncertainty.evaluation import Evaluation, Stated
 from cmm_uq.uncertainty.model_file import ModelFile
+from cmm_uq.uncertainty.ready_budget import ReadyBudget
 
 _TEXT = {"Quantity", "Unit", "Distribution", "Origin", "Method", "Interval"}
 
 
-def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Document:
+def budget_document(file: ModelFile | ReadyBudget, evaluation: Evaluation, name: str) -> Document:
     """The page of an evaluated model file.
 
     Parameters
@@ -28,7 +29,7 @@ def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Docum
     ))  # fmt: skip
     expressions = Facts(tuple((output, f"{output} = {text}") for output, text in _expressions(file).items()))
     described = Facts(tuple(file.descriptions.items()))
-    model: tuple[Block, ...] = (expressions, described) if file.descriptions else (expressions,)
+    model: tuple[Block, ...] = tuple(facts for facts in (expressions, described) if facts.rows)
     sections = [Section("Measurement model", model), Section("Results", (summary,))]
     sections += [
         Section(f"Budget of {output}", _budget(evaluation, output, stated))
@@ -37,7 +38,7 @@ def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Docum
     return Document(
         title="Uncertainty budget",
         number=file.title,
-        subject=f"Evaluated by the law of propagation of uncertainty and by Monte Carlo from {name}",
+        subject=f"Evaluated {file.how} from {name}",
         issuer=(),
         particulars=(Facts((("File", name), ("SHA-256", file.sha256))),),
         warnings=(),
@@ -50,7 +51,7 @@ def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Docum
     )
 
 
-def _expressions(file: ModelFile) -> dict[str, str]:
+def _expressions(file: ModelFile | ReadyBudget) -> dict[str, str]:
     return {output: expression.text for output, expression in file.expressions.items()}
 
 

@@ -26,6 +26,7 @@ from cmm_uq.uncertainty.evaluation import Evaluation, Request, evaluate
 from cmm_uq.uncertainty.expression import Expression, name_problem, parse
 from cmm_uq.uncertainty.input_keys import DIFFERENCES, NUMERIC, distribution_from
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.uncertainty.ready_budget import KEY, ReadyBudget, read_ready_budget
 from cmm_uq.uncertainty.stated_units import derived_unit, number_in, unit_of
 from cmm_uq.uncertainty.type_a import simultaneous_readings
 
@@ -59,6 +60,11 @@ class ModelFile:
     content: bytes
 
     @property
+    def how(self) -> str:
+        """In words, to follow "Evaluated"."""
+        return "by the law of propagation of uncertainty and by Monte Carlo"
+
+    @property
     def sha256(self) -> str:
         """SHA-256 of the file's bytes."""
         return hashlib.sha256(self.content).hexdigest()
@@ -68,9 +74,13 @@ class ModelFile:
         request = self.request if seed is None else replace(self.request, seed=seed)
         return evaluate(self.model, request, self.labels)
 
+    def further(self) -> dict[str, Any]:
+        """Keys of results.json beside those of every budget: none."""
+        return {}
 
-def read_model_file(path: Path) -> ModelFile:
-    """Read and check a model file.
+
+def read_model_file(path: Path) -> ModelFile | ReadyBudget:
+    """Read and check a model file, or one with a ready budget.
 
     Raises
     ------
@@ -82,6 +92,8 @@ def read_model_file(path: Path) -> ModelFile:
         data = toml_of(text, str(path), most_word=TEXT.most, most_listed=DRAWS.most)
     except tomllib.TOMLDecodeError as error:
         raise CmmUqError(f"is not TOML: {error}", where=str(path), fix="Mend the line that it names") from error
+    if KEY in data:
+        return read_ready_budget(content, path)
     return _Reader(str(path)).model_file(data, path.stem, content)
 
 

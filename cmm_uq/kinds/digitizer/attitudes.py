@@ -108,9 +108,8 @@ def refuse_undetermined(found: Sequence[Alignment], where: str | None) -> None:
     if times <= MOST:
         return
     told = "" if np.isinf(times) else f", {times:.0f} times as uncertain as a centre"
-    raise CmmUqError(
-        f"{len(found)} attitudes leave the offset of the mount along {words(direction)} open{told}", where=where, fix=_TURN_MORE
-    )  # fmt: skip
+    problem = f"{len(found)} attitudes leave the offset of the mount along {words(direction)} open{told}"
+    raise CmmUqError(problem, where=where, fix=_TURN_MORE)
 
 
 def words(direction: Floats) -> str:

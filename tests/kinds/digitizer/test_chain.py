@@ -31,9 +31,8 @@ SQUARENESS = (-173.0, -19.0, 21.0)
 
 JOB = """
 [job]
-id = "{id}"
+id = "hymarc"
 date = 2026-02-03
-origin = "{origin}"
 
 [machine]
 name = "DEA Iota 1102"
@@ -73,10 +72,10 @@ def scanned() -> Floats:
     return np.vstack(rows)
 
 
-def job(folder: Path, machine: str = "", origin: str = "measured", id: str = "hymarc") -> Path:
+def job(folder: Path, machine: str = "") -> Path:
     folder.mkdir(parents=True)
     shutil.copy(MAP, folder / "map.csv")
-    (folder / "job.toml").write_text(JOB.format(machine=machine, origin=origin, id=id), encoding="utf-8")
+    (folder / "job.toml").write_text(JOB.format(machine=machine), encoding="utf-8")
     rows = scanned()
     table = np.column_stack([rows[:, 0], np.tile(np.arange(1, 41), 3), rows[:, 6:], rows[:, 1:6]])
     header = "measurement,point,x_mm,y_mm,z_mm,alpha_deg,beta_deg,gamma_deg,u_mm,v_mm"
@@ -120,7 +119,7 @@ def test_scipy_finds_it_on_the_exact_chain_as_well() -> None:
             found.append(digitizer.coordinates(part[:, 4:6], part[:, 6:])[0])
         return np.linalg.norm(np.vstack(found) - state[3:], axis=1) - RADIUS
 
-    start = np.concatenate([OFFSET + [0.1, -0.2, 0.15], SPHERE + 0.1])
+    start = np.concatenate([OFFSET + np.array([0.1, -0.2, 0.15]), SPHERE + 0.1])
     found = least_squares(misses, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
     np.testing.assert_allclose(found.x[:3], OFFSET, atol=1e-6)
 

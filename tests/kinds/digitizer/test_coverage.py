@@ -8,7 +8,7 @@ from scipy import stats
 
 from benchmarks.artefacts.digitizer_coverage import cases
 
-RECORDINGS = 120
+RECORDINGS = 300
 CHANCE = 1e-4 / (2 * 4 * 3)
 """Of one bound, of two for each of four coverages in three cases: together they fail once in ten thousand by chance."""
 

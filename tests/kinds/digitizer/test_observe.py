@@ -70,7 +70,9 @@ def by_scipy(points: Points, diameter: float | None) -> tuple[Floats, Floats]:
         point = points.xyz + np.einsum("nij,nj->ni", E, seen - state[:3])
         return np.linalg.norm(point - state[3:6], axis=1) - (state[6] if diameter is None else diameter / 2)
 
-    start = np.concatenate([OFFSET + [0.5, -0.4, 0.3], SPHERE + 1.0, [RADIUS + 0.2] if diameter is None else []])
+    start = np.concatenate(
+        [OFFSET + np.array([0.5, -0.4, 0.3]), SPHERE + 1.0, [RADIUS + 0.2] if diameter is None else []]
+    )
     found = least_squares(misses, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
     return found.x[:3], np.linalg.inv(found.jac.T @ found.jac)[:3, :3]
 

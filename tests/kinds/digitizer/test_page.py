@@ -16,8 +16,8 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.digitizer.analysis import DigitizerFigures, results
 from cmm_uq.kinds.digitizer.attitudes import words
 from cmm_uq.kinds.digitizer.observe import Digitizer
-from cmm_uq.kinds.digitizer.plan import scan
 from cmm_uq.kinds.digitizer.plan import THREE as PLANNED
+from cmm_uq.kinds.digitizer.plan import scan
 from cmm_uq.physics.digitizer import euler_313
 from tests.conftest import ROOT
 from tests.kinds.digitizer.aligned import OFFSET, THREE

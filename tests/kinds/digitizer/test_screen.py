@@ -67,7 +67,7 @@ def test_readings_in_inches_are_refused() -> None:
 
 def test_a_wrong_sphere_is_refused() -> None:
     facts = artefact_facts(kind="digitizer", length_mm=25.9)
-    with pytest.raises(CmmUqError, match="diameters of the scanned spheres are 25.4 mm"):
+    with pytest.raises(CmmUqError, match=r"diameters of the scanned spheres are 25\.4 mm"):
         Digitizer(facts, scans())
 
 
