@@ -2,8 +2,8 @@
 
 Run:  python benchmarks/without_caller.py
 
-A name counts as used when it stands, as a name, an attribute or a string of an entry point ("module:NAME"), anywhere else in the
-package, in pyproject.toml, or in what __all__ of the package offers. Methods are not looked at.
+A name counts as used when it stands, as a name, an attribute or a string of an entry point ("module:NAME"), anywhere else in
+the package, in pyproject.toml, or in what __all__ of the package offers. Methods are not looked at.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from cmm_uq.uncertainty.budgets.machine import (
     use_by_calibrated_workpiece,
     use_by_simulation,
 )
-from cmm_uq.uncertainty.budgets.sphere import sphere_budgets, sphere_covariance, with_form
+from cmm_uq.uncertainty.budgets.sphere import sphere_budgets, sphere_covariance
 from cmm_uq.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE
 
 Coefficient = Annotated[float, Field(ge=0, le=1e-3)]
@@ -159,7 +159,7 @@ class ProbingTest(BudgetTable):
 class Ballbar(BudgetTable):
     """Length of a ballbar from one position of it, or from the mean of several."""
 
-    method: Literal["ballbar"]
+    method: Literal["ballbar length"]
     length_mm: Length
     direction: Triple
     u_centre_um: Three
@@ -197,7 +197,7 @@ class Ballbar(BudgetTable):
 class FittedSphere(BudgetTable):
     """Centre and radius of a sphere fitted to points spread evenly over a cap about +z, form of the ball included."""
 
-    method: Literal["sphere"]
+    method: Literal["sphere fit"]
     centre_mm: Triple
     radius_mm: Length
     points: Annotated[int, Field(ge=4, le=1_000_000)]
@@ -215,9 +215,8 @@ class FittedSphere(BudgetTable):
     def correlation(self) -> Floats:
         """Of x, y, z and radius."""
         scatter, form = self._covariances()
-        covariance = with_form(scatter, sqrt(3.0) * np.sqrt(np.diag(form)))
-        u = np.sqrt(np.diag(covariance))
-        return np.asarray(covariance / np.outer(u, u))
+        u = np.sqrt(np.diag(scatter + form))
+        return np.asarray((scatter + form) / np.outer(u, u))
 
     def _covariances(self) -> tuple[Floats, Floats]:
         directions = cap_directions(np.radians(self.cap_deg), self.points)
@@ -227,6 +226,6 @@ class FittedSphere(BudgetTable):
 
 TABLES: Mapping[str, type[BudgetTable]] = {
     "ISO 15530-3": CalibratedWorkpiece, "ISO 15530-4": SimulatedTask, "ISO/TS 23165 length": LengthTest,
-    "ISO/TS 23165 probing": ProbingTest, "ballbar": Ballbar, "sphere": FittedSphere,
+    "ISO/TS 23165 probing": ProbingTest, "ballbar length": Ballbar, "sphere fit": FittedSphere,
 }  # fmt: skip
 """By ``method``."""
