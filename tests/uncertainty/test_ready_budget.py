@@ -234,6 +234,33 @@ def test_a_warm_length_comes_to_20_degrees(tmp_path: Path) -> None:
     assert u == pytest.approx(np.sqrt(5e-4**2 + (500 * 11.5e-6 * 0.1) ** 2 + (500 * 5e-7) ** 2), rel=1e-4)
 
 
+@pytest.mark.parametrize(("temperature", "indicated", "at_20"), [(25.0, 404.259, 404.235), (30.0, 404.292, 404.244)])
+def test_the_published_bar_comes_to_20_degrees(
+    tmp_path: Path, temperature: float, indicated: float, at_20: float
+) -> None:
+    """Harris 2004, steel of 12 µm/(m K)."""
+    inputs = {
+        "indicated_mm": (indicated, 1e-6),
+        "workpiece_c": (temperature, 1e-6),
+        "workpiece_cte_per_k": (12e-6, 1e-12),
+    }
+    assert stated(tmp_path, ready("length_at_20", inputs), "length")[0] == pytest.approx(at_20, abs=0.6e-3)
+
+
+def test_scale_and_workpiece_each_bring_their_expansion(tmp_path: Path) -> None:
+    """Second method: 400 000 draws, whose standard deviation has a relative standard uncertainty of 0.11 %."""
+    inputs = {"indicated_mm": (800.0, 0.7e-3), "workpiece_c": (24.0, 0.3), "workpiece_cte_per_k": (23e-6, 1e-6),
+              "scale_c": (22.5, 0.2), "scale_cte_per_k": (8e-6, 0.5e-6)}  # fmt: skip
+    text = ready("length_at_20", inputs, method="second") + '[correlation]\n"workpiece_c,scale_c" = 0.8\n'
+    value, u, _ = stated(tmp_path, text, "length")
+    random, n = np.random.default_rng(1), 400_000
+    ta, ts = random.multivariate_normal([4.0, 2.5], [[0.09, 0.048], [0.048, 0.04]], n).T
+    grown = (1 + random.normal(8e-6, 0.5e-6, n) * ts) / (1 + random.normal(23e-6, 1e-6, n) * ta)
+    drawn = random.normal(800, 0.7e-3, n) * grown
+    assert u == pytest.approx(drawn.std(), rel=6e-3)
+    assert value == pytest.approx(drawn.mean(), abs=5 * u / np.sqrt(n))
+
+
 def test_a_scale_is_held_against_a_reference(tmp_path: Path) -> None:
     found = written(tmp_path, ready("scale_error", SCALE))["outputs"]["scale_error"]  # type: ignore[index]
     assert found["value"] == pytest.approx(-20e-6, rel=1e-4)

@@ -68,6 +68,12 @@ class DigitizerFigures:
         columns = [i for i, u in enumerate(self.result.posterior.unknowns) if u.key[0] == ARTEFACT][:3]
         return self.result.posterior.covariance[np.ix_(columns, columns)]
 
+    @property
+    def correlation(self) -> Floats:
+        """(3, 3) of U1, V1, W1."""
+        u = np.sqrt(np.diag(self.covariance))
+        return np.asarray(self.covariance / np.outer(u, u))
+
     @cached_property
     def sphere(self) -> tuple[float, ...]:
         """Centre of the reference sphere in the recorded frame, mm."""
@@ -118,6 +124,7 @@ def results(result: Result) -> Mapping[str, Any]:
         "digitizer": {
             "offset_mm": {name: quantity_data(one) for name, one in zip(OFFSET, found.offset, strict=True)},
             "covariance_mm2": found.covariance.tolist(),
+            "correlation": found.correlation.tolist(),
             "sphere_mm": list(found.sphere),
             "poses": [
                 {"pose": pose.measurement, **dict(zip(ANGLES, pose.angles_deg.tolist(), strict=True)),

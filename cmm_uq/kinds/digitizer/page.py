@@ -28,12 +28,10 @@ def sections(result: Result) -> list[Section]:
 
 
 def _offset(found: DigitizerFigures) -> Table:
-    s = np.sqrt(np.diag(found.covariance))
-    correlation = found.covariance / np.outer(s, s)
     rows = []
     for i, (name, quantity) in enumerate(zip(OFFSET, found.offset, strict=True)):
         value, U, k = expanded(quantity)
-        rows.append((name, value, U, k, "mm", *(f"{one:+.2f}".replace("-", "−") for one in correlation[i])))
+        rows.append((name, value, U, k, "mm", *(f"{one:.2f}".replace("-", "−") for one in found.correlation[i])))
     columns = (
         Column("Component", numeric=False), Column("Estimate"), Column("U"), Column("k"), Column("Unit", numeric=False),
         *(Column(f"Correlation with {name}") for name in OFFSET),
