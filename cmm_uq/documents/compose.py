@@ -284,8 +284,9 @@ def _method(result: Result) -> Section:
          f"parameter, rank-normalised R-hat {posterior.rhat_max:.4f}, autocorrelation time "
          f"{posterior.autocorrelation_time:.1f} of {posterior.steps} steps"),
     )  # fmt: skip
+    what = "Rigid-body error factors" if result.model.effects else "Sizes of the artefact"
     text = Paragraph(
-        "Rigid-body error factors are estimated from the observations with a linear measurement model, by least squares "
+        f"{what} are estimated from the observations with a linear measurement model, by least squares "
         "(orthogonal factorisation) and as a posterior distribution with priors as wide as physics allows; the certified "
         "length enters with its uncertainty. The attached job, recording and results.json suffice to run it again."
     )
