@@ -23,6 +23,9 @@ from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
+FEWEST_LEFT = 3
+"""Observations that the noise is estimated from, beside those that sizes and set-ups could explain."""
+
 
 def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
     """The model that the job names.
@@ -40,10 +43,32 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
-    return MeasurementModel(
+    model = MeasurementModel(
         artefact, effects(job.facts.model.effects, where="job.toml [model] effects"),
         None if stated is None else stated * MICROMETRE, ~np.isin(artefact.measurement, aside),
     )  # fmt: skip
+    _refuse_hidden_noise(model, job.recording_path)
+    return model
+
+
+def _refuse_hidden_noise(model: MeasurementModel, where: str) -> None:
+    """Refuse to estimate the noise where what is in doubt about each set-up could explain every residual.
+
+    Raises
+    ------
+    CmmUqError : fewer than three observations are left to estimate it from.
+    """
+    if model.sigma is not None or all(size.role != "set-up" for size in model.artefact.sizes):
+        return
+    linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
+    columns = linear.reduced.design * np.array([unknown.scale for unknown in model.unknowns])
+    left = linear.reduced.count - int(np.linalg.matrix_rank(columns, tol=1e-7 * np.linalg.norm(columns, 2)))
+    if left < FEWEST_LEFT:
+        raise CmmUqError(
+            f"what is in doubt about each set-up explains all but {left} of {linear.reduced.count} observations, so the noise "
+            "of a coordinate does not show", where=where,
+            fix="State u_coordinate_um in job.toml [recording], or record more points in each measurement",
+        )  # fmt: skip
 
 
 def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Finding]]:
