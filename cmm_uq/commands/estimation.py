@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from cmm_uq.documents.result import LACK_OF_FIT, Influence, Noise
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import OBSERVATIONS
 from cmm_uq.inference.draws import Draws, by_chain
+from cmm_uq.inference.least_squares import RANK_TOLERANCE
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import Estimate, MeasurementModel
@@ -47,8 +48,33 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
         artefact, effects(job.facts.model.effects, where="job.toml [model] effects"),
         None if stated is None else stated * MICROMETRE, ~np.isin(artefact.measurement, aside),
     )  # fmt: skip
+    _refuse_open_sizes(model, job.recording_path)
     _refuse_hidden_noise(model, job.recording_path)
     return model
+
+
+def _refuse_open_sizes(model: MeasurementModel, where: str) -> None:
+    """Refuse measurements that leave open, whatever the machine's errors, what the measurement is made for.
+
+    Raises
+    ------
+    CmmUqError : too much of the recording is set aside.
+    """
+    sought = [i for i, size in enumerate(model.artefact.sizes) if size.role == "sought"]
+    if not sought:
+        return
+    rank, _ = _rank(replace(model, effects=()), sought)
+    if rank < len(sought):
+        names = ", ".join(model.artefact.sizes[i].title for i in sought)
+        raise CmmUqError(f"the measurements that are used leave a combination of {names} open", where=where,
+                         fix="Set fewer measurements aside, or record more")  # fmt: skip
+
+
+def _rank(model: MeasurementModel, columns: Sequence[int] | slice = slice(None)) -> tuple[int, int]:
+    """Rank of some columns of the design, and how many observations there are, what is of no interest projected out."""
+    linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
+    design = (linear.reduced.design * np.array([unknown.scale for unknown in model.unknowns]))[:, columns]
+    return int(np.linalg.matrix_rank(design, tol=RANK_TOLERANCE * np.linalg.norm(design, 2))), linear.reduced.count
 
 
 def _refuse_hidden_noise(model: MeasurementModel, where: str) -> None:
@@ -60,12 +86,11 @@ def _refuse_hidden_noise(model: MeasurementModel, where: str) -> None:
     """
     if model.sigma is not None or all(size.role != "set-up" for size in model.artefact.sizes):
         return
-    linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
-    columns = linear.reduced.design * np.array([unknown.scale for unknown in model.unknowns])
-    left = linear.reduced.count - int(np.linalg.matrix_rank(columns, tol=1e-7 * np.linalg.norm(columns, 2)))
+    rank, count = _rank(model)
+    left = count - rank
     if left < FEWEST_LEFT:
         raise CmmUqError(
-            f"what is in doubt about each set-up explains all but {left} of {linear.reduced.count} observations, so the noise "
+            f"what is in doubt about each set-up explains all but {left} of {count} observations, so the noise "
             "of a coordinate does not show", where=where,
             fix="State u_coordinate_um in job.toml [recording], or record more points in each measurement",
         )  # fmt: skip

@@ -70,8 +70,11 @@ class Digitizer(Artefact):
             columns={**points.columns, **{f"tip_{axis}_mm": carried[:, i] for i, axis in enumerate(AXES)}},
         )  # fmt: skip
         self._tip = carried
+        # observations, sizes and place are all seen along the directions of the recorded points: taken anew at fitted
+        # ones, they would differ by the noise, and what no recording determines would seem determined
+        self._seen_at = points.xyz + carried
         self.target: Target = (
-            ScannedSphere(facts, points.at(points.xyz + carried), where) if self.scanned else Centre(len(points))
+            ScannedSphere(facts, points.at(self._seen_at), where) if self.scanned else Centre(len(points))
         )
         self.rows, self.noise_scale = self.target.rows, self.target.noise_scale
         self.measurement, self.repeat = points.measurement[self.rows[:, 0]], points.repeat[self.rows[:, 0]]
@@ -86,16 +89,16 @@ class Digitizer(Artefact):
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
         """See :meth:`Artefact.project`: away from the sphere's centre, or every coordinate."""
-        return self.target.project(xyz + self._tip, displacement)
+        return self.target.project(self._seen_at, displacement)
 
     def placing(self, xyz: Floats) -> Floats:
         """See :meth:`Artefact.placing`: the place of the sphere."""
-        return self.target.placing(xyz + self._tip)
+        return self.target.placing(self._seen_at)
 
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`: of offset, sphere, and set-ups."""
         moved = np.concatenate([self.attitude, -self._set_up], axis=2)
-        shown = self.target.project(self.points.xyz + self._tip, moved)
+        shown = self.target.project(self._seen_at, moved)
         return np.hstack([shown[:, :3], self.target.size_change(), shown[:, 3:]])
 
     def centre(self, xyz: Floats, sizes: Floats) -> Floats:
