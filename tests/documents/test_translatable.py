@@ -12,12 +12,12 @@ from cmm_uq.commands.plan import plan_outcome
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.conformity.plans import READY
+from cmm_uq.conformity.standards import BUILT_IN
 from cmm_uq.documents.budget_page import budget_document
 from cmm_uq.documents.document import Column, Document, Paragraph, Plot, Section, Table
 from cmm_uq.documents.origin import marked
 from cmm_uq.documents.program import NAME
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import CHARACTERISTICS
 from cmm_uq.messages import Message, Number, Verbatim, say
 from cmm_uq.physics.catalogue import every
 from cmm_uq.uncertainty.model_file import read_model_file
@@ -35,7 +35,8 @@ def known_to(folder: Path) -> str:
     effects = [
         " ".join((name, *(p.name for p in effect.reported), *effect.columns)) for name, effect in every().items()
     ]
-    return "\n".join([*own, *effects, *READY, *CHARACTERISTICS, NAME, SAMPLER])
+    decided = [one.name for standard in BUILT_IN.values() for one in standard.characteristics]
+    return "\n".join([*own, *effects, *READY, *decided, NAME, SAMPLER])
 
 
 def documents(folder: Path) -> list[Document]:
