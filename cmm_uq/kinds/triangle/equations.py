@@ -7,7 +7,7 @@ placings give rotations; what is left of a defect gives scale or squareness.
 
 Two things of the source are mended. It projects the defect of a slanted side on an axis by the cosine of the triangle's
 angle, which holds only for a defect along that side; here the apex follows from all three sides. And its perpendicularity
-(:func:`printed_perpendicularity`) finds a part only of the squareness.
+finds a part only of the squareness, half of it at most.
 """
 
 from __future__ import annotations
