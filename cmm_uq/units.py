@@ -90,6 +90,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType({row[0]: Unit(*row) for row in (
     ("ms", r"\milli\second", "millisecond", 1e-3),
     ("min", r"\minute", "minute", 60.0),
     ("h", r"\hour", "hour", HOUR),
+    ("Pa", r"\pascal", "pascal", 1.0),
 )})  # fmt: skip
 """By the symbol that is printed."""
 
@@ -108,9 +109,13 @@ def unit(symbol: str) -> Unit:
     return UNITS[symbol]
 
 
+_SPELLED: Mapping[str, str] = MappingProxyType({"degC": "°C", "percent": "%"})
+"""Units of the table as files spell them that are read by pint."""
+
+
 def unit_as_written(text: str) -> Text:
     """A unit of the user's choice: that of the table where it is there, else as it was written."""
-    return UNITS.get(text) or (Verbatim(text) if text else NOTHING)
+    return UNITS.get(_SPELLED.get(text, text)) or (Verbatim(text) if text else NOTHING)
 
 
 PRINTED: Mapping[str, Unit] = MappingProxyType({ending: UNITS[symbol] for ending, symbol in {

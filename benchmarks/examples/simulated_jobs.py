@@ -9,18 +9,20 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.kinds import artefact_of
+from cmm_uq.kinds import artefact_facts, artefact_of
+from cmm_uq.kinds.digitizer.plan import THREE, scan
 from cmm_uq.kinds.triangle.placings import placed_triangle
 from cmm_uq.kinds.triangle.standard import TriangleStandard
 from cmm_uq.model import MeasurementModel, Noise
+from cmm_uq.model.artefact import Size
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.physics.digitizer import euler_313
 from cmm_uq.points import Floats, Ints, Machine, Points
 
 SEED = 20260101
@@ -45,6 +47,7 @@ class Simulated:
     named : the effects that the job names.
     noise_um : of one coordinate.
     size : true size of the artefact, mm; its certified one by default.
+    sizes : true sizes by name, where it has several; others are drawn from what the job states of them.
     extra, model, recording : further lines of job.toml, and of its tables of these names.
     before : effects of an earlier recording, which is written too; then what is told is the change.
     columns : of the CSV beside measurement, point, repeat and coordinates.
@@ -58,6 +61,7 @@ class Simulated:
     named: Sequence[str]
     noise_um: float
     size: float | None = None
+    sizes: Mapping[str, float] = field(default_factory=dict)
     extra: str = ""
     model: str = ""
     recording: str = ""
@@ -188,7 +192,7 @@ def triangle() -> Simulated:
                 "blocks_mm": [480.0, 280.0, 380.0], "u_blocks_um": 0.1, "cylinders_mm": [20.0, 20.0, 20.0],
                 "u_cylinders_um": 0.1}  # fmt: skip
     machine = replace(MACHINE, chain="YXZ")
-    standard = TriangleStandard.of(ArtefactFacts.model_validate(artefact))
+    standard = TriangleStandard.of(artefact_facts(**artefact))
     rotations = {
         "rotation_x_x": 4.0, "rotation_x_y": -3.0, "rotation_x_z": 2.0, "rotation_y_x": 1.5, "rotation_y_y": -2.5,
         "rotation_y_z": 3.0, "rotation_z_x": -4.0, "rotation_z_y": 2.0, "rotation_z_z": 5.0,
@@ -217,7 +221,27 @@ def plane() -> Simulated:
     )  # fmt: skip
 
 
-EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, triangle, plane)
+def digitizer() -> Simulated:
+    """A digitizer scans a reference sphere in the source's three attitudes, twice each; the machine moves along w."""
+    offset, centre, radius, parts = np.array([1.001, 264.505, 129.575]), MIDDLE + np.array([-150, -120, -180]), 12.7, []
+    for number, angles in enumerate(THREE, 1):
+        seen, moved = scan(euler_313(*np.radians(angles)), offset, radius)
+        count = 2 * len(seen)
+        parts.append((np.tile(centre + moved, (2, 1)), np.full(count, number), np.tile(np.arange(1, len(seen) + 1), 2),
+                      np.repeat([1, 2], len(seen)), np.tile(angles, (count, 1)), np.tile(seen.round(4), (2, 1))))  # fmt: skip
+    xyz, measurement, point, repeat, angles, seen = (np.concatenate(part) for part in zip(*parts, strict=True))
+    names = ("alpha_deg", "beta_deg", "gamma_deg", "u_mm", "v_mm")
+    columns = dict(zip(names, np.column_stack([angles, seen]).T, strict=True))
+    return Simulated(
+        "digitizer-simulated", "Reference sphere scanned by a laser digitizer in three attitudes, twice each",
+        {"kind": "digitizer", "name": "Laser digitizer on a trunnion", "length_mm": 25.4, "u_um": 0.3,
+         "offset_mm": [1.0, 264.5, 129.6], "u_attitude_arcsec": 2.0, "u_centre_um": [1.0, 1.0, 1.0]},
+        recording(xyz, measurement, point, repeat, **columns), {}, [], 9.0,
+        sizes=dict(zip(("U1_mm", "V1_mm", "W1_mm"), offset.tolist(), strict=True)), columns=names,
+    )  # fmt: skip
+
+
+EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, triangle, plane, digitizer)
 
 
 def write(example: Simulated, folder: Path) -> None:
@@ -225,8 +249,8 @@ def write(example: Simulated, folder: Path) -> None:
     random = np.random.default_rng([SEED, *example.id.encode()])
     place = folder / example.id
     place.mkdir(parents=True, exist_ok=True)
-    artefact = artefact_of(ArtefactFacts.model_validate(dict(example.artefact)), example.points)
-    sizes = np.array([example.size or size.nominal for size in artefact.sizes])
+    artefact = artefact_of(artefact_facts(**example.artefact), example.points)
+    sizes = np.array([_true_size(example, size, random) for size in artefact.sizes])
     for name, truth in (("recording.csv", example.truth), ("earlier.csv", example.before)):
         if truth is None:
             continue
@@ -236,8 +260,14 @@ def write(example: Simulated, folder: Path) -> None:
     (place / "job.toml").write_text(_toml(example), encoding="utf-8", newline="\n")
 
 
+def _true_size(example: Simulated, size: Size, random: np.random.Generator) -> float:
+    if size.role == "set-up":
+        return float(random.normal(size.nominal, size.sd))
+    return example.size or example.sizes.get(size.name, size.nominal)
+
+
 def _coefficients(truth: Mapping[str, float | Sequence[float]]) -> Floats:
-    return np.concatenate([np.atleast_1d(np.asarray(value, dtype=np.float64)) for value in truth.values()])
+    return np.concatenate([np.zeros(0), *(np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in truth.values())])
 
 
 def _csv(example: Simulated, xyz: Floats) -> str:
@@ -259,6 +289,7 @@ def _toml(example: Simulated) -> str:
         said += [f"{effect.name} {c.name} = {value:g}" for c, value in zip(effect.coefficients, given, strict=True)]
     what = "True errors" if example.before is None else "True changes between the dates"
     size = f"; true length of the bar {example.size} mm" if example.size else ""
+    sought = "; ".join(f"{name.removesuffix('_mm')} = {value:g} mm" for name, value in example.sizes.items())
     artefact = "\n".join(f"{key} = {_value(value)}" for key, value in example.artefact.items())
     names = ", ".join(f'"{name}"' for name in example.named)
     return f"""\
@@ -270,7 +301,7 @@ date = 2026-01-01
 origin = "simulated"
 procedure = "{example.title}"
 remarks = \"\"\"
-Simulated, no machine was measured. {what}: {"; ".join(said)}{size}; \\
+Simulated, no machine was measured. {f"{what}: {'; '.join(said)}" if said else f"Truth: {sought}"}{size}; \\
 noise of a coordinate {example.noise_um:g} µm.\"\"\"
 
 [machine]

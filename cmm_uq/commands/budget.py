@@ -54,7 +54,7 @@ def write_budget(
         from cmm_uq.documents.results_file import as_json
         from cmm_uq.uncertainty.budget_results import results_of
 
-        data = as_json({**results_of(evaluation), "inputs_sha256": {file.name: model.sha256}})
+        data = as_json({**results_of(evaluation), **model.further(), "inputs_sha256": {file.name: model.sha256}})
         document = budget_document(model, evaluation, file.name)
         pdf = render_pdf(document, {file.name: model.content, "results.json": data})
         contents = {"budget.html": render_html(document).encode(), "budget.pdf": pdf, "results.json": data}

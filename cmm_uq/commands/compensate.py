@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from cmm_uq.commands.reading import job_of, read_job
@@ -21,7 +22,7 @@ from cmm_uq.model.machine_maps import maps_of
 from cmm_uq.physics.compensation import compensate_points, machine_compensation
 from cmm_uq.physics.error_map_text import error_map_text
 from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
-from cmm_uq.points import Points
+from cmm_uq.points import AXES, Points
 from cmm_uq.writing import Owner, staged
 
 PROVENANCE = "compensation.json"
@@ -47,7 +48,9 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
     log = log_of(job.facts.machine, job.inputs, job.folder)
     compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
     try:
-        return compensate_points(job.points, compensation), compensation.provenance() | _of_the_log(job.points, log)
+        return compensate_points(_with_probe(job), compensation), compensation.provenance() | _of_the_log(
+            job.points, log
+        )
     except CmmUqError as error:
         where = ", ".join(part for part in (job.recording_path, error.where) if part)
         raise CmmUqError(error.problem, where=where, fix=error.fix) from error
@@ -122,6 +125,16 @@ def _map_text(job: Job, temperature: float, beyond: Beyond) -> dict[str, bytes]:
         )
     found = ErrorMaps(maps_of(job)).map_at(temperature, beyond=beyond)
     return {name: error_map_text(found, name=name).encode()}
+
+
+def _with_probe(job: Job) -> Points:
+    """The recording, with tip offsets where its kind finds them from what it recorded."""
+    facts = job.facts.artefact
+    if not facts.carries_probe or "tip_x_mm" in job.points.columns:
+        return job.points
+    found = kind_of(job).observing("compensated")(facts, job.points, where=job.recording_path).points.columns
+    tips = {name: found[name] for name in (f"tip_{axis}_mm" for axis in AXES)}
+    return replace(job.points, columns={**job.points.columns, **tips})
 
 
 def _of_the_log(points: Points, log: TemperatureLog | None) -> dict[str, object]:

@@ -13,6 +13,7 @@ from cmm_uq.commands.compensate import PROVENANCE
 from cmm_uq.commands.reading import read_machine
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.derived_job import PROGRAM
+from cmm_uq.jobs.digitizer_calibration import DescribedDigitizer, digitizer_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logged_temperatures import log_of
 from cmm_uq.jobs.origin import first_line
@@ -55,7 +56,7 @@ def write_compensated_cloud(
         raise CmmUqError("is no cloud by its ending", where=str(cloud), fix=f"Clouds are {', '.join(FORMS)}")
     maps = ErrorMaps(maps_of(read))
     compensation = replace(machine_compensation(read.points, maps, beyond=beyond), origin=np.zeros(3))
-    chain = _chain(read, cloud, compensation)
+    chain, digitizer = _chain(read, cloud, compensation)
     name = f"{cloud.stem}-compensated{'.npy' if cloud.is_dir() else cloud.suffix}"
     owner = Owner("compensate", read.facts.job.id, read.origin)
     inputs = (*read.paths, *files)
@@ -68,26 +69,28 @@ def write_compensated_cloud(
             "software": PROGRAM, "origin": "compensated", "points": count,
             "inputs_sha256": sha256(read.inputs) | {file.name: sha256_of(file) for file in files},
             "columns": list(chain.columns), **compensation.provenance(),
-            "digitizer": machine.digitizer.model_dump() if machine.digitizer is not None else None,
+            "digitizer": digitizer.as_data(),
             "temperature_log": machine.temperature_log.file if machine.temperature_log is not None else None,
         }  # fmt: skip
         return place.write({PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode()}, [name])
 
 
-def _chain(job: Job, cloud: Path, compensation: Compensation) -> DigitizedCloud:
-    facts = job.facts.machine.digitizer
-    if facts is None:
+def _chain(job: Job, cloud: Path, compensation: Compensation) -> tuple[DigitizedCloud, DescribedDigitizer]:
+    digitizer = digitizer_of(job.facts.machine.digitizer, job.inputs, job.folder, job.origin)
+    if digitizer is None:
         raise CmmUqError(
             "the job describes no digitizer", where="job.toml [machine] digitizer",
-            fix="digitizer = { offset_mm = [U1, V1, W1], poses = [ { alpha_deg = …, beta_deg = …, gamma_deg = … } ] }",
+            fix="digitizer = { offset_mm = [U1, V1, W1], poses = [ { alpha_deg = …, beta_deg = …, gamma_deg = … } ] }, "
+            'or { calibration = "FOLDER" }',
         )  # fmt: skip
+    offset = np.array(digitizer.offset_mm)
     poses = {
         given.pose: Digitizer(
-            euler_313(*np.radians([given.alpha_deg, given.beta_deg, given.gamma_deg])), np.array(facts.offset_mm), compensation
+            euler_313(*np.radians([given.alpha_deg, given.beta_deg, given.gamma_deg])), offset, compensation
         )
-        for given in facts.poses
-    }  # fmt: skip
+        for given in digitizer.poses
+    }
     log = log_of(job.facts.machine, job.inputs, job.folder)
     columns = columns_for(cloud_header(cloud), len(poses), logged=log is not None, where=str(cloud))
     at = None if log is None else lambda times: log.at(times, lambda row: f"point {row + 1}")
-    return DigitizedCloud(poses, columns, at, compensation.beyond == "extrapolate")
+    return DigitizedCloud(poses, columns, at, compensation.beyond == "extrapolate"), digitizer

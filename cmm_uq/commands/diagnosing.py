@@ -27,28 +27,15 @@ from cmm_uq.planning.suggestion import suggestions
 from cmm_uq.screening.screened import Finding
 
 
-def diagnose_folder(
-    folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
-) -> Found:
-    """Diagnose a job, in the way of its kind.
-
-    Parameters
-    ----------
-    folder : the job folder.
-    seed : of everything random.
-    alpha : rate of false alarms.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be diagnosed as it stands.
-    """
-    return diagnose_read(read_job(folder), seed=seed, alpha=alpha, progress=progress)
-
-
 def diagnose_read(
     job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
 ) -> Found:  # fmt: skip
-    """Diagnose a job that was read; see :func:`diagnose_folder`.
+    """Diagnose a job that was read, in the way of its kind.
+
+    Parameters
+    ----------
+    seed : of everything random.
+    alpha : rate of false alarms.
 
     Raises
     ------
@@ -62,7 +49,7 @@ def diagnose_read(
 def diagnose_job(
     folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
 ) -> Diagnosed:
-    """Diagnose a recording of an artefact; see :func:`diagnose_folder`.
+    """Diagnose a recording of an artefact; see :func:`diagnose_read`.
 
     Raises
     ------
@@ -117,7 +104,7 @@ def diagnosed(
 
 
 def outcome_of(found: Found, seed: int = 0) -> Outcome:
-    """What there is to write of what :func:`diagnose_folder` found."""
+    """What there is to write of what :func:`diagnose_read` found."""
     return _recipe(found.job).outcome(found, seed)
 
 

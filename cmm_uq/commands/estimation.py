@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from cmm_uq.documents.result import LACK_OF_FIT, Component, Influence, Noise
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import OBSERVATIONS
 from cmm_uq.inference.draws import Draws, by_chain
+from cmm_uq.inference.least_squares import RANK_TOLERANCE
 from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.jobs.job import Job
@@ -26,6 +27,9 @@ from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, unit
+
+FEWEST_LEFT = 3
+"""Observations that the noise is estimated from, beside those that sizes and set-ups could explain."""
 
 
 def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
@@ -44,10 +48,56 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
-    return MeasurementModel(
+    model = MeasurementModel(
         artefact, effects(job.facts.model.effects, where="job.toml [model] effects"),
         None if stated is None else stated * MICROMETRE, ~np.isin(artefact.measurement, aside),
     )  # fmt: skip
+    _refuse_open_sizes(model, job.recording_path)
+    _refuse_hidden_noise(model, job.recording_path)
+    return model
+
+
+def _refuse_open_sizes(model: MeasurementModel, where: str) -> None:
+    """Refuse measurements that leave open, whatever the machine's errors, what the measurement is made for.
+
+    Raises
+    ------
+    CmmUqError : too much of the recording is set aside.
+    """
+    sought = [i for i, size in enumerate(model.artefact.sizes) if size.role == "sought"]
+    if not sought:
+        return
+    rank, _ = _rank(replace(model, effects=()), sought)
+    if rank < len(sought):
+        names = ", ".join(model.artefact.sizes[i].title for i in sought)
+        raise CmmUqError(f"the measurements that are used leave a combination of {names} open", where=where,
+                         fix="Set fewer measurements aside, or record more")  # fmt: skip
+
+
+def _rank(model: MeasurementModel, columns: Sequence[int] | slice = slice(None)) -> tuple[int, int]:
+    """Rank of some columns of the design, and how many observations there are, what is of no interest projected out."""
+    linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
+    design = (linear.reduced.design * np.array([unknown.scale for unknown in model.unknowns]))[:, columns]
+    return int(np.linalg.matrix_rank(design, tol=RANK_TOLERANCE * np.linalg.norm(design, 2))), linear.reduced.count
+
+
+def _refuse_hidden_noise(model: MeasurementModel, where: str) -> None:
+    """Refuse to estimate the noise where what is in doubt about each set-up could explain every residual.
+
+    Raises
+    ------
+    CmmUqError : fewer than three observations are left to estimate it from.
+    """
+    if model.sigma is not None or all(size.role != "set-up" for size in model.artefact.sizes):
+        return
+    rank, count = _rank(model)
+    left = count - rank
+    if left < FEWEST_LEFT:
+        raise CmmUqError(
+            f"what is in doubt about each set-up explains all but {left} of {count} observations, so the noise "
+            "of a coordinate does not show", where=where,
+            fix="State u_coordinate_um in job.toml [recording], or record more points in each measurement",
+        )  # fmt: skip
 
 
 def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Finding]]:

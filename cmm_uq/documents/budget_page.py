@@ -5,16 +5,17 @@ from __future__ import annotations
 from cmm_uq import __version__
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.plots import budget_bars
-from cmm_uq.messages import Text, Verbatim, commas, say
+from cmm_uq.messages import Text, Verbatim, commas, foreign, say
 from cmm_uq.uncertainty.budget import HEADINGS, Budget
 from cmm_uq.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
 from cmm_uq.uncertainty.evaluation import Evaluation, Stated
 from cmm_uq.uncertainty.model_file import ModelFile
+from cmm_uq.uncertainty.ready_budget import ReadyBudget
 
 _TEXT = {"Quantity", "Unit", "Distribution", "Origin", "Method", "Interval"}
 
 
-def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Document:
+def budget_document(file: ModelFile | ReadyBudget, evaluation: Evaluation, name: str) -> Document:
     """The page of an evaluated model file.
 
     Parameters
@@ -39,8 +40,8 @@ def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Docum
         (Verbatim(output), say("{output} = {text}", output=Verbatim(output), text=Verbatim(text)))
         for output, text in _expressions(file).items()
     ))  # fmt: skip
-    described = Facts(tuple((Verbatim(what), Verbatim(text)) for what, text in file.descriptions.items()))
-    model: tuple[Block, ...] = (expressions, described) if file.descriptions else (expressions,)
+    described = Facts(tuple((foreign(what), foreign(text)) for what, text in file.descriptions.items()))
+    model: tuple[Block, ...] = tuple(facts for facts in (expressions, described) if facts.rows)
     sections = [Section(say("Measurement model"), model), Section(say("Results"), (summary,))]
     sections += [
         Section(say("Budget of {output}", output=Verbatim(output)), _budget(evaluation, output, stated))
@@ -49,9 +50,7 @@ def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Docum
     return Document(
         title=say("Uncertainty budget"),
         number=Verbatim(file.title),
-        subject=say(
-            "Evaluated by the law of propagation of uncertainty and by Monte Carlo from {name}", name=Verbatim(name)
-        ),
+        subject=say("Evaluated {how} from {name}", how=file.how, name=Verbatim(name)),
         issuer=(),
         particulars=(Facts(((say("File"), Verbatim(name)), (say("SHA-256"), Verbatim(file.sha256)))),),
         warnings=(),
@@ -64,7 +63,7 @@ def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Docum
     )
 
 
-def _expressions(file: ModelFile) -> dict[str, str]:
+def _expressions(file: ModelFile | ReadyBudget) -> dict[str, str]:
     return {output: expression.text for output, expression in file.expressions.items()}
 
 

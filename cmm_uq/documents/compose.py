@@ -22,6 +22,7 @@ from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, listed, names, number, say, sentences, signed
 from cmm_uq.model.artefact import Size
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded, significant
 from cmm_uq.units import MICROMETRE
@@ -267,11 +268,12 @@ def _traceability(result: Result) -> Section:
         (say("Serial number"), Verbatim(artefact.serial)),
     ]
     compared = result.job.facts.recording.earlier
-    certified = [] if compared else [size for size in result.artefact.sizes if size.certified]
+    dimensions = [size for size in result.artefact.sizes if size.role == "dimension"]
+    certified = [] if compared else [size for size in dimensions if size.certified]
     rows += [_certified(size) for size in certified]
     if compared:
         rows.append((say("References"), say("the earlier recording {file}", file=Verbatim(compared))))
-    elif result.artefact.sizes and not certified:
+    elif dimensions and not certified:
         rows.append((say("Certified length"), say("none: uncalibrated artefact (auto-calibration)")))
     if artefact.cte_per_k:
         cte = say("{cte:g} × 10⁻⁶ /K", cte=artefact.cte_per_k * 1e6)
@@ -301,12 +303,13 @@ def _fitted(size: Size, quantity: Quantity) -> tuple[Text, Text]:
 
 def _posterior(result: Result) -> Section:
     posterior = result.posterior
-    if not posterior.unknowns:
+    set_up = {(ARTEFACT, size.name) for size in result.artefact.sizes if size.role == "set-up"}
+    shown = [i for i, unknown in enumerate(posterior.unknowns) if unknown.key not in set_up]
+    if not shown:
         return Section(say("Posterior distribution"), ())
-    titles = [title_of(unknown.key, result) for unknown in posterior.unknowns]
+    titles, draws = [title_of(posterior.unknowns[i].key, result) for i in shown], posterior.draws[:, shown]
     plot = corner_plot(
-        posterior.draws, titles, units=[unknown.unit for unknown in posterior.unknowns],
-        estimates=posterior.draws.mean(axis=0),
+        draws, titles, units=[posterior.unknowns[i].unit for i in shown], estimates=draws.mean(axis=0),
         caption=say("Posterior distribution: each parameter, and each pair."),
         alternative=say("Marginal and pairwise posterior densities of {names}.", names=listed(titles)),
     )  # fmt: skip
@@ -355,10 +358,11 @@ def _method(result: Result) -> Section:
     )
     text = Paragraph(
         say(
-            "Rigid-body error factors are estimated from the observations with a linear measurement "
+            "{what} are estimated from the observations with a linear measurement "
             "model, by least squares (orthogonal factorisation) and as a posterior distribution with "
             "priors as wide as physics allows; the certified length enters with its uncertainty. The "
-            "attached job, recording and results.json suffice to run it again."
+            "attached job, recording and results.json suffice to run it again.",
+            what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
         )
     )
     return Section(say("Method"), (text, Facts(tuple((label, value) for label, value in rows if value))))

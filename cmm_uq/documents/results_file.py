@@ -57,7 +57,9 @@ def results(result: Result) -> dict[str, Any]:
         "estimates": {effect: _quantities(values) for effect, values in result.parameters.items()},
         "artefact": _quantities(result.sizes),
         "certified": {
-            size.name: {"value": size.nominal, "u": size.sd} for size in result.artefact.sizes if size.certified
+            size.name: {"value": size.nominal, "u": size.sd}
+            for size in result.artefact.sizes
+            if size.certified and size.role == "dimension"
         },
         "covariance": covariance_data(result.covariance),
         "differences": [

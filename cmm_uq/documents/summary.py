@@ -19,6 +19,10 @@ def summary(result: Result) -> list[tuple[str, str, str]]:
     for name, quantity in result.accuracy.items():
         value, U, k = expanded(quantity)
         rows.append((TITLES[name], f"{value} ± {U} {quantity.unit}", f"k = {k}"))
+    for size in result.artefact.sizes:
+        if size.role == "sought":
+            value, U, k = expanded(result.sizes[size.name])
+            rows.append((size.title, f"{value} ± {U} {size.unit}", f"k = {k}"))
     for effect in result.model.effects:
         for name, quantity in result.parameters[effect.name].items():
             value, U, k = expanded(quantity)

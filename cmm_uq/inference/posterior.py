@@ -18,6 +18,9 @@ __all__ = ["SIGMA_BOUNDS", "Density", "Posterior", "Progress", "sample"]
 SIGMA_BOUNDS = (1e-6, 10.0)
 """mm: from a nanometre to a centimetre; between them an unknown noise is uniform in its logarithm."""
 
+_EDGE, _STEP = 0.01, 0.5
+"""Of ln σ: how near to the end of the range searched is at its end, and the step through the whole range."""
+
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
@@ -133,21 +136,33 @@ class Density:
             return mean, _lower(covariance)
         _, _, rest, count = self._factor
         start = 0.5 * np.log(max(rest / max(count, 1), SIGMA_BOUNDS[0] ** 2 * 4))
-        found = optimize.minimize_scalar(
-            lambda t: -self.conditional(t)[2],
-            bounds=(max(start - 4, np.log(SIGMA_BOUNDS[0])), min(start + 4, np.log(SIGMA_BOUNDS[1]))),
-            method="bounded",
-        )
-        mean, covariance, at_mode = self.conditional(float(found.x))
+        mode = self._likeliest_noise(float(start))
+        mean, covariance, at_mode = self.conditional(mode)
         step = 0.1
-        curvature = (
-            2 * at_mode - self.conditional(float(found.x) - step)[2] - self.conditional(float(found.x) + step)[2]
-        ) / step**2
+        curvature = (2 * at_mode - self.conditional(mode - step)[2] - self.conditional(mode + step)[2]) / step**2
         k = len(mean)
         factor = np.zeros((k + 1, k + 1))
         factor[:k, :k] = _lower(covariance)
         factor[k, k] = 1 / np.sqrt(max(curvature, 1e-3))
-        return np.append(mean, found.x), factor
+        return np.append(mean, mode), factor
+
+    def _likeliest_noise(self, start: float) -> float:
+        """Ln σ at which the evidence is largest, near to ``start``.
+
+        Where parameters with priors could explain every residual, nothing is left of them to start from; the largest
+        evidence then lies further up than it is looked for, and the whole range is gone through.
+        """
+        low, high = max(start - 4, np.log(SIGMA_BOUNDS[0])), min(start + 4, np.log(SIGMA_BOUNDS[1]))
+        found = float(self._largest_evidence(low, high))
+        if found < high - _EDGE:
+            return found
+        places = np.arange(low, np.log(SIGMA_BOUNDS[1]), _STEP)
+        best = float(places[np.argmax([self.conditional(float(place))[2] for place in places])])
+        return float(self._largest_evidence(best - _STEP, min(best + _STEP, np.log(SIGMA_BOUNDS[1]))))
+
+    def _largest_evidence(self, low: float, high: float) -> float:
+        found = optimize.minimize_scalar(lambda t: -self.conditional(t)[2], bounds=(low, high), method="bounded")
+        return float(found.x)
 
 
 def _lower(covariance: Floats) -> Floats:

@@ -29,12 +29,14 @@ class ArtefactFacts(Table):
     with_references : whether they do; its ``u_um`` may then stand without ``length_mm``.
     with_recording : whether there is one; otherwise what ``[machine]`` names is measured.
     with_earlier : whether two recordings of it at two dates can be compared.
+    carries_probe : whether its recording itself says how far from the end of the ram each point was, as tip offsets do.
     form_key : key of the form deviation by its certificate, for a kind that has a form to be compared.
     """
 
     with_references: ClassVar[bool] = False
     with_recording: ClassVar[bool] = True
     with_earlier: ClassVar[bool] = False
+    carries_probe: ClassVar[bool] = False
     form_key: ClassVar[str | None] = None
 
     kind: str

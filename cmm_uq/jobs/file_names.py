@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from cmm_uq.errors import CmmUqError
@@ -19,6 +19,9 @@ _WRITTEN = re.compile(
 
 DERIVED = ("truth.toml", "compensation.json")
 """Names that belong beside a derived recording."""
+
+RESULTS = "results.json"
+"""Name of what another job's report wrote; a job may keep it in a folder of its own."""
 
 _DEVICE = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])(\..*)?", re.IGNORECASE)
 """Windows takes these for devices, with any ending."""
@@ -81,6 +84,11 @@ def check_distinct(names: Iterable[str], where: str) -> None:
                              fix="Rename one of them")  # fmt: skip
 
 
+def _taken_along(parts: Sequence[str]) -> bool:
+    """Whether a file that a command wrote belongs to a job: with its recording, or as the results of another in a folder."""
+    return parts[-1] in DERIVED or (len(parts) > 1 and parts[-1] == RESULTS)
+
+
 def device_name(name: str) -> bool:
     """Whether Windows takes the name for a device."""
     return _DEVICE.fullmatch(name) is not None
@@ -104,6 +112,6 @@ def _name_problem(name: str, written: bool) -> tuple[str, str] | None:
         return f"file {name!r} is no plain name", "Name it relative to job.toml, without . and .."
     if any(device_name(part) or part != part.rstrip(". ") or part != part.lstrip() for part in parts):
         return f"file {name!r} is a name that Windows does not take", rename
-    if _WRITTEN.fullmatch(parts[-1]) and not (written and parts[-1] in DERIVED):
+    if _WRITTEN.fullmatch(parts[-1]) and not (written and _taken_along(parts)):
         return f"file {name!r} has a name that cmm-uq writes itself", rename
     return None

@@ -101,10 +101,27 @@ class Pose(Table):
 
 
 class DigitizerFacts(Table):
-    """``digitizer``: a laser digitizer on the ram; ``offset_mm`` is [U1 V1 W1], the mount in the digitizer's frame."""
+    """``digitizer``: a laser digitizer on the ram.
 
-    offset_mm: Triple
-    poses: Annotated[list[Pose], Field(min_length=1, max_length=LISTED.most)]
+    Attributes
+    ----------
+    offset_mm : [U1 V1 W1], the mount in the digitizer's frame.
+    poses : its attitudes.
+    calibration : in place of both, the results.json of its calibration, or the folder with it, inside the job's; ``poses``
+        beside it replace those in which it was calibrated.
+    """
+
+    offset_mm: Triple | None = None
+    poses: Annotated[list[Pose], Field(max_length=LISTED.most)] = []
+    calibration: Annotated[str, Field(min_length=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.offset_mm is None) == (self.calibration is None):
+            raise ValueError('give either offset_mm = [U1, V1, W1] with poses, or calibration = "FOLDER"')
+        if self.offset_mm is not None and not self.poses:
+            raise ValueError("offset_mm is given without poses: give the Euler angles of each")
+        return self
 
     @model_validator(mode="after")
     def _poses_once(self) -> Self:

@@ -15,6 +15,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.conformity import Standards
+from cmm_uq.jobs.digitizer_calibration import calibration_file
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.file_names import check_distinct
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
@@ -85,9 +86,10 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
         raise CmmUqError(f"earlier compares two recordings at two dates, which a job of kind {facts.artefact.kind!r} has not",
                          where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
     machine = _machine(facts.machine)
-    maps, logs = _of_the_machine(facts.machine)
+    maps, logs, calibrations = _of_the_machine(facts.machine)
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
-    check_distinct([*recordings, *maps, *logs], str(path))
+    check_distinct([*recordings, *maps, *logs, *calibrations], str(path))
+    inputs |= _contents(source, calibrations, TABLE_BYTES, written=True)
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
         return Job(folder, facts, _no_points(machine), inputs | _contents(source, maps, MAP_BYTES))
@@ -131,9 +133,10 @@ def read_machine(folder: Path, nameable: Nameable) -> Job:
     finish_interrupted(path.parent)
     source = InFolder(path)
     content, facts = _facts(source, nameable)
-    maps, logs = _of_the_machine(facts.machine)
-    check_distinct([*maps, *logs], str(path))
+    maps, logs, calibrations = _of_the_machine(facts.machine)
+    check_distinct([*maps, *logs, *calibrations], str(path))
     inputs = {"job.toml": content} | _contents(source, maps, MAP_BYTES) | _contents(source, logs, TABLE_BYTES)
+    inputs |= _contents(source, calibrations, TABLE_BYTES, written=True)
     return Job(path.parent, facts, _no_points(_machine(facts.machine)), inputs)
 
 
@@ -143,9 +146,13 @@ def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile]:
     return content, checked(content, source.toml, lambda data: _model_for(data, nameable), nameable.standards)
 
 
-def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str]]:
-    """Files of its error maps, and of its temperature log."""
-    return [given.file for given in facts.error_map], [facts.temperature_log.file] if facts.temperature_log else []
+def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str]]:
+    """Files of its error maps, of its temperature log, and of its digitizer's calibration."""
+    calibration = calibration_file(facts.digitizer)
+    return (
+        [given.file for given in facts.error_map], [facts.temperature_log.file] if facts.temperature_log else [],
+        [] if calibration is None else [calibration],
+    )  # fmt: skip
 
 
 def _model_for(data: dict[str, Any], nameable: Nameable) -> type[JobFile]:

@@ -23,6 +23,7 @@ from cmm_uq.points import Points
 BUILT_IN: Mapping[str, str] = MappingProxyType({
     "ballbar": "ballbar", "bryan": "bryan", "step_gauge": "step_gauge", "gauge_blocks": "gauge_blocks", "plate": "plate",
     "triangle": "triangle", "sphere": "sphere", "plane": "plane", "shift": "shifting", "error_map": "error_maps",
+    "digitizer": "digitizer",
 })  # fmt: skip
 """Folder of each built-in kind."""
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -57,6 +58,9 @@ class Forms:
     directions: Floats
 
 
+Role = Literal["dimension", "sought", "set-up"]
+
+
 @dataclass(frozen=True)
 class Size:
     """A dimension of the artefact at 20 °C, itself to be estimated.
@@ -68,6 +72,8 @@ class Size:
     nominal : where to start, in mm.
     sd : standard uncertainty of the certificate, mm; infinite without a certificate.
     what : it is, in words without whose: "length"; its title where left out.
+    role : a dimension of the artefact; a size that the measurement is made for; or what is known of how it was set up
+        (``nominal`` and ``sd`` are then in ``unit``).
     """
 
     name: str
@@ -76,6 +82,7 @@ class Size:
     nominal: float
     sd: float
     what: Text = NOTHING
+    role: Role = "dimension"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "title", foreign(self.title))

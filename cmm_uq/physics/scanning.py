@@ -27,7 +27,7 @@ class DigitizerOffset(Effect):
     name = "digitizer_offset"
     title = say("Alignment of the digitizer")
     formula = "e = du·u + dv·v"
-    mechanism = "digitizer"
+    mechanism = "optical probe"
     points_to = say(
         "the digitizer is out of alignment, or has moved in its mount: tighten the mount and align "
         "it on the reference sphere again, in every pose"
@@ -47,7 +47,7 @@ class DigitizerDepth(Effect):
     name = "digitizer_depth"
     title = say("Depth bias of the digitizer")
     formula = "e = k·depth·v"
-    mechanism = "digitizer"
+    mechanism = "optical probe"
     points_to = say(
         "the digitizer's depth scale is wrong: calibrate it over its range, and scan in its middle until then"
     )
@@ -69,7 +69,7 @@ class DigitizerIncidence(Effect):
     name = "digitizer_incidence"
     title = say("Incidence of the digitizer's light")
     formula = "e = (kᵢ·incident + kₚ·projected)·v"
-    mechanism = "digitizer"
+    mechanism = "optical probe"
     points_to = say(
         "the digitizer errs where its light meets the surface askew: turn it square to the surface, "
         "or correct its readings for the angle"

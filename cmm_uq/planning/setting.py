@@ -48,6 +48,7 @@ class Planning:
     candidates : placings that volume and fixtures allow, at most as many as the plan says.
     elsewhere : a recorded artefact in other places and attitudes, once in each, at most so many.
     shared : whether the freedoms of its placing are common to all measurements, so that their information does not add.
+    sought : whether it is sizes of the artefact that are sought, so that no effect need be named.
     free : what placings leave open, in words, of a kind that names no effects; ``(setting, points, where)``.
     """
 
@@ -55,6 +56,7 @@ class Planning:
     candidates: Callable[[Setting, Start | None], tuple[Placing, ...]]
     elsewhere: Callable[[Artefact, Volume, int], tuple[Placing, ...]] | None = None
     shared: bool = False
+    sought: bool = False
     free: Callable[[Setting, Points, str], tuple[Text, ...]] | None = None
 
 
@@ -93,7 +95,7 @@ class Setting:
         facts, plan = job.facts, job.facts.plan
         planning = kind.needs("plan", Planning, "planned")
         observe = kind.observing("planned") if planning.free is None else None
-        if not facts.model.effects and planning.free is None:
+        if not (facts.model.effects or planning.sought) and planning.free is None:
             raise CmmUqError("no effect is named, so there is nothing to determine", where="job.toml [model] effects",
                              fix="Name the error factors that the measurement shall determine")  # fmt: skip
         recorded = job.points.carriages if len(job.points) else None

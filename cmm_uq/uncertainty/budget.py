@@ -168,6 +168,10 @@ class Budget:
         variance = self.variance
         return [line.part / variance if variance else 0.0 for line in self.lines]
 
+    def of(self, value: float) -> Budget:
+        """The same with an estimate of the measurand."""
+        return replace(self, value=value)
+
     def as_line(self, name: Text, sensitivity: float = 1.0) -> Line:
         """Its result as one line of another budget."""
         return Line(name, self.u, say("budget"), self.value, self.unit, "normal", self.dof, sensitivity, parts=self)

@@ -20,18 +20,21 @@ from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.content import content_of, text_of
 from cmm_uq.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT
 from cmm_uq.files.toml import toml_of
-from cmm_uq.messages import say
+from cmm_uq.messages import Text, say
 from cmm_uq.uncertainty.budget import REPEATS, Labels
 from cmm_uq.uncertainty.distributions import Distribution
 from cmm_uq.uncertainty.evaluation import Evaluation, Request, evaluate
 from cmm_uq.uncertainty.expression import Expression, name_problem, parse
 from cmm_uq.uncertainty.input_keys import DIFFERENCES, NUMERIC, distribution_from
+from cmm_uq.uncertainty.located import Located
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.uncertainty.ready_budget import KEY, ReadyBudget, read_ready_budget
+from cmm_uq.uncertainty.ready_model import READY, ready_model
 from cmm_uq.uncertainty.stated_units import derived_unit, number_in, unit_of
 from cmm_uq.uncertainty.type_a import simultaneous_readings
 
 _TOP = ("model", "inputs", "correlation")
-_MODEL = ("outputs", "coverage", "method", "digits", "seed", "title", "units")
+_MODEL = ("outputs", "ready", "coverage", "method", "digits", "seed", "title", "units")
 _SMALLEST, _LARGEST = 1e-70, 1e70
 _TEXTS = ("distribution", "unit", "source", "description", "simultaneous")
 
@@ -60,6 +63,11 @@ class ModelFile:
     content: bytes
 
     @property
+    def how(self) -> Text:
+        """In words, to follow "Evaluated"."""
+        return say("by the law of propagation of uncertainty and by Monte Carlo")
+
+    @property
     def sha256(self) -> str:
         """SHA-256 of the file's bytes."""
         return hashlib.sha256(self.content).hexdigest()
@@ -69,9 +77,13 @@ class ModelFile:
         request = self.request if seed is None else replace(self.request, seed=seed)
         return evaluate(self.model, request, self.labels)
 
+    def further(self) -> dict[str, Any]:
+        """Keys of results.json beside those of every budget: none."""
+        return {}
 
-def read_model_file(path: Path) -> ModelFile:
-    """Read and check a model file.
+
+def read_model_file(path: Path) -> ModelFile | ReadyBudget:
+    """Read and check a model file, or one with a ready budget.
 
     Raises
     ------
@@ -83,6 +95,8 @@ def read_model_file(path: Path) -> ModelFile:
         data = toml_of(text, str(path), most_word=TEXT.most, most_listed=DRAWS.most)
     except tomllib.TOMLDecodeError as error:
         raise CmmUqError(f"is not TOML: {error}", where=str(path), fix="Mend the line that it names") from error
+    if KEY in data:
+        return read_ready_budget(content, path)
     return _Reader(str(path)).model_file(data, path.stem, content)
 
 
@@ -101,7 +115,6 @@ class _Reader:
         self._known(model, _MODEL, "[model]")
         inputs = {name: self._input(name, keys) for name, keys in given.items()}
         inputs, within = self._simultaneous(inputs, given)
-        expressions = self._outputs(model, inputs)
         for a, b in within:
             if (a, b) in correlation or (b, a) in correlation:
                 raise CmmUqError(
@@ -109,12 +122,23 @@ class _Reader:
                     where=self._where("[correlation]"),
                     fix="Leave the line out",
                 )
-        whole = MeasurementModel(
-            lambda **values: {name: expression(values) for name, expression in expressions.items()},
-            inputs,
-            list(expressions),
-            {**within, **correlation},
-        )
+        joint = {**within, **correlation}
+        if "ready" in model:
+            expressions: dict[str, Expression] = {}
+            with self._located(""):
+                whole, own = ready_model(
+                    model, inputs, {name: keys.get("unit", "") for name, keys in given.items()}, joint
+                )
+            labels = replace(own, origins={**own.origins, **_origins(given)})
+        else:
+            expressions = self._outputs(model, inputs)
+            whole = MeasurementModel(
+                lambda **values: {name: expression(values) for name, expression in expressions.items()},
+                inputs,
+                list(expressions),
+                joint,
+            )
+            labels = self._labels(given, model, expressions)
         with self._located(""):
             _ = whole.correlation_matrix
         return ModelFile(
@@ -122,16 +146,17 @@ class _Reader:
             expressions,
             whole,
             self._request(model),
-            self._labels(given, model, expressions),
-            {name: keys["description"] for name, keys in given.items() if "description" in keys},
+            labels,
+            ({say("Ready model"): READY[model["ready"]].title} if "ready" in model else {})
+            | {name: keys["description"] for name, keys in given.items() if "description" in keys},
             content,
         )
 
     def _where(self, key: str) -> str:
         return f"{self.file} {key}".strip()
 
-    def _located(self, key: str) -> _Located:
-        return _Located(self._where(key))
+    def _located(self, key: str) -> Located:
+        return Located(self._where(key))
 
     def _known(self, table: Mapping[str, Any], allowed: tuple[str, ...], key: str) -> None:
         for name in table:
@@ -272,23 +297,12 @@ class _Reader:
             elif any(units[used] not in ("", "1") for used in expression.names):
                 unit = derived_unit(expression, units) or ""
             units[name] = unit
-        origins = {
-            name: keys.get("source") or (REPEATS if "samples" in keys else say("not stated"))
-            for name, keys in given.items()
-        }
-        return Labels(units, origins)
+        return Labels(units, _origins(given))
 
 
-@dataclass(frozen=True)
-class _Located:
-    """Adds the place to an error that does not know it."""
-
-    where: str
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: object, error: object, trace: object) -> None:
-        if isinstance(error, CmmUqError):
-            where = f"{self.where} {error.where}" if error.where else self.where
-            raise CmmUqError(error.problem, where=where, fix=error.fix) from error
+def _origins(given: Mapping[str, Any]) -> dict[str, str]:
+    """Where the figures of each input come from."""
+    return {
+        name: keys.get("source") or (REPEATS if "samples" in keys else say("not stated"))
+        for name, keys in given.items()
+    }

@@ -14,7 +14,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.correlation import correlation_of
-from cmm_uq.uncertainty.distributions import Distribution, normal, sampled, student_t
+from cmm_uq.uncertainty.distributions import Distribution, normal, student_t
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +66,6 @@ def multivariate_normal(names: Sequence[str], mean: Floats, covariance: Floats) 
     u = np.sqrt(np.diagonal(matrix))
     inputs = {name: normal(float(x), float(s)) for name, x, s in zip(names, mean, u, strict=True)}
     return JointInputs(inputs, _pairs(names, correlation_of(matrix)))
-
-
-def joint_sample(draws: Mapping[str, Floats]) -> JointInputs:
-    """Columns (k,) of draws from one earlier analysis, such as a posterior; drawn again row by row."""
-    table = _table(draws)
-    label = ",".join(draws)
-    return JointInputs({name: sampled(column, label) for name, column in zip(draws, table, strict=True)})
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,10 +20,13 @@ from cmm_uq.documents.program import NAME
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Message, Number, Verbatim, say
 from cmm_uq.physics.catalogue import every
-from cmm_uq.uncertainty.model_file import read_model_file
+from cmm_uq.uncertainty.budgets.tables import TABLES
+from cmm_uq.uncertainty.model_file import ModelFile, read_model_file
+from cmm_uq.uncertainty.ready_model import READY as MODELS
 from cmm_uq.units import Unit, unit
 from tests.conftest import ROOT
 from tests.documents.saying import leaves, strangers
+from tests.uncertainty.test_ready_budget import BALLBAR, LENGTH, PROBING, SIMULATED, SPHERE, USE, ready
 
 EXAMPLES = sorted(path.name for path in (ROOT / "examples").iterdir() if (path / "job.toml").exists())
 SAMPLER = "emcee affine-invariant ensemble sampler exact draws"
@@ -35,8 +38,8 @@ def known_to(folder: Path) -> str:
     effects = [
         " ".join((name, *(p.name for p in effect.reported), *effect.columns)) for name, effect in every().items()
     ]
-    characteristics = [each.name for standard in BUILT_IN.values() for each in standard.characteristics]
-    return "\n".join([*own, *effects, *READY, *characteristics, NAME, SAMPLER])
+    decided = [one.name for standard in BUILT_IN.values() for one in standard.characteristics]
+    return "\n".join([*own, *effects, *READY, *decided, NAME, SAMPLER])
 
 
 def documents(folder: Path) -> list[Document]:
@@ -81,6 +84,33 @@ def test_the_page_of_a_model_file_is_translatable_too(tmp_path: Path) -> None:
     model = read_model_file(file)
     document = budget_document(model, model.evaluate(), file.name)
     assert strangers(document, MODEL + file.name + model.sha256 + NAME) == []
+
+
+@pytest.mark.parametrize("name", sorted(TABLES))
+def test_the_page_of_every_ready_budget_is_translatable(tmp_path: Path, name: str) -> None:
+    text = next(text for text in (USE, SIMULATED, LENGTH, PROBING, BALLBAR, SPHERE) if f'"{name}"' in text)
+    assert foreign_words(tmp_path, text) == []
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+def test_the_page_of_every_ready_model_is_translatable_with_units_of_the_table(tmp_path: Path, name: str) -> None:
+    wanted = [one for one, needed in MODELS[name].inputs.items() if needed]
+    inputs = {one: (100.0 if one.endswith("_mm") else 20.0 if one.endswith("_c") else 1e-5, 1e-6) for one in wanted}
+    assert foreign_words(tmp_path, ready(name, inputs)) == []
+
+
+def foreign_words(folder: Path, text: str) -> list[str]:
+    """Words of the page of a file that cannot be translated, and units that are not of the table."""
+    file = folder / "file.toml"
+    file.write_text(text, encoding="utf-8")
+    model = read_model_file(file)
+    evaluation = model.evaluate()
+    document = budget_document(model, evaluation, file.name)
+    inputs = model.labels.units if isinstance(model, ModelFile) else ("xy", "yz", "zx")
+    known = " ".join([text, file.stem, file.name, model.sha256, NAME, *evaluation.stated, *inputs])
+    # a name too long for a picture is cut there; it stands whole in the table beside it
+    odd = [one for one in strangers(document, known) if not one.endswith("…")]
+    return odd + [one for one in units(document) if not isinstance(one, Unit) and one]
 
 
 MODEL = """

@@ -72,6 +72,16 @@ def ball_places(results: Results) -> list[Record]:
     return columns(results["artefact"], "point", "first_mm", "U_first_mm", "second_mm", "U_second_mm")
 
 
+def offset(results: Results) -> list[Record]:
+    found = results["digitizer"]
+    return list(zip(found["offset_mm"].values(), found["correlation"], strict=True))
+
+
+def offset_by_other_ways(results: Results) -> list[Record]:
+    found = results["digitizer"]
+    return list(zip(found["offset_mm"].values(), found["by_centres_mm"], found["closed_form_mm"], strict=True))
+
+
 RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Figures of performance": lambda r: [[quantity] for quantity in r["accuracy_uncertainty"].values()],
     "Error factors of the machine": parameters,
@@ -97,6 +107,9 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Errors of axis Y": curves_of("y"),
     "Placings, as found from the readings": lambda r: [[placing] for placing in r["placings"]],
     "The plate's own geometry": ball_places,
+    "Offset of the mount": offset,
+    "The offset by other ways": offset_by_other_ways,
+    "Every attitude": lambda r: [[pose] for pose in r["digitizer"]["poses"]],
 }  # fmt: skip
 """Where in results.json the rows of a table stand, in their order, by the table's caption."""
 

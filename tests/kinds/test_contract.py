@@ -35,6 +35,7 @@ EXAMPLE = {
     "ballbar": "iota-1102-20C", "error_map": "iota-1102-maps", "bryan": "bryan-simulated", "shift": "shift-simulated",
     "step_gauge": "step-gauge-simulated", "gauge_blocks": "gauge-blocks-simulated", "plate": "plate-simulated",
     "triangle": "triangle-simulated", "sphere": "sphere-simulated", "plane": "plane-simulated",
+    "digitizer": "digitizer-simulated",
 }  # fmt: skip
 OUTSIDE = "tracker_length"
 PLUGINS = {OUTSIDE: {"outside-kinds": "0.1.0"}}
@@ -172,7 +173,7 @@ def spoilt(name: str, how: str, to: Path) -> Path:
 
 SPOILT = [
     *((name, "in one place") for name in EXAMPLE if name != "error_map"),
-    *((name, "in inches") for name in ("ballbar", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere")),
+    *((name, "in inches") for name in ("ballbar", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere", "digitizer")),
     ("plane", "without direction points"),
 ]  # fmt: skip
 

@@ -43,7 +43,9 @@ def seen(model: MeasurementModel, noise: Noise, draws: int) -> Floats:
     return model.artefact.project(model.placed(model.estimate().least_squares.value), each).T
 
 
-@pytest.mark.parametrize("name", ["iota-1102-20C", "step-gauge-simulated", "plate-simulated", "sphere-simulated"])
+@pytest.mark.parametrize(
+    "name", ["iota-1102-20C", "step-gauge-simulated", "plate-simulated", "sphere-simulated", "digitizer-simulated"]
+)
 def test_the_covariance_of_observations_is_that_of_noise_at_the_points(name: str) -> None:
     """Readings by axis, twice each, and set-up offsets; over 4000 drawings, in units of each variance."""
     model = example(name, 2)

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.uncertainty.distributions import normal
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.uncertainty.propagation import first_order
 from cmm_uq.uncertainty.type_a import (
-    joint_sample,
     multivariate_normal,
     repeated_readings,
     simultaneous_readings,
@@ -75,14 +73,6 @@ def test_a_covariance_matrix_becomes_inputs_and_comes_back() -> None:
     joint = multivariate_normal(["a", "b", "c"], np.array([1.0, 2.0, 3.0]), V)
     model = MeasurementModel(lambda a, b, c: {"a": a, "b": b, "c": c}, joint.inputs, ("a", "b", "c"), joint.correlation)
     np.testing.assert_allclose(first_order(model).covariance, V, rtol=1e-14, atol=1e-15)
-
-
-def test_a_joint_sample_brings_its_correlation() -> None:
-    draws = np.random.default_rng(2).multivariate_normal([0, 0], [[1, 0.6], [0.6, 1]], 500).T
-    joint = joint_sample({"a": draws[0], "b": draws[1]})
-    inputs = {**joint.inputs, "c": normal(0.0, 1.0)}
-    found = first_order(MeasurementModel(lambda a, b, c: a - b + c, inputs))
-    assert found.u[0] ** 2 == pytest.approx(np.var(draws[0] - draws[1], ddof=1) + 1)
 
 
 @pytest.mark.parametrize(

@@ -85,13 +85,6 @@ def calibration_curve(
     return np.concatenate([np.zeros_like(a[..., :1]), np.cumsum(steps, axis=-1)], axis=-1)
 
 
-def compensated_positions(
-    a: Readings, b: Readings, shift: Readings | float | None = None, method: Method = "pitch"
-) -> Readings:
-    """Compensated readings a_c, (..., n) mm. Source: (5) and (7), with a_c[i] for the a[i] on their right: they accumulate."""
-    return np.asarray(a[..., :1] + calibration_curve(a, b, shift, method))
-
-
 def with_known_length(curve: Readings, first: int, last: int, length: Readings | float) -> Readings:
     """The curve with its mean sensitivity from a known length between two points (indices from 0), such as a gauge block's.
 

@@ -7,7 +7,7 @@ placings give rotations; what is left of a defect gives scale or squareness.
 
 Two things of the source are mended. It projects the defect of a slanted side on an axis by the cosine of the triangle's
 angle, which holds only for a defect along that side; here the apex follows from all three sides. And its perpendicularity
-(:func:`printed_perpendicularity`) finds a part only of the squareness.
+finds a part only of the squareness, half of it at most.
 """
 
 from __future__ import annotations
@@ -142,21 +142,6 @@ def defects(triangle: Triangle, xyz: Floats, dimensions: Floats) -> list[Defects
             mean[0], mean[2], tips[rows].mean(axis=0),
         ))  # fmt: skip
     return found
-
-
-def printed_perpendicularity(sides: Floats, angles: Floats) -> float:
-    """The source's β, rad: tan β = (L2 cos α2 − L1 cos α1) / (L1 sin α1 + L2 sin α2).
-
-    Its derivation holds the certified angles fixed while the measured sides change. Of a shear γ of a triangle with base c
-    and height h it finds h·(sin α1 cos α1 + sin α2 cos α2)/c only, half of γ at most in a triangle with a right angle.
-
-    Parameters
-    ----------
-    sides : (2,) measured sides L1, L2 from the apex, mm.
-    angles : (2,) certified angles α1, α2 between them and the height, rad.
-    """
-    (one, other), (a, b) = sides, angles
-    return float(np.arctan((other * np.cos(b) - one * np.cos(a)) / (one * np.sin(a) + other * np.sin(b))))
 
 
 def _plane(corner: Floats, number: int) -> str:

@@ -71,8 +71,3 @@ def sphere_budgets(
             lines.append(Line(say("form of the ball"), shift / sqrt(3), form_origin, 0.0, unit("mm"), "rectangular"))
         budgets[name] = Budget(Verbatim(name), [*lines, *further], float(estimate_mm[k]), unit("mm"))
     return budgets
-
-
-def with_form(covariance_mm2: Floats, form_shift_mm: Sequence[float] | Floats) -> Floats:
-    """Covariance (4, 4), mm², of the fit with that of the form added, for what is computed from the sphere."""
-    return np.asarray(covariance_mm2) + np.diag(np.square(form_shift_mm) / 3)

@@ -19,7 +19,7 @@ def triangle_angles(
 
     Parameters
     ----------
-    correlation : of sides that share a part, such as the cylinder at a corner: pairs of ``a``, ``b``, ``c``.
+    correlation : of sides that share a part, such as the cylinder at a corner: pairs of ``a_mm``, ``b_mm``, ``c_mm``.
 
     Raises
     ------
@@ -32,11 +32,15 @@ def triangle_angles(
             fix="Check which side is which",
         )
 
-    def angles(a: Any, b: Any, c: Any) -> dict[str, Any]:
+    def angles(a_mm: Any, b_mm: Any, c_mm: Any) -> dict[str, Any]:
         def opposite(side: Any, p: Any, q: Any) -> Any:
             return np.arccos((p * p + q * q - side * side) / (2.0 * p * q))
 
-        return {"alpha": opposite(a, b, c), "beta": opposite(b, c, a), "gamma": opposite(c, a, b)}
+        return {
+            "alpha": opposite(a_mm, b_mm, c_mm),
+            "beta": opposite(b_mm, c_mm, a_mm),
+            "gamma": opposite(c_mm, a_mm, b_mm),
+        }
 
-    inputs = {"a": a_mm, "b": b_mm, "c": c_mm}
+    inputs = {"a_mm": a_mm, "b_mm": b_mm, "c_mm": c_mm}
     return MeasurementModel(angles, inputs, ("alpha", "beta", "gamma"), correlation or {})

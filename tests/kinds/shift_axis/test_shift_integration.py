@@ -12,7 +12,6 @@ from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan, integrate
 from cmm_uq.kinds.shift_axis.shift_integration import (
     Method,
     calibration_curve,
-    compensated_positions,
     estimated_shift,
     local_sensitivity,
     with_known_length,
@@ -88,7 +87,7 @@ def test_compensated_positions_start_at_the_first_reading_and_accumulate() -> No
     slope = 20 / (b - a)
     second = a[0] + slope[0] * (a[1] - a[0])
     third = second + slope[1] * (a[2] - a[1])
-    np.testing.assert_allclose(compensated_positions(a, b, 20.0), [5.0, second, third])
+    np.testing.assert_allclose(a[0] + calibration_curve(a, b, 20.0), [5.0, second, third])
 
 
 def test_with_a_known_length_the_shift_need_not_be_known() -> None:

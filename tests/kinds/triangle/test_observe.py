@@ -7,7 +7,7 @@ import pytest
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds import artefact_facts
-from cmm_uq.kinds.triangle.equations import PARAMETERS, printed_perpendicularity, solve_equations
+from cmm_uq.kinds.triangle.equations import PARAMETERS, solve_equations
 from cmm_uq.kinds.triangle.observe import Triangle
 from cmm_uq.kinds.triangle.placings import SEVEN_PLACINGS, SHIFTED, Placing, placed_triangle
 from cmm_uq.kinds.triangle.standard import TriangleStandard, corner_changes, corners
@@ -153,7 +153,10 @@ def test_the_printed_perpendicularity_finds_half_of_the_squareness_at_most(legs:
     foot, shear = one**2 / base, 5e-5
     angles = np.arctan([foot / height, (base - foot) / height])
     apex = foot + shear * height
-    found = printed_perpendicularity(np.hypot([apex, base - apex], height), angles)
+    sides = np.hypot([apex, base - apex], height)
+    # as printed: tan β = (L2 cos α2 − L1 cos α1) / (L1 sin α1 + L2 sin α2), the certified angles held while the sides change
+    along, across = sides * np.cos(angles), sides * np.sin(angles)
+    found = np.arctan((along[1] - along[0]) / across.sum())
     part = height * np.sum(np.sin(angles) * np.cos(angles)) / base
     assert abs(found) == pytest.approx(part * shear, rel=1e-3)
     assert part < 0.5 + 1e-9
