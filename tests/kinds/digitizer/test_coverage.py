@@ -15,6 +15,8 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Density
+from cmm_uq.inference.sampling import sample_with_noise
+from cmm_uq.model.noise import noise_of
 from tests.conftest import ROOT
 
 RECORDINGS = 300
@@ -40,6 +42,20 @@ def test_noise_is_found_where_set_ups_in_doubt_outnumber_the_observations() -> N
     centre, _ = Density(made.estimate().linear).laplace()
     assert len(made.unknowns) > int(few.sum())
     assert 3e-3 < np.exp(centre[-1]) < 27e-3
+    estimate = made.estimate()
+    sampled = sample_with_noise(estimate.linear, noise_of(made), estimate.least_squares, 0)
+    assert 3e-3 < np.median(sampled.sigma) < 27e-3
+
+
+def test_the_sampler_agrees_with_weights_by_importance() -> None:
+    """Two ways to one posterior; each knows u to about 1.5 %."""
+    made, weighed = cases()[5].draws(0)
+    estimate = made.estimate()
+    sampled = sample_with_noise(estimate.linear, noise_of(made), estimate.least_squares, 0)
+    assert sampled.converged
+    u = weighed.std(axis=0)
+    np.testing.assert_allclose(sampled.draws[:, :3].std(axis=0), u, rtol=0.07)
+    np.testing.assert_allclose(sampled.draws[:, :3].mean(axis=0) - weighed.mean(axis=0), 0, atol=0.08 * u.min())
 
 
 def test_noise_that_set_ups_in_doubt_could_explain_is_refused(tmp_path: Path) -> None:
