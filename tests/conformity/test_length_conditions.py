@@ -12,7 +12,7 @@ from cmm_uq.conformity.plans import LengthPlan
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.points import Machine
-from tests.conformity.recorded import bars, gauge
+from tests.conformity.recorded import MACHINE, bars, gauge
 from tests.recordings import TRAVEL, bar_facts
 
 X, Y, _ = np.eye(3)
@@ -25,7 +25,7 @@ def said(artefact: StepGauge | Ballbar, plan: LengthPlan = PLAN) -> tuple[list[s
     return [condition.what for condition in found], [text for condition in found for text in condition.missing]
 
 
-def along(*lines: tuple[np.ndarray, Sequence[float]], machine: Machine = Machine("m", "XYZ", TRAVEL)) -> StepGauge:
+def along(*lines: tuple[np.ndarray, Sequence[float]], machine: Machine = MACHINE) -> StepGauge:
     """One run of each line, its travel 900 mm along X and 550 mm along Y."""
     return gauge([line for line, _ in lines], [lengths for _, lengths in lines], repeats=1, machine=machine)
 

@@ -84,7 +84,7 @@ def test_a_line_is_parallel_to_an_axis_up_to_ten_degrees_from_it(degrees: float,
 @pytest.mark.parametrize(("moved", "position"), [(0.248, "space diagonal"), (0.251, "oblique")])
 def test_a_space_diagonal_crosses_three_quarters_of_every_axis(moved: float, position: str) -> None:
     """Moved along X by a part of its travel, the diagonal crosses the rest."""
-    middle = TRAVEL.mean(axis=1) + [900 * moved, 0, 0]
+    middle = TRAVEL.mean(axis=1) + np.array([900 * moved, 0, 0])
     assert position_on(MACHINE, middle, np.array([900.0, 550, 500])) == f"{position} +X +Y +Z"
 
 

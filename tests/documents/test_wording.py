@@ -27,6 +27,7 @@ def test_the_expanded_uncertainty_is_the_larger_half_of_the_interval_with_its_fa
         (0.012345, "1.2 %"),
         (0.49949, "50 %"),
         (0.5, "50 %"),
+        (0.50149, "50.1 %"),
         (0.67055, "67.1 %"),
         (0.99849, "99.8 %"),
         (0.999, "99.9 %"),
