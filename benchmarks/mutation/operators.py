@@ -40,6 +40,10 @@ _Path = tuple[tuple[str, int | None], ...]
 """Field and place in it, from a module down to a node."""
 
 
+_GUARDS = {"strict"}
+"""Keywords that only guard against mistakes in the program itself."""
+
+
 @dataclass(frozen=True)
 class Mutant:
     """One fault.
@@ -141,7 +145,8 @@ def _faults(node: ast.AST, parent: ast.AST, field: str) -> Iterator[ast.AST]:
         ast.If: _conditions, ast.comprehension: _filters, ast.Slice: _slices, ast.FormattedValue: _formats,
     }  # fmt: skip
     if isinstance(node, ast.Constant):
-        yield from _constants(node, parent, field)
+        if not (isinstance(parent, ast.keyword) and parent.arg in _GUARDS):
+            yield from _constants(node, parent, field)
     elif type(node) in by_type:
         yield from by_type[type(node)](node)
 

@@ -135,3 +135,43 @@ def test_no_placing_is_planned_twice_while_others_are_left() -> None:
     indices = choose(known, known.prior, score, 20).indices
     assert len(set(indices)) == 20
     assert list(indices) == sorted(indices)
+
+
+def drawn(seed: int) -> Told:
+    """Thirty candidates, each of two readings of four effects, larger and smaller."""
+    random = np.random.default_rng(seed)
+    rows = random.standard_normal((30, 2, 4)) * random.uniform(0.1, 3.0, (30, 1, 1))
+    unknowns = tuple(Unknown((name, name), "", 0.0, 1.0, 1.0) for name in "abcd")
+    return Told(unknowns, rows.swapaxes(1, 2) @ rows, np.zeros((4, 4)))
+
+
+@pytest.mark.parametrize("criterion", ["D", "A", "worst", "separation"])
+@pytest.mark.parametrize("again", [False, True])
+def test_no_single_exchange_makes_a_choice_better(criterion: str, again: bool) -> None:
+    for seed in range(8):
+        known = drawn(seed)
+        score = score_of(criterion, known, [0, 1, 2, 3])
+        found = choose(known, known.prior, score, 6, again=again)
+        assert len(found.indices) == 6
+        assert found.before == pytest.approx(float(score(known.prior[None])[0]))
+        whole = known.each[list(found.indices)].sum(axis=0)
+        assert found.after == pytest.approx(float(score(whole[None])[0]))
+        for one in found.indices:
+            others = [i for i in range(30) if again or i not in found.indices]
+            assert np.all(score(whole - known.each[one] + known.each[others]) >= found.after - 1e-6)
+
+
+def test_where_no_placing_alone_helps_the_one_that_tells_most_is_taken_first() -> None:
+    """Two effects that show as a sum and as a difference: neither alone parts them."""
+    rows = np.array([[1e-3, 0.0], [0.0, 1e-3], [30.0, 30.0], [20.0, -20.0]])
+    unknowns = tuple(Unknown((name, name), "", 0.0, 1.0, 1.0) for name in "ab")
+    known = Told(unknowns, rows[:, :, None] * rows[:, None, :], np.zeros((2, 2)))
+    found = choose(known, known.prior, score_of("separation", known, [0, 1]), 2)
+    assert found.indices == (2, 3)
+    assert found.before == pytest.approx(-np.log(0.001))
+
+
+def test_more_placings_than_candidates_take_some_again() -> None:
+    known = drawn(3)
+    score = score_of("A", known, [0, 1, 2, 3])
+    assert len(choose(known, known.prior, score, 31).indices) == 31

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cmm_uq.inference.linear_model import Unknown
+from cmm_uq.kinds.ballbar.plan import ballbar
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.planning.information import Told, certified, gram, scales, told, whole
+from cmm_uq.planning.information import Told, certified, gram, scales, shared, told, whole
 from cmm_uq.planning.placing import along, joined
-from cmm_uq.kinds.ballbar.plan import ballbar
 from cmm_uq.planning.ready import ready_plan
+from cmm_uq.planning.separation import left_of
 from tests.planning.plans import EVERY_KIND, SIX, setting
 
 RIVALS = effects(("rotation_x_z", "straightness_y_z", "artefact_sag"))
@@ -61,13 +64,34 @@ def test_the_information_of_one_bar_by_hand() -> None:
     np.testing.assert_allclose(np.abs(found), np.outer(rows, rows), rtol=1e-4)
 
 
+def test_information_needs_the_noise() -> None:
+    chosen = setting(EVERY_KIND["ballbar"][0], named=("scale_x",), repeats=1)
+    model = replace(chosen.model(joined(ready_plan(chosen)[1])), sigma=None)
+    with pytest.raises(ValueError, match="needs the noise"):
+        gram(model, np.array([0.0, 400.0]))
+
+
+def test_freedoms_that_all_placings_share_leave_what_projecting_them_out_leaves() -> None:
+    facts, wishes = EVERY_KIND["bryan"]
+    chosen = setting(facts, ("squareness_xy", "squareness_zx"), **wishes)
+    model = chosen.model(joined(ready_plan(chosen)[1]))
+    known = shared(model)
+    k, rows = len(model.unknowns), len(known.prior)
+    assert rows > k
+    together = left_of(known.each.sum(axis=0), range(k), range(k, rows))
+    expected = gram(model, np.array([unknown.prior_mean for unknown in model.unknowns]))
+    np.testing.assert_allclose(together, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+
 def test_a_certificate_is_worth_the_square_of_its_unit_over_its_uncertainty() -> None:
-    """A tenth of a millimetre over half a micrometre, squared; one without uncertainty holds its size."""
+    """A tenth of a millimetre over half a micrometre, squared; one without uncertainty, or with hardly any, holds its size."""
+    hardly = Unknown((ARTEFACT, "other"), "mm", 1.0, 1e-9, 0.1, known=True)
+    assert certified([hardly])[0, 0] == 1e12
     exact = Unknown((ARTEFACT, "other"), "mm", 1.0, 0.0, 0.1, known=True)
     found = certified([SCALE, BAR, exact], 1)
     assert found.shape == (4, 4)
     assert np.diag(found)[[0, 1, 3]] == pytest.approx([0.0, 4e4, 0.0])
-    assert found[2, 2] >= 1e12
+    assert found[2, 2] == 1e12
     assert np.count_nonzero(found) == 2
 
 

@@ -61,23 +61,57 @@ def log_odds(found: Any, facts: ArtefactFacts, what: str, repetitions: int, pair
     return float(0.5 * np.sum((rest / linear.noise_scale / SIGMA) ** 2))
 
 
-def test_the_odds_of_a_further_bar_are_those_of_a_fit_to_it() -> None:
-    """Bars in one plane of constant y: the yaw of X looks like its scale. Independently of the suggestion, the true effect
-    is put in without noise, and the false one fitted to the recording and the further bars together.
-    """
-    chosen = setting(BALLBAR, repeats=1)
-    bar = ballbar(BALLBAR, chosen.plan)
+def in_one_plane(size: float) -> Any:
+    """Bars of known length in one plane of constant y, where the yaw of X looks like its scale."""
+    chosen = setting(KNOWN, repeats=1)
+    bar = ballbar(KNOWN, chosen.plan)
     placings = tuple(
         chosen.volume.set_up(bar, along(np.array([np.cos(t), 0.0, np.sin(t)])), (x, 0.3, z), "in the plane")
         for t in (0.0, 0.5, 1.0, 1.5, 2.0, 2.6) for x in (0.2, 0.8) for z in (0.3, 0.6)
     )  # fmt: skip
-    pair, named = ("rotation_x_z", "scale_x"), ("scale_z", "squareness_zx")
-    found = diagnosed(BALLBAR, placings, "rotation_x_z", 60.0, pair, named)
-    (suggestion,) = suggested(found, BALLBAR)
-    assert suggestion.separates == pair
+    return diagnosed(KNOWN, placings, PAIR[0], size, PAIR, ("scale_z", "squareness_zx"))
+
+
+KNOWN = BALLBAR.model_copy(update={"u_um": 1e-3})
+PAIR = ("rotation_x_z", "scale_x")
+
+
+@pytest.mark.parametrize(
+    ("size", "repetitions", "said"),
+    [
+        (4.0, 1, "measure it once: odds of 49 : 1 for the true one are to be expected, 1 : 1 without it."),
+        (2.0, 6, "measure it 6 times: odds of 25 : 1 for the true one are to be expected, 1 : 1 without it."),
+    ],
+)
+def test_the_odds_of_a_further_bar_are_those_of_a_fit_to_it(size: float, repetitions: int, said: str) -> None:
+    """Independently of the suggestion, the true effect is put in without noise, and the false one fitted to the recording and
+    the further bars together; either may be true. With one bar less the odds would not be reached.
+    """
+    found = in_one_plane(size)
+    (suggestion,) = suggested(found, KNOWN)
+    assert suggestion.separates == PAIR
+    assert suggestion.repetitions == repetitions
+    assert suggestion.what.endswith(said)
+    expected = min(log_odds(found, KNOWN, suggestion.what, repetitions, PAIR, true) for true in PAIR)
+    assert np.log(suggestion.odds) == pytest.approx(expected, rel=1e-3)
     assert suggestion.odds >= ODDS
-    least = min(log_odds(found, BALLBAR, suggestion.what, suggestion.repetitions, pair, true) for true in pair)
-    assert np.log(suggestion.odds) == pytest.approx(min(least, 50.0), rel=0.02)
+    if repetitions > 1:
+        fewer = min(log_odds(found, KNOWN, suggestion.what, repetitions - 1, PAIR, true) for true in PAIR)
+        assert np.exp(fewer) < ODDS
+
+
+def test_odds_beyond_all_doubt_are_not_counted() -> None:
+    (suggestion,) = suggested(in_one_plane(60.0), KNOWN)
+    assert suggestion.odds == pytest.approx(np.exp(50.0))
+    assert "odds of more than 1000 : 1 for the true one" in suggestion.what
+
+
+def test_of_a_large_group_the_pairs_of_its_first_three_are_parted() -> None:
+    found = in_one_plane(60.0)
+    found.indistinguishable = ((*PAIR, "scale_y", "squareness_xy"),)
+    pairs = {suggestion.separates for suggestion in suggested(found, KNOWN)}
+    assert PAIR in pairs
+    assert not any("squareness_xy" in pair for pair in pairs)
 
 
 def test_a_gauge_on_seven_lines_is_told_where_to_lay_an_eighth() -> None:

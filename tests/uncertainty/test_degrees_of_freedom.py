@@ -48,9 +48,13 @@ def test_where_a_set_has_several_the_smallest_counts_for_all_that_are_not_known(
 
 def test_from_point_to_point_each_has_its_own() -> None:
     contributions = np.array([[[3.0, 1.0], [4.0, 2.0]]])
-    dof = [np.array([5.0, 2.0]), 10.0]
+    dof = [np.array([5.0, np.inf]), 10.0]
     found = effective_dof(contributions, np.eye(2), dof, np.array([[25.0, 5.0]]))
-    assert found[0] == pytest.approx([625 / (81 / 5 + 256 / 10), 25 / (1 / 2 + 16 / 10)])
+    assert found[0] == pytest.approx([625 / (81 / 5 + 256 / 10), 25 / (16 / 10)])
+
+
+def test_what_rests_on_nothing_is_known() -> None:
+    assert np.isinf(effective_dof(np.zeros((1, 0)), np.zeros((0, 0)), [], np.zeros(1))).tolist() == [True]
 
 
 @pytest.mark.parametrize("coverage", [0.5, 0.6827, 0.95, 0.99])
