@@ -1,160 +1,40 @@
-"""Mutants against the tests that cover their lines: ``python -m benchmarks.mutation.driver [MODULE ...]``.
+"""Mutants against the tests that run their lines: ``python -m benchmarks.mutation.driver [MODULE ...]``.
 
 pytest collects the tests once; every mutant is a fork of that process, in which the code of its function is exchanged and the
-tests run, fastest first, until one fails. What runs on import (constants, defaults) gets fresh imports in the fork. Results are
-appended to ``--results`` as they come, and a run takes up where the last one ended; ``--survivors`` tries what survived again.
-``--measure`` (first of all, or for some test files alone) finds out which tests cover which lines, and how long they take.
+tests run, fastest first, until one fails. What runs on import (constants, defaults) gets fresh imports there. Results are
+appended to ``results.jsonl`` as they come, and a run takes up where the last one ended; ``--survivors`` tries again what
+survived. ``--measure`` (first of all, or for some test files alone) finds out which tests run which lines.
 """
 
 from __future__ import annotations
 
 import argparse
 import gc
-import importlib.abc
-import importlib.util
 import json
 import os
 import random
-import re
-import signal
 import sys
 import time
-import xml.etree.ElementTree as ElementTree
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from functools import cache
-from importlib.machinery import ModuleSpec
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
 
 import pytest
-from coverage import CoverageData
 
-from benchmarks.mutation.modules import MODULES, ROOT
+from benchmarks.mutation.covering import QUIET, Cover, durations, measure
+from benchmarks.mutation.faulty import Faulty, Watched, exchange, functions
+from benchmarks.mutation.modules import KEEP, MODULES, ROOT
 from benchmarks.mutation.operators import Mutant, mutants
+from benchmarks.mutation.table import Equivalents, read
 
-KEEP = ROOT / "reports" / "mutation"
-OUTSIDE = (
-    "tests/hostile",
-    "tests/test_packaging.py",
-    "tests/test_contributing.py",
-    "tests/documents/test_html_layout.py",
-)
-"""Tests that start other processes or a browser: they would run the code without the fault."""
-QUIET = ["-q", "-p", "no:cacheprovider", "-o", "tmp_path_retention_policy=none", "--hypothesis-profile=ci",
-         "-W", "ignore::pytest.PytestAssertRewriteWarning", *(f"--ignore={path}" for path in OUTSIDE)]  # fmt: skip
 LEAST, PATIENCE = 30.0, 5.0
 """Seconds that any test may take, and times those of the longest on top: then the mutant hangs, which kills it."""
 
 
-def measure(tests: Sequence[str], keep: Path) -> int:
-    """Which test runs which line, and how long each test takes; added to what is known."""
-    keep.mkdir(parents=True, exist_ok=True)
-    settings = keep / "coveragerc"
-    lines = "\n".join(f"    {ROOT / module}" for module in MODULES)
-    settings.write_text(f"[run]\ndata_file = {keep / 'coverage.db'}\ninclude =\n{lines}\n", encoding="utf-8")
-    times = keep / f"times-{len(list(keep.glob('times-*.xml'))):03d}.xml"
-    wanted = list(tests) or ["tests"]
-    return pytest.main([*QUIET, "-n", "2", "--cov", "--cov-append", f"--cov-config={settings}", "--cov-context=test",
-                        "--cov-report=", f"--junitxml={times}", *wanted])  # fmt: skip
-
-
-@cache
-def shares(path: str) -> bool:
-    """Whether the tests of a file share what is computed once: then the first of them pays for all."""
-    beside = ROOT / path, (ROOT / path).with_name("conftest.py")
-    return any(
-        re.search(r"scope=|@cache|simulated", file.read_text(encoding="utf-8")) for file in beside if file.exists()
-    )
-
-
-def durations(keep: Path) -> tuple[dict[str, float], dict[str, float]]:
-    """Seconds that each test takes, and what the first of a file takes at most where its tests share something."""
-    found: dict[str, float] = {}
-    for path in sorted(keep.glob("times-*.xml")):
-        for case in ElementTree.parse(path).iter("testcase"):
-            found[f"{case.get('classname', '').replace('.', '/')}.py::{case.get('name')}"] = float(case.get("time", 0))
-    first: dict[str, float] = defaultdict(float)
-    for test, seconds in found.items():
-        file = test.split("::")[0]
-        if (ROOT / file).exists() and shares(file):
-            first[file] = max(first[file], seconds)
-    return found, first
-
-
-class Cover:
-    """Tests by the lines that they run.
-
-    Where a line runs while a test is set up, or a file caches what it computes, other tests of that file may rest on it too.
-    """
-
-    def __init__(self, keep: Path, known: Sequence[str]) -> None:
-        self._data = CoverageData(str(keep / "coverage.db"))
-        self._data.read()
-        self._by_file: dict[str, list[str]] = defaultdict(list)
-        for test in known:
-            self._by_file[test.split("::")[0]].append(test)
-
-    def of(self, mutant: Mutant) -> set[str]:
-        """Tests that may kill a mutant: those that run its lines, or any line of the module where it acts on import."""
-        by_line = self._data.contexts_by_lineno(str(ROOT / mutant.module))
-        lines = by_line if mutant.qualname is None else range(mutant.line, mutant.last + 1)
-        found: set[str] = set()
-        for test, _, phase in (context.rpartition("|") for line in lines for context in by_line.get(line, ())):
-            path = test.split("::")[0]
-            found |= {test} if phase == "run" and not shares(path) else set(self._by_file[path])
-        return found
-
-
-def functions() -> dict[str, list[FunctionType]]:
-    """All functions of the running process that can be exchanged, by module."""
-    found = defaultdict(list)
-    for function in gc.get_objects():
-        if isinstance(function, FunctionType):
-            found[function.__code__.co_filename].append(function)
-    return {module: found[str(ROOT / module)] for module in MODULES}
-
-
-def exchange(mutant: Mutant, present: Sequence[FunctionType]) -> bool:
-    """Put the faulty code into the functions of the running process; whether any function took it."""
-    wanted, done = dict(_codes(mutant.code(ROOT))), False
-    for function in present:
-        new = wanted.get(_name(function.__code__))
-        if new is not None and len(new.co_freevars) == len(function.__code__.co_freevars):
-            done |= str(mutant.qualname).startswith(function.__code__.co_qualname.split(".<locals>")[0])
-            function.__code__ = new
-    return done
-
-
-def _name(code: CodeType) -> tuple[object, ...]:
-    return code.co_qualname, code.co_firstlineno, code.co_varnames[: code.co_argcount]
-
-
-def _codes(code: CodeType) -> Iterator[tuple[tuple[object, ...], CodeType]]:
-    yield _name(code), code
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _codes(constant)
-
-
-class Faulty(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Imports one module with its fault."""
-
-    def __init__(self, mutant: Mutant) -> None:
-        self._mutant = mutant
-        self._name = mutant.module.removesuffix(".py").replace("/", ".")
-
-    def find_spec(self, name: str, path: object, target: object = None) -> ModuleSpec | None:
-        """See the base class."""
-        return (
-            importlib.util.spec_from_file_location(name, ROOT / self._mutant.module, loader=self)
-            if name == self._name
-            else None
-        )
-
-    def exec_module(self, module: ModuleType) -> None:
-        """See the base class."""
-        exec(self._mutant.code(ROOT), module.__dict__)  # noqa: S102
+def drawn_of(faults: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
+    """So many of a module's faults, in the order of the source; a fault more or less elsewhere draws the others as before."""
+    order = sorted(faults, key=lambda mutant: random.Random(f"{seed} {mutant.key}").random())
+    return sorted(order[:count], key=lambda mutant: mutant.line)
 
 
 class Study:
@@ -164,7 +44,7 @@ class Study:
         self.options = options
         self.usual, self.first = durations(options.keep)
         self.kills: dict[str, Counter[str]] = defaultdict(Counter)
-        for record in read(options.results).values():
+        for record in read(options.keep).values():
             self.kills[str(record["module"])][str(record["by"])] += record["result"] == "killed"
         self.sound: dict[str, bool] = {}
 
@@ -201,12 +81,15 @@ class Study:
             self._note(mutant, tests, status, last[-1] if last else "", time.monotonic() - began)
 
     def _wanted(self) -> Iterator[Mutant]:
-        done = {key: record["result"] for key, record in read(self.options.results).items()}
+        equivalents = Equivalents()
+        done = {key: record["result"] for key, record in read(self.options.keep).items()}
         for module in self.options.modules or MODULES:
             drawn = mutants(ROOT, module)
-            if self.options.sample and len(drawn) > self.options.sample:
-                drawn = random.Random(self.options.seed).sample(drawn, self.options.sample)
+            if self.options.sample:
+                drawn = drawn_of(drawn, self.options.sample, self.options.seed)
             for mutant in drawn:
+                if mutant in equivalents:
+                    continue
                 if mutant.key not in done or (self.options.survivors and done[mutant.key] == "survived"):
                     yield mutant
 
@@ -253,8 +136,11 @@ class Study:
         if result == "killed":
             self.kills[mutant.module][last] += 1
         module, source, change, nth = mutant.key
-        record = {"module": module, "line": mutant.line, "source": source, "change": change, "nth": nth, "result": result,
-                  "by": last if result == "killed" else "", "status": status, "tests": len(tests), "seconds": round(seconds, 1)}  # fmt: skip
+        by = last if result == "killed" else ""
+        record = {
+            "module": module, "line": mutant.line, "source": source, "change": change, "nth": nth, "result": result, "by": by,
+            "status": status, "tests": len(tests), "seconds": round(seconds, 1),
+        }  # fmt: skip
         with self.options.results.open("a", encoding="utf-8") as file:
             file.write(json.dumps(record, ensure_ascii=False) + "\n")
 
@@ -266,41 +152,6 @@ class Study:
             os.close(reading)
             os.close(writing)
         return self.sound[test]
-
-
-class Watched:
-    """Names each test as it starts, and ends the process where it takes too long."""
-
-    def __init__(self, pipe: int, limit: int) -> None:
-        self._pipe, self._limit = pipe, limit
-
-    def run(self, items: Sequence[pytest.Item]) -> int:
-        """Run tests of the collecting process; no return when one fails."""
-        for item, following in zip(items, [*items[1:], None], strict=True):
-            if item is items[0]:
-                item.config.pluginmanager.register(self)
-            item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-        return 0
-
-    @pytest.hookimpl(tryfirst=True)
-    def pytest_runtest_setup(self, item: pytest.Item) -> None:
-        """Note which test runs, and set the clock."""
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.alarm(self._limit)
-        os.write(self._pipe, f"{item.nodeid}\n".encode())
-
-    @pytest.hookimpl(tryfirst=True)
-    def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
-        """End at the first failure, of which nobody asks for a report."""
-        if call.excinfo is not None and not isinstance(call.excinfo.value, pytest.skip.Exception):
-            os._exit(1)
-
-
-def read(results: Path) -> dict[tuple[object, ...], dict[str, object]]:
-    """The last result of every mutant."""
-    lines = results.read_text(encoding="utf-8").splitlines() if results.exists() else []
-    records = [json.loads(line) for line in lines]
-    return {tuple(record[name] for name in ("module", "source", "change", "nth")): record for record in records}
 
 
 def main() -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+KEEP = ROOT / "reports" / "mutation"
 
 _BY_ROOM = {
     "conformity": "decision standards accuracy statement tolerances consequences length_conditions bar_conditions "

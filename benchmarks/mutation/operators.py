@@ -1,6 +1,6 @@
 """What is changed: small faults in a module's syntax tree, each one that a tired engineer could have written.
 
-Left alone: docstrings, annotations, decorators, imports, string constants, and whatever stands in a ``raise`` (texts of errors).
+Left alone: docstrings, annotations, decorators, imports, string constants, assertions, and what stands in a ``raise``.
 """
 
 from __future__ import annotations
@@ -232,9 +232,10 @@ def _slices(node: ast.AST) -> Iterator[ast.AST]:
 def _formats(node: ast.AST) -> Iterator[ast.AST]:
     """One decimal or digit more than meant."""
     assert isinstance(node, ast.FormattedValue)
-    if isinstance(node.format_spec, ast.JoinedStr) and isinstance(spec := node.format_spec.values[0], ast.Constant):
-        if (text := str(spec.value)).startswith(".") and text[1:2].isdigit():
-            yield _with(node, format_spec=ast.JoinedStr([ast.Constant(f".{int(text[1]) + 1}{text[2:]}")]))
+    spec = node.format_spec.values[0] if isinstance(node.format_spec, ast.JoinedStr) else None
+    text = str(spec.value) if isinstance(spec, ast.Constant) else ""
+    if text.startswith(".") and text[1:2].isdigit():
+        yield _with(node, format_spec=ast.JoinedStr([ast.Constant(f".{int(text[1]) + 1}{text[2:]}")]))
 
 
 def _constants(node: ast.Constant, parent: ast.AST, field: str) -> Iterator[ast.AST]:

@@ -43,3 +43,10 @@ def test_five_copies_are_named_in_the_order_of_their_numbers_and_of_more_how_man
     assert named([6, 4, 5, 3, 2]) == f"{begin}{'; '.join(said)}."
     assert named([7, 6, 4, 5, 3, 2]) == f"{begin}{'; '.join(said)} and 1 more."
     assert named([8, 7, 6, 4, 5, 3, 2]) == f"{begin}{'; '.join(said)} and 2 more."
+
+
+def test_copies_of_several_are_named_in_the_order_of_their_originals() -> None:
+    assert copies_in_words(runs((3, 1, 5.0), (1, 1, 6.0), (4, 1, 5.0), (2, 1, 6.0))) == (
+        "Copies to the last digit, which do not count: measurement 2, repeat 1 of measurement 1, repeat 1; "
+        "measurement 4, repeat 1 of measurement 3, repeat 1."
+    )

@@ -59,6 +59,20 @@ def test_three_axes_and_their_middle_leave_a_part_of_the_hemisphere_bare() -> No
     assert missing(SpherePlan(4, float(plane) - 3.0), spheres) != []
 
 
+def test_between_a_pole_and_a_dense_equator_the_hemisphere_is_bare_at_45_degrees() -> None:
+    """Half-way between two of 36 points of the equator: tan of the height is cos 5°, 45.1° from the pole and from both."""
+    equator = [[np.cos(t), np.sin(t), 0.0] for t in np.radians(np.arange(0.0, 360.0, 10.0))]
+    assert missing(SpherePlan(37, 45.2), [Z, *equator]) == []
+    assert missing(SpherePlan(37, 43.5), [Z, *equator]) != []
+
+
+def test_points_round_the_equator_alone_leave_the_pole_bare() -> None:
+    """Their mean is nothing at all; of 400 directions the highest is less than 3° from the pole."""
+    equator = [X, Y, [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    assert missing(SpherePlan(4, 90.0), equator) == []
+    assert missing(SpherePlan(4, 87.0), equator) != []
+
+
 def test_points_that_balance_each_other_are_looked_at_about_the_vertical() -> None:
     """Two above, three at a height of −2/3: above, the farthest direction is at 12.6°, 77.4° from all; below, 68.1°."""
     low = [[np.sqrt(5) / 3 * np.cos(t), np.sqrt(5) / 3 * np.sin(t), -2 / 3] for t in np.radians([0.0, 120.0, 240.0])]

@@ -77,6 +77,26 @@ def test_two_scales_are_alike_where_all_bars_lie_near_the_diagonal(
         assert plan.alike[0][2] == pytest.approx(cosine, abs=1e-4)
 
 
+def test_of_a_free_length_no_more_is_known_than_the_prior_of_the_scale_leaves() -> None:
+    """Along X only scale and length together show: u² of the length is 2σ² + (L·s)², s the prior of the scale."""
+    chosen = setting(UNCALIBRATED, named=("scale_x",), length_mm=400.0, repeats=1, sigma=1e-2)
+    plan = found(chosen, bars(chosen, (1, 0, 0)))
+    scale, length = plan.parameters
+    assert (scale.status, length.status, scale.u, length.u) == ("free", "free", None, None)
+    prior = 0.4e-3 * scale.unknown.prior_sd
+    assert length.u_with_prior == pytest.approx(np.sqrt(2e-4 + prior**2), rel=1e-4)
+    assert scale.u_with_prior == pytest.approx(scale.unknown.prior_sd, rel=1e-4)
+
+
+def test_a_length_that_is_measured_is_determined_however_roughly() -> None:
+    """The square of √2·0.2 mm is eight times that of the tenth of a millimetre that is its unit; it has no prior to fall back on."""
+    chosen = setting(UNCALIBRATED, named=("scale_y",), length_mm=400.0, repeats=1, sigma=0.2)
+    scale, length = found(chosen, bars(chosen, (1, 0, 0))).parameters
+    assert (scale.status, length.status) == ("free", "determined")
+    assert length.u == pytest.approx(np.sqrt(2) * 0.2, rel=1e-4)
+    assert length.u_with_prior == pytest.approx(np.sqrt(2) * 0.2, rel=1e-4)
+
+
 def test_an_uncalibrated_bar_leaves_the_three_scales_free_together_with_its_length() -> None:
     chosen = setting(UNCALIBRATED, length_mm=400.0)
     plan = found(chosen, ready_plan(chosen)[1])
