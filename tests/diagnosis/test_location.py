@@ -131,7 +131,7 @@ def test_a_constant_that_the_baseline_absorbs_is_no_part_of_the_curve() -> None:
     ],
 )
 def test_a_jump_lies_where_it_is_with_95_percent(evidence: list[float], region: tuple[float, float]) -> None:
-    steps = [np.where(X > after, 1.0, 0.0)[:, None] for after in (2.0, 4.0, 7.0, 9.0)]
+    steps = [np.where(after < X, 1.0, 0.0)[:, None] for after in (2.0, 4.0, 7.0, 9.0)]
     data = 1e-3 * steps[0][:, 0]
     (place,) = located(compared(data, term(*steps), evidence=np.array(evidence)), 0.01)
     assert place.region == region

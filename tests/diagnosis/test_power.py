@@ -89,7 +89,7 @@ def test_an_amplitude_is_found_in_the_recordings_whose_size_it_reaches(
 
 
 def test_the_amplitude_found_with_80_percent_is_within_what_physics_allows() -> None:
-    """At least eight of ten: a size of 9 (of ranks 0 to 9 the quantile 0.8 is 7.2, the higher of whose neighbours is the ninth)."""
+    """A size of 9: of ranks 0 to 9 the quantile 0.8 is at 7.2, and the higher of its neighbours is the ninth."""
     assert known().detectable == pytest.approx(4.5)
     assert known().identifiable == pytest.approx(6.0)
     assert known(allowed=4.5).detectable == pytest.approx(4.5)

@@ -83,13 +83,21 @@ def test_of_a_free_length_no_more_is_known_than_the_prior_of_the_scale_leaves() 
     plan = found(chosen, bars(chosen, (1, 0, 0)))
     scale, length = plan.parameters
     assert (scale.status, length.status, scale.u, length.u) == ("free", "free", None, None)
+    assert plan.alike == ()  # an artefact's length is no effect to be told apart
     prior = 0.4e-3 * scale.unknown.prior_sd
     assert length.u_with_prior == pytest.approx(np.sqrt(2e-4 + prior**2), rel=1e-4)
     assert scale.u_with_prior == pytest.approx(scale.unknown.prior_sd, rel=1e-4)
 
 
+def test_of_a_calibrated_bar_without_effects_there_is_nothing_to_determine() -> None:
+    chosen = setting(EXACT, named=())
+    plan = found(chosen, bars(chosen, (1, 0, 0)))
+    assert (plan.parameters, plan.free, plan.alike, plan.complete) == ((), (), (), True)
+    assert plan.singular_values.tolist() == []
+
+
 def test_a_length_that_is_measured_is_determined_however_roughly() -> None:
-    """The square of √2·0.2 mm is eight times that of the tenth of a millimetre that is its unit; it has no prior to fall back on."""
+    """√2·0.2 mm, beyond the tenth of a millimetre that is its unit: it has no prior to fall back on."""
     chosen = setting(UNCALIBRATED, named=("scale_y",), length_mm=400.0, repeats=1, sigma=0.2)
     scale, length = found(chosen, bars(chosen, (1, 0, 0))).parameters
     assert (scale.status, length.status) == ("free", "determined")
@@ -115,6 +123,7 @@ def test_bars_along_one_axis_determine_its_scale_and_nothing_else() -> None:
     plan = found(chosen, bars(chosen, (1, 0, 0), (1, 0, 0)))
     assert [p.unknown.key[0] for p in plan.parameters if p.status == "determined"] == ["scale_x"]
     assert len(plan.free) == 5
+    assert plan.alike == ()  # what does not show looks like nothing
 
 
 def test_sag_is_one_with_the_scales_of_the_table_axes() -> None:

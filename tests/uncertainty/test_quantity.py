@@ -14,6 +14,7 @@ def test_the_expanded_uncertainty_covers_the_whole_interval(value: float, expand
     found = Quantity(value, 1.25, (1.0, 6.0), "µm")
     assert found.expanded == expanded
     assert found.coverage_factor == pytest.approx(expanded / 1.25)
+    assert Quantity(value, 0.5, (1.0, 6.0), "µm").coverage_factor == pytest.approx(expanded / 0.5)
 
 
 def test_what_is_not_uncertain_has_no_coverage_factor() -> None:

@@ -107,6 +107,7 @@ def test_as_many_digits_as_asked_for() -> None:
 
 def test_binary_noise_does_not_decide_a_tie() -> None:
     assert significant(0.1 + 0.2, 1) == "0.3"
+    assert significant(1.23e-18) == "1.2×10⁻¹⁸"
     assert significant(1.25 - 1e-15) == "1.3"
 
 
