@@ -162,8 +162,8 @@ def test_no_single_exchange_makes_a_choice_better(criterion: str, again: bool) -
 
 
 def test_where_no_placing_alone_helps_the_one_that_tells_most_is_taken_first() -> None:
-    """Two effects that show as a sum and as a difference: neither alone parts them."""
-    rows = np.array([[1e-3, 0.0], [0.0, 1e-3], [30.0, 30.0], [20.0, -20.0]])
+    """Two effects, each of which shows in one placing only: neither placing alone parts them."""
+    rows = np.array([[1e-3, 0.0], [0.0, 1e-3], [30.0, 0.0], [0.0, 20.0]])
     unknowns = tuple(Unknown((name, name), "", 0.0, 1.0, 1.0) for name in "ab")
     known = Told(unknowns, rows[:, :, None] * rows[:, None, :], np.zeros((2, 2)))
     found = choose(known, known.prior, score_of("separation", known, [0, 1]), 2)
