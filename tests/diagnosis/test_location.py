@@ -59,9 +59,9 @@ def compared(
 
     def each(*_: object) -> Any:
         count = len(terms[0].members)
-        cube = np.log(np.zeros((count, 1, 1)) + 1.0) if evidence is None else np.log(evidence)[:, None, None]
-        yield SimpleNamespace(r=2, member=np.arange(count)), cube + 1e3
+        cube = np.log(np.ones(count) if evidence is None else 1e3 * evidence)[:, None, None]
         yield SimpleNamespace(r=1, member=np.arange(count)), cube
+        yield SimpleNamespace(r=2, member=np.arange(count)), cube[::-1]
 
     comparison = SimpleNamespace(
         noise_scale=np.full(12, 2.0), rest=rest, left=rest(data), least_noise=LEAST, each=each,
@@ -77,13 +77,14 @@ def bent(x: Floats) -> Floats:
     return np.column_stack([np.sin(x), np.cos(0.7 * x), x**2 / 50])
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("exact", [False, True])
-def test_the_curve_is_that_of_kriging(exact: bool) -> None:
+def test_the_curve_is_that_of_kriging(exact: bool, sign: float) -> None:
     """Prior covariance a²v·VVᵀ, noise v: mean a²VLᵀ(a²LLᵀ + 1)⁻¹y (Rasmussen & Williams 2006, 2.25–26), with v of the
     residuals of least squares, or the least noise where these are less.
     """
     V, L = bent(np.unique(X)), 5.0 * bent(X)
-    data = L @ [2e-3, -1e-3, 4e-3] + (0.0 if exact else 1e-3) * np.random.default_rng(5).standard_normal(12)
+    data = sign * L @ [2e-3, -1e-3, 4e-3] + (0.0 if exact else 1e-3) * np.random.default_rng(5).standard_normal(12)
     (place,) = located(compared(data, term(bent(X))), 0.01)
     rest = data - L @ np.linalg.lstsq(L, data, rcond=None)[0]
     v = LEAST**2 if exact else rest @ rest / 9
@@ -126,6 +127,7 @@ def test_a_constant_that_the_baseline_absorbs_is_no_part_of_the_curve() -> None:
         # steps after 2, 4, 7 and 9: of 0.6, 0.3, 0.08 and 0.02 the first three are needed for 95 %
         ([0.6, 0.3, 0.08, 0.02], (2.0, 8.0)),
         ([0.02, 0.96, 0.01, 0.01], (4.0, 5.0)),
+        ([0.6, 0.352, 0.03, 0.018], (2.0, 5.0)),
         ([0.07, 0.3, 0.03, 0.6], (2.0, 10.0)),
         ([0.04, 0.92, 0.02, 0.02], (2.0, 5.0)),
     ],

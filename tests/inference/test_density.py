@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg, optimize, stats
@@ -102,3 +104,12 @@ def test_a_stated_noise_leaves_the_exact_distribution_to_start_from() -> None:
     assert centre.tolist() == mean.tolist()
     np.testing.assert_allclose(factor @ factor.T, covariance, rtol=1e-10)
     assert factor[0, 1] == 0.0
+
+
+@pytest.mark.parametrize("scale", [1.0, 5.0])
+def test_a_certificate_without_uncertainty_holds_to_a_millionth_of_a_typical_size(scale: float) -> None:
+    exact = Unknown(("e", "0"), "", 1.0, 0.0, scale, known=True)
+    model = replace(given(), unknowns=(exact, given().unknowns[1]))
+    mean, covariance, _ = Density(model).conditional(0.0)
+    assert mean[0] == pytest.approx(1.0, abs=1e-9)
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(1e-6 * scale, rel=1e-6)

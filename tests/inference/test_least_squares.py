@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -115,6 +117,13 @@ def test_observations_count_by_their_noise_and_residuals_are_in_millimetres() ->
     assert found.sigma == found.sigma_of_residuals == pytest.approx(np.sqrt(np.sum((w * residuals) ** 2) / 4))
     covariance = np.linalg.inv((w[:, None] * A).T @ (w[:, None] * A))[:2, :2]
     np.testing.assert_allclose(found.covariance, found.sigma**2 * covariance, rtol=1e-10)
+
+
+def test_a_place_that_is_given_twice_is_taken_once() -> None:
+    given = weighted()
+    twice = replace(given, placing=np.hstack([given.placing, -3.0 * given.placing]))
+    assert solve(twice).degrees_of_freedom == solve(given).degrees_of_freedom == 4
+    np.testing.assert_allclose(solve(twice).value, solve(given).value, rtol=1e-9)
 
 
 def test_a_stated_noise_is_used_and_that_of_the_residuals_is_told() -> None:

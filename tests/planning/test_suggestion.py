@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -36,7 +37,10 @@ def diagnosed(
     return SimpleNamespace(after=after, indistinguishable=(group,))
 
 
-def log_odds(found: Any, facts: ArtefactFacts, what: str, repetitions: int, pair: tuple[str, str], true: str) -> float:
+def log_odds(
+    found: Any, facts: ArtefactFacts, what: str, repetitions: int, pair: tuple[str, str], true: str,
+    shapes: dict[str, tuple[float, ...]] | None = None,
+) -> float:  # fmt: skip
     """Half the χ² by which the false one of a pair fits worse, recording and further bars together, without noise."""
     ends = [
         np.array([float(v.replace("−", "-")) for v in part.split(")")[0].split(", ")]) for part in what.split("(")[1:3]
@@ -50,13 +54,19 @@ def log_odds(found: Any, facts: ArtefactFacts, what: str, repetitions: int, pair
         np.append(points.point, np.tile([1, 2], repetitions)),
         np.append(points.repeat, np.repeat(np.arange(1, repetitions + 1), 2)), points.machine,
     )  # fmt: skip
-    acting = MeasurementModel(artefact_of(facts, more), effects((true,)))
+    formed = {name: shape for name, shape in (shapes or {}).items() if name == true}
+    acting = MeasurementModel(artefact_of(facts, more), effects((true,)), shapes=formed)
     others = tuple(e for e in found.after.effects if e.name not in pair)
-    fitted = MeasurementModel(found.after.artefact, (*others, *effects((true,))), SIGMA).estimate().least_squares
-    size = next(v for u, v in zip(fitted.unknowns, fitted.value, strict=True) if u.key[0] == true)
-    exact = more.at(acting.predicted(np.array([size, facts.length_mm or 0.0])))
+    fitted = (
+        MeasurementModel(found.after.artefact, (*others, *effects((true,))), SIGMA, shapes=formed)
+        .estimate()
+        .least_squares
+    )
+    size = [v for u, v in zip(fitted.unknowns, fitted.value, strict=True) if u.key[0] == true]
+    exact = more.at(acting.predicted(np.array([*size, facts.length_mm or 0.0])))
     other = pair[1] if pair[0] == true else pair[0]
-    model = MeasurementModel(artefact_of(facts, exact), (*others, *effects((other,))), SIGMA)
+    formed = {name: shape for name, shape in (shapes or {}).items() if name == other}
+    model = MeasurementModel(artefact_of(facts, exact), (*others, *effects((other,))), SIGMA, shapes=formed)
     linear, rest = model.estimate().linear, model.estimate().least_squares.residuals
     return float(0.5 * np.sum((rest / linear.noise_scale / SIGMA) ** 2))
 
@@ -104,6 +114,19 @@ def test_odds_beyond_all_doubt_are_not_counted() -> None:
     (suggestion,) = suggested(in_one_plane(60.0), KNOWN)
     assert suggestion.odds == pytest.approx(np.exp(50.0))
     assert "odds of more than 1000 : 1 for the true one" in suggestion.what
+
+
+@pytest.mark.parametrize("period", [None, 400.0])
+def test_a_period_is_the_one_found_or_the_longest(period: float | None) -> None:
+    """The longest that is tried is 982.9 mm on these bars."""
+    found, pair = in_one_plane(2.0), ("rotation_x_z", "periodic_scale_x")
+    found.indistinguishable = (pair,)
+    if period is not None:
+        found.after = replace(found.after, shapes={"periodic_scale_x": (period,)})
+    (suggestion,) = suggested(found, KNOWN)
+    shapes = {"periodic_scale_x": (period or 982.8630625641526,)}
+    expected = min(log_odds(found, KNOWN, suggestion.what, suggestion.repetitions, pair, true, shapes) for true in pair)
+    assert np.log(suggestion.odds) == pytest.approx(expected, rel=2e-3)
 
 
 def test_of_a_large_group_the_pairs_of_its_first_three_are_parted() -> None:
