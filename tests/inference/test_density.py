@@ -97,6 +97,13 @@ def test_with_priors_the_start_is_where_the_marginal_density_of_the_noise_is_lar
     assert centre[2] == pytest.approx(best.x, abs=1e-4)
 
 
+def test_without_residuals_the_chains_start_at_the_least_noise() -> None:
+    exact = replace(given(), observed=given().design @ MEAN)
+    centre, factor = Density(exact).laplace()
+    assert SIGMA_BOUNDS[0] <= np.exp(centre[2]) < 1.1 * SIGMA_BOUNDS[0]
+    assert np.isfinite(factor).all()
+
+
 def test_a_stated_noise_leaves_the_exact_distribution_to_start_from() -> None:
     density = Density(given(0.25))
     mean, covariance, _ = density.conditional(float(np.log(0.25)))
