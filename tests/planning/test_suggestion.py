@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from cmm_uq.jobs.job import ArtefactFacts
-from cmm_uq.kinds import artefact_of
+from cmm_uq.kinds import artefact_of, kind_named
 from cmm_uq.kinds.ballbar.plan import ballbar
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning.placing import Placing, along, joined
 from cmm_uq.planning.ready import ready_plan
-from cmm_uq.planning.suggestion import ODDS
+from cmm_uq.planning.suggestion import ODDS, suggestions
 from cmm_uq.points import Points
 from tests.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting
 from tests.recordings import suggested
@@ -131,10 +131,30 @@ def test_a_period_is_the_one_found_or_the_longest(period: float | None) -> None:
 
 def test_of_a_large_group_the_pairs_of_its_first_three_are_parted() -> None:
     found = in_one_plane(60.0)
-    found.indistinguishable = ((*PAIR, "scale_y", "squareness_xy"),)
+    found.indistinguishable = ((*PAIR, "periodic_scale_x", "squareness_xy"),)
     pairs = {suggestion.separates for suggestion in suggested(found, KNOWN)}
-    assert PAIR in pairs
+    assert {PAIR, ("rotation_x_z", "periodic_scale_x")} <= pairs
     assert not any("squareness_xy" in pair for pair in pairs)
+
+
+def test_the_order_of_a_pair_changes_nothing() -> None:
+    found = in_one_plane(2.0)
+    (one,) = suggested(found, KNOWN)
+    found.indistinguishable = (PAIR[::-1],)
+    (two,) = suggested(found, KNOWN)
+    assert (two.what, two.odds) == (one.what, pytest.approx(one.odds))
+
+
+def test_a_placing_may_reach_to_the_ends_of_travel() -> None:
+    """Travel 900 by 800 mm."""
+    (suggestion,) = suggested(in_one_plane(4.0), KNOWN)
+    assert "→ (900, 800, −300) mm" in suggestion.what
+
+
+def test_a_kind_that_offers_no_other_places_gets_no_suggestion() -> None:
+    kind = kind_named("ballbar")
+    assert kind is not None
+    assert suggestions(in_one_plane(4.0), KNOWN, kind.observing("diagnosed"), None) == ()
 
 
 def test_a_gauge_on_seven_lines_is_told_where_to_lay_an_eighth() -> None:
