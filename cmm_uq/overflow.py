@@ -12,6 +12,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.plugins import naming_package
 
 _NOT_FINITE = "infs or NaNs"
 """In what SciPy says of an array."""
@@ -32,7 +33,8 @@ def refusing_overflow(where: str, fix: str) -> Iterator[None]:
     """
     with warnings.catch_warnings(record=True) as told:
         try:
-            yield
+            with naming_package():
+                yield
         except (ArithmeticError, np.linalg.LinAlgError) as error:
             raise _overflow(where, fix) from error
         except ValueError as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +20,25 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 AXES = "xyz"
+"""Of coordinates, and of the carriages of a Cartesian machine."""
 
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """What the physics must know of the machine.
+    """What the physics must know of the machine, whose readings are coordinates but for an origin: a Cartesian one.
+
+    A machine with further axes, or with others, is a class of its own, whose :meth:`coordinates` and :meth:`readings` say how
+    they belong together; everything else is said by axis.
 
     Parameters
     ----------
     name : as on the certificate.
     chain : carriages from the table to the ram, a permutation of ``XYZ``.
-    travel_mm : (3, 2) lowest and highest scale reading of each axis, mm; ``nan`` where the job does not say.
+    travel_mm : (axes, 2) lowest and highest scale reading of each axis, mm; ``nan`` where the job does not say.
     origin_mm : (3,) scale reading = recorded coordinate + origin, mm.
     tip_on_every_carriage : whether rotations of all carriages act on the stylus tip offset, as they do in truth, or those
         of the ram alone, as job files have it, where the other levers are so much longer.
+    axes : names of the axes that are read.
     """
 
     name: str = ""
@@ -40,6 +46,21 @@ class Machine:
     travel_mm: Floats = field(default_factory=lambda: np.full((3, 2), np.nan))
     origin_mm: Floats = field(default_factory=lambda: np.zeros(3))
     tip_on_every_carriage: bool = False
+    axes: tuple[str, ...] = tuple(AXES)
+
+    def coordinates(self, readings: Floats) -> Floats:
+        """Recorded coordinates (n, 3), mm, of scale readings (n, axes)."""
+        return np.asarray(readings - self.origin_mm, dtype=np.float64)
+
+    def readings(self, xyz: Floats, columns: Mapping[str, Floats]) -> Floats:
+        """Scale readings (n, axes) of recorded coordinates (n, 3), mm.
+
+        Parameters
+        ----------
+        xyz : recorded coordinates.
+        columns : what was recorded beside them, each (n,): readings that do not follow from coordinates are among it.
+        """
+        return np.asarray(xyz + self.origin_mm, dtype=np.float64)
 
     def travel(self, axis: str) -> tuple[float, float]:
         """Lowest and highest scale reading of an axis, mm.
@@ -48,7 +69,7 @@ class Machine:
         ------
         CmmUqError : the job does not give the travel of this axis.
         """
-        low, high = self.travel_mm[AXES.index(axis)]
+        low, high = self.travel_mm[self.axes.index(axis)]
         if np.isnan(low) or np.isnan(high):
             raise CmmUqError(
                 f"the travel of axis {axis} is needed",
@@ -83,8 +104,19 @@ class Points:
         return len(self.xyz)
 
     @cached_property
-    def readings(self) -> Floats:
-        """(n, 3) scale readings, mm: recorded coordinates plus the machine's origin."""
+    def readings(self) -> Mapping[str, Floats]:
+        """What each axis of the machine read, (n,), by its name: mm for a carriage."""
+        read = self.machine.readings(self.xyz, self.columns)
+        return MappingProxyType(dict(zip(self.machine.axes, read.T, strict=True)))
+
+    @cached_property
+    def carriages(self) -> Floats:
+        """(n, 3) scale readings of the carriages x, y, z, mm: what the errors of three carriages go by."""
+        return np.column_stack([self.readings[axis] for axis in AXES])
+
+    @cached_property
+    def machine_xyz(self) -> Floats:
+        """(n, 3) the place in the frame of the machine's scales, mm: recorded coordinates plus the machine's origin."""
         return self.xyz + self.machine.origin_mm
 
     @cached_property

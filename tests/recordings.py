@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.planning.setting import Planning
 from cmm_uq.planning.suggestion import Suggestion, suggestions

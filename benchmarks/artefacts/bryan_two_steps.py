@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.bryan.observe import Bryan
 from cmm_uq.model import MeasurementModel, Noise

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import artefact_of
 from cmm_uq.kinds.triangle.placings import placed_triangle
 from cmm_uq.kinds.triangle.standard import TriangleStandard

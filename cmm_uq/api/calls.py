@@ -1,4 +1,4 @@
-"""The calls: each computes what the command of its name computes, and writes nothing."""
+"""The calls: each computes what the command of its name computes, and writes nothing. A call imports what it alone needs."""
 
 from __future__ import annotations
 
@@ -8,23 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.api.outcomes import Diagnosis, Plan, Report
-from cmm_uq.commands.compensate import compensated_job
-from cmm_uq.commands.frames import job_from_frames
-from cmm_uq.commands.plan import plan_outcome
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.report import diagnosis_outcome, report_outcome
-from cmm_uq.commands.simulate import simulated_job
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
-from cmm_uq.physics.map_interpolation import Beyond
-from cmm_uq.uncertainty.distributions import Distribution, normal
-from cmm_uq.uncertainty.evaluation import Evaluation, Request, evaluate
-from cmm_uq.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.uncertainty.model_file import read_model_file
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from cmm_uq.physics.map_interpolation import Beyond
+    from cmm_uq.uncertainty.distributions import Distribution
+    from cmm_uq.uncertainty.evaluation import Evaluation
 
 
 def read(folder: str | Path) -> Job:
@@ -97,6 +92,8 @@ def job(
         "model": {"effects": list(effects), **tables.get("model", {})},
         "conformity": list(conformity),
     }
+    from cmm_uq.commands.frames import job_from_frames
+
     return job_from_frames(points, told, files or {})
 
 
@@ -117,7 +114,7 @@ def report(job: Job | str | Path, *, seed: int = 0) -> Report:
     >>> import cmm_uq
     >>> found = cmm_uq.report("examples/iota-1102-20C", seed=0)
     >>> found
-    <Report of iota-1102-20C: 8 estimates, ASME B89.4.1-1997 fail, consistent>
+    <Report of iota-1102-20C: 11 estimates, ASME B89.4.1-1997 fail, consistent>
     >>> found.figures.loc["b89_range_um", "value"].round(1)
     np.float64(339.9)
     """
@@ -153,6 +150,8 @@ def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0) -> Plan:
     ------
     CmmUqError : the plan is impossible.
     """
+    from cmm_uq.commands.plan import plan_outcome
+
     return Plan(plan_outcome(_job(job), power=power, seed=seed))
 
 
@@ -176,6 +175,8 @@ def simulate(job: Job | str | Path, truth: Mapping[str, Any] | str | Path, *, se
     >>> drawn.origin
     'simulated'
     """
+    from cmm_uq.commands.simulate import simulated_job
+
     return simulated_job(_job(job), truth if isinstance(truth, Mapping) else Path(truth), seed=seed)
 
 
@@ -191,6 +192,8 @@ def compensate(job: Job | str | Path, *, beyond: Beyond = "refuse") -> Job:
     ------
     CmmUqError : the job has no error map, or it does not serve these points.
     """
+    from cmm_uq.commands.compensate import compensated_job
+
     return compensated_job(_job(job), beyond=beyond)
 
 
@@ -233,10 +236,16 @@ def budget(
         if inputs is not None:
             raise CmmUqError("inputs belong to a function; a model file has its own", where=str(model),
                              fix="Leave them out")  # fmt: skip
+        from cmm_uq.uncertainty.model_file import read_model_file
+
         return read_model_file(Path(model)).evaluate(seed)
     if not inputs:
         raise CmmUqError("a function needs its inputs", where="budget",
                          fix='Give each a distribution, or value and u: {"a": (1.0, 0.1)}')  # fmt: skip
+    from cmm_uq.uncertainty.distributions import Distribution, normal
+    from cmm_uq.uncertainty.evaluation import Request, evaluate
+    from cmm_uq.uncertainty.measurement_model import MeasurementModel
+
     known = {name: given if isinstance(given, Distribution) else normal(*given) for name, given in inputs.items()}
     asked = Request(method, coverage, digits, 0 if seed is None else seed)
     return evaluate(MeasurementModel(model, known, tuple(outputs), dict(correlation or {})), asked)

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
-import pandas as pd
-
-from cmm_uq.api.tables import html_table, quantities, quantity_frame, shown
+from cmm_uq.api.tables import quantities, quantity_frame, shown
 from cmm_uq.commands.plan import PLAN
 from cmm_uq.commands.report import DIAGNOSE, REPORT
 from cmm_uq.commands.written import Form
@@ -19,6 +17,10 @@ from cmm_uq.documents.outcome import Outcome
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
 from cmm_uq.jobs.job import Job
+from cmm_uq.notebook import html_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,16 +73,7 @@ class Found:
         Parameters
         ----------
         folder : to write to; without one, that of the command: below ``reports/<job id>``.
-        force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-
-        Returns
-        -------
-        path of each file, by its name.
-
-        Raises
-        ------
-        CmmUqError : something stands in the folder that was not written for this job.
-        OutputError : the folder cannot be written to.
+        force : as of :meth:`cmm_uq.jobs.job.Job.write`, which says too what is given back, and what is refused.
         """
         out = None if folder is None else Path(folder)
         return self.form.write(self.job, lambda: self.outcome, out, force=force).files
@@ -143,6 +136,8 @@ class Report(Found):
     @cached_property
     def conformity(self) -> pd.DataFrame:
         """Statements of conformity, one a row, with the columns of results.json; lengths and remarks as lists."""
+        import pandas as pd
+
         return pd.DataFrame(list(self.results.get("conformity", [])))
 
     @property
@@ -205,6 +200,8 @@ class Plan(Found):
     @cached_property
     def placings(self) -> pd.DataFrame:
         """What is to be measured: title, minutes and number of points, by measurement."""
+        import pandas as pd
+
         frame = pd.DataFrame(list(self.results["placings"]), columns=["measurement", "title", "minutes", "points"])
         return frame.set_index("measurement")
 

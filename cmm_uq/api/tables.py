@@ -1,15 +1,15 @@
-"""Results as tables: frames for computing, HTML for notebooks."""
+"""Results as tables: frames for computing, and rows of text. Whoever asks for no frame does not wait for pandas."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from html import escape
-from typing import Any
-
-import pandas as pd
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import printed_unit
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 QUANTITY = ("value", "u", "lower", "upper", "unit")
 
@@ -33,6 +33,8 @@ def quantities(results: Mapping[str, Any], units: Mapping[str, str]) -> pd.DataF
 
 def quantity_frame(found: Mapping[str, Mapping[str, Any]], units: Mapping[str, str]) -> pd.DataFrame:
     """Quantities of results.json as rows of value, u, ends of the 95 % interval, and unit."""
+    import pandas as pd
+
     rows = [
         (item["value"], item["u"], *item["interval95"], units.get(name, printed_unit(name)))
         for name, item in found.items()
@@ -49,10 +51,3 @@ def shown(frame: pd.DataFrame) -> Iterator[tuple[str, ...]]:
     for name, value, u, lower, upper, unit in frame.itertuples():
         text, expanded = rounded(value, max(upper - value, value - lower)) if u > 0 else (f"{value:.6g}", "0")
         yield str(name), f"{text} ± {expanded}", str(unit)
-
-
-def html_table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table for a notebook; every text is escaped. Empty without rows."""
-    body = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
-    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
-    return f"<table><caption>{escape(caption)}</caption><tr>{head}</tr>{body}</table>" if body else ""

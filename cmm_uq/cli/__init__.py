@@ -65,8 +65,12 @@ def _ended() -> int:
         _say("the memory does not suffice for this input. Split it, or use a machine with more memory")
         return NO_OUTPUT
     except Exception as error:
+        from cmm_uq.plugins import told_with_package
         from cmm_uq.writing.interruption import written
 
+        if (told := told_with_package(error)) is not None:
+            _say(str(told))
+            return BAD_INPUT
         there = ", ".join(map(str, written()))
         state = f"The files are written in {there}" if there else "Nothing was written"
         _say(f"a fault of the program: {type(error).__name__}: {error}. {state}; please report it with the input")

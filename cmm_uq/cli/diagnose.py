@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
-from cmm_uq.cli.printing import put, say
+from cmm_uq.cli.printing import conclude, say
 from cmm_uq.cli.progress import shown
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.written import Written
 
 
 def command(
@@ -28,12 +30,11 @@ def command(
         from cmm_uq.commands.report import write_diagnosis
 
         written = write_diagnosis(job, out, seed=seed, alpha=alpha, force=force, stage=stage)
-    if json:
-        put(written.results.decode())
-    elif not quiet:
-        for row in written.summary:
-            say("  ".join(row))
-        for path in written.files.values():
-            say(str(path))
-    if strict and not written.conforming:
-        raise typer.Exit(NOT_CONFORMING)
+    conclude(written, _summarise, json=json, quiet=quiet, strict=strict)
+
+
+def _summarise(written: Written) -> None:
+    for row in written.summary:
+        say("  ".join(row))
+    for path in written.files.values():
+        say(str(path))

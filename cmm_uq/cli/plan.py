@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.cli.options import Force, Json, Quiet, Strict
-from cmm_uq.cli.printing import put, say, table
+from cmm_uq.cli.printing import conclude, say, table
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
-    from cmm_uq.commands.planning import Plan
+    from cmm_uq.commands.written import Written
 
 
 def command(
@@ -30,23 +29,18 @@ def command(
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with shown(quiet=quiet or json) as stage:
-        from cmm_uq.commands.plan import plan_of, write_plan
+        from cmm_uq.commands.plan import write_plan
 
         written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage)
-    if json:
-        put(written.results.decode())
-    elif not quiet:
-        _summarise(plan_of(written.outcome))
-        for path in written.files.values():
-            say(str(path))
-    if strict and not written.conforming:
-        raise typer.Exit(NOT_CONFORMING)
+    conclude(written, _summarise, json=json, quiet=quiet, strict=strict)
 
 
-def _summarise(plan: Plan) -> None:
+def _summarise(written: Written) -> None:
+    from cmm_uq.commands.plan import plan_of
     from cmm_uq.commands.plan_page import placing_rows
     from cmm_uq.commands.plan_words import STATUS, absorbed, combination, expected, named, pairs, unit_of
 
+    plan = plan_of(written.outcome)
     table(placing_rows(plan), "No.", "Set up", "From → to / mm", "Points", "min")
     for text in plan.free:
         say(f"No reading shows: {text}.")
@@ -62,3 +56,5 @@ def _summarise(plan: Plan) -> None:
             say(f"Would be taken for what the job names: {text}.")
     for condition in plan.conditions:
         say(f"{'met' if condition.met else 'NOT MET'}: {condition.what}")
+    for path in written.files.values():
+        say(str(path))

@@ -1,12 +1,19 @@
-"""What goes to standard output, and what happens where nobody takes it."""
+"""What goes to standard output, how a command ends, and what happens where nobody takes what it says."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
 
+import typer
+
+from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.errors import OutputError
 from cmm_uq.writing.interruption import written
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.written import Written
 
 
 def say(text: str = "") -> None:
@@ -68,3 +75,20 @@ def table(
         Console().print(shown)
     except OSError:
         raise closed() from None
+
+
+def conclude(
+    ended: Written, summarise: Callable[[Written], None], *, json: bool, quiet: bool, strict: bool
+) -> None:  # fmt: skip
+    """How a command ends that wrote an outcome: results.json or a summary, unless it is to be quiet.
+
+    Raises
+    ------
+    typer.Exit : with ``strict``, when not all is well.
+    """
+    if json:
+        put(ended.results.decode())
+    elif not quiet:
+        summarise(ended)
+    if strict and not ended.conforming:
+        raise typer.Exit(NOT_CONFORMING)

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
-from cmm_uq.cli.printing import put, table
+from cmm_uq.cli.printing import conclude, table
 from cmm_uq.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -30,12 +29,7 @@ def command(
         from cmm_uq.commands.report import write_report
 
         report = write_report(job, out, seed=seed, force=force, stage=stage)
-    if json:
-        put(report.results.decode())
-    elif not quiet:
-        _summarise(report)
-    if strict and not report.conforming:
-        raise typer.Exit(NOT_CONFORMING)
+    conclude(report, _summarise, json=json, quiet=quiet, strict=strict)
 
 
 def _summarise(report: Written) -> None:

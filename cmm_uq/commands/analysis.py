@@ -10,14 +10,18 @@ from pathlib import Path
 from cmm_uq.commands.diagnosing import diagnosed, screened_model
 from cmm_uq.commands.estimation import accuracy, influences, named_draws, noise, parameters, sizes, with_noise
 from cmm_uq.commands.reading import read_job
-from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
+from cmm_uq.commands.recipe import recipe_of
+from cmm_uq.commands.refusals import OVERFLOW_FIX
 from cmm_uq.conformity.standards import statement
 from cmm_uq.documents.compose import certified
-from cmm_uq.documents.outcome import Found, Outcome, OwnAnalysis, Page, Recipe
+from cmm_uq.documents.outcome import Found, Outcome, Page, Recipe
 from cmm_uq.documents.result import Result
-from cmm_uq.inference.posterior import Progress, sample
+from cmm_uq.inference.posterior import Progress
+from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
+from cmm_uq.model.kind import Kind
+from cmm_uq.model.noise import noise_of
 from cmm_uq.overflow import must_be_finite, refusing_overflow
 
 __all__ = ["Result", "analyse", "analyse_job", "analyse_observations", "outcome_of"]
@@ -47,7 +51,7 @@ def analyse_job(job: Job, *, seed: int = 0, progress: Progress | None = None) ->
     CmmUqError : the job cannot be analysed as it stands.
     """
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
-        return recipe_of(job).analyse(job, seed=seed, progress=progress)
+        return report_recipe(job).analyse(job, seed=seed, progress=progress)
 
 
 def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Result:
@@ -60,17 +64,19 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     kind = kind_of(job)
     screened, findings = screened_model(job)
     model, estimate, p_value = with_noise(screened)
-    posterior = sample(estimate.linear, seed, progress)
+    components = noise_of(model)
+    posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, progress)
     figures = accuracy(model, estimate, posterior, seed)
     statements = [
-        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.standards)
+        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested)
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
     result = Result(
-        job, model, findings, influences(model, estimate, findings), estimate, posterior, named_draws(model, posterior),
+        job, model, findings, influences(model, estimate, findings), estimate, posterior,
+        named_draws(model, components, posterior),
         parameters(model, posterior), sizes(model, posterior),
-        noise(posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
-        diagnosed(job, screened, findings, seed=seed),
+        noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
+        diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None),
     )  # fmt: skip
     for name, quantity in result.quantities():
         must_be_finite(
@@ -86,21 +92,19 @@ def outcome_of(found: Found, seed: int = 0) -> Outcome:
     ------
     CmmUqError : its kind has no page for a certificate.
     """
-    return recipe_of(found.job).outcome(found, seed)
+    return report_recipe(found.job).outcome(found, seed)
 
 
-def recipe_of(job: Job) -> Recipe:
-    """How a job is analysed: in its kind's own way, or as observations that named effects explain.
+def report_recipe(job: Job) -> Recipe:
+    """How a job is reported; see :func:`~cmm_uq.commands.recipe.recipe_of`.
 
     Raises
     ------
-    CmmUqError : in neither, or nothing is measured yet.
+    CmmUqError : it cannot be, or nothing is measured yet.
     """
-    refuse_planned(job)
-    kind = kind_of(job)
-    own = kind.offers("own", OwnAnalysis)
-    if own is not None and own.report is not None:
-        return own.report
-    kind.observing("reported")
+    return recipe_of(job, lambda own: own.report, _certified, "reported")
+
+
+def _certified(kind: Kind) -> Recipe:
     page = kind.needs("page", Page, "reported")
     return Recipe(analyse_observations, lambda found, seed: certified(found, page))

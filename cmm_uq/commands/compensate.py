@@ -62,14 +62,7 @@ def write_compensated(
     ----------
     map_text_c : temperature, °C, at which the error map is written beside it in the contractors' text form.
 
-    Returns
-    -------
-    path of each file.
-
-    Raises
-    ------
-    CmmUqError : bad input, or something in the folder that this command did not write for this job.
-    OutputError : the folder cannot be written to.
+    Returns and raises as :func:`~cmm_uq.commands.simulate.write_simulation`.
     """
     read = read_job(job)
     _refuse(read)

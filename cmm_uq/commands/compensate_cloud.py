@@ -47,14 +47,7 @@ def write_compensated_cloud(
     beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
     progress : told the part done.
 
-    Returns
-    -------
-    path of each file.
-
-    Raises
-    ------
-    CmmUqError : bad input, or something in the folder that this command did not write for this job.
-    OutputError : the folder cannot be written to.
+    Returns and raises as :func:`~cmm_uq.commands.simulate.write_simulation`.
     """
     read = read_machine(job)
     files = cloud_files(cloud)

@@ -7,18 +7,20 @@ from pathlib import Path
 
 from cmm_uq.commands.estimation import without_outliers
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
 from cmm_uq.conformity.consequences import consequences
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, diagnose
 from cmm_uq.documents.diagnosis_page import diagnosed_outcome
-from cmm_uq.documents.outcome import Found, Outcome, OwnAnalysis, Recipe
+from cmm_uq.documents.outcome import Found, Outcome, Recipe
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.errors import CmmUqError
-from cmm_uq.inference.posterior import Progress
+from cmm_uq.inference.posterior import NoisyPosterior, Progress
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.kind import Kind
 from cmm_uq.overflow import refusing_overflow
 from cmm_uq.planning.setting import Planning
 from cmm_uq.planning.suggestion import suggestions
@@ -54,7 +56,7 @@ def diagnose_read(
     """
     _check_rate(alpha)
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
-        return recipe_of(job).analyse(job, seed=seed, alpha=alpha, progress=progress)
+        return _recipe(job).analyse(job, seed=seed, alpha=alpha, progress=progress)
 
 
 def diagnose_job(
@@ -102,33 +104,27 @@ def diagnosed(
     seed: int,
     alpha: float = FALSE_ALARMS,
     progress: Progress | None = None,
+    known: NoisyPosterior | None = None,
 ) -> Diagnosed:
-    """Diagnose the screened model of a job."""
+    """Diagnose the screened model of a job; ``known`` is its posterior where it was sampled already."""
     stated = job.facts.recording.u_coordinate_um
-    diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress)
+    diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known)
     kind, facts = kind_of(job), job.facts.artefact
     observe = kind.observing("diagnosed")
-    changes = consequences(job, diagnosis, partial(observe, facts, where=job.recording_path), kind.standards, seed)
+    changes = consequences(job, diagnosis, partial(observe, facts, where=job.recording_path), kind.tested, seed)
     next_ones = suggestions(diagnosis, facts, observe, kind.offers("plan", Planning), job.facts.plan)
     return Diagnosed(job, findings, diagnosis, next_ones, changes)
 
 
 def outcome_of(found: Found, seed: int = 0) -> Outcome:
     """What there is to write of what :func:`diagnose_folder` found."""
-    return recipe_of(found.job).outcome(found, seed)
+    return _recipe(found.job).outcome(found, seed)
 
 
-def recipe_of(job: Job) -> Recipe:
-    """How a job is diagnosed: in its kind's own way, or as observations that named effects explain.
+def _recipe(job: Job) -> Recipe:
+    """How a job is diagnosed; see :func:`~cmm_uq.commands.recipe.recipe_of`."""
+    return recipe_of(job, lambda own: own.diagnose, _usual, "diagnosed as a recording of an artefact")
 
-    Raises
-    ------
-    CmmUqError : in neither, or nothing is measured yet.
-    """
-    refuse_planned(job)
-    kind = kind_of(job)
-    own = kind.offers("own", OwnAnalysis)
-    if own is not None and own.diagnose is not None:
-        return own.diagnose
-    kind.observing("diagnosed as a recording of an artefact")
+
+def _usual(kind: Kind) -> Recipe:
     return Recipe(_diagnose, lambda found, seed: diagnosed_outcome(found))

@@ -9,19 +9,23 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.conformity.accuracy import with_uncertainty
-from cmm_uq.documents.result import LACK_OF_FIT, Influence, Noise
+from cmm_uq.documents.result import LACK_OF_FIT, Component, Influence, Noise
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import OBSERVATIONS
 from cmm_uq.inference.draws import Draws, by_chain
-from cmm_uq.inference.posterior import Posterior
+from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
+from cmm_uq.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.jobs.job import Job
+from cmm_uq.messages import say
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.measurement import ARTEFACT
+from cmm_uq.model.noise import noise_of
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
@@ -55,7 +59,13 @@ def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Fi
         used[i] = False
         measurement, repeat = int(artefact.measurement[i]), int(artefact.repeat[i])
         rows = (artefact.points.measurement == measurement) & (artefact.points.repeat == repeat)
-        why = f"measurement {measurement}, repeat {repeat} is {times:.1f} of its standard deviations off what the others say"
+        why = say(
+            "measurement {measurement}, repeat {repeat} is {times:.1f} of its standard deviations off "
+            "what the others say",
+            measurement=measurement,
+            repeat=repeat,
+            times=times,
+        )
         lines = tuple(artefact.points.lines[rows].tolist()) if len(artefact.points.lines) else ()
         found.append(Finding("outlier", (measurement,), lines, why, set_aside=True))
     return replace(model, used=used), found
@@ -104,15 +114,15 @@ def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[
     return {effect.name: found[effect.name] for effect in model.effects}
 
 
-def named_draws(model: MeasurementModel, posterior: Posterior) -> Draws:
-    """The posterior of all that is reported: of each effect, of the artefact's sizes, and of the noise if it is estimated."""
+def named_draws(model: MeasurementModel, components: Components, posterior: NoisyPosterior) -> Draws:
+    """The posterior of all that is reported: of each effect, of the artefact's sizes, and of the noise."""
     units, columns = {}, []
-    for (owner, name), (draws, unit) in model.reported(posterior.draws).items():
-        units[f"{owner}.{name}"] = unit
+    for (owner, name), (draws, own) in model.reported(posterior.draws).items():
+        units[f"{owner}.{name}"] = own
         columns.append(draws)
-    if model.sigma is None:
-        units["noise.coordinate_um"] = "µm"
-        columns.append(posterior.sigma / MICROMETRE)
+    for name, values in sizes_of_noise(components, posterior).items():
+        units[f"noise.{name}_um"] = unit("µm")
+        columns.append(values / MICROMETRE)
     values = np.column_stack(columns) if columns else np.zeros((len(posterior.draws), 0))
     return Draws(units, by_chain(values, posterior.steps))
 
@@ -124,22 +134,57 @@ def sizes(model: MeasurementModel, posterior: Posterior) -> dict[str, Quantity]:
 
 def _quantities(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
     found: dict[str, dict[str, Quantity]] = {}
-    for (owner, name), (draws, unit) in model.reported(posterior.draws).items():
-        found.setdefault(owner, {})[name] = Quantity.of_draws(draws, unit)
+    for (owner, name), (draws, own) in model.reported(posterior.draws).items():
+        found.setdefault(owner, {})[name] = Quantity.of_draws(draws, own)
     return found
 
 
-def noise(posterior: Posterior, stated_um: float | None, p_value: float | None) -> Noise:
-    """Noise of a coordinate."""
-    return Noise(Quantity.of_draws(posterior.sigma / MICROMETRE, "µm"), stated_um, p_value)
+def sizes_of_noise(components: Components, posterior: NoisyPosterior) -> dict[str, Floats]:
+    """Draws (N,), mm, of the reading noise, all axes and each, and of every other component that the recording could show."""
+    sizes = posterior.sizes
+    found = {"coordinate": sizes.coordinate}
+    if AXES in components.possible:
+        found |= dict(zip("xyz", sizes.reading.T, strict=True))
+    each = {PLACING: sizes.placing, GROWTH: sizes.growth, SLOW: sizes.slow}
+    return found | {name: values for name, values in each.items() if name in components.possible}
 
 
-def accuracy(model: MeasurementModel, estimate: Estimate, posterior: Posterior, seed: int) -> Mapping[str, Quantity]:
-    """Figures of performance of all recorded lengths; empty for an artefact that has none."""
+def noise(
+    estimate: Estimate,
+    components: Components,
+    posterior: NoisyPosterior,
+    stated_um: float | None,
+    p_value: float | None,
+) -> Noise:
+    """What the noise is, by component, and what it does to the uncertainties."""
+    found = {
+        name: Component(Quantity.of_draws(values / MICROMETRE, unit("µm")), float(np.mean(values > 0)))
+        for name, values in sizes_of_noise(components, posterior).items()
+    }
+    coordinate = found.pop("coordinate").size
+    apart = float(np.mean(np.ptp(posterior.sizes.reading, axis=1) > 0))
+    return Noise(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value)
+
+
+def _wider(estimate: Estimate, posterior: Posterior) -> float:
+    """Largest ratio of an uncertainty to what it would be under white noise; 1 where nothing is determined."""
+    ls = estimate.least_squares
+    free = ls.determined & ~np.array([u.known for u in ls.unknowns], dtype=bool)
+    white = np.sqrt(np.diag(ls.covariance)[free])
+    return float(np.max(posterior.draws.std(axis=0)[free] / white, initial=1.0, where=white > 0))
+
+
+def accuracy(
+    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, seed: int
+) -> Mapping[str, Quantity]:
+    """Figures of performance of all recorded lengths, the noise drawn anew; empty for an artefact that has none."""
     artefact = model.artefact
     lengths = artefact.lengths()
     if lengths is None:
         return {}
-    linear = replace(model, used=np.ones_like(model.used)).linearised(estimate.least_squares.value)
+    every = replace(model, used=np.ones_like(model.used))
+    linear, components, sizes = every.linearised(estimate.least_squares.value), noise_of(every), posterior.sizes
     predicted = lengths - linear.observed + posterior.draws @ linear.design.T
-    return with_uncertainty(lengths, predicted, posterior.sigma[:, None] * artefact.noise_scale, seed)
+    return with_uncertainty(
+        lengths, predicted, lambda some, times, random: components.repeated(sizes.at(some), times, random), seed
+    )

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from cmm_uq.commands.planning import Plan, make_plan
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.written import Form, Stage, Written, silent
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import PLANNED
 from cmm_uq.planning.placing import joined
+from cmm_uq.plugins import naming_package
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.planning import Plan
 
 TO_FILL_IN = "plan.csv"
 PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
 
 
+@naming_package()
 def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent) -> Outcome:
     """Plan a job that was read, whose recording may be missing; nothing is written.
 
@@ -30,6 +35,8 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
     ------
     CmmUqError : the plan is impossible.
     """
+    from cmm_uq.commands.planning import make_plan
+
     plan = make_plan(job, power=power, seed=seed, progress=stage)
     from cmm_uq.commands.plan_page import placing_rows, plan_document, plan_results
 
@@ -44,6 +51,8 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
 
 def plan_of(outcome: Outcome) -> Plan:
     """The plan in its outcome."""
+    from cmm_uq.commands.planning import Plan
+
     if not isinstance(outcome.found, Plan):
         raise TypeError("an outcome of another command")
     return outcome.found

@@ -25,9 +25,13 @@ from cmm_uq.documents.plan_picture import gain_plot, placing_pictures
 from cmm_uq.documents.program import program
 from cmm_uq.documents.results_file import head
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.units import MICROMETRE
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, number, plural, say
+from cmm_uq.units import MICROMETRE, unit
 
 SCHEMA = "cmm-uq/plan/1"
+
+
+MET, NOT_MET = Verbatim("✓"), Verbatim("✗")
 
 
 def plan_results(plan: Plan) -> dict[str, Any]:
@@ -58,12 +62,21 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
         return {}
     return {
         "determined": [
-            {"effect": p.unknown.key[0], "parameter": p.unknown.key[1], "unit": p.unknown.unit, "u": p.u,
-             "u_with_prior": p.u_with_prior, "status": p.status}
+            {
+                "effect": p.unknown.key[0],
+                "parameter": p.unknown.key[1],
+                "unit": p.unknown.unit,
+                "u": p.u,
+                "u_with_prior": p.u_with_prior,
+                "status": p.status,
+            }
             for p in found.parameters
         ],
         "undetermined": [
-            {"parameters": {f"{owner}.{name}": part for (owner, name), part in parts.items()}, "words": combination(parts)}
+            {
+                "parameters": {f"{owner}.{name}": part for (owner, name), part in parts.items()},
+                "words": combination(parts),
+            }
             for parts in found.free
         ],
         "singular_values": found.singular_values.tolist(),
@@ -71,114 +84,167 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
         "absorbed": [{"effect": name, "as": list(others)} for name, others in found.absorbed],
         "unseen": list(found.unseen),
         "smallest": [
-            {"effect": power.effect, "parameter": power.parameter, "unit": power.unit,
-             "detected": power.detectable, "named": power.identifiable}
+            {
+                "effect": power.effect,
+                "parameter": power.parameter,
+                "unit": power.unit,
+                "detected": power.detectable,
+                "named": power.identifiable,
+            }
             for power in outlook.powers
         ],
-    }  # fmt: skip
+    }
 
 
 def plan_document(plan: Plan) -> Document:
     """The page of a plan."""
     facts = plan.job.facts
     total = sum(plan.minutes)
-    stated = "" if plan.setting.stated is not None else " (assumed: the job states none)"
+    stated = NOTHING if plan.setting.stated is not None else say(" (assumed: the job states none)")
     if plan.name == RECORDED and plan.setting.stated is None:
-        stated = " (from the recording's residuals)"
+        stated = say(" (from the recording's residuals)")
     return working_page(
-        facts, "Measurement plan", _artefact(plan),
+        facts,
+        say("Measurement plan"),
+        _artefact(plan),
         particulars=(
-            Facts((("Machine", facts.machine.name), ("Artefact", _artefact(plan)),
-                   ("Effects to determine", ", ".join(facts.model.effects) or "the error of one axis"))),
-            Facts((("Start from", base_name(plan)), ("To be measured", _to_measure(plan, total)),
-                   ("Noise of a coordinate", f"{plan.setting.sigma / MICROMETRE:.2g} µm{stated}"))),
+            Facts(
+                (
+                    (say("Machine"), Verbatim(facts.machine.name)),
+                    (say("Artefact"), _artefact(plan)),
+                    (say("Effects to determine"), (commas(names(facts.model.effects)) or say("the error of one axis"))),
+                )
+            ),
+            Facts(
+                (
+                    (say("Start from"), base_name(plan)),
+                    (say("To be measured"), _to_measure(plan, total)),
+                    (
+                        say("Noise of a coordinate"),
+                        say("{sigma:.2g} µm{stated}", sigma=plan.setting.sigma / MICROMETRE, stated=stated),
+                    ),
+                )
+            ),
         ),
         warnings=_warnings(plan),
         sections=_sections(plan),
-        attachments=("plan.csv", "results.json") if plan.to_measure else ("results.json",),
-        produced_by=program(),
-        end="End of plan",
-    )  # fmt: skip
+        attachments=(Verbatim("plan.csv"), Verbatim("results.json"))
+        if plan.to_measure
+        else (Verbatim("results.json"),),
+        produced_by=program(plan.job),
+        end=say("End of plan"),
+    )
 
 
-def _artefact(plan: Plan) -> str:
+def _artefact(plan: Plan) -> Text:
     facts = plan.job.facts.artefact
-    return facts.name or facts.kind.replace("_", " ")
+    return Verbatim(facts.name) if facts.name else Verbatim(facts.kind.replace("_", " "))
 
 
-def _to_measure(plan: Plan, total: float) -> str:
+def _to_measure(plan: Plan, total: float) -> Text:
     count = len(plan.to_measure)
     if not count:
-        return "nothing more: the placings are recorded"
-    return f"{count} placing{'s' if count > 1 else ''}, about {total:.0f} min"
+        return say("nothing more: the placings are recorded")
+    return plural(
+        count,
+        one=say("{count} placing, about {total:.0f} min", count=count, total=total),
+        many=say("{count} placings, about {total:.0f} min", count=count, total=total),
+    )
 
 
-def _warnings(plan: Plan) -> list[str]:
-    said = [f"Not met: {condition.what}." for condition in plan.conditions if not condition.met]
+def _warnings(plan: Plan) -> list[Text]:
+    said: list[Text] = [
+        say("Not met: {what}.", what=condition.what) for condition in plan.conditions if not condition.met
+    ]
     found = plan.outlook.identifiability
     if found is not None and not found.complete:
-        free = ", ".join(named(p) for p in found.parameters if p.status == "free")
-        said.append(f"Not determined by these placings: {free}.")
+        free = commas(named(p) for p in found.parameters if p.status == "free")
+        said.append(say("Not determined by these placings: {free}.", free=free))
     return said
 
 
 def _sections(plan: Plan) -> tuple[Section, ...]:
     return (
-        Section("Placings", _placings(plan)),
-        Section("Pictures of the placings", tuple(
-            placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first) if plan.to_measure else ()
-        )),
-        Section("What these placings determine", _determined(plan)),
-        Section("What a better plan gains", _gain(plan)),
-        Section("Smallest effects that the diagnosis would find", _smallest(plan)),
-        Section("Conditions of the standard", tuple(
-            Paragraph(f"{'✓' if condition.met else '✗'} {condition.what}") for condition in plan.conditions
-        )),
-    )  # fmt: skip
+        Section(say("Placings"), _placings(plan)),
+        Section(
+            say("Pictures of the placings"),
+            tuple(placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first) if plan.to_measure else ()),
+        ),
+        Section(say("What these placings determine"), _determined(plan)),
+        Section(say("What a better plan gains"), _gain(plan)),
+        Section(say("Smallest effects that the diagnosis would find"), _smallest(plan)),
+        Section(
+            say("Conditions of the standard"),
+            tuple(
+                Paragraph(say("{mark} {what}", mark=MET if condition.met else NOT_MET, what=condition.what))
+                for condition in plan.conditions
+            ),
+        ),
+    )
 
 
-def placing_rows(plan: Plan) -> list[tuple[str, ...]]:
+def placing_rows(plan: Plan) -> list[tuple[Text, ...]]:
     """Number, title, from and to, points and time of every placing to be measured."""
     return [
-        (str(number), placing.title, placing.ends, str(len(placing.points)), f"{time:.0f}")
-        for number, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.first)
+        (number(first), placing.title, placing.ends, number(len(placing.points)), number(time, ".0f"))
+        for first, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.first)
     ]
 
 
 def _placings(plan: Plan) -> tuple[Block, ...]:
     if not plan.to_measure:
         return ()
-    heads = (Column("No."), Column("Set up", numeric=False), Column("From → to, scale readings in mm", numeric=False),
-             Column("Points"), Column("Time", "min"))  # fmt: skip
-    notes = [f"Every point {plan.setting.plan.repeats} times; points count repeats."]
+    heads = (
+        Column(say("No.")),
+        Column(say("Set up"), numeric=False),
+        Column(say("From → to, scale readings in mm"), numeric=False),
+        Column(say("Points")),
+        Column(say("Time"), unit("min")),
+    )
+    notes = [say("Every point {repeats} times; points count repeats.", repeats=plan.setting.plan.repeats)]
     if plan.measured:
-        notes.append(f"{plan.measured} measurements are recorded already.")
-    return (Table("Placings in the order of measurement", heads, tuple(placing_rows(plan)), tuple(notes)),)
+        notes.append(say("{measured} measurements are recorded already.", measured=plan.measured))
+    return (Table(say("Placings in the order of measurement"), heads, tuple(placing_rows(plan)), tuple(notes)),)
 
 
 def _determined(plan: Plan) -> tuple[Block, ...]:
     found = plan.outlook.identifiability
-    blocks: list[Block] = [Paragraph(f"No reading shows: {text}.") for text in plan.free]
+    blocks: list[Block] = [Paragraph(say("No reading shows: {text}.", text=text)) for text in plan.free]
     if found is None:
         return tuple(blocks)
-    heads = (Column("Parameter", numeric=False), Column("Expected u"), Column("Unit", numeric=False),
-             Column("Allowed by physics"), Column("", numeric=False))  # fmt: skip
+    heads = (Column(say("Parameter"), numeric=False), Column(say("Expected u")), Column(say("Unit"), numeric=False),
+             Column(say("Allowed by physics")), Column(NOTHING, numeric=False))  # fmt: skip
     rows = tuple(
-        (named(p), expected(p), unit_of(p), f"{p.unknown.prior_sd:.3g}" if p.unknown.prior_sd < 1e6 else "any",
-         STATUS[p.status])
+        (
+            named(p),
+            expected(p),
+            unit_of(p),
+            (number(p.unknown.prior_sd, ".3g") if p.unknown.prior_sd < 1e6 else say("any")),
+            STATUS[p.status],
+        )
         for p in found.parameters
-    )  # fmt: skip
-    note = (
-        "u is the standard uncertainty of the least-squares estimate, certificates included. “Allowed by physics” is the "
-        "standard deviation that the effect may have before anything is measured."
     )
-    blocks.append(Table("What to expect", heads, rows, (note,)))
-    blocks += [Paragraph(f"Stays free: {combination(parts)}.", tone="warning") for parts in found.free]
-    blocks += [Paragraph(f"Could not be told apart: {text}.") for text in pairs(found)]
-    blocks += [Paragraph(f"If it acts, it will be taken for what the job names: {text}.") for text in absorbed(found)]
+    note = say(
+        "u is the standard uncertainty of the least-squares estimate, certificates included. "
+        "“Allowed by physics” is the standard deviation that the effect may have before anything is "
+        "measured."
+    )
+    blocks.append(Table(say("What to expect"), heads, rows, (note,)))
+    blocks += [
+        Paragraph(say("Stays free: {combination}.", combination=combination(parts)), tone="warning")
+        for parts in found.free
+    ]
+    blocks += [Paragraph(say("Could not be told apart: {text}.", text=text)) for text in pairs(found)]
+    blocks += [
+        Paragraph(say("If it acts, it will be taken for what the job names: {text}.", text=text))
+        for text in absorbed(found)
+    ]
     if found.unseen:
         blocks.append(
-            Paragraph(f"Nothing would show of: {', '.join(title_of(name) for name in found.unseen)}.", tone="note")
+            Paragraph(
+                say("Nothing would show of: {effects}.", effects=commas(title_of(name) for name in found.unseen)),
+                tone="note",
+            )
         )
     return tuple(blocks)
 
@@ -188,37 +254,63 @@ def _gain(plan: Plan) -> tuple[Block, ...]:
     criterion = plan.setting.plan.criterion
     if start is None or better is None or plan.better is None or criterion is None:
         return ()
-    names = (base_name(plan).partition(" (")[0], "the better plan")
+    both = (say("the recording") if plan.name == RECORDED else plan.name, say("the better plan"))
     count, before = len(plan.better.placings), len(plan.start.placings)
-    blocks: list[Block] = [Paragraph(
-        f"Searched for: {CRITERIA[criterion]}, by greedy choice and exchange. {before} placings before, {count} in the better "
-        f"plan, {plan.kept} of them kept. Pairs that could not be told apart: {len(start.alike)} before, "
-        f"{len(better.alike)} after; effects of which nothing shows, or that pass for named ones: "
-        f"{len(start.unseen) + len(start.absorbed)} before, {len(better.unseen) + len(better.absorbed)} after."
-    )]  # fmt: skip
+    blocks: list[Block] = [
+        Paragraph(
+            say(
+                "Searched for: {criteria}, by greedy choice and exchange. {before} placings before, {better} "
+                "in the better plan, {kept} of them kept. Pairs that could not be told apart: {alike_before} "
+                "before, {alike_after} after; effects of which nothing shows, or that pass for named ones: "
+                "{hidden_before} before, {hidden_after} after.",
+                criteria=CRITERIA[criterion],
+                before=before,
+                better=count,
+                kept=plan.kept,
+                alike_before=len(start.alike),
+                alike_after=len(better.alike),
+                hidden_before=len(start.unseen) + len(start.absorbed),
+                hidden_after=len(better.unseen) + len(better.absorbed),
+            )
+        )
+    ]
     blocks += _beside(
         [(named(p), p.u, q.u, unit_of(p), expected(p), expected(q))
          for p, q in zip(start.parameters, better.parameters, strict=True)],
-        names, "Expected standard uncertainty",
+        both, say("Expected standard uncertainty"),
     )  # fmt: skip
     if plan.start.powers and plan.better.powers:
         blocks += _beside(
-            [(title_of(p.effect), p.identifiable, q.identifiable, p.unit, smallest(p.identifiable), smallest(q.identifiable))
-             for p, q in zip(plan.start.powers, plan.better.powers, strict=True)
-             if p.identifiable is not None or q.identifiable is not None],
-            names, "Smallest effect named rightly",
-        )  # fmt: skip
+            [
+                (
+                    title_of(p.effect),
+                    p.identifiable,
+                    q.identifiable,
+                    p.unit,
+                    smallest(p.identifiable),
+                    smallest(q.identifiable),
+                )
+                for p, q in zip(plan.start.powers, plan.better.powers, strict=True)
+                if p.identifiable is not None or q.identifiable is not None
+            ],
+            both,
+            say("Smallest effect named rightly"),
+        )
     return tuple(blocks)
 
 
 def _beside(
-    rows: list[tuple[str, float | None, float | None, str, str, str]], names: tuple[str, str], quantity: str
+    rows: list[tuple[Text, float | None, float | None, Text, Text, Text]], names: tuple[Text, Text], quantity: Text
 ) -> list[Block]:
     """Both plans beside each other as a picture and in numbers: label, both values, unit, both in words."""
     if not rows:
         return []
-    heads = (Column(quantity, numeric=False), Column(names[0]), Column(names[1]), Column("Unit", numeric=False))
-    table = Table(f"{quantity} with both plans", heads, tuple((row[0], row[4], row[5], row[3]) for row in rows))
+    heads = (Column(quantity, numeric=False), Column(names[0]), Column(names[1]), Column(say("Unit"), numeric=False))
+    table = Table(
+        say("{quantity} with both plans", quantity=quantity),
+        heads,
+        tuple((row[0], row[4], row[5], row[3]) for row in rows),
+    )
     picture = gain_plot(
         [row[0] for row in rows], [row[1] for row in rows], [row[2] for row in rows], names=names, quantity=quantity
     )
@@ -228,15 +320,19 @@ def _beside(
 def _smallest(plan: Plan) -> tuple[Block, ...]:
     if not plan.outlook.powers:
         return ()
-    heads = (Column("Effect not in the job's model", numeric=False), Column("Parameter", numeric=False),
-             Column("Detected from"), Column("Named rightly from"), Column("Unit", numeric=False))  # fmt: skip
+    heads = (Column(say("Effect not in the job's model"), numeric=False), Column(say("Parameter"), numeric=False),
+             Column(say("Detected from")), Column(say("Named rightly from")), Column(say("Unit"), numeric=False))  # fmt: skip
     rows = tuple(
-        (title_of(p.effect), p.parameter, smallest(p.detectable), smallest(p.identifiable), p.unit)
+        (title_of(p.effect), Verbatim(p.parameter), smallest(p.detectable), smallest(p.identifiable), p.unit)
         for p in plan.outlook.powers
     )
-    note = (
-        f"Size found in {100 * POWER:.0f} of 100 recordings, at {100 * FALSE_ALARMS:g} % of false alarms. Named rightly: the "
-        "effect alone is more probable than any other and than none, and no other is left as possible. – where that is so "
-        f"for no size that physics allows, or for none up to {SIZES[-1]:.0f} times the noise in all observations together."
+    note = say(
+        "Size found in {power:.0f} of 100 recordings, at {false_alarms:g} % of false alarms. Named "
+        "rightly: the effect alone is more probable than any other and than none, and no other is "
+        "left as possible. – where that is so for no size that physics allows, or for none up to "
+        "{sizes:.0f} times the noise in all observations together.",
+        power=100 * POWER,
+        false_alarms=100 * FALSE_ALARMS,
+        sizes=SIZES[-1],
     )
-    return (Table("Smallest effects", heads, rows, (note,)),)
+    return (Table(say("Smallest effects"), heads, rows, (note,)),)

@@ -2,69 +2,113 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from cmm_uq.commands.planning import RECORDED, Plan
-from cmm_uq.documents.wording import listed
+from cmm_uq.messages import DASH, Message, Text, Verbatim, listed, number, say
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import every
 from cmm_uq.planning.identifiability import Determined, Identifiability
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
-STATUS = {"determined": "determined", "weak": "weakly: hardly better than physics allows", "free": "not determined"}
+STATUS = {
+    "determined": say("determined"),
+    "weak": say("weakly: hardly better than physics allows"),
+    "free": say("not determined"),
+}
 
 CRITERIA = {
-    "separation": "effects told apart best",
-    "D": "smallest volume of uncertainty (D)",
-    "A": "smallest mean variance (A)",
-    "worst": "smallest of the largest uncertainties (worst case)",
+    "separation": say("effects told apart best"),
+    "D": say("smallest volume of uncertainty (D)"),
+    "A": say("smallest mean variance (A)"),
+    "worst": say("smallest of the largest uncertainties (worst case)"),
 }
 
 
-def title_of(name: str) -> str:
+def title_of(name: str) -> Text:
     """An effect in words."""
-    return every()[name].title if name in every() else name
+    return every()[name].title if name in every() else Verbatim(name)
 
 
-def combination(parts: Mapping[tuple[str, str], float]) -> str:
+def combination(parts: Mapping[tuple[str, str], float]) -> Text:
     """A free combination in words: ``scale error of X, Y and Z together, with the artefact's own length``."""
     effects = list(dict.fromkeys(owner for owner, _ in parts if owner != ARTEFACT))
     sizes = [name for owner, name in parts if owner == ARTEFACT]
-    families: dict[str, list[str]] = {}
-    for effect in effects:
-        head, _, tail = title_of(effect).rpartition(" ")
-        families.setdefault(head, []).append(tail)
-    words = listed([f"{head} {listed(tails)}" for head, tails in families.items()]) if families else ""
-    own = "the artefact's own length" if len(sizes) == 1 else "the artefact's own dimensions"
+    one = len(sizes) == 1
     if not effects:
-        return own[0].upper() + own[1:]
+        return say("The artefact's own length") if one else say("The artefact's own dimensions")
+    words = listed(_families([title_of(effect) for effect in effects]))
     if sizes:
-        return f"{words}{' together' if len(effects) > 1 else ''}, with {own}"
-    return f"{words} together" if len(effects) > 1 else f"{words}: nothing shows of it"
+        own = say("the artefact's own length") if one else say("the artefact's own dimensions")
+        together = say("{effects} together", effects=words) if len(effects) > 1 else words
+        return say("{effects}, with {own}", effects=together, own=own)
+    return (
+        say("{effects} together", effects=words)
+        if len(effects) > 1
+        else say("{effect}: nothing shows of it", effect=words)
+    )
 
 
-def expected(parameter: Determined) -> str:
+def _families(titles: Sequence[Text]) -> list[Text]:
+    """Titles that differ in their last argument alone as one, in the order of the first: ``scale error of X, Y and Z``."""
+    families: dict[tuple[object, ...], list[Text]] = {}
+    for title in titles:
+        key: tuple[object, ...] = (title,)
+        if isinstance(title, Message) and title.pattern.endswith("}"):
+            key = (title.pattern, *list(title.arguments.values())[:-1])
+        families.setdefault(key, []).append(title)
+    return [_family(members) for members in families.values()]
+
+
+def _family(members: Sequence[Text]) -> Text:
+    first = members[0]
+    if len(members) == 1 or not isinstance(first, Message):
+        return first
+    name = first.pattern.rpartition("{")[2].removesuffix("}")
+    last = [member.arguments[name] for member in members if isinstance(member, Message)]
+    merged = listed([one for one in last if isinstance(one, Text)])
+    return Message(first.pattern, {**first.arguments, name: merged})
+
+
+def expected(parameter: Determined) -> Text:
     """Expected standard uncertainty, in the unit of :func:`unit_of`."""
     if parameter.u is None:
-        return "–"
-    return f"{parameter.u / (MICROMETRE if parameter.unknown.unit == 'mm' else 1.0):.2g}"
+        return DASH
+    return number(parameter.u / (MICROMETRE if parameter.unknown.unit == "mm" else 1.0), ".2g")
 
 
-def unit_of(parameter: Determined) -> str:
+def unit_of(parameter: Determined) -> Text:
     """Unit of an expected uncertainty: sizes of the artefact in micrometres."""
-    return "µm" if parameter.unknown.unit == "mm" else parameter.unknown.unit
+    return unit("µm") if parameter.unknown.unit == "mm" else parameter.unknown.unit
 
 
-def named(parameter: Determined) -> str:
+def _size_words(name: str) -> Text:
+    """A size of the artefact by its name, which a kind of another package may choose as it likes."""
+    plain = name.removesuffix("_mm")
+    what, _, which = plain.partition("_")
+    if plain == "length":
+        return say("length")
+    if which.isdigit() and what == "block":
+        return say("block {which}", which=Verbatim(which))
+    if which.isdigit() and what == "cylinder":
+        return say("cylinder {which}", which=Verbatim(which))
+    return Verbatim(plain.replace("_", " "))
+
+
+def named(parameter: Determined) -> Text:
     """A parameter in words."""
     owner, name = parameter.unknown.key
     if owner == ARTEFACT:
-        return f"Artefact, {name.removesuffix('_mm').replace('_', ' ')}"
+        return say("Artefact, {size}", size=_size_words(name))
     effect = every()[owner]
-    return effect.title if len(effect.coefficients) == 1 else f"{effect.title}, {name}"
+    return (
+        effect.title
+        if len(effect.coefficients) == 1
+        else say("{title}, {name}", title=effect.title, name=Verbatim(name))
+    )
 
 
-def pairs(found: Identifiability) -> list[str]:
+def pairs(found: Identifiability) -> list[Text]:
     """Effects that could not be told apart, grouped where they all resemble each other."""
     groups: list[set[str]] = []
     for first, second, _ in found.alike:
@@ -74,22 +118,30 @@ def pairs(found: Identifiability) -> list[str]:
     return [listed([title_of(name) for name in every() if name in group]) for group in groups]
 
 
-def absorbed(found: Identifiability) -> list[str]:
+def absorbed(found: Identifiability) -> list[Text]:
     """Effects that would be taken for others: ``sag of the artefact for scale error of X and scale error of Y``."""
-    own = "the artefact's own size"
+    own = say("the artefact's own size")
     return [
-        f"{title_of(name)} for {listed([own if other == ARTEFACT else title_of(other) for other in others])}"
+        say(
+            "{effect} for {others}",
+            effect=title_of(name),
+            others=listed([own if other == ARTEFACT else title_of(other) for other in others]),
+        )
         for name, others in found.absorbed
         if others
     ]
 
 
-def base_name(plan: Plan) -> str:
+def base_name(plan: Plan) -> Text:
     """Of the placings to start from."""
     count = len(plan.start.placings)
-    return f"the recording ({count} placings)" if plan.name == RECORDED else f"{plan.name} ({count} placings)"
+    return (
+        say("the recording ({count} placings)", count=count)
+        if plan.name == RECORDED
+        else say("{name} ({count} placings)", name=plan.name, count=count)
+    )
 
 
-def smallest(amplitude: float | None) -> str:
+def smallest(amplitude: float | None) -> Text:
     """Smallest size of an effect that is found."""
-    return "–" if amplitude is None else f"{amplitude:.2g}"
+    return DASH if amplitude is None else number(amplitude, ".2g")

@@ -16,6 +16,7 @@ from cmm_uq.diagnosis.power import Power, powers, without_fault
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
+from cmm_uq.messages import Text, say
 from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.candidates import candidates, thinned
@@ -28,10 +29,10 @@ from cmm_uq.planning.setting import Setting, Start
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import MICROMETRE
 
-RECORDED = "recording"
+RECORDED = say("recording")
 """Name of the placings of a recording that is there already."""
 
-SPREAD = "an even spread of candidates"
+SPREAD = say("an even spread of candidates")
 """Name of the placings to compare with where the usual plan is not possible."""
 
 Progress = Callable[[str, float], None]
@@ -74,13 +75,13 @@ class Plan:
 
     job: Job
     setting: Setting
-    name: str
+    name: Text
     start: Outlook
     better: Outlook | None
     kept: int
     scores: tuple[float, float] | None
     conditions: tuple[Condition, ...]
-    free: tuple[str, ...] = ()
+    free: tuple[Text, ...] = ()
 
     @property
     def outlook(self) -> Outlook:
@@ -157,10 +158,10 @@ def _part(tell: Progress, low: float, high: float) -> Callable[[float], None]:
     return lambda part: tell("Predicting what the diagnosis would find", low + (high - low) * part)
 
 
-def _start(job: Job, setting: Setting) -> tuple[str, tuple[Placing, ...], Points]:
+def _start(job: Job, setting: Setting) -> tuple[Text, tuple[Placing, ...], Points]:
     if len(job.points):
         points = job.points.select(~np.isin(job.points.measurement, job.facts.recording.set_aside))
-        return RECORDED, split(points, "recorded as measurement {}"), points
+        return RECORDED, split(points, lambda n: say("recorded as measurement {n}", n=n)), points
     try:
         name, placings = ready_plan(setting)
     except CmmUqError:
@@ -272,8 +273,8 @@ def _in_time(setting: Setting, name: str, placings: Sequence[Placing]) -> tuple[
     if budget is None or name == RECORDED:
         return ()
     total = sum(minutes(setting, placing) for placing in placings)
-    over = (f"{total - budget:.0f} min too many",) if total > budget else ()
-    return (Condition(f"at most {budget:g} min: {total:.0f} min", over),)
+    over = (say("{total:.0f} min too many", total=total - budget),) if total > budget else ()
+    return (Condition(say("at most {budget:g} min: {total:.0f} min", budget=budget, total=total), over),)
 
 
 def _series_plan(job: Job, setting: Setting) -> Plan:

@@ -5,11 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from cmm_uq.conformity.standards import names as standard_names
+from cmm_uq.conformity.standards import standard_named
 from cmm_uq.jobs import reading
+from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.reading import Nameable
 from cmm_uq.kinds import names, table_of
+from cmm_uq.plugins import naming_package
+
+NAMEABLE = Nameable(table_of, names, Standards(standard_named, standard_names))
+"""Every kind and every standard that there is, of other packages too."""
 
 
+@naming_package()
 def read_job(folder: Path, *, recorded: bool = True) -> Job:
     """Read and check a job; see :func:`cmm_uq.jobs.reading.read_job`.
 
@@ -22,14 +31,16 @@ def read_job(folder: Path, *, recorded: bool = True) -> Job:
     ------
     CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
     """
-    return reading.read_job(folder, table_of, names, recorded=recorded)
+    return reading.read_job(folder, NAMEABLE, recorded=recorded)
 
 
+@naming_package()
 def read_machine(folder: Path) -> Job:
     """A job for its machine alone; see :func:`cmm_uq.jobs.reading.read_machine`."""
-    return reading.read_machine(folder, table_of, names)
+    return reading.read_machine(folder, NAMEABLE)
 
 
+@naming_package()
 def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
     """Read and check a job that lies in no folder yet; see :func:`cmm_uq.jobs.reading.job_of`.
 
@@ -42,4 +53,4 @@ def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
     ------
     CmmUqError : a file is missing, or says something unknown or contradictory.
     """
-    return reading.job_of(files, table_of, names, recorded=recorded)
+    return reading.job_of(files, NAMEABLE, recorded=recorded)

@@ -10,12 +10,14 @@ from cmm_uq.commands.written import Form, Stage, Written, silent
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
+from cmm_uq.plugins import naming_package
 
 CERTIFICATE, DIAGNOSIS = ("certificate.html", "certificate.pdf"), "diagnosis.html"
 REPORT = Form("report", CERTIFICATE)
 DIAGNOSE = Form("diagnose", (DIAGNOSIS,), "diagnosis")
 
 
+@naming_package()
 def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent) -> Outcome:
     """Analyse a job that was read and compose its certificate; nothing is written.
 
@@ -59,10 +61,11 @@ def write_report(
     tell = stage or silent
     tell("Reading the job", 0.0)
     read = read_job(job)
-    analysis.recipe_of(read)  # refused before anything is made
+    analysis.report_recipe(read)  # refused before anything is made
     return REPORT.write(read, lambda: report_outcome(read, seed=seed, stage=tell), out, force=force, stage=tell)
 
 
+@naming_package()
 def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, stage: Stage = silent) -> Outcome:
     """Diagnose a job that was read and compose the page; nothing is written.
 

@@ -22,12 +22,13 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import first_line
 from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.jobs.toml_file import as_toml, checked
-from cmm_uq.jobs.truth import Truth
+from cmm_uq.jobs.truth import NoiseFacts, Truth
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.plugins import naming_package
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE
 from cmm_uq.writing import Owner, staged
@@ -39,6 +40,7 @@ _TRUTH_GIVES = "It gives the effects, the noise and the seed"
 _FIX = "Give effects, sizes and noise that a machine can have"
 
 
+@naming_package()
 def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str = TRUTH) -> Points:
     """The points of a recording with the placings of the job's own.
 
@@ -63,7 +65,7 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     model = MeasurementModel(
         artefact, acting, shapes={effect.name: shape for effect, (_, shape) in zip(acting, given, strict=True)}
     )
-    noise = Noise(truth.noise.coordinate_um * MICROMETRE, truth.noise.placing_um * MICROMETRE)
+    noise = _noise(truth.noise)
     random = np.random.default_rng(truth.seed if seed is None else seed)
     coefficients = np.concatenate([np.zeros(0), *(values for values, _ in given)])
     with refusing_overflow(truth_path, _FIX):
@@ -122,7 +124,7 @@ def _files(job: Job, content: bytes, truth: Path, seed: int | None) -> dict[str,
     how = f", seed {drawn.seed if seed is None else seed}, from {TRUTH}"
     files = {
         **{name: data for name, data in job.inputs.items() if name != "job.toml"},
-        job.facts.recording.file: first_line("simulate", program(drawn.effects), how).encode() + recording(points),
+        job.facts.recording.file: first_line("simulate", program(job, drawn.effects), how).encode() + recording(points),
         TRUTH: content,
     }
     return {"job.toml": derived_toml(job, "simulate", files, without=IN_THE_RECORDING), **files}
@@ -139,6 +141,14 @@ def recording(points: Points) -> bytes:
         coordinates = [f"{value:.7f}" for value in points.xyz[i]]
         writer.writerow([*numbers, *coordinates, *(f"{values[i]:.10g}" for values in points.columns.values())])
     return text.getvalue().encode()
+
+
+def _noise(given: NoiseFacts) -> Noise:
+    x, y, z = (sd * MICROMETRE for sd in given.coordinates_um)
+    return Noise(
+        (x, y, z), given.placing_um * MICROMETRE, given.growth_um * MICROMETRE, given.slow_um * MICROMETRE,
+        given.slow_time_s, given.tails_dof or 0.0, given.resolution_um * MICROMETRE,
+    )  # fmt: skip
 
 
 def _sizes(artefact: Artefact, truth: Truth, path: str) -> Floats:

@@ -8,23 +8,22 @@ or a standard deviation grows with every uncertainty that is drawn, JCGM 101:200
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from cmm_uq.points import Floats
+from cmm_uq.messages import Text, say
+from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, PRINTED, Unit
 
-TITLES: Mapping[str, str] = {
-    "mean_length_mm": "Mean length",
-    "rms_accuracy_error_um": "rms accuracy error (standard deviation of the lengths)",
-    "b89_range_um": "Range of the lengths (ASME B89.4.1 volumetric performance)",
-    "b89_max_deviation_um": "Largest deviation from the mean length",
+TITLES: Mapping[str, Text] = {
+    "mean_length_mm": say("Mean length"),
+    "rms_accuracy_error_um": say("rms accuracy error (standard deviation of the lengths)"),
+    "b89_range_um": say("Range of the lengths (ASME B89.4.1 volumetric performance)"),
+    "b89_max_deviation_um": say("Largest deviation from the mean length"),
 }
-UNITS: Mapping[str, str] = {
-    "mean_length_mm": "mm", "rms_accuracy_error_um": "µm", "b89_range_um": "µm", "b89_max_deviation_um": "µm",
-}  # fmt: skip
+UNITS: Mapping[str, Unit] = {name: PRINTED[name.rpartition("_")[2]] for name in TITLES}
 
 _DRAWS = 1000
 _NUMBERS = 3_000_000
@@ -47,14 +46,18 @@ def figures(lengths: Floats) -> dict[str, Floats]:
     }
 
 
-def with_uncertainty(lengths: Floats, predicted: Floats, noise: Floats, seed: int) -> dict[str, Quantity]:
+Repeated = Callable[[Ints, int, np.random.Generator], Floats]
+"""Noise (w, repetitions, m), mm, of the recording made anew, for w of the draws."""
+
+
+def with_uncertainty(lengths: Floats, predicted: Floats, noise: Repeated, seed: int) -> dict[str, Quantity]:
     """Figures of recorded lengths, with uncertainty.
 
     Parameters
     ----------
     lengths : (m,) as recorded, mm.
     predicted : (N, m) lengths that draws from the posterior predict, mm, without noise.
-    noise : (N, m) standard uncertainty of each length in each draw, mm.
+    noise : draws that of each repetition.
     seed : of the repetitions.
     """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
@@ -63,8 +66,7 @@ def with_uncertainty(lengths: Floats, predicted: Floats, noise: Floats, seed: in
     unbiased = np.sqrt(repetitions / (repetitions - 1))
     errors: dict[str, list[Floats]] = {name: [] for name in TITLES}
     for block in np.array_split(chosen, 10):
-        scatter = random.standard_normal((len(block), repetitions, len(lengths)))
-        repeated = figures(predicted[block, None, :] + noise[block, None, :] * scatter)
+        repeated = figures(predicted[block, None, :] + noise(block, repetitions, random))
         for name, values in repeated.items():
             errors[name].append((unbiased * (values - values.mean(axis=1, keepdims=True))).ravel())
     return {

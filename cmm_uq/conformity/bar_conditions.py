@@ -9,6 +9,7 @@ import numpy as np
 from cmm_uq.conformity.copies import run_of
 from cmm_uq.conformity.measurement_lines import position_of
 from cmm_uq.conformity.plans import BarPlan, Condition
+from cmm_uq.messages import Text, commas, number, plural, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Floats, Points
 
@@ -23,22 +24,35 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
     same = _same_places(plan, points, numbers, ends, copies)
     distinct = [i for i, number in enumerate(numbers) if number not in same]
     count = len(distinct)
-    lost = "".join(f", {text}" for text in _in_words(same))
-    missing = (f"{wanted - count} of {wanted} positions: {count} distinct{lost}",) if count < wanted else ()
-    unknown = (
-        () if known else ("[machine] travel_mm of all three axes, by whose proportions the number of positions goes",)
-    )
-    taken = {position_of(ends[i, 1] - ends[i, 0]) for i in distinct}
-    directions = tuple(f"position {_along(d)}" for d in plan.directions if d not in taken)
-    return (
-        Condition(f"at least {wanted} positions of the bar: {count}", (*missing, *unknown)),
-        Condition("along the axes, and the face and space diagonals of the volume"
-                  f"{'; missing: ' if directions else ''}{', '.join(directions)}", directions),
+    missing = _lacking(wanted, count, _in_words(same)) if count < wanted else ()
+    unknown = () if known else (
+        say("[machine] travel_mm of all three axes, by whose proportions the number of positions goes"),
     )  # fmt: skip
+    taken = {position_of(ends[i, 1] - ends[i, 0]) for i in distinct}
+    directions = tuple(say("position {along}", along=_along(d)) for d in plan.directions if d not in taken)
+    return (
+        Condition(
+            say("at least {wanted} positions of the bar: {count}", wanted=wanted, count=count), (*missing, *unknown)
+        ),
+        Condition(_directions(directions), directions),
+    )
 
 
-def _along(position: str) -> str:
-    return position if position.startswith("parallel") else f"along {position}"
+def _lacking(wanted: int, count: int, same: Sequence[Text]) -> tuple[Text, ...]:
+    lack = say("{lack} of {wanted} positions: {count} distinct", lack=wanted - count, wanted=wanted, count=count)
+    return (commas((lack, *same)),)
+
+
+def _directions(missing: tuple[Text, ...]) -> Text:
+    if not missing:
+        return say("along the axes, and the face and space diagonals of the volume")
+    return say(
+        "along the axes, and the face and space diagonals of the volume; missing: {missing}", missing=commas(missing)
+    )
+
+
+def _along(position: Text) -> Text:
+    return position if position.startswith("parallel") else say("along {position}", position=position)
 
 
 def _one_a_measurement(artefact: Artefact) -> tuple[list[int], Floats]:
@@ -49,47 +63,64 @@ def _one_a_measurement(artefact: Artefact) -> tuple[list[int], Floats]:
 
 def _same_places(
     plan: BarPlan, points: Points, numbers: Sequence[int], ends: Floats, copies: Mapping[int, int]
-) -> dict[int, tuple[str, int]]:
-    """Measurements that are no further position: what each is instead, and of which other."""
-    found: dict[int, tuple[str, int]] = {}
+) -> dict[int, tuple[float | None, int]]:
+    """Measurements that are no further position: within how many mm of which other, or a copy of it."""
+    found: dict[int, tuple[float | None, int]] = {}
     for later, original in copies.items():
         (one, _), (two, _) = run_of(points, original), run_of(points, later)
         if one != two:
-            found[two] = "a copy", one
+            found[two] = None, one
     kept: list[int] = []
-    for i, number in enumerate(numbers):
-        if number in found:
+    for i, own in enumerate(numbers):
+        if own in found:
             continue
         near = next((j for j in kept if _apart(ends[i], ends[j]) < plan.apart_mm), None)
         if near is None:
             kept.append(i)
         else:
-            found[number] = f"within {plan.apart_mm:g} mm", numbers[near]
+            found[own] = plan.apart_mm, numbers[near]
     return found
 
 
-def _in_words(same: dict[int, tuple[str, int]]) -> list[str]:
-    """One sentence for all that are the same of one other."""
-    texts = []
-    for what, of in sorted(set(same.values()), key=lambda pair: pair[::-1]):
-        numbers = sorted(number for number, pair in same.items() if pair == (what, of))
-        if len(numbers) == 1:
-            texts.append(f"measurement {numbers[0]} is {what} of {of}")
-        else:
-            texts.append(f"measurements {_listed(numbers)} are {what.replace('a copy', 'copies')} of {of}")
-    return texts
+def _in_words(same: dict[int, tuple[float | None, int]]) -> list[Text]:
+    """One sentence for all that are the same of one other; copies come first."""
+    pairs = sorted(set(same.values()), key=lambda pair: (pair[1], pair[0] is not None))
+    return [
+        _is_no_further(apart, other, sorted(own for own, pair in same.items() if pair == (apart, other)))
+        for apart, other in pairs
+    ]
 
 
-def _listed(numbers: Sequence[int]) -> str:
+def _is_no_further(apart: float | None, other: int, numbers: Sequence[int]) -> Text:
+    which = _listed(numbers)
+    if apart is None:
+        return plural(
+            len(numbers),
+            one=say("measurement {which} is a copy of {other}", which=which, other=other),
+            many=say("measurements {which} are copies of {other}", which=which, other=other),
+        )
+    return plural(
+        len(numbers),
+        one=say("measurement {which} is within {apart:g} mm of {other}", which=which, apart=apart, other=other),
+        many=say("measurements {which} are within {apart:g} mm of {other}", which=which, apart=apart, other=other),
+    )
+
+
+def _listed(numbers: Sequence[int]) -> Text:
     """Numbers in ascending order, those that follow each other as from 2 to 20."""
     runs: list[list[int]] = []
-    for number in numbers:
-        if runs and runs[-1][-1] == number - 1:
-            runs[-1].append(number)
+    for one in numbers:
+        if runs and runs[-1][-1] == one - 1:
+            runs[-1].append(one)
         else:
-            runs.append([number])
-    parts = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
-    return ", ".join(parts)
+            runs.append([one])
+    return commas(part for run in runs for part in _run(run))
+
+
+def _run(numbers: Sequence[int]) -> list[Text]:
+    if len(numbers) > 2:
+        return [say("{first} to {last}", first=numbers[0], last=numbers[-1])]
+    return [number(one) for one in numbers]
 
 
 def _apart(one: Floats, two: Floats) -> float:

@@ -11,11 +11,11 @@ from cmm_uq.conformity.accuracy import with_uncertainty
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
-from cmm_uq.inference.posterior import Density
 from cmm_uq.jobs.job import Job
 from cmm_uq.model.kind import Observed
+from cmm_uq.model.noise import noise_of
+from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
 
 _DRAWS = 1000
 
@@ -35,7 +35,7 @@ class Consequences:
 
 
 def consequences(
-    job: Job, diagnosis: Diagnosis, observe: Observed, standards: Collection[str], seed: int
+    job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int
 ) -> Consequences | None:
     """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
 
@@ -44,7 +44,7 @@ def consequences(
     Parameters
     ----------
     observe : makes the artefact of points.
-    standards : that may be stated of its kind.
+    tested : what of its kind a standard may be decided on.
     seed : of the figures' repetitions.
     """
     found = {item.effect for item in diagnosis.effects}
@@ -63,21 +63,22 @@ def consequences(
     after: dict[str, Quantity] = {}
     late = corrected.lengths()
     if lengths is not None and late is not None:
-        sigma = diagnosis.noise.coordinate.value * MICROMETRE
-        mean, covariance, _ = Density(linear).conditional(float(np.log(sigma)))
-        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(7,)))
-        draws = random.multivariate_normal(mean, covariance, _DRAWS, method="eigh")
+        some = np.linspace(0, len(diagnosis.posterior.draws) - 1, _DRAWS).astype(np.int64)
+        draws, sizes, components = diagnosis.posterior.draws[some], diagnosis.posterior.sizes.at(some), noise_of(model)
         whole = model.linearised(value)
         predicted = lengths - whole.observed + draws @ whole.design.T
-        noise = np.broadcast_to(sigma * artefact.noise_scale, predicted.shape)
+
+        def noise(chosen: Ints, times: int, random: np.random.Generator) -> Floats:
+            return components.repeated(sizes.at(chosen), times, random)
+
         before = with_uncertainty(lengths, predicted, noise, seed)
         after = with_uncertainty(late, predicted - draws[:, ours] @ whole.design[:, ours].T, noise, seed)
     return Consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(
             (
-                statement(wish, artefact, before, key, standards),
-                statement(wish, corrected, after, key, standards, artefact),
+                statement(wish, artefact, before, key, tested),
+                statement(wish, corrected, after, key, tested, artefact),
             )
             for i, wish in enumerate(job.facts.conformity, 1)
             for key in [f"[[conformity]] {i}"]

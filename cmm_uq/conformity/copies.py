@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.messages import NOTHING, Text, say, semicolons
 from cmm_uq.points import Points
 
 _NAMED = 5
@@ -19,18 +20,30 @@ def copied(points: Points) -> dict[int, int]:
     return found
 
 
-def copies_in_words(points: Points) -> str:
+def copies_in_words(points: Points) -> Text:
     """Which measurements are copies of which; empty when none is."""
     told = []
     for later, original in copied(points).items():
         (one, first), (two, repeat) = run_of(points, original), run_of(points, later)
         told.append((one, first, two, repeat))
     said = [
-        f"measurement {two}, repeat {repeat} of measurement {one}, repeat {first}"
+        say(
+            "measurement {two}, repeat {repeat} of measurement {one}, repeat {first}",
+            two=two,
+            repeat=repeat,
+            one=one,
+            first=first,
+        )
         for one, first, two, repeat in sorted(told)
     ]
-    more = f" and {len(said) - _NAMED} more" if len(said) > _NAMED else ""
-    return f"Copies to the last digit, which do not count: {'; '.join(said[:_NAMED])}{more}." if said else ""
+    if not said:
+        return NOTHING
+    if len(said) <= _NAMED:
+        return say("Copies to the last digit, which do not count: {copies}.", copies=semicolons(said))
+    return say(
+        "Copies to the last digit, which do not count: {copies} and {count} more.",
+        copies=semicolons(said[:_NAMED]), count=len(said) - _NAMED,
+    )  # fmt: skip
 
 
 def run_of(points: Points, group: int) -> tuple[int, int]:

@@ -12,7 +12,8 @@ from typing import Literal
 
 from scipy import optimize, special
 
-from cmm_uq.jobs.job import FalseAccept, GuardBand, Rule
+from cmm_uq.jobs.conformity import FalseAccept, GuardBand, Rule
+from cmm_uq.messages import NOTHING, Text, say
 
 Outcome = Literal["pass", "fail", "undecided"]
 
@@ -41,7 +42,7 @@ class Decision:
     probability_conforming: float | None
     probability_beyond: float | None
     guard_band: float | None
-    rule: str
+    rule: Text
 
 
 def decide(value: float, u: float, limit: float, rule: Rule, *, signed: bool) -> Decision:
@@ -133,12 +134,15 @@ def _guard_band(u: float, limit: float, risk: float, signed: bool) -> float | No
     return limit - float(optimize.brentq(lambda v: _beyond(v, u, limit, signed) - risk, 0.0, limit, xtol=1e-12 * limit))
 
 
-def _words(rule: Rule, band: float | None, u: float) -> str:
+def _words(rule: Rule, band: float | None, u: float) -> Text:
     if rule == "simple":
-        return "simple acceptance (JCGM 106:2012, 8.2.1)"
+        return say("simple acceptance (JCGM 106:2012, 8.2.1)")
     if isinstance(rule, GuardBand):
-        return f"guard band {rule.guard_band:g} U, k = 2 (ILAC-G8:09/2019)"
+        return say("guard band {guard_band:g} U, k = 2 (ILAC-G8:09/2019)", guard_band=rule.guard_band)
     if isinstance(rule, FalseAccept):
-        return f"probability of false acceptance at most {rule.max_false_accept:g} (JCGM 106:2012, 9.5)"
-    told = "" if band is None else f"guard band {band / u:.3g} u "
-    return f"ISO 14253-1:2017, {told}(95 %)"
+        return say(
+            "probability of false acceptance at most {max_false_accept:g} (JCGM 106:2012, 9.5)",
+            max_false_accept=rule.max_false_accept,
+        )
+    told = NOTHING if band is None else say("guard band {band:.3g} u ", band=band / u)
+    return say("ISO 14253-1:2017, {told}(95 %)", told=told)

@@ -9,6 +9,7 @@ import numpy as np
 
 from cmm_uq.conformity.measurement_lines import crossed_travel, position_on
 from cmm_uq.conformity.plans import Condition, LengthPlan
+from cmm_uq.messages import NOTHING, Text, commas, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Floats, Ints, Machine, Points
 
@@ -23,19 +24,25 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
         measured.setdefault(found.position, []).append(found)
     absent = tuple(line for line in plan.positions if line not in measured)
     return (
-        Condition(f"four space diagonals and three axes{'; missing: ' if absent else ''}{', '.join(absent)}", absent),
+        Condition(_positions(absent), absent),
         _long_enough(plan, artefact.points.machine, measured),
         _different(plan, measured),
         _shortest(plan, measured),
         _repeated(plan, measured),
-    )  # fmt: skip
+    )
+
+
+def _positions(absent: tuple[Text, ...]) -> Text:
+    if not absent:
+        return say("four space diagonals and three axes")
+    return say("four space diagonals and three axes; missing: {absent}", absent=commas(absent))
 
 
 @dataclass(frozen=True)
 class _Measured:
     """All that was measured of one nominal length in one position."""
 
-    position: str
+    position: Text
     nominal: int
     length: float
     share: float | None
@@ -77,57 +84,91 @@ def nominals(lengths: Floats) -> Ints:
     return found
 
 
-_Places = dict[str, list[_Measured]]
+_Places = dict[Text, list[_Measured]]
 
 
 def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Condition:
-    least = f"{100 * plan.least_share:.0f} %"
-    what = f"longest length at least {least} of the travel along each line"
+    least = say("{least_share:.0f} %", least_share=100 * plan.least_share)
+    what = say("longest length at least {least} of the travel along each line", least=least)
     if not np.all(np.isfinite(machine.travel_mm)):
-        key = "[machine] travel_mm of all three axes, without which no length's share of the travel is known"
-        return Condition(f"{what}: not known", (key,))
+        key = say("[machine] travel_mm of all three axes, without which no length's share of the travel is known")
+        return Condition(say("{what}: not known", what=what), (key,))
     shares = {line: max((m.share or 0.0 for m in found), default=0.0) for line, found in places.items()}
     missing = tuple(
-        f"length of at least {least} of the travel along {line} ({100 * share:.0f} %)"
+        say(
+            "length of at least {least} of the travel along {line} ({share:.0f} %)",
+            least=least,
+            line=line,
+            share=100 * share,
+        )
         for line, share in shares.items()
         if share < plan.least_share
     )
-    return Condition(f"{what}: {_span([100 * share for share in shares.values()], ' %')}", missing)
+    return Condition(
+        say("{what}: {span}", what=what, span=_span([100 * share for share in shares.values()], say(" %"))), missing
+    )
 
 
-def _span(figures: Sequence[float], unit: str = "") -> str:
-    return f"{min(figures):.0f}{unit} to {max(figures):.0f}{unit}" if figures else "none"
+def _span(figures: Sequence[float], unit: Text = NOTHING) -> Text:
+    if not figures:
+        return say("none")
+    return say("{low:.0f}{unit} to {high:.0f}{unit}", low=min(figures), high=max(figures), unit=unit)
 
 
 def _different(plan: LengthPlan, places: _Places) -> Condition:
     counts = {line: len(found) for line, found in places.items()}
     missing = tuple(
-        f"{plan.lengths} different lengths along {line} ({count})"
+        say("{lengths} different lengths along {line} ({count})", lengths=plan.lengths, line=line, count=count)
         for line, count in counts.items()
         if count < plan.lengths
     )
-    return Condition(f"{plan.lengths} lengths on each line: {_span(list(counts.values()))}", missing)
+    return Condition(
+        say("{lengths} lengths on each line: {span}", lengths=plan.lengths, span=_span(list(counts.values()))), missing
+    )
 
 
 def _shortest(plan: LengthPlan, places: _Places) -> Condition:
     shortest = {line: min(m.length for m in found) for line, found in places.items()}
     missing = tuple(
-        f"length of at most {plan.shortest_mm:g} mm along {line} ({length:.4g} mm)"
+        say(
+            "length of at most {shortest_mm:g} mm along {line} ({length:.4g} mm)",
+            shortest_mm=plan.shortest_mm,
+            line=line,
+            length=length,
+        )
         for line, length in shortest.items()
         if length > plan.shortest_mm
     )
-    longest = f"{max(shortest.values()):.4g} mm" if shortest else "none"
-    return Condition(f"shortest length at most {plan.shortest_mm:g} mm: {longest}", missing)
+    longest = say("{shortest:.4g} mm", shortest=max(shortest.values())) if shortest else say("none")
+    return Condition(
+        say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=plan.shortest_mm, longest=longest),
+        missing,
+    )
 
 
 def _repeated(plan: LengthPlan, places: _Places) -> Condition:
     """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks."""
     repeats = {line: sorted((m.repeats for m in found), reverse=True) for line, found in places.items()}
     total = sum(sum(counts) for counts in repeats.values())
-    lost = (f"{plan.total - total} of {plan.total} lengths",) if total < plan.total else ()
+    lost: tuple[Text, ...] = ()
+    if total < plan.total:
+        lost = (say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total),)
     missing = tuple(
-        f"{plan.repeats} repetitions of each length along {line} ({counts[: plan.lengths][-1]})"
+        say(
+            "{repeats} repetitions of each length along {line} ({counts})",
+            repeats=plan.repeats,
+            line=line,
+            counts=counts[: plan.lengths][-1],
+        )
         for line, counts in repeats.items()
         if counts[: plan.lengths][-1] < plan.repeats
     )
-    return Condition(f"{plan.repeats} repetitions of each, {plan.total} lengths in all: {total}", (*missing, *lost))
+    return Condition(
+        say(
+            "{repeats} repetitions of each, {wanted} lengths in all: {total}",
+            repeats=plan.repeats,
+            wanted=plan.total,
+            total=total,
+        ),
+        (*missing, *lost),
+    )

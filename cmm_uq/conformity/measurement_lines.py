@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.messages import Message, Text, Verbatim, say
 from cmm_uq.points import AXES, Floats, Machine
 
 ALIGNED = np.sin(np.radians(10.0))
@@ -17,22 +18,25 @@ which leaves room for the fixture."""
 _ROUNDING = 1e-6
 """mm; a line as near as this to the end of an axis' travel lies in it."""
 
-PARALLELS = tuple(f"parallel to {a.upper()}" for a in AXES)
-SPACE_DIAGONALS = tuple(f"space diagonal {x}X {y}Y +Z" for x in "+−" for y in "+−")
-FACE_DIAGONALS = tuple(f"face diagonal {s}{a} +{b}" for a, b in ("XY", "YZ", "XZ") for s in "+−")
+PARALLELS = tuple(say("parallel to {axis}", axis=Verbatim(a.upper())) for a in AXES)
+SPACE_DIAGONALS = tuple(say("space diagonal {axes}", axes=Verbatim(f"{x}X {y}Y +Z")) for x in "+−" for y in "+−")
+FACE_DIAGONALS = tuple(
+    say("face diagonal {axes}", axes=Verbatim(f"{s}{a} +{b}")) for a, b in ("XY", "YZ", "XZ") for s in "+−"
+)
 
 
-def position_of(direction: Floats) -> str:
+def position_of(direction: Floats) -> Message:
     """Position of a line in words, from its direction (3,), either way along it."""
     u = direction / np.linalg.norm(direction)
     counts = np.abs(u) > ALIGNED
     taken = [a.upper() for a, counted in zip(AXES, counts, strict=True) if counted]
     if len(taken) == 1:
-        return f"parallel to {taken[0]}"
-    return f"{'space' if len(taken) == 3 else 'face'} diagonal {_signed(u, counts)}"
+        return say("parallel to {axis}", axis=Verbatim(taken[0]))
+    axes = _signed(u, counts)
+    return say("space diagonal {axes}", axes=axes) if len(taken) == 3 else say("face diagonal {axes}", axes=axes)
 
 
-def position_on(machine: Machine, middle: Floats, direction: Floats) -> str:
+def position_on(machine: Machine, middle: Floats, direction: Floats) -> Text:
     """Position of a line through ``middle`` (3,), mm in the recorded frame, where the travel is known: by what it crosses.
 
     A space diagonal goes from corner to corner: by its direction alone a line across a corner, or one that hardly leaves the
@@ -44,8 +48,10 @@ def position_on(machine: Machine, middle: Floats, direction: Floats) -> str:
     if crossed is None:
         return named
     if np.all(crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(machine.travel_mm, axis=1)):
-        return f"space diagonal {_signed(u, np.ones(3, dtype=bool))}"
-    return named.replace("space diagonal", "oblique")
+        return say("space diagonal {axes}", axes=_signed(u, np.ones(3, dtype=bool)))
+    if named.startswith("space diagonal"):
+        return say("oblique {axes}", axes=named.arguments["axes"])
+    return named
 
 
 def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float | None:
@@ -68,7 +74,7 @@ def share_of_travel(machine: Machine, middle: Floats, direction: Floats, length:
     return length / available if available else None
 
 
-def _signed(u: Floats, counts: NDArray[np.bool_]) -> str:
+def _signed(u: Floats, counts: NDArray[np.bool_]) -> Text:
     signs = np.sign(u) * np.sign(u[counts][-1])
     taken = zip(AXES, signs, counts, strict=True)
-    return " ".join(f"{'+' if sign > 0 else '−'}{axis.upper()}" for axis, sign, counted in taken if counted)
+    return Verbatim(" ".join(f"{'+' if sign > 0 else '−'}{axis.upper()}" for axis, sign, counted in taken if counted))

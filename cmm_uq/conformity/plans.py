@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from cmm_uq.conformity.measurement_lines import FACE_DIAGONALS, PARALLELS, SPACE_DIAGONALS
-from cmm_uq.jobs.job import Standard
+from cmm_uq.messages import Text
 from cmm_uq.points import Floats
 
 
@@ -30,7 +30,7 @@ class LengthPlan:
     shortest_mm : largest that the shortest length may be.
     """
 
-    positions: tuple[str, ...]
+    positions: tuple[Text, ...]
     lengths: int
     repeats: int
     least_share: float
@@ -56,7 +56,7 @@ class BarPlan:
     """
 
     positions: int
-    directions: tuple[str, ...]
+    directions: tuple[Text, ...]
     further: int
     nearly_cubic: float
     apart_mm: float
@@ -98,8 +98,8 @@ class Condition:
     missing : what is not there, each in words; nothing when the condition is met.
     """
 
-    what: str
-    missing: tuple[str, ...] = ()
+    what: Text
+    missing: tuple[Text, ...] = ()
 
     @property
     def met(self) -> bool:
@@ -118,12 +118,6 @@ a longer volume needs, what nearly cubic is, and the distance are this project's
 
 ISO_10360_5 = SpherePlan(25, 45.0)
 """Twenty-five points (Renishaw's summary of ISO 10360), spread over a hemisphere; the reach is this project's figure."""
-
-PLANS: Mapping[Standard, Plan] = MappingProxyType({
-    "ASME B89.4.1-1997": B89, "ISO 10360-2:2009": ISO_10360_2, "ISO 10360-5:2010": ISO_10360_5,
-    "VDI/VDE 2617": ISO_10360_2,
-})  # fmt: skip
-"""By standard; VDI/VDE 2617 is held to that of ISO 10360-2."""
 
 READY: Mapping[str, Plan] = MappingProxyType(
     {"ASME B89.4.1": B89, "ISO 10360-2": ISO_10360_2, "ISO 10360-5": ISO_10360_5}

@@ -8,6 +8,7 @@ import numpy as np
 
 from cmm_uq.conformity.copies import run_of
 from cmm_uq.conformity.plans import Condition, SpherePlan
+from cmm_uq.messages import say
 from cmm_uq.points import Floats, Points
 
 _DIRECTIONS = 400
@@ -31,16 +32,31 @@ def sphere_points(
             continue
         rows = np.flatnonzero(points.group == group)
         count = len(np.unique(points.xyz[rows] + 0.0, axis=0))
-        name = f"measurement {run_of(points, group)[0]}"
+        name = say("measurement {run_of}", run_of=run_of(points, group)[0])
         if not count == plan.points == len(rows):
-            lacking.append(f"{plan.points} points on the sphere of {name} ({len(rows)} recorded, {count} different)")
+            lacking.append(
+                say(
+                    "{points} points on the sphere of {name} ({recorded} recorded, {different} different)",
+                    points=plan.points,
+                    name=name,
+                    recorded=len(rows),
+                    different=count,
+                )
+            )
         elif (gap := _farthest(directions[rows])) > plan.reach_deg:
             bare.append(
-                f"points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)"
+                say(
+                    "points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)",
+                    name=name,
+                    gap=gap,
+                )
             )
     return (
-        Condition(f"{plan.points} points over the sphere", tuple(lacking)),
-        Condition(f"every direction of a hemisphere within {plan.reach_deg:g}° of a point", tuple(bare)),
+        Condition(say("{points} points over the sphere", points=plan.points), tuple(lacking)),
+        Condition(
+            say("every direction of a hemisphere within {reach_deg:g}° of a point", reach_deg=plan.reach_deg),
+            tuple(bare),
+        ),
     )
 
 

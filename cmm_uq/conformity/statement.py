@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from cmm_uq.conformity.decision import Decision
-from cmm_uq.jobs.job import CHARACTERISTICS, ConformityFacts
+from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.messages import Text
 
 StatementOutcome = Literal["pass", "fail", "undecided", "incomplete"]
 
@@ -42,6 +43,7 @@ class Statement:
     Parameters
     ----------
     facts : the job's wish.
+    characteristic : the one of the standard's that is decided.
     quantity : what is compared, in words.
     measured : what was measured, in the plural, for "… conform".
     errors : all that was decided, in the recording's order.
@@ -50,16 +52,12 @@ class Statement:
     """
 
     facts: ConformityFacts
-    quantity: str
-    measured: str
+    characteristic: str
+    quantity: Text
+    measured: Text
     errors: tuple[Decided, ...]
-    missing: tuple[str, ...]
-    remarks: tuple[str, ...]
-
-    @property
-    def characteristic(self) -> str:
-        """The one of the standard's that is decided."""
-        return CHARACTERISTICS[self.facts.standard]
+    missing: tuple[Text, ...]
+    remarks: tuple[Text, ...]
 
     @property
     def scope(self) -> Literal["complete", "partial"]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from cmm_uq.messages import Text
 from cmm_uq.uncertainty.quantity import Quantity
 
 Verdict = Literal["in", "out", "open"]
@@ -22,7 +23,7 @@ class Judged:
     """
 
     effect: str
-    title: str
+    title: Text
     parameter: str
     quantity: Quantity
     tolerance: float

@@ -8,19 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
-from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, Found, ModelComparison, search, with_rivals
 from cmm_uq.diagnosis.held_out import Improvement, improvement
 from cmm_uq.diagnosis.joint import Joint, joint_posterior
 from cmm_uq.diagnosis.location import Place, located
-from cmm_uq.diagnosis.noise import Kind
+from cmm_uq.diagnosis.noise import named
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel
-from cmm_uq.inference.posterior import Posterior, Progress
+from cmm_uq.inference.noise import Components
+from cmm_uq.inference.posterior import NoisyPosterior, Progress
+from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 FALSE_ALARMS = 0.01
 """Default rate at which a recording without any fault is found to have one."""
@@ -45,12 +46,12 @@ class LeftOut:
     """
 
     effect: str
-    title: str
+    title: Text
     probability: float
     parameters: Mapping[str, Quantity]
     explained: float
     together: float
-    points_to: str
+    points_to: Text
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,7 @@ class Diagnosis:
     rivals : every candidate by itself with its probability, most probable first.
     noise, improvement : see their classes.
     before, after : the job's model, and with what was left out.
+    components : of the noise, for the model after.
     posterior : joint, of the model after.
     """
 
@@ -88,16 +90,23 @@ class Diagnosis:
     where: tuple[Place, ...]
     effects: tuple[LeftOut, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
-    rivals: tuple[tuple[str, float], ...]
+    rivals: tuple[tuple[Text, float], ...]
     noise: NoiseFound
     improvement: Improvement
     before: MeasurementModel
     after: MeasurementModel
-    posterior: Posterior
+    components: Components
+    posterior: NoisyPosterior
 
 
 def diagnose(
-    model: MeasurementModel, *, stated_um: float | None, alpha: float, seed: int, progress: Progress | None = None
+    model: MeasurementModel,
+    *,
+    stated_um: float | None,
+    alpha: float,
+    seed: int,
+    progress: Progress | None = None,
+    known: NoisyPosterior | None = None,
 ) -> Diagnosis:
     """Diagnose a recording.
 
@@ -107,6 +116,7 @@ def diagnose(
     stated_um : standard uncertainty of a coordinate that the job states.
     alpha : false-alarm rate.
     seed : of everything random.
+    known : posterior of the model, where it was sampled already.
     """
     stated = None if stated_um is None else stated_um * MICROMETRE
     found = search(model, stated, alpha=alpha, seed=seed)
@@ -114,13 +124,13 @@ def diagnose(
     if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
         found = replace(found, last=found.first.comparison, model=model, chosen=frozenset(), unexplained=1.0)
         gain = improvement(model, model)
-    noise = _noise(found.last, stated)
-    known = None if stated is None else noise.coordinate.value * MICROMETRE
-    joint = joint_posterior(found, known, seed, progress)
+    joint = joint_posterior(found, seed, progress, known)
+    noise = _noise(found, joint, stated)
     after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     return Diagnosis(
         _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha), _left_out(found, joint),
-        _indistinguishable(found), _rivals(found.first), noise, gain, model, after, joint.posterior,
+        _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
+        joint.components, joint.posterior,
     )  # fmt: skip
 
 
@@ -133,7 +143,7 @@ def _verdict(found: Found, alpha: float) -> str:
 
 
 def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
-    index = {found.first.explanations[i].name: i for i in found.chosen}
+    index = {str.__str__(found.first.explanations[i].name): i for i in found.chosen}
     posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
     linear, first = found.model.estimate().linear, _squares(found.first.model.estimate().linear, ())
@@ -183,50 +193,28 @@ def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
     return tuple(groups)
 
 
-def _rivals(compared: ModelComparison) -> tuple[tuple[str, float], ...]:
+def _rivals(compared: ModelComparison) -> tuple[tuple[Text, float], ...]:
     order = np.argsort(-compared.probability)
     return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
 
 
-def _noise(comparison: Comparison, stated: float | None) -> NoiseFound:
-    """Posterior of the noise, given what is modelled; a kind is named when it has nine parts of ten."""
-    weight = comparison.noise_posterior()
-    sigma = comparison.sigma / MICROMETRE
-    sizes = np.array([kind.size if kind.name == "placing" else 0.0 for kind in comparison.kinds])
-    probability = _probabilities(comparison.kinds, weight)
-    placing = np.outer(sizes, sigma)
-    coordinate = _summary(np.broadcast_to(sigma, weight.shape), weight)
+def _noise(found: Found, joint: Joint, stated: float | None) -> NoiseFound:
+    """The noise, given what is modelled; a kind is named when it has nine parts of ten."""
+    sizes, weight = joint.posterior.sizes, found.last.noise_posterior().sum(axis=1)
+    estimate = found.model.estimate()
+    residuals = joint.components.white(sizes.typical)(estimate.least_squares.residuals[:, None])[:, 0]
     return NoiseFound(
-        coordinate,
-        _summary(placing, weight),
-        probability.get("correlated", 0.0) > _NOISE_KIND,
-        probability.get("tails", 0.0) > _NOISE_KIND or _heavy(comparison),
+        Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
+        Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
+        float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
+        named(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or _heavy(residuals),
         stated is not None
-        and _contradicts(stated, comparison.squares[int(weight.sum(axis=1).argmax())], comparison.degrees_of_freedom),
-    )
+        and _contradicts(stated, found.last.squares[int(weight.argmax())], found.last.degrees_of_freedom),
+    )  # fmt: skip
 
 
-def _probabilities(kinds: Sequence[Kind], weight: Floats) -> dict[str, float]:
-    total: dict[str, float] = {}
-    for kind, part in zip(kinds, weight.sum(axis=1), strict=True):
-        total[kind.name] = total.get(kind.name, 0.0) + float(part)
-    return total
-
-
-def _summary(values: Floats, weight: Floats) -> Quantity:
-    flat, w = values.ravel(), weight.ravel()
-    mean = float(w @ flat)
-    order = np.argsort(flat)
-    cumulative = np.cumsum(w[order])
-    low, high = (float(flat[order][min(int(np.searchsorted(cumulative, q)), len(flat) - 1)]) for q in (0.025, 0.975))
-    return Quantity(
-        mean, float(np.sqrt(max(float(w @ (flat - mean) ** 2), 0.0))), (min(low, mean), max(high, mean)), "µm"
-    )
-
-
-def _heavy(comparison: Comparison) -> bool:
-    """Whether Student's t with four degrees of freedom describes the residuals e⁴ times better than a normal."""
-    z = comparison.left
+def _heavy(z: Floats) -> bool:
+    """Whether Student's t with four degrees of freedom describes residuals e⁴ times better than a normal distribution."""
     deviation = float(z.std())
     if len(z) < 15 or deviation == 0:
         return False

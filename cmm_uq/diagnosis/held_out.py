@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.inference.posterior import Density
+from cmm_uq.messages import Text, say
 from cmm_uq.model import MeasurementModel
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
@@ -37,7 +38,7 @@ class Improvement:
     heldout_rms_after_um: float
     elpd_gain: float
     elpd_gain_se: float
-    unseen: str = "placings"
+    unseen: Text = say("placings")
 
 
 def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvement:
@@ -87,7 +88,7 @@ def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float
     return _rms(np.concatenate(errors)), np.array(densities)
 
 
-def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], str]:
+def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], Text]:
     """What is left out together, and what it is: placings; of few placings their points. Each with its repeats.
 
     Without one of a few placings the rest would often determine nothing: a gauge on seven lines has one along Y.
@@ -95,9 +96,9 @@ def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], str]:
     artefact, used = model.artefact, model.used
     placing = artefact.measurement[used]
     if len(np.unique(placing)) >= FOLDS:
-        return placing, "placings"
+        return (placing, say("placings"))
     key = np.column_stack([placing, artefact.points.point[artefact.rows[:, 0]][used]])
-    return np.unique(key, axis=0, return_inverse=True)[1].ravel(), "points"
+    return (np.unique(key, axis=0, return_inverse=True)[1].ravel(), say("points"))
 
 
 def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy import special
 
 from cmm_uq.diagnosis.comparison.explanations import evenly, unevenly
 from cmm_uq.diagnosis.comparison.search import Found
-from cmm_uq.diagnosis.noise import Kind
-from cmm_uq.inference.posterior import Posterior, Progress, sample
+from cmm_uq.inference.noise import Components
+from cmm_uq.inference.posterior import NoisyPosterior, Progress
+from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.inference.shaped import Shaped, sample_shaped
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.noise import noise_of
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 
@@ -25,39 +27,44 @@ _IMPROBABLE = 12.0
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A posterior and the draws (N, s) of each effect's shape, by its name."""
+    """A posterior, the components of its noise, and the draws (N, s) of each effect's shape, by its name."""
 
-    posterior: Posterior
+    posterior: NoisyPosterior
+    components: Components
     shapes: dict[str, Floats]
 
 
-def joint_posterior(found: Found, sigma: float | None, seed: int, progress: Progress | None = None) -> Joint:
+def joint_posterior(
+    found: Found, seed: int, progress: Progress | None = None, known: NoisyPosterior | None = None
+) -> Joint:
     """Sample everything at once.
 
     Parameters
     ----------
     found : by the search.
-    sigma : standard uncertainty of a coordinate, mm; ``None`` when it is to be estimated here.
     seed : of the draws.
     progress : told the part done.
+    known : posterior of the job's own model, which it stays where nothing is found.
     """
-    model = replace(found.model, sigma=sigma)
+    model, components = found.model, noise_of(found.model)
+    if known is not None and not found.effects:
+        return Joint(known, components, {})
     estimate = model.estimate()
-    linear, white = estimate.linear.uncorrelated(_noise(found).white)
     new = [e for e in model.effects if e.shape and e.name in found.effects]
+    posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, None if new else progress)
     if not new:
-        return Joint(sample(linear, seed, progress), {})
-    values = estimate.least_squares.value
+        return Joint(posterior, components, {})
+    # what shapes columns is sampled under the noise that is typical with the shapes held
+    white = components.white(posterior.sizes.typical)
+    linear, values = estimate.linear.uncorrelated(white), estimate.least_squares.value
     shaped = [_shaped(found, model, effect, values) for effect in new]
     shaped = [replace(some, table=np.stack([white(columns) for columns in some.table])) for some in shaped]
-    posterior = sample_shaped(linear, shaped, seed, progress)
-    return Joint(posterior, {e.name: posterior.shapes[:, j : j + 1] for j, e in enumerate(new)})
-
-
-def _noise(found: Found) -> Kind:
-    """That is most probable once everything found is modelled."""
-    weight = found.last.noise_posterior().sum(axis=1)
-    return found.last.kinds[int(np.argmax(weight))]
+    drawn = sample_shaped(replace(linear, sigma=None), shaped, seed, progress)
+    sizes = posterior.sizes.at(np.resize(np.arange(len(posterior.draws)), len(drawn.draws)))
+    shapes = {e.name: drawn.shapes[:, j : j + 1] for j, e in enumerate(new)}
+    return Joint(
+        NoisyPosterior(**{f.name: getattr(drawn, f.name) for f in fields(drawn)}, sizes=sizes), components, shapes
+    )
 
 
 def _shaped(found: Found, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:

@@ -11,6 +11,7 @@ from cmm_uq.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.diagnosis.comparison.lack_of_fit import tail_probability
 from cmm_uq.diagnosis.comparison.search import ModelComparison
 from cmm_uq.diagnosis.comparison.stack import Version
+from cmm_uq.messages import Text
 from cmm_uq.points import Floats, Ints
 from cmm_uq.units import MICROMETRE
 
@@ -36,7 +37,7 @@ class Place:
     region: tuple[float, float]
     p_value: float
     amplitude_um: float
-    what: str
+    what: Text
     curve: tuple[Floats, Floats, Floats]
 
 

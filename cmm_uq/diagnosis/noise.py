@@ -1,72 +1,166 @@
-"""What the noise may be: white, with a common part in each placing, or correlated in time.
+"""The noise under which candidates are compared: a few shapes of it that stand for all that it could be.
 
-The noise model belongs to the baseline. Set-up offsets or slow drifts of the noise that are not modelled look like physics.
+A shape is the noise of sizes in proportion to the reading noise. Many are drawn from their prior, evenly; those that matter,
+whether or not something is missing, are kept, each with a weight that makes their sum an unbiased estimate of the integral
+over all. The noise belongs to the baseline: set-up offsets or slow drifts that are not modelled look like physics.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import linalg, sparse, special
+from scipy import sparse, special
 
-from cmm_uq.points import Floats, Ints
+from cmm_uq.inference.least_squares import LeastSquares
+from cmm_uq.inference.linear_model import LinearModel, Unknown
+from cmm_uq.inference.marginal import Marginal
+from cmm_uq.inference.noise import Components, Sizes
+from cmm_uq.points import Floats
+from cmm_uq.units import unit
 
-PLACING_RATIOS = (0.5, 1.0, 2.0)
-"""Standard deviation of a placing over that of a reading."""
-
-CORRELATIONS = (0.5, 0.85)
-"""Correlation of neighbours in time."""
-
-WHITE = 0.8
-"""Probability, beforehand, that noise is white; the rest is shared by the other kinds."""
-
-_FEW = 12
-"""Directions; of no more than that, correlation is reckoned within each of them: a point may be seen along several at once."""
+SHAPES, KEPT = 512, 7
+"""How many are drawn, and how many stand for them."""
 
 TAILS = 0.05
-"""Probability of heavy tails, taken from that of white noise."""
+"""Probability of heavy tails."""
 
 _TAILS_DOF = 4.0
 _SHRINK = (_TAILS_DOF - 2) / _TAILS_DOF
 """Square of the t distribution's scale over its standard deviation."""
 
 _STATED_IS_RIGHT = 0.9
-_STATED_SPREAD = 0.08
+_STATED_SPREAD = 0.2
 _POINTS = 400
 
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """One kind of noise.
+    """One shape of the noise.
 
     Parameters
     ----------
-    name : ``white``, ``placing``, ``correlated`` or ``tails``.
-    size : ratio of the placing's standard deviation to the reading's, or correlation of neighbours; 0 for white.
-    whitening : (m, m) W, sparse where it can be; W times such noise, over the standard deviation of a reading, is white.
+    name : ``components`` or ``tails``.
+    whitening : (m, m) sparse W; W times the part of such noise that is independent, over that of a reading, is white.
     log_whitening : logarithm of its determinant.
     probability : beforehand.
+    slow : (m, c) columns with standard normal coefficients that it has besides.
     log_factor : logarithm by which its density exceeds that of a normal distribution with this covariance.
     """
 
     name: str
-    size: float
-    whitening: sparse.csr_array | Floats
+    whitening: sparse.csr_array
     log_whitening: float
     probability: float
+    slow: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     log_factor: float = 0.0
 
     def white(self, columns: Floats) -> Floats:
-        """Columns (m, b) that become white noise if they are noise of this kind."""
+        """W times columns (m, b)."""
         return np.asarray(self.whitening @ columns, dtype=np.float64)
 
-    def noise(self, normal: Floats) -> Floats:
-        """Noise (m, b) of this kind from standard normal numbers."""
-        if isinstance(self.whitening, np.ndarray):
-            return np.asarray(linalg.solve_triangular(self.whitening, normal, lower=True), dtype=np.float64)
-        return np.asarray(sparse.linalg.splu(self.whitening.tocsc()).solve(normal), dtype=np.float64)
+    def coloured(self, columns: Floats) -> Floats:
+        """The inverse of W times columns (m, b)."""
+        return np.asarray(sparse.linalg.splu(self.whitening.tocsc()).solve(columns), dtype=np.float64)
+
+    def noise(self, random: np.random.Generator, draws: int) -> Floats:
+        """Noise (m, draws) of this shape, a reading's standard deviation being one."""
+        found = self.coloured(random.standard_normal((self.whitening.shape[0], draws)))
+        return found + self.slow @ random.standard_normal((self.slow.shape[1], draws)) if self.slow.size else found
+
+
+def kinds(
+    linear: LinearModel, components: Components, estimate: LeastSquares, rivals: Floats, residuals: Floats
+) -> list[Kind]:
+    """Shapes of the noise that a recording could show.
+
+    Parameters
+    ----------
+    linear : what is explained.
+    components : of the noise.
+    estimate : least squares of ``linear``.
+    rivals : (m, r) columns, mm, of what could be missing, for coefficients of standard deviation one.
+    residuals : (m,) of the estimate, mm.
+    """
+    shapes = drawn_shapes(components)
+    wide = Marginal(_with_rivals(linear, rivals), components, _without_rivals(estimate, rivals.shape[1]))
+    share = np.mean([_probability(Marginal(linear, components, estimate), shapes), _probability(wide, shapes)], axis=0)
+    kept, weight = _representative(components.sizes(shapes), share)
+    scale = linear.noise_scale
+    found = [
+        shape_of(components, components.sizes(shapes[[i]]), scale, (1 - TAILS) * w)
+        for i, w in zip(kept, weight, strict=True)
+    ]
+    return [*found, tails(residuals / scale)]
+
+
+def drawn_shapes(components: Components) -> Floats:
+    """Latent numbers (n, d) of shapes for a reading noise of 1 mm, spread evenly over their prior; the first is white."""
+    d = components.dimension
+    found = np.zeros((SHAPES, d))
+    if d > 1:
+        # a lattice by powers of the root of x^d = x + 1 (Roberts 2018), which leaves no gaps in any dimension
+        root = 1.5
+        for _ in range(30):
+            root = (1 + root) ** (1 / d)
+        steps = root ** -np.arange(1.0, d)
+        found[:, 1:] = special.ndtri(np.clip((0.5 + np.outer(np.arange(SHAPES), steps)) % 1, 1e-6, 1 - 1e-6))
+    return found
+
+
+def _probability(marginal: Marginal, shapes: Floats) -> Floats:
+    """Of each shape (n,), the reading noise integrated out: the sum of squares has a gamma distribution given the shape."""
+    at = shapes.copy()
+    at[:, 0] = np.log(marginal.estimate.sigma_of_residuals or 1.0)
+    log, squares = marginal.log_likelihood(marginal.noise.sizes(at))
+    count = max(marginal.estimate.degrees_of_freedom, 1)
+    value = log - 0.5 * count * np.log(np.maximum(squares, 1e-12))
+    value = np.where(np.isfinite(value), value, -np.inf)
+    return np.asarray(np.exp(value - special.logsumexp(value)))
+
+
+def _representative(sizes: Sizes, share: Floats) -> tuple[list[int], Floats]:
+    """Shapes that stand for all, and their weights: those of what each stands for (systematic resampling)."""
+    table = np.column_stack(
+        [sizes.reading, sizes.placing, sizes.growth, sizes.slow, np.where(sizes.slow > 0, sizes.rate, 0)]
+    )
+    _, first, index, count = np.unique(
+        np.round(table, 9), axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    part = np.bincount(index.ravel(), share, len(first))
+    part = 0.9 * part / part.sum() + 0.1 * count / count.sum()
+    expected = KEPT * part
+    certain = expected >= 1
+    rest = np.where(certain, 0.0, part)
+    places = max(KEPT - int(certain.sum()), 0)
+    taken = np.zeros(len(part))
+    if places and rest.sum() > 0:
+        upper = np.cumsum(rest / rest.sum() * places)
+        taken = np.floor(upper + 0.5) - np.floor(np.append(0.0, upper[:-1]) + 0.5)
+        taken = taken * rest.sum() / (places * np.where(rest > 0, rest, 1.0))
+    weight = np.where(certain, 1.0, taken) * count / count.sum()
+    chosen = np.flatnonzero(weight > 0)
+    return first[chosen].tolist(), weight[chosen]
+
+
+def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probability: float) -> Kind:
+    """A single draw of sizes as a kind of noise, over the noise scale (m,), for a reading noise of one."""
+    variances, slow = components.variances(sizes)
+    v = (variances @ components.shares.T)[0]
+    whitening = sparse.diags_array(1 / np.sqrt(v)) @ components.turn @ sparse.diags_array(noise_scale)
+    columns = components.slow * np.sqrt(slow[0]) / noise_scale[:, None] if np.any(slow) else np.zeros((0, 0))
+    log = float(np.log(noise_scale).sum() - 0.5 * np.log(v).sum())
+    return Kind("components", sparse.csr_array(whitening), log, probability, columns)
+
+
+def _with_rivals(linear: LinearModel, rivals: Floats) -> LinearModel:
+    more = tuple(Unknown(("rival", str(i)), unit("1"), 0.0, 1.0, 1.0) for i in range(rivals.shape[1]))
+    return replace(linear, design=np.hstack([linear.design, rivals]), unknowns=(*linear.unknowns, *more))
+
+
+def _without_rivals(estimate: LeastSquares, count: int) -> LeastSquares:
+    return replace(estimate, value=np.append(estimate.value, np.zeros(count)))
 
 
 def tails(residual: Floats) -> Kind:
@@ -82,76 +176,14 @@ def tails(residual: Floats) -> Kind:
     log_t = log_t - 0.5 * (_TAILS_DOF + 1) * np.log1p(squares / _TAILS_DOF) - 0.5 * np.log(_SHRINK)
     normal = -0.5 * np.log(2 * np.pi * _SHRINK / weight) - 0.5 * weight * squares
     log_whitening = 0.5 * float(np.log(weight / _SHRINK).sum())
-    whitening = sparse.diags_array(np.sqrt(weight / _SHRINK)).tocsr()
-    return Kind("tails", _TAILS_DOF, whitening, log_whitening, TAILS, float(np.sum(log_t - normal)))
-
-
-def kinds(
-    placing: Ints,
-    order: Floats,
-    directions: Floats,
-    *,
-    white: float = WHITE,
-    correlations: Sequence[float] = CORRELATIONS,
-) -> list[Kind]:
-    """Kinds of noise that a recording could show.
-
-    Parameters
-    ----------
-    placing : (m,) observations with the same number share an offset: repeats of one quantity in one placing.
-    order : (m,) time, or place in the recording, of each observation.
-    directions : (m, 3) along which each observation sees the noise of a point; zero where it sees a difference of points.
-    white : probability, beforehand, that it is white; the others share the rest.
-    correlations : of neighbours in time to consider.
-    """
-    m = len(placing)
-    _, place, repeats = np.unique(placing, return_inverse=True, return_counts=True)
-    shared = len(repeats) < m
-    share = (1 - white) / (len(correlations) + shared * len(PLACING_RATIOS))
-    found = [Kind("white", 0.0, sparse.eye_array(m, format="csr"), 0.0, white - TAILS)]
-    if shared:
-        found += [_shared(ratio, place, repeats, share) for ratio in PLACING_RATIOS]
-    distinct, chain = np.unique(np.round(directions, 3), axis=0, return_inverse=True)
-    if len(distinct) > _FEW and directions.any(axis=1).all():
-        return found + [_correlated_along(phi, order, directions, share) for phi in correlations]
-    sequence = np.lexsort((order, chain.ravel()))
-    return found + [_correlated(phi, sequence, chain.ravel()[sequence], share) for phi in correlations]
-
-
-def _shared(ratio: float, place: Ints, repeats: Ints, probability: float) -> Kind:
-    """An offset of each place, ``ratio`` times a reading's standard deviation: covariance 1 + ratio² within a place."""
-    m, grown = len(place), np.sqrt(1 + repeats * ratio**2)
-    member = sparse.csr_array((np.ones(m), (np.arange(m), place)), shape=(m, len(repeats)))
-    less = sparse.diags_array((1 - 1 / grown) / repeats)
-    whitening = (sparse.eye_array(m) - member @ less @ member.T).tocsr()
-    return Kind("placing", ratio, whitening, -float(np.log(grown).sum()), probability)
-
-
-def _correlated(phi: float, sequence: Ints, chain: Ints, probability: float) -> Kind:
-    """First-order autoregression along a sequence (m,) of observations, in chains that are numbered (m,)."""
-    m, innovation = len(sequence), np.sqrt(1 - phi**2)
-    follows = np.append(False, chain[1:] == chain[:-1])
-    diagonal = np.where(follows, 1 / innovation, 1.0)
-    below = np.full(int(follows.sum()), -phi / innovation)
-    rows, columns = np.append(sequence, sequence[follows]), np.append(sequence, sequence[np.flatnonzero(follows) - 1])
-    whitening = sparse.csr_array((np.append(diagonal, below), (rows, columns)), shape=(m, m))
-    return Kind("correlated", phi, whitening, float(np.log(diagonal).sum()), probability)
-
-
-def _correlated_along(phi: float, order: Floats, directions: Floats, probability: float) -> Kind:
-    """First-order autoregression of each coordinate, seen along directions that all differ."""
-    rank = np.argsort(np.argsort(order, kind="stable"), kind="stable")  # without ties: equal times would be singular
-    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    covariance = phi ** np.abs(rank[:, None] - rank) * (unit @ unit.T)
-    factor = linalg.cholesky(covariance, lower=True)
-    whitening = np.asarray(linalg.solve_triangular(factor, np.eye(len(rank)), lower=True), dtype=np.float64)
-    return Kind("correlated", phi, whitening, -float(np.log(np.diag(factor)).sum()), probability)
+    whitening = sparse.csr_array(sparse.diags_array(np.sqrt(weight / _SHRINK)))
+    return Kind("tails", whitening, log_whitening, TAILS, log_factor=float(np.sum(log_t - normal)))
 
 
 def sigma_grid(stated: float | None, residual: float) -> tuple[Floats, Floats]:
     """Values (s,) of the noise, mm, and their log probabilities beforehand.
 
-    A stated value is mostly right to 8 %, and now and then simply wrong; without one, the logarithm is uniform.
+    A stated value is mostly good to a fifth, and now and then simply wrong; without one, the logarithm is uniform.
 
     Parameters
     ----------
@@ -170,6 +202,9 @@ def sigma_grid(stated: float | None, residual: float) -> tuple[Floats, Floats]:
     return np.exp(grid), np.log(weight * np.gradient(grid) / np.sqrt(2 * np.pi))
 
 
-def order_of(time: Floats | None, count: int) -> Floats:
-    """Time of each observation, or its place in the recording."""
-    return np.arange(count, dtype=np.float64) if time is None else time
+def named(kinds: Sequence[Kind], weight: Floats) -> dict[str, float]:
+    """Probability of each name of ``kinds`` by their weights (k,)."""
+    total: dict[str, float] = {}
+    for kind, part in zip(kinds, weight, strict=True):
+        total[kind.name] = total.get(kind.name, 0.0) + float(part)
+    return total

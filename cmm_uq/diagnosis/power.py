@@ -27,6 +27,7 @@ from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.kind import Observed
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
+from cmm_uq.units import Unit
 
 POWER = 0.8
 
@@ -59,7 +60,7 @@ class Power:
 
     effect: str
     parameter: str
-    unit: str
+    unit: Unit
     allowed: float
     per_unit: float
     detected_at: Floats
@@ -181,13 +182,7 @@ class _Rule:
         """
         comparison = self.comparison
         random = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(2,)))
-        sizes = comparison.sigma[comparison.noise_posterior().argmax(axis=1)]
-        probability = np.array([kind.probability for kind in comparison.kinds])
-        chosen = random.choice(len(sizes), DRAWS, p=probability / probability.sum())
-        draws = np.empty((len(comparison.left), DRAWS))
-        for g in np.unique(chosen):
-            columns = np.flatnonzero(chosen == g)
-            draws[:, columns] = sizes[g] * comparison.noise(comparison.kinds[g], random, len(columns))
+        draws = comparison.nothing(random, DRAWS)
         found = []
         for larger in _LARGER:
             statistic = statistic_of(comparison, larger * draws)[0]

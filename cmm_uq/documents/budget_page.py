@@ -5,6 +5,7 @@ from __future__ import annotations
 from cmm_uq import __version__
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.plots import budget_bars
+from cmm_uq.messages import Text, Verbatim, commas, say
 from cmm_uq.uncertainty.budget import HEADINGS, Budget
 from cmm_uq.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
 from cmm_uq.uncertainty.evaluation import Evaluation, Stated
@@ -22,31 +23,44 @@ def budget_document(file: ModelFile, evaluation: Evaluation, name: str) -> Docum
     name : of the file.
     """
     asked = evaluation.request
-    summary = Table("Results", _columns(SUMMARY), tuple(summary_rows(evaluation)), (
-        f"Intervals are for a coverage probability of {100 * asked.coverage:g} %; the shortest one where the method is "
-        "Monte Carlo.",
+    summary = Table(
+        say("Results"),
+        _columns(SUMMARY),
+        tuple(summary_rows(evaluation)),
+        (
+            say(
+                "Intervals are for a coverage probability of {coverage:g} %; the shortest one where the "
+                "method is Monte Carlo.",
+                coverage=100 * asked.coverage,
+            ),
+        ),
+    )
+    expressions = Facts(tuple(
+        (Verbatim(output), say("{output} = {text}", output=Verbatim(output), text=Verbatim(text)))
+        for output, text in _expressions(file).items()
     ))  # fmt: skip
-    expressions = Facts(tuple((output, f"{output} = {text}") for output, text in _expressions(file).items()))
-    described = Facts(tuple(file.descriptions.items()))
+    described = Facts(tuple((Verbatim(what), Verbatim(text)) for what, text in file.descriptions.items()))
     model: tuple[Block, ...] = (expressions, described) if file.descriptions else (expressions,)
-    sections = [Section("Measurement model", model), Section("Results", (summary,))]
+    sections = [Section(say("Measurement model"), model), Section(say("Results"), (summary,))]
     sections += [
-        Section(f"Budget of {output}", _budget(evaluation, output, stated))
+        Section(say("Budget of {output}", output=Verbatim(output)), _budget(evaluation, output, stated))
         for output, stated in evaluation.stated.items()
     ]
     return Document(
-        title="Uncertainty budget",
-        number=file.title,
-        subject=f"Evaluated by the law of propagation of uncertainty and by Monte Carlo from {name}",
+        title=say("Uncertainty budget"),
+        number=Verbatim(file.title),
+        subject=say(
+            "Evaluated by the law of propagation of uncertainty and by Monte Carlo from {name}", name=Verbatim(name)
+        ),
         issuer=(),
-        particulars=(Facts((("File", name), ("SHA-256", file.sha256))),),
+        particulars=(Facts(((say("File"), Verbatim(name)), (say("SHA-256"), Verbatim(file.sha256)))),),
         warnings=(),
         sections=tuple(sections),
         statements=(),
         signatures=(),
-        attachments=(name, "results.json"),
-        produced_by=f"cmm-uq {__version__}, seed {asked.seed}",
-        end="End of budget",
+        attachments=(Verbatim(name), Verbatim("results.json")),
+        produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=asked.seed),
+        end=say("End of budget"),
     )
 
 
@@ -56,29 +70,39 @@ def _expressions(file: ModelFile) -> dict[str, str]:
 
 def _budget(evaluation: Evaluation, output: str, stated: Stated) -> tuple[Block, ...]:
     budget = stated.budget
-    blocks: list[Block] = [Paragraph(f"{stated.reason[0].upper()}{stated.reason[1:]}.".replace("..", "."), tone="note")]
+    blocks: list[Block] = [Paragraph(_sentence(stated.reason), tone="note")]
     if budget.statement:
         blocks.append(Paragraph(budget.statement, tone="note"))
-    blocks += budget_blocks(output, budget)
+    blocks += budget_blocks(Verbatim(output), budget)
     rows = tuple(comparison_rows(evaluation, output))
     if len(rows) > 1:
-        blocks.append(Table(f"The methods beside each other for {output}", _columns(COMPARISON), rows))
+        blocks.append(
+            Table(
+                say("The methods beside each other for {output}", output=Verbatim(output)), _columns(COMPARISON), rows
+            )
+        )
     return (*blocks, Paragraph(statement(evaluation, output)))
 
 
-def budget_blocks(measurand: str, budget: Budget) -> list[Block]:
+def _sentence(reason: Text) -> Text:
+    return say("{reason:capital}", reason=reason) if reason.endswith(".") else say("{reason:capital}.", reason=reason)
+
+
+def budget_blocks(measurand: Text, budget: Budget) -> list[Block]:
     """A budget as a table, and as a picture when it has more than one line."""
-    table = Table(f"Contributions to {measurand}", _columns(HEADINGS), tuple(budget.as_text()))
+    table = Table(say("Contributions to {measurand}", measurand=measurand), _columns(HEADINGS), tuple(budget.as_text()))
     shares = [(line.name, share) for depth, line, share in budget.flat() if depth == 0 and share]
     if len(shares) < 2:
         return [table]
-    names = ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares)
+    told = commas(say("{name} {share:.0f} %", name=name, share=100 * share) for name, share in shares)
     picture = budget_bars(
-        [name for name, _ in shares], [share for _, share in shares],
-        caption=f"Share of each contribution in the variance of {measurand}.", alternative=f"Shares: {names}.",
-    )  # fmt: skip
+        [name for name, _ in shares],
+        [share for _, share in shares],
+        caption=say("Share of each contribution in the variance of {measurand}.", measurand=measurand),
+        alternative=say("Shares: {shares}.", shares=told),
+    )
     return [table, picture]
 
 
-def _columns(headings: tuple[str, ...]) -> tuple[Column, ...]:
+def _columns(headings: tuple[Text, ...]) -> tuple[Column, ...]:
     return tuple(Column(heading, numeric=heading not in _TEXT) for heading in headings)

@@ -20,12 +20,13 @@ from cmm_uq.documents.plot_style import (
     SMALL,
     TINY,
     WIDTH_MM,
-    as_svg,
+    drawn,
     finite,
     house_style,
     new_figure,
 )
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import NOTHING, Text, say
 from cmm_uq.points import Floats
 
 if TYPE_CHECKING:
@@ -43,14 +44,14 @@ _LEFT, _BELOW, _ABOVE = 14.0, 11.0, 4.5  # room for figures and names, mm
 
 def corner_plot(
     samples: ArrayLike,
-    names: Sequence[str],
+    names: Sequence[Text],
     *,
-    units: Sequence[str] | None = None,
+    units: Sequence[Text] | None = None,
     estimates: ArrayLike | None = None,
     intervals95: ArrayLike | None = None,
     priors: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
-    caption: str,
-    alternative: str,
+    caption: Text,
+    alternative: Text,
 ) -> Plot:
     """Marginal and pairwise posterior densities.
 
@@ -72,7 +73,12 @@ def corner_plot(
         raise CmmUqError("the picture of a posterior needs at least two draws of one parameter")
     chosen = _most_correlated(draws)
     if len(chosen) < len(names):
-        caption = f"{caption} The {len(chosen)} of {len(names)} parameters that are correlated most are shown."
+        caption = say(
+            "{caption} The {count} of {total} parameters that are correlated most are shown.",
+            caption=caption,
+            count=len(chosen),
+            total=len(names),
+        )
     kept = draws[:, chosen]
     ranges = _ranges(kept)
     middle = np.median(draws, axis=0) if estimates is None else finite("estimates", estimates, (len(names),))
@@ -89,8 +95,12 @@ def corner_plot(
                 panels.prior(k, *priors[parameter])
         panels.pairs(middle[chosen])
         panels.frames()
-        panels.words([f"{names[c]} / {units[c]}" if units and units[c] else names[c] for c in chosen])
-        return Plot(caption, alternative, as_svg(panels.figure))
+        panels.words([_label(names[c], units[c] if units else NOTHING) for c in chosen])
+        return drawn(panels.figure, caption, alternative)
+
+
+def _label(name: Text, unit: Text) -> Text:
+    return say("{name} / {unit}", name=name, unit=unit) if unit else name
 
 
 def _most_correlated(draws: Floats) -> NDArray[np.intp]:
@@ -218,7 +228,7 @@ class _Panels:
         x, y = column.astype(np.float64), self.count - 1.0 - row
         self.strokes(np.append(x, x), np.append(x, x + _SCALE), np.append(y, y), np.append(y + _SCALE, y), MUTED)
 
-    def words(self, labels: Sequence[str]) -> None:
+    def words(self, labels: Sequence[Text]) -> None:
         """Ticks with their figures along the outer edges, and names with units over the densities."""
         length, distance = 0.8 / self.panel_mm, 1.4 / self.panel_mm
         for k, label in enumerate(labels):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.conformity.accuracy import TITLES, UNITS
-from cmm_uq.documents.diagnosis_words import VERDICTS, lines, noise_words, sentence, summary_rows
+from cmm_uq.documents.diagnosis_words import VERDICT_WORDS, VERDICTS, lines, noise_words, sentence, summary_rows
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.origin import came_about
 from cmm_uq.documents.outcome import Outcome
@@ -15,9 +15,10 @@ from cmm_uq.documents.plots import curve_with_band, length_plot
 from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.results_file import diagnosis_data, head
-from cmm_uq.documents.wording import expanded, probability
+from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.units import MICROMETRE
+from cmm_uq.messages import NOTHING, Verbatim, commas, day, names, number, say, together
+from cmm_uq.units import MICROMETRE, unit
 
 
 def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
@@ -37,31 +38,48 @@ def diagnosis_document(found: Diagnosed) -> Document:
     """The page of a diagnosis."""
     facts, d = found.job.facts, found.diagnosis
     return working_page(
-        facts, "Diagnosis", f"{came_about(found.job)} {facts.job.date.isoformat()}",
+        facts,
+        say("Diagnosis"),
+        say("{came_about} {date}", came_about=came_about(found.job), date=day(facts.job.date)),
         particulars=(
-            Facts((("Verdict", d.verdict), ("p-value of “nothing is missing”", f"{d.p_value:.2g}"),
-                   ("False-alarm rate", f"{100 * d.alpha:g} %"))),
-            Facts((("Machine", facts.machine.name), ("Artefact", d.before.artefact.title),
-                   ("Effects that the job names", ", ".join(facts.model.effects) or "none"))),
+            Facts(
+                (
+                    (say("Verdict"), VERDICT_WORDS[d.verdict]),
+                    (say("p-value of “nothing is missing”"), number(d.p_value, ".2g")),
+                    (say("False-alarm rate"), say("{alpha:g} %", alpha=100 * d.alpha)),
+                )
+            ),
+            Facts(
+                (
+                    (say("Machine"), Verbatim(facts.machine.name)),
+                    (say("Artefact"), d.before.artefact.title),
+                    (say("Effects that the job names"), (commas(names(facts.model.effects)) or say("none"))),
+                )
+            ),
         ),
-        warnings=(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
+        warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
         sections=diagnosis_sections(found),
-        produced_by=f"{program()}, {d.posterior.sampler}, seed {d.posterior.seed}",
-    )  # fmt: skip
+        produced_by=say(
+            "{program}, {sampler}, seed {seed}",
+            program=program(found.job),
+            sampler=Verbatim(d.posterior.sampler),
+            seed=d.posterior.seed,
+        ),
+    )
 
 
 def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
     """What a diagnosis says, as sections of any document."""
     noise = noise_words(found.diagnosis, found.job.facts.recording.u_coordinate_um)
     sections = (
-        Section("What was left out", _left_out(found)),
-        Section("Before and after", _before_after(found)),
-        Section("What a correction would change", _consequences(found)),
-        Section("Where the mismatch lives", _where(found)),
-        Section("Candidate explanations", (_rivals(found),)),
-        Section("Noise", tuple(Paragraph(text) for text in noise)),
-        Section("What to measure next", tuple(
-            Paragraph(f"{' and '.join(s.separates)}: {s.what}") for s in found.suggestions
+        Section(say("What was left out"), _left_out(found)),
+        Section(say("Before and after"), _before_after(found)),
+        Section(say("What a correction would change"), _consequences(found)),
+        Section(say("Where the mismatch lives"), _where(found)),
+        Section(say("Candidate explanations"), (_rivals(found),)),
+        Section(say("Noise"), tuple(Paragraph(text) for text in noise)),
+        Section(say("What to measure next"), tuple(
+            Paragraph(say("{effects}: {what}", effects=together(names(s.separates)), what=s.what)) for s in found.suggestions
         )),
     )  # fmt: skip
     return tuple(section for section in sections if section.blocks)
@@ -72,7 +90,7 @@ def _left_out(found: Diagnosed) -> tuple[Block, ...]:
     blocks: list[Block] = [Paragraph(VERDICTS[d.verdict])]
     blocks += [Paragraph(sentence(item, d.improvement)) for item in d.effects]
     blocks += [
-        Paragraph(f"This recording cannot tell apart: {', '.join(group)}.", tone="warning")
+        Paragraph(say("This recording cannot tell apart: {effects}.", effects=commas(names(group))), tone="warning")
         for group in d.indistinguishable
     ]
     return tuple(blocks)
@@ -87,29 +105,49 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
     odd = {m for f in found.findings for m in f.measurements}
     gain = d.improvement
     plot = length_plot(
-        d.before.artefact.measurement.astype(np.float64), before, after, expanded_before_um=expanded,
-        expanded_after_um=expanded, reference="no residual", flagged=np.isin(d.before.artefact.measurement, list(odd)),
-        before_label="Residuals of the job's model", after_label="With what was left out",
-        caption="Residual of each observation before and after, with U (k = 2) from the noise.",
-        alternative=f"Residual rms {gain.rms_before_um:.1f} µm before and {gain.rms_after_um:.1f} µm after.",
-    )  # fmt: skip
-    rows = (
-        ("Residual rms", f"{gain.rms_before_um:.2f}", f"{gain.rms_after_um:.2f}", "µm"),
-        (
-            f"Rms on held-out {gain.unseen}",
-            f"{gain.heldout_rms_before_um:.2f}",
-            f"{gain.heldout_rms_after_um:.2f}",
-            "µm",
+        d.before.artefact.measurement.astype(np.float64),
+        before,
+        after,
+        expanded_before_um=expanded,
+        expanded_after_um=expanded,
+        reference=say("no residual"),
+        flagged=np.isin(d.before.artefact.measurement, list(odd)),
+        before_label=say("Residuals of the job's model"),
+        after_label=say("With what was left out"),
+        caption=say("Residual of each observation before and after, with U (k = 2) from the noise."),
+        alternative=say(
+            "Residual rms {rms_before_um:.1f} µm before and {rms_after_um:.1f} µm after.",
+            rms_before_um=gain.rms_before_um,
+            rms_after_um=gain.rms_after_um,
         ),
-        ("Gain in log predictive density", "", f"{gain.elpd_gain:.1f} ± {gain.elpd_gain_se:.1f}", ""),
     )
-    heads = (Column("Quantity", numeric=False), Column("Before"), Column("After"), Column("Unit", numeric=False))
+    rows = (
+        (say("Residual rms"), number(gain.rms_before_um, ".2f"), number(gain.rms_after_um, ".2f"), unit("µm")),
+        (
+            say("Rms on held-out {unseen}", unseen=gain.unseen),
+            number(gain.heldout_rms_before_um, ".2f"),
+            number(gain.heldout_rms_after_um, ".2f"),
+            unit("µm"),
+        ),
+        (
+            say("Gain in log predictive density"),
+            NOTHING,
+            say("{elpd_gain:.1f} ± {elpd_gain_se:.1f}", elpd_gain=gain.elpd_gain, elpd_gain_se=gain.elpd_gain_se),
+            NOTHING,
+        ),
+    )
+    heads = (
+        Column(say("Quantity"), numeric=False),
+        Column(say("Before")),
+        Column(say("After")),
+        Column(say("Unit"), numeric=False),
+    )
     changes = _changes(found)
     table = Table(
-        "Improvement",
+        say("Improvement"),
         heads,
         rows,
-        (f"{gain.unseen.capitalize()} are left out with all their repeats; ± is one standard error.",),
+        (say("{unseen:capital} are left out with all their repeats; ± is one standard error.", unseen=gain.unseen),),
     )
     return (plot, table, changes) if changes else (plot, table)
 
@@ -122,12 +160,22 @@ def _changes(found: Diagnosed) -> Table | None:
     before, after = (model.estimate().least_squares for model in (d.before, d.after))
     late = {u.key: value for u, value in zip(after.unknowns, after.value, strict=True)}
     rows = tuple(
-        (f"{u.key[0]}, {u.key[1]}", f"{value:.4g}", f"{late[u.key]:.4g}", u.unit)
+        (
+            say("{owner}, {parameter}", owner=Verbatim(u.key[0]), parameter=Verbatim(u.key[1])),
+            number(value, ".4g"),
+            number(late[u.key], ".4g"),
+            u.unit,
+        )
         for u, value, known in zip(before.unknowns, before.value, before.determined, strict=True)
         if known and not u.known
     )
-    heads = (Column("Parameter", numeric=False), Column("Before"), Column("After"), Column("Unit", numeric=False))
-    return Table("What it changes in the estimates (least squares)", heads, rows) if rows else None
+    heads = (
+        Column(say("Parameter"), numeric=False),
+        Column(say("Before")),
+        Column(say("After")),
+        Column(say("Unit"), numeric=False),
+    )
+    return Table(say("What it changes in the estimates (least squares)"), heads, rows) if rows else None
 
 
 def _consequences(found: Diagnosed) -> tuple[Block, ...]:
@@ -138,51 +186,80 @@ def _consequences(found: Diagnosed) -> tuple[Block, ...]:
     rows = []
     for name, (before, after) in found.consequences.figures.items():
         (one, U_one, _), (two, U_two, _) = expanded(before), expanded(after)
-        rows.append((TITLES[name], f"{one} ± {U_one}", f"{two} ± {U_two}", UNITS[name]))
-    heads = (Column("Figure", numeric=False), Column("As recorded"), Column("Corrected"), Column("Unit", numeric=False))
+        rows.append(
+            (
+                TITLES[name],
+                say("{one} ± {u_one}", one=one, u_one=U_one),
+                say("{two} ± {u_two}", two=two, u_two=U_two),
+                UNITS[name],
+            )
+        )
+    heads = (
+        Column(say("Figure"), numeric=False),
+        Column(say("As recorded")),
+        Column(say("Corrected")),
+        Column(say("Unit"), numeric=False),
+    )
     if rows:
-        note = (
+        note = say(
             "± is the expanded uncertainty for 95 %, for repetitions of the recording with the correction as it stands."
         )
-        blocks.append(Table("Figures of performance", heads, tuple(rows), (note,)))
+        blocks.append(Table(say("Figures of performance"), heads, tuple(rows), (note,)))
     decisions = tuple(
-        (f"{before.facts.standard}, {before.quantity}", before.outcome, after.outcome)
+        (
+            say("{standard}, {quantity}", standard=Verbatim(before.facts.standard), quantity=before.quantity),
+            OUTCOME_WORDS[before.outcome],
+            OUTCOME_WORDS[after.outcome],
+        )
         for before, after in found.consequences.statements
     )
     if decisions:
-        columns = tuple(Column(title, numeric=False) for title in ("Statement", "As recorded", "Corrected"))
-        blocks.append(Table("Statements of conformity", columns, decisions))
+        columns = tuple(
+            Column(title, numeric=False) for title in (say("Statement"), say("As recorded"), say("Corrected"))
+        )
+        blocks.append(Table(say("Statements of conformity"), columns, decisions))
     return tuple(blocks)
 
 
 def _where(found: Diagnosed) -> tuple[Block, ...]:
     rows = tuple(
-        (place.what, place.covariate, f"{place.region[0]:.4g} … {place.region[1]:.4g}", f"{place.amplitude_um:.3g}",
-         f"{place.p_value:.1g}")
+        (
+            place.what,
+            Verbatim(place.covariate),
+            say("{low:.4g} … {high:.4g}", low=place.region[0], high=place.region[1]),
+            number(place.amplitude_um, ".3g"),
+            number(place.p_value, ".1g"),
+        )
         for place in found.diagnosis.where
-    )  # fmt: skip
+    )
     if not rows:
         return ()
-    heads = (Column("Nonparametric term", numeric=False), Column("Covariate", numeric=False), Column("Region"),
-             Column("Amplitude", "µm"), Column("p"))  # fmt: skip
+    heads = (
+        Column(say("Nonparametric term"), numeric=False),
+        Column(say("Covariate"), numeric=False),
+        Column(say("Region")),
+        Column(say("Amplitude"), unit("µm")),
+        Column(say("p")),
+    )
     first = found.diagnosis.where[0]
     x, y, u = first.curve
     plot = curve_with_band(
-        x, y, 2 * u, x_label=first.covariate, y_label="Error / µm",
-        caption=f"What the residuals show: {first.what}, with U (k = 2).",
-        alternative=f"A function with a largest value of {first.amplitude_um:.3g} µm.",
+        x, y, 2 * u, x_label=Verbatim(first.covariate), y_label=say("Error / µm"),
+        caption=say("What the residuals show: {what}, with U (k = 2).", what=first.what),
+        alternative=say("A function with a largest value of {amplitude_um:.3g} µm.", amplitude_um=first.amplitude_um),
     )  # fmt: skip
-    note = (
-        "p is corrected for having looked everywhere; the region is where the function exceeds half its largest value, or "
-        "between which values it jumps. What the job's own model would absorb is no part of the function."
+    note = say(
+        "p is corrected for having looked everywhere; the region is where the function exceeds half "
+        "its largest value, or between which values it jumps. What the job's own model would absorb "
+        "is no part of the function."
     )
-    return (plot, Table("Covariates on which the residuals depend", heads, rows, (note,)))
+    return (plot, Table(say("Covariates on which the residuals depend"), heads, rows, (note,)))
 
 
 def _rivals(found: Diagnosed) -> Table:
     rows = tuple((name, probability(p)) for name, p in found.diagnosis.rivals)
-    heads = (Column("Explanation", numeric=False), Column("Probability"))
-    return Table("Model comparison: one explanation alone", heads, rows, ("Nothing missing has the rest.",))
+    heads = (Column(say("Explanation"), numeric=False), Column(say("Probability")))
+    return Table(say("Model comparison: one explanation alone"), heads, rows, (say("Nothing missing has the rest."),))
 
 
 def diagnosed_outcome(found: Diagnosed) -> Outcome:

@@ -2,76 +2,124 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.wording import expanded, probability
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, say, together
 from cmm_uq.screening.finding import Finding
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import unit
 
 _SAME = 0.01
 """Difference of two probabilities that is not worth telling."""
 
-VERDICTS = {
-    "consistent": "The recording agrees with the model that the job names.",
-    "explained": "The recording does not agree with the model that the job names; what was left out is found.",
-    "partial": "Something that was left out is found, but structure remains that no known effect accounts for.",
-    "unexplained": "The recording does not agree with the model that the job names, and no known effect accounts for it.",
+VERDICTS: Mapping[str, Text] = {
+    "consistent": say("The recording agrees with the model that the job names."),
+    "explained": say("The recording does not agree with the model that the job names; what was left out is found."),
+    "partial": say("Something that was left out is found, but structure remains that no known effect accounts for."),
+    "unexplained": say(
+        "The recording does not agree with the model that the job names, and no known effect accounts for it."
+    ),
 }
 
+VERDICT_WORDS: Mapping[str, Text] = {
+    "consistent": say("consistent"), "explained": say("explained"), "partial": say("partial"),
+    "unexplained": say("unexplained"),
+}  # fmt: skip
+"""A verdict in a word."""
 
-def lines(found: Diagnosed) -> list[str]:
+VERDICTS_IN_SHORT: Mapping[str, Text] = {
+    "consistent": say("CONSISTENT"), "explained": say("EXPLAINED"), "partial": say("PARTIAL"),
+    "unexplained": say("UNEXPLAINED"),
+}  # fmt: skip
+"""The same, to begin a summary with."""
+
+
+def lines(found: Diagnosed) -> list[Text]:
     """Verdict and everything that follows from it, a sentence or two each."""
     d = found.diagnosis
     said = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
-    said += [f"Cannot be told apart by this recording: {', '.join(group)}." for group in d.indistinguishable]
-    said += [f"To part {' and '.join(s.separates)}: {s.what}" for s in found.suggestions]
+    said += [
+        say("Cannot be told apart by this recording: {effects}.", effects=commas(names(group)))
+        for group in d.indistinguishable
+    ]
+    said += [
+        say("To part {effects}: {what}", effects=together(names(s.separates)), what=s.what) for s in found.suggestions
+    ]
     return said + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
 
 
-def sentence(item: LeftOut, gain: Improvement) -> str:
+def sentence(item: LeftOut, gain: Improvement) -> Text:
     """One left-out effect: size, cause, what it explains, and what was held out says."""
     alone = len(item.parameters) == 1
-    parameters = {name: q.times(1e6, "10⁻⁶/K") if q.unit == "1/K" else q for name, q in item.parameters.items()}
+    parameters = {name: q.times(1e6, unit("10⁻⁶/K")) if q.unit == "1/K" else q for name, q in item.parameters.items()}
     sizes = [(name, *expanded(quantity), quantity) for name, quantity in parameters.items()]
     words = [
-        f"{'' if alone else f'{name} = '}{value} ± {U}\u00a0{quantity.unit} (k\u00a0=\u00a0{k})"
+        _size(NOTHING if alone else Verbatim(name), value, U, k, quantity)
         if quantity.u > 0
-        else f"{name} = {quantity.value:.4g}\u00a0{quantity.unit}"
+        else say("{name} = {value:.4g}\u00a0{unit}", name=Verbatim(name), value=quantity.value, unit=quantity.unit)
         for name, value, U, k, quantity in sizes
     ]
     alike = item.together > item.probability + _SAME
-    together = f" ({probability(item.together)} of it or one that cannot be told from it)" if alike else ""
-    return (
-        f"{item.title}: {', '.join(words)}. What it points to: {item.points_to}. "
-        f"Probability {probability(item.probability)}{together}; explains {100 * item.explained:.0f}\u00a0% of the misfit; "
-        f"on {gain.unseen} that the fit had not seen the rms falls from "
-        f"{gain.heldout_rms_before_um:.1f} to {gain.heldout_rms_after_um:.1f}\u00a0µm."
+    together = (
+        say(" ({probability} of it or one that cannot be told from it)", probability=probability(item.together))
+        if alike
+        else NOTHING
+    )
+    return say(
+        "{title}: {sizes}. What it points to: {points_to}. Probability {probability}{together}; "
+        "explains {explained:.0f}\u00a0% of the misfit; on {unseen} that the fit had not seen the "
+        "rms falls from {before:.1f} to {after:.1f}\u00a0µm.",
+        title=item.title,
+        sizes=commas(words),
+        points_to=item.points_to,
+        probability=probability(item.probability),
+        together=together,
+        explained=100 * item.explained,
+        unseen=gain.unseen,
+        before=gain.heldout_rms_before_um,
+        after=gain.heldout_rms_after_um,
     )
 
 
-def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[str, ...]:
+def _size(name: Text, value: Text, U: Text, k: Text, quantity: Quantity) -> Text:
+    size = say("{value} ± {U}\u00a0{unit} (k\u00a0=\u00a0{k})", value=value, U=U, unit=quantity.unit, k=k)
+    return say("{name} = {size}", name=name, size=size) if name else size
+
+
+def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ...]:
     """What the noise is like."""
     noise = diagnosis.noise
     low, high = noise.coordinate.interval95
     texts = [
-        f"Standard uncertainty of a coordinate {noise.coordinate.value:.2g} µm (95 % interval {low:.2g} to {high:.2g} µm)."
+        say(
+            "Standard uncertainty of a coordinate {value:.2g} µm (95 % interval {low:.2g} to {high:.2g} µm).",
+            value=noise.coordinate.value,
+            low=low,
+            high=high,
+        )
     ]
     if noise.contradicts_stated and stated_um is not None:
-        texts.append(f"This contradicts the stated {stated_um:g} µm.")
+        texts.append(say("This contradicts the stated {stated_um:g} µm.", stated_um=stated_um))
     if noise.placing.value > 0.3 * noise.coordinate.value:
-        texts.append(f"Each set-up is off by about {noise.placing.value:.2g} µm that its repeats share.")
+        texts.append(
+            say("Each set-up is off by about {value:.2g} µm that its repeats share.", value=noise.placing.value)
+        )
     if noise.correlated_in_time:
-        texts.append("Neighbouring readings are correlated in time.")
+        texts.append(say("Neighbouring readings are correlated in time."))
     if noise.heavy_tails:
-        texts.append("The scatter has heavier tails than a normal distribution.")
+        texts.append(say("The scatter has heavier tails than a normal distribution."))
     return tuple(texts)
 
 
 def summary_rows(
-    verdict: str, p_value: float, told: Sequence[str], findings: Iterable[Finding]
-) -> tuple[tuple[str], ...]:
+    verdict: str, p_value: float, told: Sequence[Text], findings: Iterable[Finding]
+) -> tuple[tuple[Text], ...]:
     """Verdict and everything that follows from it, and what the screening found, for the end of a command."""
-    first = f"{verdict.upper()} (p = {p_value:.2g}). {told[0]}"
-    return ((first,), *((text,) for text in (*told[1:], *(f"{f.why[0].upper()}{f.why[1:]}." for f in findings))))
+    first = say(
+        "{verdict} (p = {p_value:.2g}). {told}", verdict=VERDICTS_IN_SHORT[verdict], p_value=p_value, told=told[0]
+    )
+    return ((first,), *((text,) for text in (*told[1:], *(say("{why:capital}.", why=f.why) for f in findings))))

@@ -14,6 +14,9 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
+from cmm_uq.documents.view_words import label
+from cmm_uq.messages import NOTHING, Text, say
+
 Outcome = Literal["pass", "fail", "undecided", "incomplete"]
 
 
@@ -21,7 +24,7 @@ Outcome = Literal["pass", "fail", "undecided", "incomplete"]
 class Paragraph:
     """Running text; a note is set smaller, a warning stands out."""
 
-    text: str
+    text: Text
     tone: Literal["plain", "note", "warning"] = "plain"
     kind: ClassVar[str] = "paragraph"
 
@@ -30,7 +33,7 @@ class Paragraph:
 class Facts:
     """Label and value pairs, such as the customer's address or the conditions. Values may have several lines."""
 
-    rows: tuple[tuple[str, str], ...]
+    rows: tuple[tuple[Text, Text], ...]
     kind: ClassVar[str] = "facts"
 
 
@@ -38,8 +41,8 @@ class Facts:
 class Column:
     """Heading of a table column; numeric columns are aligned to the right with tabular figures."""
 
-    heading: str
-    unit: str = ""
+    heading: Text
+    unit: Text = NOTHING
     numeric: bool = True
 
 
@@ -47,10 +50,10 @@ class Column:
 class Table:
     """Rows of text under headings; every row has as many cells as there are columns."""
 
-    caption: str
+    caption: Text
     columns: tuple[Column, ...]
-    rows: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...] = ()
+    rows: tuple[tuple[Text, ...], ...]
+    notes: tuple[Text, ...] = ()
     kind: ClassVar[str] = "table"
 
     def __post_init__(self) -> None:
@@ -61,11 +64,12 @@ class Table:
 
 @dataclass(frozen=True)
 class Plot:
-    """A picture as SVG, with the sentence that replaces it for whoever cannot see it."""
+    """A picture as SVG, with the sentence that replaces it for whoever cannot see it, and the texts lettered in it."""
 
-    caption: str
-    alternative: str
+    caption: Text
+    alternative: Text
     svg: str
+    lettering: tuple[Text, ...] = ()
     kind: ClassVar[str] = "plot"
 
 
@@ -73,14 +77,14 @@ class Plot:
 class Decision:
     """A statement of conformity: what was compared with what, by which rule, what follows, and what of the test is missing."""
 
-    standard: str
-    quantity: str
-    measured: str
-    limit: str
-    rule: str
+    standard: Text
+    quantity: Text
+    measured: Text
+    limit: Text
+    rule: Text
     outcome: Outcome
-    explanation: str
-    missing: tuple[str, ...] = ()
+    explanation: Text
+    missing: tuple[Text, ...] = ()
     kind: ClassVar[str] = "decision"
 
 
@@ -91,7 +95,7 @@ Block = Paragraph | Facts | Table | Plot | Decision
 class Section:
     """A titled part of the document."""
 
-    title: str
+    title: Text
     blocks: tuple[Block, ...]
 
 
@@ -99,8 +103,8 @@ class Section:
 class Signature:
     """A line to sign on: who authorises the document."""
 
-    name: str
-    role: str = ""
+    name: Text
+    role: Text = NOTHING
 
 
 @dataclass(frozen=True)
@@ -126,21 +130,21 @@ class Document:
     banner : what every page must say at its head, such as that nothing was measured.
     """
 
-    title: str
-    number: str
-    subject: str
-    issuer: tuple[str, ...]
+    title: Text
+    number: Text
+    subject: Text
+    issuer: tuple[Text, ...]
     particulars: tuple[Facts, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[Text, ...]
     sections: tuple[Section, ...]
-    statements: tuple[str, ...]
+    statements: tuple[Text, ...]
     signatures: tuple[Signature, ...]
-    attachments: tuple[str, ...]
-    produced_by: str
+    attachments: tuple[Text, ...]
+    produced_by: Text
     date: dt.date | None = None
     language: str = "en"
-    end: str = "End of certificate"
-    banner: str = ""
+    end: Text = say("End of certificate")
+    banner: Text = NOTHING
 
     def as_data(self) -> dict[str, Any]:
         """The document as plain dicts and lists of printable text, ready for JSON.
@@ -155,15 +159,16 @@ class Document:
         for section, plain in zip(self.sections, data["sections"], strict=True):
             for block, plain_block in zip(section.blocks, plain["blocks"], strict=True):
                 plain_block["kind"] = block.kind
-                if word := _NUMBERED.get(block.kind):
-                    counted[word] += 1
-                    plain_block["label"] = f"{word} {counted[word]}"
+                plain_block.pop("lettering", None)
+                if block.kind in _NUMBERED:
+                    counted[block.kind] += 1
+                    plain_block["label"] = str.__str__(label(block.kind, counted[block.kind]))
                 if block.kind == "table":
                     _measure(plain_block)
         return data
 
 
-_NUMBERED = {"table": "Table", "plot": "Figure"}
+_NUMBERED = ("table", "plot")
 
 
 def _measure(table: dict[str, Any]) -> None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.documents import plot_style
 from cmm_uq.documents.document import Document
 from cmm_uq.documents.templates import template_folder
+from cmm_uq.documents.view_words import view_words
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -20,7 +21,11 @@ if TYPE_CHECKING:
 
 def render_html(document: Document) -> str:
     """The document as one self-contained page, plots inline."""
-    return _environment().get_template("document.html").render(document=document.as_data(), colour=plot_style.COLOURS)
+    return (
+        _environment()
+        .get_template("document.html")
+        .render(document=document.as_data(), words=view_words(), colour=plot_style.COLOURS)
+    )
 
 
 @cache

@@ -8,15 +8,21 @@ from pathlib import PurePosixPath
 from cmm_uq.documents.document import Document
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import COMPENSATED, MEASURED, SIMULATED
+from cmm_uq.messages import Text, Verbatim, after, commas, names, say
 
 BANNERS = {
-    SIMULATED: "SIMULATED RECORDING, not a calibration certificate",
-    COMPENSATED: "COMPENSATED RECORDING, not a calibration certificate",
+    SIMULATED: say("SIMULATED RECORDING, not a calibration certificate"),
+    COMPENSATED: say("COMPENSATED RECORDING, not a calibration certificate"),
 }
-TITLES = {SIMULATED: "Evaluation of a simulated recording", COMPENSATED: "Evaluation of a compensated recording"}
+TITLES = {
+    SIMULATED: say("Evaluation of a simulated recording"),
+    COMPENSATED: say("Evaluation of a compensated recording"),
+}
 _WHAT = {
-    SIMULATED: "The recording was simulated: no machine was measured, and nothing here certifies one.",
-    COMPENSATED: "The coordinates were corrected by computation: nothing here certifies what the machine indicates.",
+    SIMULATED: say("The recording was simulated: no machine was measured, and nothing here certifies one."),
+    COMPENSATED: say(
+        "The coordinates were corrected by computation: nothing here certifies what the machine indicates."
+    ),
 }
 
 
@@ -37,32 +43,44 @@ def marked(document: Document, job: Job) -> Document:
     is_certificate = document.title == CERTIFICATE
     return replace(
         document,
-        title=TITLES[job.origin] if is_certificate else f"{document.title} of a {job.origin} recording",
-        number=job.facts.job.id,
+        title=TITLES[job.origin] if is_certificate else _of_such(document.title, job.origin),
+        number=Verbatim(job.facts.job.id),
         banner=BANNERS[job.origin],
         warnings=warnings,
         statements=(),
         signatures=(),
-        end="End of evaluation" if is_certificate else document.end,
+        end=say("End of evaluation") if is_certificate else document.end,
     )
 
 
-CERTIFICATE = "Calibration certificate"
+CERTIFICATE = say("Calibration certificate")
 """Title of a document that certifies."""
 
 
-def came_about(job: Job) -> str:
+def _of_such(title: Text, origin: str) -> Text:
+    if origin == SIMULATED:
+        return say("{title} of a simulated recording", title=title)
+    return say("{title} of a compensated recording", title=title)
+
+
+def came_about(job: Job) -> Text:
     """The word before the date of a recording."""
-    return "simulated, dated" if job.origin == SIMULATED else "measured on"
+    return say("simulated, dated") if job.origin == SIMULATED else say("measured on")
 
 
-def origin_warnings(job: Job) -> list[str]:
+def origin_warnings(job: Job) -> list[Text]:
     """What the reader must know of where the recording comes from."""
     if job.origin == MEASURED:
         return []
     source = job.facts.job.derived_from
-    told = f" It was derived from job {source.job} by {source.program} ({source.by})." if source else ""
-    texts = [_WHAT[job.origin] + told]
+    what = _WHAT[job.origin]
+    texts: list[Text] = [what]
+    if source:
+        told = say(
+            "It was derived from job {job} by {program} ({by}).",
+            job=Verbatim(source.job), program=Verbatim(source.program), by=Verbatim(source.by),
+        )  # fmt: skip
+        texts = [after(what, told)]
     if job.altered:
-        texts.append(f"Changed after it was derived: {', '.join(job.altered)}.")
+        texts.append(say("Changed after it was derived: {files}.", files=commas(names(job.altered))))
     return texts

@@ -12,6 +12,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import Origin
+from cmm_uq.messages import Text
 
 
 class Found(Protocol):
@@ -43,7 +44,7 @@ class Outcome:
     document: Document
     results: Mapping[str, Any]
     summary: tuple[tuple[str, ...], ...]
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Text, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
     conforming: bool = True
     draws: Draws | None = None

@@ -17,6 +17,7 @@ from typing import Any
 from cmm_uq.documents.document import Document
 from cmm_uq.documents.plot_style import COLOURS
 from cmm_uq.documents.templates import template_folder
+from cmm_uq.documents.view_words import described, view_words
 from cmm_uq.errors import CmmUqError
 
 EPOCH = "1970-01-01"
@@ -48,6 +49,7 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     """
     content = {
         "document": document.as_data(),
+        "words": view_words(),
         "colour": COLOURS,
         "date": document.date.isoformat() if document.date else EPOCH,
         "attachments": [_attachment(name, data) for name, data in attachments.items()],
@@ -68,7 +70,7 @@ def _attachment(name: str, data: bytes) -> dict[str, Any]:
         "data": body,
         "relationship": "data" if outcome else "source",
         "type": _TYPES.get(suffix, "application/octet-stream"),
-        "description": f"{'Results in machine-readable form' if outcome else 'Input of this document'}: {name}",
+        "description": described(name, outcome=outcome),
     }
 
 

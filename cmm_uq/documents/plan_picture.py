@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmm_uq.documents.document import Plot
-from cmm_uq.documents.plot_style import ACCENT, INK, MUTED, RULE, TINY, WIDTH_MM, as_svg, dots, house_style, new_figure
+from cmm_uq.documents.plot_style import ACCENT, INK, MUTED, RULE, TINY, WIDTH_MM, dots, drawn, house_style, new_figure
+from cmm_uq.messages import Text, number, say, semicolons
 from cmm_uq.planning.placing import Placing
 from cmm_uq.points import AXES, Floats
 
@@ -58,13 +59,19 @@ def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
             figure.text(left + 0.035, 1 - 4.5 / height, placing.title, fontsize=7.5, color=INK, fontweight="bold")
             figure.text(left, 1 - 9.5 / height, placing.ends, fontsize=TINY, color=MUTED)
         last = first + len(placings) - 1
-        numbers = f"Placing {first}" if last == first else f"Placings {first} to {last}"
-        told = "; ".join(f"{first + i}: {p.title}, {p.ends} mm" for i, p in enumerate(placings))
-        return Plot(
-            f"{numbers}: scale readings in mm; ○ is the first point, dashed lines drop to the table.",
-            told,
-            as_svg(figure),
+        numbers = (
+            say("Placing {first}", first=first)
+            if last == first
+            else say("Placings {first} to {last}", first=first, last=last)
         )
+        placings_in_words = semicolons(
+            say("{first}: {title}, {ends} mm", first=first + i, title=p.title, ends=p.ends)
+            for i, p in enumerate(placings)
+        )
+        told = say(
+            "{numbers}: scale readings in mm; ○ is the first point, dashed lines drop to the table.", numbers=numbers
+        )
+        return drawn(figure, told, placings_in_words)
 
 
 def _seen(xyz: Floats) -> Floats:
@@ -74,7 +81,7 @@ def _seen(xyz: Floats) -> Floats:
 
 def _draw(ax: Axes, placing: Placing, box: Floats) -> None:
     _frame(ax, box)
-    readings = placing.points.readings[placing.points.repeat == placing.points.repeat.min()]
+    readings = placing.points.machine_xyz[placing.points.repeat == placing.points.repeat.min()]
     floor = readings.copy()
     floor[:, 2] = box[2, 0]
     outline = _outline(readings)
@@ -127,8 +134,8 @@ def _line(ax: Axes, xyz: Floats, colour: str, width: float, *, dashed: bool = Fa
 
 
 def gain_plot(
-    labels: Sequence[str], before: Sequence[float | None], after: Sequence[float | None], *, names: tuple[str, str],
-    quantity: str,
+    labels: Sequence[Text], before: Sequence[float | None], after: Sequence[float | None], *, names: tuple[Text, Text],
+    quantity: Text,
 ) -> Plot:  # fmt: skip
     """Before and after for each effect, over the larger of the two; what has no finite value stands at the right edge.
 
@@ -157,17 +164,18 @@ def gain_plot(
         dots(ax, shown[:, 1], y, 5.0, ACCENT, zorder=4)
         ax.set_yticks(y, labels)
         ax.set(xlim=(0.0, 1.38), ylim=(-0.7, len(labels) - 0.3))
-        ax.set_xticks([0, 0.25, 0.5, 0.75, 1.0, 1.3], ["0", "¼", "½", "¾", "1", "not at all"])
+        ax.set_xticks([0, 0.25, 0.5, 0.75, 1.0, 1.3], ["0", "¼", "½", "¾", "1", say("not at all")])
         ax.grid(axis="x")
-        ax.set_xlabel(f"{quantity}, over the larger of the two")
-        figure.text(0.36, 1 - 4.5 / height, f"○ {names[0]}", color=MUTED, fontsize=8)
-        figure.text(0.66, 1 - 4.5 / height, f"● {names[1]}", color=ACCENT, fontsize=8, fontweight="bold")
-        told = "; ".join(
-            f"{label}: {_figure(a)} before, {_figure(b)} after"
+        ax.set_xlabel(say("{quantity}, over the larger of the two", quantity=quantity))
+        figure.text(0.36, 1 - 4.5 / height, say("○ {plan}", plan=names[0]), color=MUTED, fontsize=8)
+        figure.text(0.66, 1 - 4.5 / height, say("● {plan}", plan=names[1]), color=ACCENT, fontsize=8, fontweight="bold")
+        told = semicolons(
+            say("{label}: {before} before, {after} after", label=label, before=_figure(a), after=_figure(b))
             for label, a, b in zip(labels, before, after, strict=True)
         )
-        return Plot(f"{quantity} with {names[0]} and with {names[1]}.", told, as_svg(figure))
+        both = say("{quantity} with {one} and with {other}.", quantity=quantity, one=names[0], other=names[1])
+        return drawn(figure, both, told)
 
 
-def _figure(value: float | None) -> str:
-    return "not at all" if value is None or not np.isfinite(value) else f"{value:.2g}"
+def _figure(value: float | None) -> Text:
+    return say("not at all") if value is None or not np.isfinite(value) else number(value, ".2g")

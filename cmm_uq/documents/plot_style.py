@@ -19,7 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cmm_uq.documents.document import Plot
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text
 from cmm_uq.points import Floats
 
 if TYPE_CHECKING:
@@ -138,6 +140,16 @@ def as_svg(figure: Figure) -> str:
     while "<g></g>" in svg or "<defs></defs>" in svg:
         svg = svg.replace("<g></g>", "").replace("<defs></defs>", "")
     return svg.replace("<svg ", '<svg font-family="sans-serif" stroke-linejoin="round" ', 1).strip()
+
+
+def drawn(figure: Figure, caption: Text, alternative: Text) -> Plot:
+    """The figure as a block of a document, with the texts that are lettered in it."""
+    from matplotlib.text import Text as Lettering
+
+    lettering = (found.get_text() for found in figure.findobj(Lettering))
+    return Plot(
+        caption, alternative, as_svg(figure), tuple(text for text in lettering if isinstance(text, Text) and text)
+    )
 
 
 def finite(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Floats:

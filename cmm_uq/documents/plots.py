@@ -22,14 +22,15 @@ from cmm_uq.documents.plot_style import (
     RULE,
     TINY,
     WIDTH_MM,
-    as_svg,
     bars,
     dots,
+    drawn,
     finite,
     house_style,
     new_figure,
 )
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, Verbatim, say, semicolons, signed
 from cmm_uq.points import Floats
 
 if TYPE_CHECKING:
@@ -44,14 +45,14 @@ def length_plot(
     *,
     expanded_before_um: ArrayLike | float,
     expanded_after_um: ArrayLike | float,
-    reference: str,
+    reference: Text,
     reference_expanded_um: float = 0.0,
     flagged: ArrayLike | None = None,
-    position_label: str = "Position of the bar",
-    before_label: str = "Before the model",
-    after_label: str = "After the fitted model",
-    caption: str,
-    alternative: str,
+    position_label: Text = say("Position of the bar"),
+    before_label: Text = say("Before the model"),
+    after_label: Text = say("After the fitted model"),
+    caption: Text,
+    alternative: Text,
 ) -> Plot:
     """Bar lengths by position, before and after the fitted model, as deviations from a reference length.
 
@@ -87,7 +88,7 @@ def length_plot(
             _mark(ax, x[marked], values[marked], size)
             ax.grid(axis="y")
             ax.margins(y=0.08)
-            ax.set_ylabel("Deviation / µm")
+            ax.set_ylabel(say("Deviation / µm"))
             ax.set_title(label, loc="left", fontsize=8, color=colour, fontweight="bold", pad=4)
         axes[0].tick_params(bottom=False)
         axes[1].set_xlabel(position_label)
@@ -95,11 +96,17 @@ def length_plot(
         axes[1].set_xlim(x.min() - room, x.max() + room)
         _whole_numbers(axes[1], x)
         figure.align_ylabels(axes)
-        band = f", band: its U = {reference_expanded_um:.2g} µm" if reference_expanded_um else ""
-        marks = ", rings: flagged by screening" if marked.any() else ""
-        note = f"zero: {reference}{band}; bars: U{marks}"
+        note = _legend(reference, reference_expanded_um, flagged=bool(marked.any()))
         figure.text(0.995, 0.985, note, ha="right", va="top", fontsize=TINY, color=MUTED)
-        return Plot(caption, alternative, as_svg(figure))
+        return drawn(figure, caption, alternative)
+
+
+def _legend(reference: Text, band_um: float, *, flagged: bool) -> Text:
+    parts: list[Text] = [say("zero: {reference}", reference=reference)]
+    if band_um:
+        parts = [say("zero: {reference}, band: its U = {U:.2g} µm", reference=reference, U=band_um)]
+    marks = say("bars: U, rings: flagged by screening") if flagged else say("bars: U")
+    return semicolons((*parts, marks))
 
 
 def _side_by_side(position: Floats) -> Floats:
@@ -129,10 +136,10 @@ def volume_plot(
     *,
     end_mm: ArrayLike | None = None,
     travel_mm: ArrayLike | None = None,
-    axis_labels: Sequence[str] = ("X / mm", "Y / mm", "Z / mm"),
-    quantity: str = "Residual / µm",
-    caption: str,
-    alternative: str,
+    axis_labels: Sequence[Text] = (say("X / mm"), say("Y / mm"), say("Z / mm")),
+    quantity: Text = say("Residual / µm"),
+    caption: Text,
+    alternative: Text,
 ) -> Plot:
     """Residuals where they lie in the machine's volume, in three orthogonal projections to one scale.
 
@@ -172,7 +179,7 @@ def volume_plot(
             ax.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]))
             ax.locator_params(nbins=4)
         _colour_scale(scale_axes, edges, quantity)
-        return Plot(caption, alternative, as_svg(figure))
+        return drawn(figure, caption, alternative)
 
 
 _PANELS = ((0, 1), (0, 2), (1, 2))
@@ -210,12 +217,12 @@ def _members(ax: Axes, start: Floats, end: Floats, relative: Floats, colour: str
                 dots(ax, middle[some, 0], middle[some, 1], size, colour, hollow=not positive)
 
 
-def _colour_scale(ax: Axes, edges: Floats, quantity: str) -> None:
+def _colour_scale(ax: Axes, edges: Floats, quantity: Text) -> None:
     ax.bar(edges[:-1], 1, np.diff(edges), align="edge", color=DIVERGING, lw=0)
     digits = max(0, 1 - int(np.floor(np.log10(edges[-1]))))
     ax.set_xticks(edges, [f"{edge:+.{digits}f}".replace("-", "−") for edge in edges])
     ax.set(xlim=(edges[0], edges[-1]), yticks=[])
-    ax.set_xlabel(f"{quantity}  (full dot: positive, hollow dot: negative)", labelpad=2)
+    ax.set_xlabel(say("{quantity}  (full dot: positive, hollow dot: negative)", quantity=quantity), labelpad=2)
     for spine in ax.spines.values():
         spine.set_visible(False)
 
@@ -225,11 +232,11 @@ def curve_with_band(
     y: ArrayLike,
     expanded: ArrayLike,
     *,
-    x_label: str,
-    y_label: str,
+    x_label: Text,
+    y_label: Text,
     points: tuple[ArrayLike, ArrayLike] | None = None,
-    caption: str,
-    alternative: str,
+    caption: Text,
+    alternative: Text,
 ) -> Plot:
     """A curve (n,) with the band of its expanded uncertainty (n,), and optional points that it was drawn through.
 
@@ -251,10 +258,10 @@ def curve_with_band(
         ax.grid(axis="y")
         ax.margins(x=0.01)
         ax.set(xlabel=x_label, ylabel=y_label)
-        return Plot(caption, alternative, as_svg(figure))
+        return drawn(figure, caption, alternative)
 
 
-def budget_bars(sources: Sequence[str], shares: ArrayLike, *, caption: str, alternative: str) -> Plot:
+def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, alternative: Text) -> Plot:
     """Share of every source in the variance (0 … 1; negative where a correlation takes away), largest first."""
     share = finite("shares", shares, (len(sources),))
     if not len(share):
@@ -269,7 +276,7 @@ def budget_bars(sources: Sequence[str], shares: ArrayLike, *, caption: str, alte
         ax.barh(rows, share[order], 0.55, color=[ACCENT if value >= 0 else MUTED for value in share[order]], lw=0)
         ax.axvline(0, color=MUTED, lw=0.6)
         for row, value in zip(rows, share[order], strict=True):
-            text = f"{100 * value:.1f} %".replace("-", "−")
+            text = say("{share} %", share=signed(100 * value, ".1f"))
             ax.annotate(text, (max(value, 0), row), (4, 0), textcoords="offset points", va="center", color=INK)
         ax.set_yticks(rows, [_cut(sources[index], 44) for index in order])
         ax.set(xlim=(min(share.min() * 1.15, 0), max(share.max(), 1e-9) * 1.02), xticks=[])
@@ -277,8 +284,8 @@ def budget_bars(sources: Sequence[str], shares: ArrayLike, *, caption: str, alte
         ax.tick_params(left=False)
         for side in ("bottom", "left"):
             ax.spines[side].set_visible(False)
-        return Plot(caption, alternative, as_svg(figure))
+        return drawn(figure, caption, alternative)
 
 
-def _cut(text: str, length: int) -> str:
-    return text if len(text) <= length else text[: length - 1] + "…"
+def _cut(text: Text, length: int) -> Text:
+    return text if len(text) <= length else Verbatim(text[: length - 1] + "…")

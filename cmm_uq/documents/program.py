@@ -1,4 +1,4 @@
-"""What produced a document or a file of results: the program, and the packages whose effects took part."""
+"""What produced a document or a file of results: the program, and the packages that took part."""
 
 from __future__ import annotations
 
@@ -6,18 +6,34 @@ from collections.abc import Iterable
 from typing import Any
 
 from cmm_uq import __version__
+from cmm_uq.jobs.job import Job
+from cmm_uq.messages import Text, Verbatim, say, together
 from cmm_uq.physics.catalogue import plugins
+from cmm_uq.plugins import KINDS, STANDARDS, versions
 
 NAME = "cmm-uq"
 
 
-def software(*, effects: bool = True) -> dict[str, Any]:
-    """For results.json: name and version, and those of the packages whose effects were candidates, if there are any."""
-    taking_part = plugins() if effects else {}
+def software(job: Job, *, effects: bool = True) -> dict[str, Any]:
+    """For results.json: name and version, and those of other packages that took part, if there are any.
+
+    These are the packages whose effects were candidates, where ``effects`` says that there were candidates, and those of the
+    job's kind and standards.
+    """
+    taking_part = (plugins() if effects else {}) | _of_the_job(job)
     return {"name": NAME, "version": __version__, **({"plugins": taking_part} if taking_part else {})}
 
 
-def program(effects: Iterable[str] | None = None) -> str:
+def program(job: Job, effects: Iterable[str] | None = None) -> Text:
     """The same in words: ``cmm-uq 1.0`` or ``cmm-uq 1.0 with outside-effects 0.1``; of the effects named only, if any are."""
-    taking_part = " and ".join(f"{package} {version}" for package, version in plugins(effects).items())
-    return f"{NAME} {__version__}{f' with {taking_part}' if taking_part else ''}"
+    parts = [_versioned(package, version) for package, version in (plugins(effects) | _of_the_job(job)).items()]
+    own = _versioned(NAME, __version__)
+    return say("{program} with {plugins}", program=own, plugins=together(parts)) if parts else own
+
+
+def _of_the_job(job: Job) -> dict[str, str]:
+    return versions({KINDS: [job.facts.artefact.kind], STANDARDS: [wish.standard for wish in job.facts.conformity]})
+
+
+def _versioned(package: str, version: str) -> Text:
+    return say("{package} {version}", package=Verbatim(package), version=Verbatim(version))

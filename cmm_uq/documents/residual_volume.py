@@ -7,10 +7,11 @@ import numpy as np
 from cmm_uq.documents.document import Plot
 from cmm_uq.documents.plots import volume_plot
 from cmm_uq.documents.result import Result
+from cmm_uq.messages import Text, say
 from cmm_uq.units import MICROMETRE
 
 
-def residual_volume(result: Result, what: str) -> Plot:
+def residual_volume(result: Result, what: Text) -> Plot:
     """Residuals of observations of one point each, or of pairs of points (drawn as bars), over the scale readings.
 
     Parameters
@@ -18,11 +19,18 @@ def residual_volume(result: Result, what: str) -> Plot:
     what : the points in words, as ``faces``.
     """
     artefact, residuals = result.artefact, result.residuals / MICROMETRE
-    readings, travel = artefact.points.readings, artefact.points.machine.travel_mm
+    readings, travel = artefact.points.machine_xyz, artefact.points.machine.travel_mm
     ends = readings[artefact.rows]
     return volume_plot(
-        ends[:, 0], residuals, end_mm=ends[:, -1] if ends.shape[1] > 1 else None,
+        ends[:, 0],
+        residuals,
+        end_mm=ends[:, -1] if ends.shape[1] > 1 else None,
         travel_mm=travel if np.all(np.isfinite(travel)) else None,
-        caption="Residuals after the fitted model in the machine's volume (scale readings).",
-        alternative=f"Three projections of the {what}; residuals of {residuals.min():.1f} to {residuals.max():.1f} µm.",
-    )  # fmt: skip
+        caption=say("Residuals after the fitted model in the machine's volume (scale readings)."),
+        alternative=say(
+            "Three projections of the {what}; residuals of {low:.1f} to {high:.1f} µm.",
+            what=what,
+            low=residuals.min(),
+            high=residuals.max(),
+        ),
+    )

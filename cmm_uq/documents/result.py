@@ -29,18 +29,33 @@ LACK_OF_FIT = 0.01
 """Probability below which the residuals are held to contradict the stated noise."""
 
 
+@dataclass(frozen=True)
+class Component:
+    """Standard deviation of a component of the noise, µm, and the probability that it is there at all."""
+
+    size: Quantity
+    probability: float
+
+
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Standard uncertainty of one recorded coordinate.
+    """The noise of a recording, and what it does to the uncertainties.
 
     Parameters
     ----------
-    coordinate : as used, µm; from the residuals unless the job states it.
+    coordinate : standard deviation of one reading of one coordinate, root mean square of the axes, µm.
+    components : its parts that the recording could show: readings along ``x``, ``y``, ``z``; ``placing``,
+        ``growth``, ``slow``.
+    axes_apart : probability that the axes differ.
+    wider : largest ratio of a parameter's standard uncertainty to what white noise would leave it.
     stated_um : what the job states, if anything.
     p_value : of the residuals' sum of squares under the stated noise (χ² test), if it is stated.
     """
 
     coordinate: Quantity
+    components: Mapping[str, Component]
+    axes_apart: float
+    wider: float
     stated_um: float | None
     p_value: float | None
 

@@ -39,7 +39,7 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
     derived = facts.derived_from
     return {
         "schema": schema,
-        "software": software(effects=effects),
+        "software": software(job, effects=effects),
         "job": {
             "id": facts.id,
             "origin": facts.origin,
@@ -69,6 +69,11 @@ def results(result: Result) -> dict[str, Any]:
         "noise": {
             "stated_coordinate_um": result.noise.stated_um,
             "coordinate_um": quantity_data(result.noise.coordinate),
+            **{
+                f"{name}_um": {**quantity_data(one.size), "probability": one.probability}
+                for name, one in result.noise.components.items()
+            },
+            "axes_differ_probability": result.noise.axes_apart,
             "p_value": result.noise.p_value,
             "contradicts_stated": result.noise.contradicts_stated,
         },

@@ -14,19 +14,20 @@ from cmm_uq.documents.plot_style import (
     DIVERGING,
     INK,
     MUTED,
-    as_svg,
     dots,
+    drawn,
     finite,
     house_style,
     new_figure,
 )
+from cmm_uq.messages import Text, say
 
 _FARTHEST = 3.0
 """Times the tolerance that the picture reaches; what lies beyond is drawn at its edge with its figure."""
 
 
 def tolerance_plot(
-    names: Sequence[str], ratio: ArrayLike, low: ArrayLike, high: ArrayLike, *, caption: str, alternative: str
+    names: Sequence[Text], ratio: ArrayLike, low: ArrayLike, high: ArrayLike, *, caption: Text, alternative: Text
 ) -> Plot:
     """Parameters over their tolerances, one row each: inside the band is inside the tolerance.
 
@@ -61,8 +62,8 @@ def tolerance_plot(
             ax.annotate(text, (side * reach, row), (-6 * side, 4), textcoords="offset points",
                         ha="right" if side > 0 else "left", color=MUTED)  # fmt: skip
         ax.set_yticks(rows, names)
-        ax.set(xlim=(-1.02 * reach, 1.02 * reach), xlabel="Parameter over its tolerance (band: inside)")
+        ax.set(xlim=(-1.02 * reach, 1.02 * reach), xlabel=say("Parameter over its tolerance (band: inside)"))
         ax.invert_yaxis()
         ax.tick_params(left=False)
         ax.spines["left"].set_visible(False)
-        return Plot(caption, alternative, as_svg(figure))
+        return drawn(figure, caption, alternative)

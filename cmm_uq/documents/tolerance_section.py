@@ -5,7 +5,11 @@ from __future__ import annotations
 from cmm_uq.documents.document import Column, Section, Table
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.tolerance_plot import tolerance_plot
-from cmm_uq.documents.wording import expanded, listed
+from cmm_uq.documents.wording import expanded
+from cmm_uq.messages import listed, names, number, say
+from cmm_uq.units import unit
+
+_VERDICTS = {"in": say("in"), "out": say("out"), "open": say("open")}
 
 
 def sections(result: Result) -> list[Section]:
@@ -16,24 +20,32 @@ def sections(result: Result) -> list[Section]:
     rows = []
     for one in judged:
         value, U, _ = expanded(one.quantity)
-        rows.append((one.title, value, U, f"{one.tolerance:g}", one.quantity.unit, one.verdict))
+        rows.append((one.title, value, U, number(one.tolerance, "g"), one.quantity.unit, _VERDICTS[one.verdict]))
     columns = (
-        Column("Parameter", numeric=False), Column("Estimate"), Column("U"), Column("Tolerance"),
-        Column("Unit", numeric=False), Column("Verdict", numeric=False),
+        Column(say("Parameter"), numeric=False), Column(say("Estimate")), Column(say("U")), Column(say("Tolerance")),
+        Column(say("Unit"), numeric=False), Column(say("Verdict"), numeric=False),
     )  # fmt: skip
     left_out = sorted(set(result.job.facts.model.tolerances) - {one.effect for one in judged})
-    notes = ["In or out: the whole 95 % interval is; otherwise open."]
+    notes = [say("In or out: the whole 95 % interval is; otherwise open.")]
     if left_out:
-        notes.append(f"Not determined by this recording, so not judged: {listed(left_out)}.")
+        notes.append(
+            say("Not determined by this recording, so not judged: {left_out}.", left_out=listed(names(left_out)))
+        )
     out = [one.title for one in judged if one.verdict == "out"]
-    ratios = [(part.value, *part.interval95) for part in (one.quantity.times(1 / one.tolerance, "1") for one in judged)]
+    ratios = [
+        (part.value, *part.interval95) for part in (one.quantity.times(1 / one.tolerance, unit("1")) for one in judged)
+    ]
     plot = tolerance_plot(
-        [one.title for one in judged], *map(list, zip(*ratios, strict=True)),
-        caption="Each parameter over its tolerance, with its 95 % interval.",
-        alternative=f"Out of tolerance: {listed(out)}." if out else "No parameter is out of tolerance.",
-    )  # fmt: skip
+        [one.title for one in judged],
+        *map(list, zip(*ratios, strict=True)),
+        caption=say("Each parameter over its tolerance, with its 95 % interval."),
+        alternative=say("Out of tolerance: {out}.", out=listed(out))
+        if out
+        else say("No parameter is out of tolerance."),
+    )
     return [
         Section(
-            "Tolerances by parameter", (plot, Table("Parameters and tolerances", columns, tuple(rows), tuple(notes)))
+            say("Tolerances by parameter"),
+            (plot, Table(say("Parameters and tolerances"), columns, tuple(rows), tuple(notes))),
         )
     ]

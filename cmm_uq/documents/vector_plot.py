@@ -8,18 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.documents.document import Plot
-from cmm_uq.documents.plot_style import ACCENT, MUTED, RULE, TINY, as_svg, dots, finite, house_style, new_figure
+from cmm_uq.documents.plot_style import ACCENT, MUTED, RULE, TINY, dots, drawn, finite, house_style, new_figure
+from cmm_uq.messages import Text, say
 
 _ROUND = (1.0, 2.0, 5.0)
 
 
 def vector_plot(
     position_mm: ArrayLike,
-    series: Sequence[tuple[str, ArrayLike]],
+    series: Sequence[tuple[Text, ArrayLike]],
     *,
-    axis_labels: tuple[str, str] = ("x / mm", "y / mm"),
-    caption: str,
-    alternative: str,
+    axis_labels: tuple[Text, Text] = (say("x / mm"), say("y / mm")),
+    caption: Text,
+    alternative: Text,
 ) -> Plot:
     """Vectors in a plane, one panel a series, all magnified alike, with a scale arrow of a round length.
 
@@ -55,9 +56,16 @@ def vector_plot(
         unit = _round_length(longest)
         at = (high[0] + 0.9 * margin - factor * unit, low[1] - 0.75 * margin)
         axes[-1].plot([at[0], at[0] + factor * unit], [at[1], at[1]], color=ACCENT, lw=1.6, solid_capstyle="butt")
-        axes[-1].annotate(f"{unit:g} µm", (at[0] + factor * unit / 2, at[1]), (0, 3), textcoords="offset points",
-                          ha="center", va="bottom", fontsize=TINY)  # fmt: skip
-        return Plot(caption, alternative, as_svg(figure))
+        axes[-1].annotate(
+            say("{length:g} µm", length=unit),
+            (at[0] + factor * unit / 2, at[1]),
+            (0, 3),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=TINY,
+        )
+        return drawn(figure, caption, alternative)
 
 
 def _round_length(longest: float) -> float:

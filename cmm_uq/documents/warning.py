@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from cmm_uq.documents.diagnosis_words import VERDICTS
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import listed, title_of
+from cmm_uq.documents.wording import title_of
 from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.messages import NOTHING, Text, commas, listed, say, sentences
 from cmm_uq.uncertainty.rounding import significant
 
 ASSUMED = 0.25
 """Share of the prior in a parameter's variance from which on the reader is told."""
 
+IMPLAUSIBLE = 4.0
+"""Standard deviations of what was known beforehand from which on an estimate is held to be a mistake."""
 
-def warnings(result: Result) -> tuple[str, ...]:
+
+def warnings(result: Result) -> tuple[Text, ...]:
     """All warnings, the gravest first."""
     return tuple(
         text
@@ -20,6 +24,7 @@ def warnings(result: Result) -> tuple[str, ...]:
             _convergence(result),
             _mismatch(result),
             _noise(result),
+            _implausible(result),
             _undetermined(result),
             _screening(result),
             _missing(result),
@@ -28,46 +33,83 @@ def warnings(result: Result) -> tuple[str, ...]:
     )
 
 
-def _convergence(result: Result) -> list[str]:
+def _convergence(result: Result) -> list[Text]:
     posterior = result.posterior
     if posterior.converged:
         return []
     return [
-        f"The sampling did not converge (least effective sample size {posterior.ess_min:.0f}, R-hat "
-        f"{posterior.rhat_max:.3f}): estimates and uncertainties must not be used."
+        say(
+            "The sampling did not converge (least effective sample size {ess_min:.0f}, R-hat "
+            "{rhat_max:.3f}): estimates and uncertainties must not be used.",
+            ess_min=posterior.ess_min,
+            rhat_max=posterior.rhat_max,
+        )
     ]
 
 
-def _mismatch(result: Result) -> list[str]:
+def _mismatch(result: Result) -> list[Text]:
     diagnosis = result.diagnosed.diagnosis
     if diagnosis.verdict == "consistent":
         return []
     named = [item.title for item in diagnosis.effects]
-    found = f" It shows: {listed(named)}." if named else ""
-    return [f"{VERDICTS[diagnosis.verdict]}{found} The figures below hold for the named model; see the diagnosis."]
+    said = [VERDICTS[diagnosis.verdict]]
+    if named:
+        said.append(say("It shows: {named}.", named=listed(named)))
+    return [sentences((*said, say("The figures below hold for the named model; see the diagnosis.")))]
 
 
-def _noise(result: Result) -> list[str]:
+def _noise(result: Result) -> list[Text]:
     noise, ls = result.noise, result.least_squares
-    texts = []
-    if noise.contradicts_stated and noise.stated_um is not None:
+    texts: list[Text] = []
+    if noise.contradicts_stated and noise.stated_um is not None and noise.p_value is not None:
         texts.append(
-            f"The residuals contradict the stated uncertainty of a coordinate, {significant(noise.stated_um)} µm (p = "
-            f"{noise.p_value:.1g}): the model leaves something out, or the recording is noisier than stated. The "
-            f"uncertainties below rest on the residuals ({significant(noise.coordinate.value)} µm), not on the stated figure."
+            say(
+                "The residuals contradict the stated uncertainty of a coordinate, {stated_um} µm (p = "
+                "{p_value:.1g}): the model leaves something out, or the recording is noisier than stated. "
+                "The uncertainties below rest on the residuals ({value} µm), not on the stated figure.",
+                stated_um=significant(noise.stated_um),
+                p_value=noise.p_value,
+                value=significant(noise.coordinate.value),
+            )
         )
     if ls.degrees_of_freedom < 3 and noise.stated_um is None:
-        texts.append(f"Only {ls.degrees_of_freedom} degrees of freedom are left to estimate the noise from.")
+        texts.append(
+            say(
+                "Only {degrees_of_freedom} degrees of freedom are left to estimate the noise from.",
+                degrees_of_freedom=ls.degrees_of_freedom,
+            )
+        )
     return texts + [
-        f"{size.title} is given without an uncertainty (u_um) and is taken as exact."
+        say("{title} is given without an uncertainty (u_um) and is taken as exact.", title=size.title)
         for size in result.artefact.sizes
         if size.certified and size.sd == 0
     ]
 
 
-def _undetermined(result: Result) -> list[str]:
-    texts = [
-        f"Not determined by this recording: the common part of {listed([title_of(key, result) for key in combination])}."
+def _implausible(result: Result) -> list[Text]:
+    """Parameters far beyond what was known of them: a certified length that is wrong looks like scale errors of all axes."""
+    texts: list[Text] = []
+    means = result.posterior.draws.mean(axis=0)
+    for unknown, mean in zip(result.posterior.unknowns, means, strict=True):
+        off = mean - unknown.prior_mean
+        if 0 < unknown.prior_sd < abs(off) / IMPLAUSIBLE:
+            texts.append(
+                say(
+                    "{parameter}: {off:.4g} {unit} is {times:.0f} times the standard uncertainty with which it was known "
+                    "beforehand ({sd:.3g} {unit}). Before it is used, rule out a wrong certified length, unit or expansion.",
+                    parameter=title_of(unknown.key, result), off=off, unit=unknown.unit, times=abs(off) / unknown.prior_sd,
+                    sd=unknown.prior_sd,
+                )
+            )  # fmt: skip
+    return texts
+
+
+def _undetermined(result: Result) -> list[Text]:
+    texts: list[Text] = [
+        say(
+            "Not determined by this recording: the common part of {parameters}.",
+            parameters=listed([title_of(key, result) for key in combination]),
+        )
         for combination in result.undetermined
     ]
     free = {key for combination in result.undetermined for key in combination}
@@ -75,47 +117,67 @@ def _undetermined(result: Result) -> list[str]:
         share = result.prior_share(unknown.key)
         if share > ASSUMED and unknown.key not in free and not unknown.known:
             texts.append(
-                f"{title_of(unknown.key, result)} is hardly determined by this recording: {100 * share:.0f} % of its variance "
-                f"is the assumption that it lies within about ±{2 * unknown.prior_sd:g} {unknown.unit}."
+                say(
+                    "{parameter} is hardly determined by this recording: {share:.0f} % of its variance is the "
+                    "assumption that it lies within about ±{prior_sd:g} {unit}.",
+                    parameter=title_of(unknown.key, result),
+                    share=100 * share,
+                    prior_sd=2 * unknown.prior_sd,
+                    unit=unknown.unit,
+                )
             )
     return texts
 
 
-def _screening(result: Result) -> list[str]:
-    texts = [
-        f"{finding.why[0].upper()}{finding.why[1:]}. "
-        + ("It is set aside: not used for the error factors." if finding.set_aside else "It is used as it stands.")
+def _screening(result: Result) -> list[Text]:
+    texts: list[Text] = [
+        say("{why:capital}. It is set aside: not used for the error factors.", why=finding.why)
+        if finding.set_aside
+        else say("{why:capital}. It is used as it stands.", why=finding.why)
         for finding in result.findings
     ]
     for influence in result.influences:
         sd = (
-            ""
+            NOTHING
             if influence.residual_sd_um is None
-            else f"residual standard deviation {influence.residual_sd_um:.1f} µm, "
+            else say("residual standard deviation {residual_sd_um:.1f} µm, ", residual_sd_um=influence.residual_sd_um)
         )
         texts.append(
-            f"Without measurement {influence.measurement}: {sd}largest change of an estimate "
-            f"{influence.largest_change:.2g} of its standard uncertainty ({title_of(influence.parameter, result)})."
+            say(
+                "Without measurement {measurement}: {sd}largest change of an estimate {largest_change:.2g} "
+                "of its standard uncertainty ({parameter}).",
+                measurement=influence.measurement,
+                sd=sd,
+                largest_change=influence.largest_change,
+                parameter=title_of(influence.parameter, result),
+            )
         )
     return texts
 
 
-def _missing(result: Result) -> list[str]:
+def _missing(result: Result) -> list[Text]:
     """What ISO/IEC 17025:2017 asks for and the job does not say; a recording that nobody measured has no certificate."""
     if result.job.origin != MEASURED:
         return []
     facts = result.job.facts
     wanted = (
-        (facts.laboratory.name, "name of the laboratory (7.8.2.1 b)"),
-        (facts.laboratory.address, "address of the laboratory (7.8.2.1 b)"),
-        (facts.job.place, "place of the measurement (7.8.2.1 c)"),
-        (facts.job.customer, "customer (7.8.2.1 e)"),
-        (facts.job.procedure, "method (7.8.2.1 f)"),
-        (facts.machine.serial, "serial number of the machine (7.8.2.1 g)"),
-        (facts.job.issued, "date of issue (7.8.2.1 j)"),
-        (facts.laboratory.signatory, "who authorises it (7.8.2.1 o)"),
-        (facts.job.conditions, "conditions (7.8.4.1 b)"),
-        (facts.artefact.length_mm is None or facts.artefact.certificate, "certificate of the artefact (7.8.4.1 c)"),
+        (facts.laboratory.name, say("name of the laboratory (7.8.2.1 b)")),
+        (facts.laboratory.address, say("address of the laboratory (7.8.2.1 b)")),
+        (facts.job.place, say("place of the measurement (7.8.2.1 c)")),
+        (facts.job.customer, say("customer (7.8.2.1 e)")),
+        (facts.job.procedure, say("method (7.8.2.1 f)")),
+        (facts.machine.serial, say("serial number of the machine (7.8.2.1 g)")),
+        (facts.job.issued, say("date of issue (7.8.2.1 j)")),
+        (facts.laboratory.signatory, say("who authorises it (7.8.2.1 o)")),
+        (facts.job.conditions, say("conditions (7.8.4.1 b)")),
+        (
+            facts.artefact.length_mm is None or facts.artefact.certificate,
+            say("certificate of the artefact (7.8.4.1 c)"),
+        ),
     )
     missing = [name for given, name in wanted if not given]
-    return [f"Not complete by ISO/IEC 17025:2017; the job does not state: {', '.join(missing)}."] if missing else []
+    return (
+        [say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=commas(missing))]
+        if missing
+        else []
+    )

@@ -2,48 +2,70 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.result import Result
+from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import NOTHING, Text, Verbatim, foreign, number, say
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
 
+OUTCOME_WORDS: Mapping[str, Text] = {
+    "pass": say("pass"), "fail": say("fail"), "undecided": say("undecided"), "incomplete": say("incomplete"),
+}  # fmt: skip
+"""What a statement of conformity comes to, in a table."""
 
-def expanded(quantity: Quantity) -> tuple[str, str, str]:
+
+def expanded(quantity: Quantity) -> tuple[Text, Text, Text]:
     """Value, expanded uncertainty and coverage factor, as text.
 
     The expanded uncertainty is given to two significant digits.
     """
     value, uncertainty = rounded(quantity.value, quantity.expanded)
     k = quantity.coverage_factor
-    return value, uncertainty, "–" if k is None else f"{k:.2f}"
+    return (value, uncertainty, (say("–") if k is None else number(k, ".2f")))
 
 
-def probability(p: float) -> str:
+def probability(p: float) -> Text:
     """A probability in per cent that never claims certainty."""
     if p < 1e-4:
-        return "<\u00a00.01\u00a0%"
+        return say("<\u00a00.01\u00a0%")
     if p > 1 - 1e-4:
-        return ">\u00a099.99\u00a0%"
-    return f"{100 * p:.{2 if p < 0.5 else 3 if p < 0.999 else 4}g}\u00a0%"
+        return say(">\u00a099.99\u00a0%")
+    digits = 2 if p < 0.5 else 3 if p < 0.999 else 4
+    return say("{p}\u00a0%", p=number(100 * p, f".{digits}g"))
 
 
-def measured(statement: Statement) -> tuple[str, str]:
+def measured(statement: Statement) -> tuple[Text, Text]:
     """Value that a statement names and its standard uncertainty, as text; the latter empty where none is known."""
     if statement.u_um > 0:
         return rounded(statement.value_um, statement.u_um)
-    return f"{statement.value_um:.4g}", ""
+    return (number(statement.value_um, ".4g"), NOTHING)
 
 
-def title_of(key: tuple[str, str], result: Result) -> str:
+def title_of(key: tuple[str, str], result: Result) -> Text:
     """A parameter in words: ``Squareness X–Y``."""
     owner, name = key
     if owner == ARTEFACT:
         return next(size.title for size in result.artefact.sizes if size.name == name)
     effect = next(effect for effect in result.model.effects if effect.name == owner)
-    return effect.title if len(effect.reported) == 1 else f"{effect.title}, {name}"
+    return (
+        effect.title if len(effect.reported) == 1 else say("{title}, {name}", title=effect.title, name=Verbatim(name))
+    )
 
 
-def listed(words: list[str]) -> str:
-    """Words with commas and an "and"."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+def refusal(error: CmmUqError) -> Text:
+    """Why something has no solution, as the error says it."""
+    parts = (Verbatim(error.where or ""), foreign(error.problem), foreign(error.fix or ""))
+    where, problem, fix = parts
+    told = say("{where}: {problem}. {fix}", where=where, problem=problem, fix=fix)
+    return told if told == str(error) else Verbatim(str(error))
+
+
+def numbered(measurement: int, repeat: int | None) -> Text:
+    """A measurement by its number, with that of its repeat where there are several: ``12 (2)``."""
+    if repeat is None:
+        return number(measurement)
+    return say("{measurement} ({repeat})", measurement=measurement, repeat=repeat)

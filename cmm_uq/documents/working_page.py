@@ -6,26 +6,27 @@ from collections.abc import Iterable
 
 from cmm_uq.documents.document import Document, Facts, Section
 from cmm_uq.jobs.job import JobFile
+from cmm_uq.messages import Text, Verbatim, say
 
 
 def working_page(
     facts: JobFile,
-    title: str,
-    subject: str,
+    title: Text,
+    subject: Text,
     *,
     particulars: tuple[Facts, ...],
-    warnings: Iterable[str],
+    warnings: Iterable[Text],
     sections: Iterable[Section],
-    produced_by: str,
-    end: str = "End of diagnosis",
-    attachments: tuple[str, ...] = (),
+    produced_by: Text,
+    end: Text = say("End of diagnosis"),
+    attachments: tuple[Text, ...] = (),
 ) -> Document:
     """A document about a job, without the sections that have nothing to say; see :class:`Document`."""
     return Document(
         title=title,
-        number=facts.job.id,
-        subject=f"{facts.machine.name}, {subject}",
-        issuer=tuple(line for line in (facts.laboratory.name,) if line),
+        number=Verbatim(facts.job.id),
+        subject=say("{name}, {subject}", name=Verbatim(facts.machine.name), subject=subject),
+        issuer=tuple(Verbatim(line) for line in (facts.laboratory.name,) if line),
         particulars=particulars,
         warnings=tuple(warnings),
         sections=tuple(section for section in sections if section.blocks),

@@ -1,7 +1,8 @@
 """The draws of a posterior by name and by chain, as other programs read them.
 
 A chain is the path of one walker of one ensemble, as the sampler ran it. Draws of several walkers strung together would look
-independent to a program that estimates autocorrelation along a chain, and be counted several times over.
+independent to a program that estimates autocorrelation along a chain, and be counted several times over. Where only some draws
+were kept, a chain is an ensemble, with the paths of its walkers one behind the other.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.inference.effective import bulk_ess
-from cmm_uq.inference.ensembles import ENSEMBLES, rhat
-from cmm_uq.points import Floats
+from cmm_uq.inference.ensembles import ENSEMBLES, normal_scores, rhat, split
+from cmm_uq.points import Floats, Ints
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,14 +64,18 @@ class Draws(Mapping[str, Floats]):
         return list(self.units)
 
     @cached_property
+    def _scores(self) -> Floats:
+        return normal_scores(split(self.array))
+
+    @cached_property
     def rhat_max(self) -> float:
         """Largest rank-normalised split R-hat, each walker a chain; ``nan`` with nothing drawn."""
-        return rhat(self.array) if len(self) else float("nan")
+        return rhat(self.array, self._scores) if len(self) else float("nan")
 
     @cached_property
     def ess_bulk_min(self) -> float:
         """Smallest bulk effective sample size, each walker a chain; ``nan`` with nothing drawn."""
-        return bulk_ess(self.array) if len(self) else float("nan")
+        return bulk_ess(self.array, self._scores) if len(self) else float("nan")
 
     @cached_property
     def covariance(self) -> pd.DataFrame:
@@ -130,6 +135,29 @@ def by_chain(values: Floats, steps: int) -> Floats:
     return np.asarray(
         values.reshape(ENSEMBLES, steps, walkers, *rest).swapaxes(1, 2).reshape(ENSEMBLES * walkers, steps, *rest)
     )
+
+
+def evenly(count: int, most: int) -> Ints:
+    """Which of so many draws, ensembles, steps and walkers in this order, are kept where at most so many are wanted."""
+    return np.linspace(0, count - 1, min(most, count)).astype(np.int64)
+
+
+def by_ensemble(values: Floats, steps: int, count: int) -> Floats:
+    """Draws (N, …) kept :func:`evenly` of ``count`` as chains (chain, draw, …), each one ensemble.
+
+    Along a chain the walkers' paths follow each other, each in the order of its steps: what two draws of a walker have in
+    common stays to be seen, as it would not where walkers take turns.
+
+    Parameters
+    ----------
+    values : one a kept draw; N is a multiple of the number of ensembles.
+    steps : of each walker, before some were kept.
+    count : of all draws, before some were kept.
+    """
+    walkers = count // (ENSEMBLES * steps)
+    kept = evenly(count, len(values))
+    order = np.lexsort((kept // walkers, kept % walkers, kept // (walkers * steps)))
+    return np.asarray(values[order].reshape(ENSEMBLES, -1, *values.shape[1:]))
 
 
 def _texts(words: Any) -> Any:

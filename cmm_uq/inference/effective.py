@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.inference.ensembles import normal_scores
+from cmm_uq.inference.ensembles import normal_scores, split
 from cmm_uq.points import Floats
 
 
-def bulk_ess(chains: Floats) -> float:
+def bulk_ess(chains: Floats, scores: Floats | None = None) -> float:
     """Smallest bulk effective sample size of the parameters.
 
     Parameters
     ----------
     chains : (c, n, d) draws, n at least 8.
+    scores : of the chains' halves, where they are known already.
     """
-    half = chains.shape[1] // 2
-    scores = normal_scores(np.concatenate([chains[:, :half], chains[:, -half:]]))
+    scores = normal_scores(split(chains)) if scores is None else scores
     return min(_effective(scores[:, :, i]) for i in range(scores.shape[2]))
 
 

@@ -21,6 +21,7 @@ ENSEMBLES = 4
 STEPS_AT_ONCE = 300
 MOST_STEPS = 6000
 BURN_IN = 60
+WALKERS = 32
 EFFECTIVE_SAMPLES = 4000
 """Asked of every parameter: the interval's ends are then stable to about 3 % of u, below the last digit printed."""
 
@@ -75,6 +76,7 @@ def run_ensembles(
     *,
     effective_samples: int = EFFECTIVE_SAMPLES,
     steps_at_once: int = STEPS_AT_ONCE,
+    least_walkers: int = WALKERS,
 ) -> Chains:
     """Sample a density with emcee.
 
@@ -86,11 +88,12 @@ def run_ensembles(
     progress : told the part done, from 0 to 1.
     effective_samples : to reach in every parameter.
     steps_at_once : between two looks at how many there are.
+    least_walkers : in each ensemble; there are at least four for each dimension.
     """
     import emcee
 
     d = len(centre)
-    walkers = max(32, 4 * d + 4 * d % 2)
+    walkers = max(least_walkers, 4 * d)
     samplers, states = [], []
     for child in np.random.SeedSequence(seed).spawn(ENSEMBLES):
         sampler = emcee.EnsembleSampler(
@@ -148,6 +151,64 @@ def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> t
     return centre, factor
 
 
+def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> tuple[Floats, Floats]:
+    """An approximation of a density that may lie far from where it was looked for: importance sampling, let in by degrees.
+
+    What is looked for goes from where the search begins to the density, in each round as far as enough draws count.
+
+    Parameters
+    ----------
+    centre, factor : where to begin, (d,) and (d, d), wide enough for the density to be somewhere within.
+    seed : of the draws.
+
+    Returns
+    -------
+    centre (d,) and factor (d, d), as :func:`run_ensembles` wants them.
+    """
+    random, d = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))), len(centre)
+    begin, back = centre, np.linalg.inv(factor)
+    count, power, left = 100 * (d + 1), 0.0, _LOOKS
+    for _ in range(_MOST_LOOKS):
+        z = _t_draws(count, d, random)
+        theta = centre + z @ factor.T
+        first = -0.5 * np.sum(((theta - begin) @ back.T) ** 2, axis=1)
+        gain = np.maximum(density(theta) - first, _NEVER)
+        known = first - _t_log_density(z)
+        power = _highest_power(gain, known, power, _ENOUGH * count)
+        weight = _weights(power * gain + known)
+        mean = weight @ theta
+        about = theta - mean
+        covariance = (about * weight[:, None]).T @ about
+        centre, factor = mean, np.linalg.cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(d))
+        left -= power == 1.0
+        if not left:
+            break
+    return centre, factor
+
+
+_ENOUGH, _MOST_LOOKS, _NEVER = 0.2, 25, -1e30
+
+
+def _highest_power(gain: Floats, known: Floats, least: float, enough: float) -> float:
+    """Largest power of a gain in density, not below ``least``, at which the draws are worth enough, by bisection."""
+    low, high = least, 1.0
+    if _worth(gain + known) >= enough:
+        return 1.0
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _worth(middle * gain + known) >= enough else (low, middle)
+    return low
+
+
+def _weights(log: Floats) -> Floats:
+    weight = np.exp(log - log.max())
+    return np.asarray(weight / weight.sum())
+
+
+def _worth(log: Floats) -> float:
+    return float(1 / np.sum(_weights(log) ** 2))
+
+
 def _start(density: LogDensity, walkers: int, d: int, random: Any) -> Floats:
     """Where the walkers begin: draws that the density does not forbid."""
     z = _t_draws(walkers, d, random)
@@ -187,17 +248,24 @@ def _effective_samples(chains: Floats) -> tuple[float, float]:
     return time, steps * ensembles * walkers / time
 
 
-def rhat(chains: Floats) -> float:
+def rhat(chains: Floats, scores: Floats | None = None) -> float:
     """Largest rank-normalised split R-hat of the parameters, bulk or tail (Vehtari et al. 2021, section 4).
 
     Parameters
     ----------
     chains : (c, n, d) independent chains.
+    scores : of the chains' halves, where they are known already.
     """
+    halves = split(chains)
+    folded = np.abs(halves - np.median(halves, axis=(0, 1)))
+    bulk = normal_scores(halves) if scores is None else scores
+    return max(float(_split_rhat(values).max()) for values in (bulk, normal_scores(folded)))
+
+
+def split(chains: Floats) -> Floats:
+    """The first and the last half of each chain as chains (2c, n // 2, d)."""
     half = chains.shape[1] // 2
-    split = np.concatenate([chains[:, :half], chains[:, -half:]])
-    folded = np.abs(split - np.median(split, axis=(0, 1)))
-    return max(float(_split_rhat(normal_scores(values)).max()) for values in (split, folded))
+    return np.concatenate([chains[:, :half], chains[:, -half:]])
 
 
 def normal_scores(values: Floats) -> Floats:

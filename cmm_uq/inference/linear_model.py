@@ -16,6 +16,7 @@ import numpy as np
 from scipy import linalg
 
 from cmm_uq.points import Floats
+from cmm_uq.units import Unit
 
 Whiten = Callable[[Floats], Floats]
 
@@ -34,7 +35,7 @@ class Unknown:
     """
 
     key: tuple[str, str]
-    unit: str
+    unit: Unit
     prior_mean: float
     prior_sd: float
     scale: float
@@ -76,34 +77,25 @@ class LinearModel:
     @cached_property
     def _reached(self) -> Floats:
         """Orthonormal basis of what the placing reaches, in units of the noise scale."""
-        if not self.placing.shape[1]:
-            return np.zeros((len(self.observed), 0))
-        Q, R, _ = linalg.qr(self.placing / self.noise_scale[:, None], mode="economic", pivoting=True)
-        diagonal = np.abs(np.diag(R))
-        return np.asarray(Q[:, diagonal > 1e-10 * diagonal[0]], dtype=np.float64)
+        return reached(self.placing / self.noise_scale[:, None])
 
     def only(self, parameters: Sequence[int]) -> LinearModel:
         """The model with some of its parameters, the others zero."""
         chosen = list(parameters)
         return replace(self, design=self.design[:, chosen], unknowns=tuple(self.unknowns[i] for i in chosen))
 
-    def uncorrelated(self, whiten: Whiten) -> tuple[LinearModel, Whiten]:
-        """The same model in observations without correlation, and what turns columns (m, r) of the old into the new.
+    def uncorrelated(self, whiten: Whiten) -> LinearModel:
+        """The same model in observations without correlation.
 
         Parameters
         ----------
-        whiten : what turns noise (m, r), in units of the noise scale, into white noise.
+        whiten : what turns columns (m, r) of noise, mm, into white noise of one coordinate's standard deviation.
         """
-
-        def white(columns: Floats) -> Floats:
-            return whiten(columns / self.noise_scale[:, None])
-
-        observed = white(self.observed[:, None])[:, 0]
-        model = replace(
-            self, observed=observed, design=white(self.design), placing=white(self.placing),
+        observed = whiten(self.observed[:, None])[:, 0]
+        return replace(
+            self, observed=observed, design=whiten(self.design), placing=whiten(self.placing),
             noise_scale=np.ones(len(observed)),
         )  # fmt: skip
-        return model, white
 
     @property
     def prior_mean(self) -> Floats:
@@ -123,3 +115,12 @@ class Reduced:
     observed: Floats
     design: Floats
     count: int
+
+
+def reached(columns: Floats) -> Floats:
+    """Orthonormal basis (m, r) of what columns (m, q) reach, by QR with pivoting."""
+    if not columns.shape[1]:
+        return np.zeros((len(columns), 0))
+    Q, R, _ = linalg.qr(columns, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(R))
+    return np.asarray(Q[:, diagonal > 1e-10 * diagonal[0]], dtype=np.float64)

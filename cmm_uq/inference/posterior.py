@@ -10,6 +10,7 @@ from scipy import linalg, optimize
 
 from cmm_uq.inference.ensembles import Progress, converged, run_ensembles
 from cmm_uq.inference.linear_model import LinearModel, Unknown
+from cmm_uq.inference.noise import Sizes
 from cmm_uq.points import Floats
 
 __all__ = ["SIGMA_BOUNDS", "Density", "Posterior", "Progress", "sample"]
@@ -54,6 +55,13 @@ class Posterior:
     def covariance(self) -> Floats:
         """(k, k) of the draws."""
         return np.atleast_2d(np.cov(self.draws, rowvar=False))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NoisyPosterior(Posterior):
+    """A posterior with the sizes of the noise's components in each draw."""
+
+    sizes: Sizes
 
 
 @dataclass(frozen=True, eq=False)

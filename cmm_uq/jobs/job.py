@@ -6,44 +6,29 @@ import datetime as dt
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from html import escape
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
 
 from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.conformity import ConformityFacts, needed, standards_in, uncertainty_missing
 from cmm_uq.jobs.file_names import device_name
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.jobs.table import (
-    AnyFloat,
-    Length,
     Limit,
     Names,
     Numbers,
     Table,
-    Uncertainty,
     at_least,
 )
+from cmm_uq.notebook import html_table
 from cmm_uq.points import Points
 from cmm_uq.writing import Owner, staged
-
-Standard = Literal["ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617"]
-
-CHARACTERISTICS: Mapping[Standard, str] = {
-    "ASME B89.4.1-1997": "volumetric performance", "ISO 10360-2:2009": "E0", "ISO 10360-5:2010": "P_FTU",
-    "VDI/VDE 2617": "E0",
-}  # fmt: skip
-"""The characteristic that is decided of each standard, of all that it has."""
-
-LENGTH_STANDARDS: tuple[Standard, ...] = ("ISO 10360-2:2009", "VDI/VDE 2617")
-"""Standards that compare with calibrated lengths."""
-
-FORM_STANDARD: Standard = "ISO 10360-5:2010"
-"""Compares the form of a calibrated sphere."""
 
 Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]
 """A permissible size of an effect in its own unit."""
@@ -98,81 +83,6 @@ class Laboratory(Table):
     signatory_role: str = ""
 
 
-class Traceability(Table):
-    """The artefact's own certificate."""
-
-    number: str = ""
-    laboratory: str = ""
-    date: dt.date | None = None
-    due: dt.date | None = None
-
-
-class ArtefactFacts(Table):
-    """``[artefact]``: what every kind of measurement has; a kind with more keys has a table of its own.
-
-    Without ``length_mm`` the artefact is uncalibrated, unless its certified figures stand in the recording.
-
-    Attributes
-    ----------
-    with_references : whether they do; its ``u_um`` may then stand without ``length_mm``.
-    with_recording : whether there is one; otherwise what ``[machine]`` names is measured.
-    with_earlier : whether two recordings of it at two dates can be compared.
-    form_key : key of the form deviation by its certificate, for a kind that has a form to be compared.
-    """
-
-    with_references: ClassVar[bool] = False
-    with_recording: ClassVar[bool] = True
-    with_earlier: ClassVar[bool] = False
-    form_key: ClassVar[str | None] = None
-
-    kind: str
-    name: str = ""
-    serial: str = ""
-    length_mm: Length | None = None
-    u_um: Uncertainty | None = None
-    cte_per_k: AnyFloat = 0.0
-    certificate: Traceability | None = None
-
-    @model_validator(mode="after")
-    def _uncertainty_of_something(self) -> Self:
-        if self.u_um is not None and self.length_mm is None and not self.with_references:
-            raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
-        if abs(self.cte_per_k) > 1e-3:
-            raise ValueError(
-                f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
-            )
-        return self
-
-    @property
-    def certified(self) -> bool:
-        """Whether lengths can be compared with it."""
-        return self.length_mm is not None
-
-
-class ReferencedFacts(ArtefactFacts):
-    """``[artefact]`` of a kind whose certified figures stand in the recording.
-
-    ``nominal`` says that those figures are nominal only: their common scale then stays free.
-    """
-
-    with_references: ClassVar[bool] = True
-
-    nominal: bool = False
-
-    @model_validator(mode="after")
-    def _nominal_or_certified(self) -> Self:
-        if self.nominal and (self.u_um is not None or self.length_mm is not None):
-            raise ValueError(
-                "nominal = true says that the recording's references are not certified: leave out length_mm and u_um"
-            )
-        return self
-
-    @property
-    def certified(self) -> bool:
-        """Whether lengths can be compared with it."""
-        return not self.nominal
-
-
 class RecordingFacts(Table):
     """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
 
@@ -206,71 +116,6 @@ class ModelFacts(Table):
         return self
 
 
-class MaximumPermissibleError(Table):
-    """``mpe``: E = A + L/K, with L in mm and E in µm."""
-
-    a_um: Uncertainty
-    k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)]
-
-
-class GuardBand(Table):
-    """A guard band of so many expanded uncertainties (ILAC-G8:09/2019, 4.2.2)."""
-
-    guard_band: Annotated[float, Field(ge=0, le=100)]
-
-
-class FalseAccept(Table):
-    """Accept only when the probability of not conforming is at most this."""
-
-    max_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-12)]
-
-
-Rule = Literal["simple", "ISO 14253-1"] | GuardBand | FalseAccept
-
-
-class ConformityFacts(Table):
-    """One ``[[conformity]]``: a standard, a limit and a decision rule."""
-
-    standard: Standard
-    characteristic: str | None = None
-    limit_um: Limit | None = None
-    mpe: MaximumPermissibleError | None = None
-    rule: Rule = "ISO 14253-1"
-
-    @model_validator(mode="after")
-    def _one_limit(self) -> Self:
-        if (self.limit_um is None) == (self.mpe is None):
-            raise ValueError("give either limit_um or mpe = { a_um = …, k = … }")
-        return self
-
-    @model_validator(mode="after")
-    def _decided_here(self) -> Self:
-        known = CHARACTERISTICS[self.standard]
-        if self.characteristic not in (None, known):
-            raise ValueError(
-                f"characteristic = {self.characteristic!r} of {self.standard} is not decided here: only {known}"
-            )
-        return self
-
-    def uncertainty_missing(self, artefact: ArtefactFacts) -> str | None:
-        """The key of ``[artefact]`` whose uncertainty the rule needs and does not have; ``None`` when nothing is missing."""
-        if self.rule == "simple":
-            return None
-        if self.standard in LENGTH_STANDARDS:
-            return "u_um" if artefact.certified and not artefact.u_um else None
-        key = artefact.form_key if self.standard == FORM_STANDARD else None
-        return key if key is not None and not getattr(artefact, key) else None
-
-
-def needed(key: str, wish: ConformityFacts) -> tuple[str, str]:
-    """That a rule needs an uncertainty which ``[artefact]`` does not state, and how to mend it."""
-    rule = wish.rule if isinstance(wish.rule, str) else next(iter(wish.rule.model_dump()))
-    return (
-        f"the rule {rule} needs the uncertainty of what {wish.standard} compares with, and [artefact] states no {key} above 0",
-        f'Give {key} in [artefact], or rule = "simple", which takes no account of it',
-    )
-
-
 class JobFile(Table):
     """All of job.toml. A job of a kind without a recording has no ``[recording]``."""
 
@@ -290,7 +135,7 @@ class JobFile(Table):
     ) -> list[ConformityFacts]:  # fmt: skip
         artefact = info.data.get("artefact")
         for wish in wishes:
-            key = wish.uncertainty_missing(artefact) if artefact is not None else None
+            key = uncertainty_missing(wish, artefact, standards_in(info)) if artefact is not None else None
             if key is not None:
                 raise ValueError(". ".join(needed(key, wish)))
         return wishes
@@ -378,12 +223,11 @@ class Job:
 
     def _repr_html_(self) -> str:
         rows = (
-            ("Job", self.facts.job.id),
+            ("Id", self.facts.job.id),
             ("Machine", self.facts.machine.name),
             ("Artefact", self.facts.artefact.kind),
             ("Points", len(self.points)),
             ("Recording", self.origin),
             ("Effects", ", ".join(self.facts.model.effects)),
         )
-        cells = "".join(f"<tr><th>{escape(head)}</th><td>{escape(str(cell))}</td></tr>" for head, cell in rows)
-        return f"<table>{cells}</table>"
+        return html_table("Job", (), rows)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,9 +13,11 @@ from pydantic import create_model
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.file_names import check_distinct
-from cmm_uq.jobs.job import ArtefactFacts, Job, JobFile, Tables, job_file_of
+from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
@@ -25,13 +28,28 @@ from cmm_uq.points import AXES, Machine, Points
 from cmm_uq.writing import finish_interrupted
 
 
-def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *, recorded: bool = True) -> Job:
+@dataclass(frozen=True)
+class Nameable:
+    """What a job may name.
+
+    Parameters
+    ----------
+    tables, kinds : of the kinds of measurement, and their names.
+    standards : of conformity.
+    """
+
+    tables: Tables
+    kinds: Callable[[], Sequence[str]]
+    standards: Standards
+
+
+def read_job(folder: Path, nameable: Nameable, *, recorded: bool = True) -> Job:
     """Read and check a job.
 
     Parameters
     ----------
     folder : the job folder, or its job.toml.
-    tables, known : of the kinds that may be read, and their names.
+    nameable : kinds and standards that it may name.
     recorded : whether the recording must be there; otherwise a job still to be measured has no points.
 
     Raises
@@ -40,29 +58,27 @@ def read_job(folder: Path, tables: Tables, known: Callable[[], Sequence[str]], *
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
-    return _read(InFolder(path), tables, known, recorded=recorded)
+    return _read(InFolder(path), nameable, recorded=recorded)
 
 
-def job_of(
-    files: Mapping[str, bytes], tables: Tables, known: Callable[[], Sequence[str]], *, recorded: bool = True
-) -> Job:
+def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = True) -> Job:
     """Read and check a job that lies in no folder yet.
 
     Parameters
     ----------
     files : contents of job.toml and of all that it names, by name.
-    tables, known, recorded : see :func:`read_job`.
+    nameable, recorded : see :func:`read_job`.
 
     Raises
     ------
     CmmUqError : a file is missing, or says something unknown or contradictory.
     """
-    return _read(InMemory(files), tables, known, recorded=recorded)
+    return _read(InMemory(files), nameable, recorded=recorded)
 
 
-def _read(source: Source, tables: Tables, known: Callable[[], Sequence[str]], *, recorded: bool) -> Job:
+def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     path, folder = source.toml, source.toml.parent
-    content, facts = _facts(source, tables, known)
+    content, facts = _facts(source, nameable)
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
     if earlier is not None and not facts.artefact.with_earlier:
@@ -104,7 +120,7 @@ def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
         raise CmmUqError(none, where=f"{path}: {KEY}", fix="Leave the log out")
 
 
-def read_machine(folder: Path, tables: Tables, known: Callable[[], Sequence[str]]) -> Job:
+def read_machine(folder: Path, nameable: Nameable) -> Job:
     """A job for its machine alone: job.toml, error maps and temperature log, whatever its recording is.
 
     Raises
@@ -114,17 +130,17 @@ def read_machine(folder: Path, tables: Tables, known: Callable[[], Sequence[str]
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
     source = InFolder(path)
-    content, facts = _facts(source, tables, known)
+    content, facts = _facts(source, nameable)
     maps, logs = _of_the_machine(facts.machine)
     check_distinct([*maps, *logs], str(path))
     inputs = {"job.toml": content} | _contents(source, maps, MAP_BYTES) | _contents(source, logs, TABLE_BYTES)
     return Job(path.parent, facts, _no_points(_machine(facts.machine)), inputs)
 
 
-def _facts(source: Source, tables: Tables, known: Callable[[], Sequence[str]]) -> tuple[bytes, JobFile]:
+def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile]:
     """job.toml: its bytes, and what it says."""
     content = source.job_file(JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
-    return content, checked(content, source.toml, lambda data: _model_for(data, tables, known))
+    return content, checked(content, source.toml, lambda data: _model_for(data, nameable), nameable.standards)
 
 
 def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str]]:
@@ -132,15 +148,15 @@ def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str]]:
     return [given.file for given in facts.error_map], [facts.temperature_log.file] if facts.temperature_log else []
 
 
-def _model_for(data: dict[str, Any], tables: Tables, known: Callable[[], Sequence[str]]) -> type[JobFile]:
+def _model_for(data: dict[str, Any], nameable: Nameable) -> type[JobFile]:
     """What a job.toml must say for the kind that it names."""
     artefact = data.get("artefact")
     kind = artefact.get("kind") if isinstance(artefact, dict) else None
     if not isinstance(kind, str):
         return JobFile
-    table = tables(kind)
+    table = nameable.tables(kind)
     if table is None:
-        names: Any = Literal[tuple(known())]
+        names: Any = Literal[tuple(nameable.kinds())]
         table = create_model("ArtefactFacts", __base__=ArtefactFacts, kind=(names, ...))
     return job_file_of(table)
 
@@ -162,4 +178,5 @@ def _no_points(machine: Machine) -> Points:
 
 def _machine(facts: MachineFacts) -> Machine:
     travel = np.array([getattr(facts.travel_mm, axis) or [np.nan, np.nan] for axis in AXES], dtype=np.float64)
-    return Machine(facts.name, facts.chain, travel, np.array(facts.origin_mm, dtype=np.float64))
+    axes = tuple(axis for axis in AXES if axis.upper() in facts.chain)
+    return Machine(facts.name, facts.chain, travel, np.array(facts.origin_mm, dtype=np.float64), axes=axes)

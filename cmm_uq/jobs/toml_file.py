@@ -24,7 +24,9 @@ _SHOWN = 60
 """Characters of a key or a value in a message."""
 
 
-def checked(content: bytes, path: Path, model: type[Facts] | Callable[[dict[str, Any]], type[Facts]]) -> Facts:
+def checked(
+    content: bytes, path: Path, model: type[Facts] | Callable[[dict[str, Any]], type[Facts]], context: object = None
+) -> Facts:  # fmt: skip
     """The contents of a TOML file as a checked object.
 
     Parameters
@@ -32,6 +34,7 @@ def checked(content: bytes, path: Path, model: type[Facts] | Callable[[dict[str,
     content : the file's bytes, UTF-8.
     path : of the file, for messages.
     model : what it must say, or what that is for a file that says this.
+    context : what its checks go by beside the file.
 
     Raises
     ------
@@ -45,7 +48,7 @@ def checked(content: bytes, path: Path, model: type[Facts] | Callable[[dict[str,
                          fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip
     wanted = cast("type[Facts]", model if isinstance(model, type) else model(data))
     try:
-        return wanted.model_validate(data)
+        return wanted.model_validate(data, context=context)
     except ValidationError as error:
         raise _located(error.errors(include_url=False)[0], text, path, wanted) from None
 

@@ -22,11 +22,36 @@ from cmm_uq.jobs.recording import REQUIRED, largest
 from cmm_uq.jobs.table import AnyFloat, Column, Table, Uncertainty
 
 
-class NoiseFacts(Table):
-    """``[noise]``: standard deviations of a coordinate, of each reading and of each placing."""
+class ByAxis(Table):
+    """One number for each axis."""
 
-    coordinate_um: Uncertainty = 0.0
+    x: Uncertainty
+    y: Uncertainty
+    z: Uncertainty
+
+
+class NoiseFacts(Table):
+    """``[noise]``: standard deviations of a coordinate.
+
+    ``coordinate_um`` is that of each reading, of every coordinate or ``{ x = …, y = …, z = … }``; ``placing_um`` that of each
+    point of each placing, which its repeats share; ``growth_um`` what is added at the longest distance in a placing, in
+    proportion to it; ``slow_um`` that of slow noise, which forgets over ``slow_time_s`` and needs ``time_s`` in the recording.
+    ``tails_dof`` makes the readings Student's t of the same standard deviation; ``resolution_um`` are the display's steps.
+    """
+
+    coordinate_um: Uncertainty | ByAxis = 0.0
     placing_um: Uncertainty = 0.0
+    growth_um: Uncertainty = 0.0
+    slow_um: Uncertainty = 0.0
+    slow_time_s: Annotated[float, Field(gt=0, le=1e9)] = 600.0
+    tails_dof: Annotated[float, Field(gt=2, le=1000)] | None = None
+    resolution_um: Uncertainty = 0.0
+
+    @property
+    def coordinates_um(self) -> tuple[float, float, float]:
+        """Of each axis."""
+        given = self.coordinate_um
+        return (given.x, given.y, given.z) if isinstance(given, ByAxis) else (given, given, given)
 
 
 class Truth(Table):

@@ -9,18 +9,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts, Job
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.job import Job
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import Kind
+from cmm_uq.plugins import KINDS, Plugin, named, offered
 from cmm_uq.points import Points
-
-GROUP = "cmm_uq.kinds"
-"""Entry points by which other packages offer kinds."""
 
 BUILT_IN: Mapping[str, str] = MappingProxyType({
     "ballbar": "ballbar", "bryan": "bryan", "step_gauge": "step_gauge", "gauge_blocks": "gauge_blocks", "plate": "plate",
@@ -31,7 +29,7 @@ BUILT_IN: Mapping[str, str] = MappingProxyType({
 
 def names() -> tuple[str, ...]:
     """Of all kinds, those of other packages last."""
-    return (*BUILT_IN, *sorted(entry.name for entry in _offered() if entry.name not in BUILT_IN))
+    return (*BUILT_IN, *(plugin.name for plugin in _offered() if plugin.name not in BUILT_IN))
 
 
 @cache
@@ -45,11 +43,8 @@ def kind_named(name: str) -> Kind | None:
     if name in BUILT_IN:
         found: Kind = import_module(f"cmm_uq.kinds.{BUILT_IN[name]}.kind").KIND
         return found
-    offers = [entry for entry in _offered() if entry.name == name]
-    if len(offers) > 1:
-        given = " and ".join(_package(entry) for entry in offers)
-        raise CmmUqError(f"the kind {name!r} comes from {given}", fix="Uninstall one of them")
-    return _loaded(offers[0]) if offers else None
+    outside = named(_offered(), name)
+    return None if outside is None else outside.loaded(Kind)
 
 
 def kind_of(job: Job) -> Kind:
@@ -90,22 +85,5 @@ def _known(name: str) -> Kind:
     return found
 
 
-def _offered() -> list[EntryPoint]:
-    return list(entry_points(group=GROUP))
-
-
-def _package(entry: EntryPoint) -> str:
-    return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.module
-
-
-def _loaded(entry: EntryPoint) -> Kind:
-    """A kind of another package, whose mistakes are said to be its own."""
-    try:
-        found = entry.load()
-    except Exception as error:
-        raise CmmUqError(f"the kind {entry.name!r} cannot be loaded: {type(error).__name__}: {error}",
-                         where=f"package {_package(entry)}", fix="Mend the package, or uninstall it") from error  # fmt: skip
-    if not isinstance(found, Kind) or found.name != entry.name:
-        raise CmmUqError(f"{entry.value!r} is no Kind of the name {entry.name!r}", where=f"package {_package(entry)}",
-                         fix="Mend the package, or uninstall it")  # fmt: skip
-    return found
+def _offered() -> tuple[Plugin, ...]:
+    return offered(KINDS, Plugin)

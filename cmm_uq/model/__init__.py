@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.model.measurement import Estimate, MeasurementModel, Noise
+from cmm_uq.model.drawn_noise import Noise
+from cmm_uq.model.measurement import Estimate, MeasurementModel
 
 __all__ = ["Estimate", "MeasurementModel", "Noise"]

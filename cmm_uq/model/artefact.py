@@ -13,7 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cmm_uq.messages import NOTHING, Text, foreign
 from cmm_uq.points import Floats, Ints, Points
+from cmm_uq.units import Unit, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +67,19 @@ class Size:
     unit : as printed.
     nominal : where to start, in mm.
     sd : standard uncertainty of the certificate, mm; infinite without a certificate.
+    what : it is, in words without whose: "length"; its title where left out.
     """
 
     name: str
-    title: str
-    unit: str
+    title: Text
+    unit: Unit
     nominal: float
     sd: float
+    what: Text = NOTHING
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "title", foreign(self.title))
+        object.__setattr__(self, "unit", unit(self.unit))
 
     @property
     def certified(self) -> bool:
@@ -94,7 +102,7 @@ class Artefact(ABC):
     """
 
     kind: str
-    title: str
+    title: Text
     points: Points
     sizes: tuple[Size, ...]
     noise_scale: Floats

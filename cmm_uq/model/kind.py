@@ -13,9 +13,18 @@ from importlib import import_module
 from typing import TypeVar
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Points
+
+LENGTHS = "calibrated lengths"
+"""That a standard may be decided on: ``Artefact.indications``."""
+
+BARS = "lengths of one bar"
+"""The same: ``Artefact.lengths`` of one bar in many positions, and figures of their range."""
+
+FORMS = "forms of test spheres"
+"""The same: ``Artefact.forms``."""
 
 Facet = TypeVar("Facet")
 
@@ -40,7 +49,7 @@ class Kind:
     plan : a :class:`~cmm_uq.planning.setting.Planning`.
     page : a :class:`~cmm_uq.documents.outcome.Page`.
     own : a :class:`~cmm_uq.documents.outcome.OwnAnalysis`, where its errors are no list of effects.
-    standards : that may be stated of it.
+    tested : what of it a standard may be decided on: :data:`LENGTHS`, :data:`BARS`, :data:`FORMS`, or a word of its own.
     refusal, instead : why some command cannot serve it, with ``{}`` for what cannot be done, and what can be done.
     """
 
@@ -51,7 +60,7 @@ class Kind:
     plan: object = None
     page: object = None
     own: object = None
-    standards: tuple[str, ...] = ()
+    tested: tuple[str, ...] = ()
     refusal: str = ""
     instead: str = "Use another command"
 

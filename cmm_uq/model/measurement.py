@@ -22,8 +22,10 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.least_squares import LeastSquares, solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
+from cmm_uq.units import Unit
 
 ARTEFACT = "artefact"
 """First part of the key of a size of the artefact."""
@@ -47,14 +49,6 @@ class Estimate:
 
     least_squares: LeastSquares
     linear: LinearModel
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviations of a coordinate, mm: of each reading, and of each placing (which its repeats share)."""
-
-    coordinate: float = 0.0
-    placing: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +81,9 @@ class MeasurementModel:
             if effect.shape and effect.name not in self.shapes:
                 raise CmmUqError(
                     f"{effect.name} has the nonlinear parameter {effect.shape[0].name}, which a report does not estimate",
-                    where="job.toml [model] effects", fix="Leave it out",
-                )  # fmt: skip
+                    where="job.toml [model] effects",
+                    fix="Leave it out",
+                )
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -104,7 +99,7 @@ class MeasurementModel:
         )
         return coefficients + sizes
 
-    def reported(self, draws: Floats) -> dict[tuple[str, str], tuple[Floats, str]]:
+    def reported(self, draws: Floats) -> dict[tuple[str, str], tuple[Floats, Unit]]:
         """Draws (N,), and unit, of every parameter as it is reported, then of the artefact's sizes, by key.
 
         Parameters
@@ -208,14 +203,11 @@ class MeasurementModel:
         ----------
         coefficients : (k,) of the effects, in order.
         sizes : (s,) true sizes of the artefact, mm.
-        noise : standard deviations.
+        noise : sizes of its components.
         random : their source.
         """
-        points = self.artefact.points
-        _, placing = np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)
-        offsets = noise.placing * random.standard_normal((placing.max() + 1, 3))
-        scatter = noise.coordinate * random.standard_normal(points.xyz.shape)
-        return self.predicted(np.concatenate([coefficients, sizes])) + offsets[placing.ravel()] + scatter
+        exact = self.predicted(np.concatenate([coefficients, sizes]))
+        return noise.displayed(exact + noise.drawn(self.artefact.points, random))
 
     def _basis(self, xyz: Floats) -> Floats:
         points = self.artefact.points.at(xyz)

@@ -10,12 +10,13 @@ from typing import ClassVar
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.messages import Text
 from cmm_uq.model.artefact import Artefact, Size
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import check_length, place
 from cmm_uq.points import Floats, Points
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 LEAST_POINTS = 4
 """Points that a centre and a distance need, not all in one plane."""
@@ -30,12 +31,13 @@ class Radial(Artefact):
     Attributes
     ----------
     per_size : distance from the centre over the size that the certificate gives (a diameter: ½).
-    size_title : of that size.
+    size_title, size_what : of that size, with and without whose.
     plural : what is measured, for messages.
     """
 
     per_size: ClassVar[float]
-    size_title: ClassVar[str]
+    size_title: ClassVar[Text]
+    size_what: ClassVar[Text]
     plural: ClassVar[str]
 
     def __init__(
@@ -51,10 +53,19 @@ class Radial(Artefact):
         self._refuse_flat(where)
         mean = float(np.mean(self.distances(points.xyz, None) / expansion)) / self.per_size
         if facts.length_mm is None:
-            self.sizes = (Size("length_mm", self.size_title, "mm", mean, np.inf),)
+            self.sizes = (Size("length_mm", self.size_title, unit("mm"), mean, np.inf, self.size_what),)
         else:
             check_length(mean, facts.length_mm, self.plural, where)
-            self.sizes = (Size("length_mm", self.size_title, "mm", facts.length_mm, (facts.u_um or 0.0) * MICROMETRE),)
+            self.sizes = (
+                Size(
+                    "length_mm",
+                    self.size_title,
+                    unit("mm"),
+                    facts.length_mm,
+                    (facts.u_um or 0.0) * MICROMETRE,
+                    self.size_what,
+                ),
+            )
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """See :meth:`Artefact.fit`: every point moved along its normal onto the sphere about the least-squares centre."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts, ReferencedFacts
+from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
 

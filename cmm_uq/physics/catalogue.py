@@ -15,7 +15,7 @@ from types import MappingProxyType
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.physics import drives, probing, reversal, rigid_body, scales, scanning, stylus, thermal, warming
 from cmm_uq.physics.effect import Effect
-from cmm_uq.physics.plugins import Plugin, offered
+from cmm_uq.physics.plugins import EffectPlugin, outside_effects
 
 CATALOGUE = MappingProxyType(
     {effect.name: effect for effect in (*rigid_body.EFFECTS, *drives.EFFECTS, *thermal.EFFECTS, *probing.EFFECTS)}
@@ -70,8 +70,8 @@ def plugins(names: Iterable[str] | None = None) -> dict[str, str]:
 
 # What is installed follows from where packages are looked for, so that is the key.
 @lru_cache(maxsize=4)
-def _outside(path: tuple[str, ...]) -> Mapping[str, Plugin]:
-    return offered(EVERY)
+def _outside(path: tuple[str, ...]) -> Mapping[str, EffectPlugin]:
+    return outside_effects(EVERY)
 
 
 @lru_cache(maxsize=4)

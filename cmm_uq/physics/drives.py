@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.messages import Verbatim, say
 from cmm_uq.physics.effect import Effect, Harmonic, Nonparametric, Parameter, Shape, along
 from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import HOUR, MICROMETRE
+from cmm_uq.units import HOUR, MICROMETRE, unit
 
 
 class PeriodicScale(Harmonic):
@@ -16,22 +17,22 @@ class PeriodicScale(Harmonic):
 
     formula = "e_a = A·sin(2π a/λ + φ)"
     mechanism = "scale"
-    points_to = "an error that repeats with the period: scale interpolation, leadscrew or rack"
+    points_to = say("an error that repeats with the period: scale interpolation, leadscrew or rack")
 
-    amplitude = Parameter("amplitude_um", "µm", 10.0)
-    coefficients = (Parameter("cosine_um", "µm", 10.0), Parameter("sine_um", "µm", 10.0))
+    amplitude = Parameter("amplitude_um", unit("µm"), 10.0)
+    coefficients = (Parameter("cosine_um", unit("µm"), 10.0), Parameter("sine_um", unit("µm"), 10.0))
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"periodic_scale_{axis}"
-        self.title = f"Periodic scale error of {axis.upper()}"
-        self.shape = (Shape("period_mm", "mm", 0.5, 1000.0, period_along=axis),)
+        self.title = say("Periodic scale error of {axis}", axis=Verbatim(axis.upper()))
+        self.shape = (Shape("period_mm", unit("mm"), 0.5, 1000.0, period_along=axis),)
         self.imitated_by = (Nonparametric(f"{axis}_mm", axis),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
         (period,) = shape
-        angle = 2 * np.pi * points.readings[:, AXES.index(self.axis)] / period
+        angle = 2 * np.pi * points.readings[self.axis] / period
         return np.concatenate(
             [along(self.axis, MICROMETRE * np.sin(angle)), along(self.axis, MICROMETRE * np.cos(angle))], axis=2
         )
@@ -42,14 +43,14 @@ class Hysteresis(Effect):
 
     formula = "e_a = ½·gap·approach_a"
     mechanism = "drive"
-    points_to = "backlash or friction in this drive: the reading depends on the side it is reached from"
+    points_to = say("backlash or friction in this drive: the reading depends on the side it is reached from")
 
-    coefficients = (Parameter("gap_um", "µm", 30.0),)
+    coefficients = (Parameter("gap_um", unit("µm"), 30.0),)
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"hysteresis_{axis}"
-        self.title = f"Hysteresis of {axis.upper()}"
+        self.title = say("Hysteresis of {axis}", axis=Verbatim(axis.upper()))
         self.columns = (f"approach_{axis}",)
         self.idealised_over = axis
         self.imitated_by = (Nonparametric(f"approach_{axis}"),)
@@ -64,16 +65,16 @@ class Drift(Effect):
 
     formula = "e_a = v · time"
     mechanism = "temperature"
-    points_to = "the axis drifts with time: warm-up, or the room's temperature"
+    points_to = say("the axis drifts with time: warm-up, or the room's temperature")
 
-    coefficients = (Parameter("um_per_h", "µm/h", 10.0),)
+    coefficients = (Parameter("um_per_h", unit("µm/h"), 10.0),)
     columns = ("time_s",)
     idealised_over = "time_s"
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"drift_{axis}"
-        self.title = f"Drift of {axis.upper()} with time"
+        self.title = say("Drift of {axis} with time", axis=Verbatim(axis.upper()))
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

@@ -16,7 +16,9 @@ from typing import ClassVar
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.messages import Text
 from cmm_uq.points import Floats, Points
+from cmm_uq.units import Unit, unit
 
 CONTRACT, FURTHER = "contract", "further"
 """Tiers: effects that every job file may count on, and rarer ones that only some machines and recordings show."""
@@ -39,8 +41,11 @@ class Parameter:
     """
 
     name: str
-    unit: str
+    unit: Unit
     prior_sd: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", unit(self.unit))
 
 
 @dataclass(frozen=True)
@@ -51,10 +56,13 @@ class Shape:
     """
 
     name: str
-    unit: str
+    unit: Unit
     low: float
     high: float
     period_along: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", unit(self.unit))
 
 
 @dataclass(frozen=True)
@@ -92,10 +100,10 @@ class Effect(ABC):
     """
 
     name: str
-    title: str
+    title: Text
     formula: str
     mechanism: str
-    points_to: str
+    points_to: Text
     coefficients: tuple[Parameter, ...]
     shape: tuple[Shape, ...] = ()
     columns: tuple[str, ...] = ()
@@ -165,7 +173,7 @@ class Harmonic(Effect):
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:
         """Amplitude, shape, phase."""
-        return (self.amplitude, *self.shape, Parameter("phase_rad", "rad", np.pi))
+        return (self.amplitude, *self.shape, Parameter("phase_rad", unit("rad"), np.pi))
 
     def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
         """Amplitude ≥ 0, shape, and phase in (−π, π]."""

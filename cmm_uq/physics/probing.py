@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.messages import say
 from cmm_uq.physics.effect import Effect, Harmonic, Parameter
 from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 def normals_of(points: Points) -> Floats:
@@ -20,11 +21,11 @@ class ProbeRadius(Effect):
     """Error of the effective stylus radius."""
 
     name = "probe_radius"
-    title = "Effective stylus radius"
+    title = say("Effective stylus radius")
     formula = "true surface point = indicated + r·n"
     mechanism = "probe"
-    points_to = "the effective stylus radius is wrong: qualify the probe again"
-    coefficients = (Parameter("um", "µm", 10.0),)
+    points_to = say("the effective stylus radius is wrong: qualify the probe again")
+    coefficients = (Parameter("um", unit("µm"), 10.0),)
     columns = ("nx", "ny", "nz")
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -36,12 +37,12 @@ class ProbeLobing(Harmonic):
     """Three-lobed pre-travel."""
 
     name = "probe_lobing"
-    title = "Lobing of the probe"
+    title = say("Lobing of the probe")
     formula = "true surface point = indicated + A·cos(3θ + φ)·n, θ = atan2(ny, nx)"
     mechanism = "probe"
-    points_to = "the probe's pre-travel has three lobes: qualify it in more directions"
-    amplitude = Parameter("amplitude_um", "µm", 5.0)
-    coefficients = (Parameter("cosine_um", "µm", 5.0), Parameter("sine_um", "µm", 5.0))
+    points_to = say("the probe's pre-travel has three lobes: qualify it in more directions")
+    amplitude = Parameter("amplitude_um", unit("µm"), 5.0)
+    coefficients = (Parameter("cosine_um", unit("µm"), 5.0), Parameter("sine_um", unit("µm"), 5.0))
     columns = ("nx", "ny", "nz")
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -60,11 +61,11 @@ class ArtefactSag(Effect):
     """
 
     name = "artefact_sag"
-    title = "Sag of the artefact"
+    title = say("Sag of the artefact")
     formula = "true length = length − s·cos²(elevation above the table)"
     mechanism = "artefact"
-    points_to = "the artefact sags or its supports are not at the right points"
-    coefficients = (Parameter("um", "µm", 10.0),)
+    points_to = say("the artefact sags or its supports are not at the right points")
+    coefficients = (Parameter("um", unit("µm"), 10.0),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

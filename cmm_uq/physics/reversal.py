@@ -9,10 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.messages import Verbatim, say
 from cmm_uq.physics.effect import FURTHER, Effect, Parameter, along
 from cmm_uq.physics.rigid_body import turned
 from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import ARCSECOND, METRE, MICROMETRE
+from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, unit
 
 _MILLISECOND = 1e-3
 """1 ms in s."""
@@ -26,16 +27,22 @@ class Play(Effect):
 
     formula = "e_b = ½·gap·approach_a"
     mechanism = "guideway"
-    coefficients = (Parameter("gap_um", "µm", 10.0),)
+    coefficients = (Parameter("gap_um", unit("µm"), 10.0),)
     tier = FURTHER
 
     def __init__(self, axis: str, direction: str) -> None:
         self.axis, self.direction = axis, direction
         self.name = f"play_{axis}_{direction}"
-        self.title = f"Lateral play of {axis.upper()} along {direction.upper()}"
-        self.points_to = (
-            f"play across the guideway of {axis.upper()}: check wear, preload and air gap of the bearings that hold the "
-            f"carriage along {direction.upper()}"
+        self.title = say(
+            "Lateral play of {axis} along {direction}",
+            axis=Verbatim(axis.upper()),
+            direction=Verbatim(direction.upper()),
+        )
+        self.points_to = say(
+            "play across the guideway of {axis}: check wear, preload and air gap of the bearings that "
+            "hold the carriage along {direction}",
+            axis=Verbatim(axis.upper()),
+            direction=Verbatim(direction.upper()),
         )
         self.columns = (f"approach_{axis}",)
 
@@ -52,16 +59,17 @@ class YawPlay(Effect):
 
     formula = "e = ε × what carriage a carries, ε_z = ½·angle·approach_a"
     mechanism = "guideway"
-    coefficients = (Parameter("angle_arcsec", "″", 2.0),)
+    coefficients = (Parameter("angle_arcsec", unit("″"), 2.0),)
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"yaw_play_{axis}"
-        self.title = f"Yaw of carriage {axis.upper()} at reversal"
-        self.points_to = (
-            f"carriage {axis.upper()} yaws when it turns round: check the side bearings of its guideway, and where its drive "
-            "takes hold beside its middle"
+        self.title = say("Yaw of carriage {axis} at reversal", axis=Verbatim(axis.upper()))
+        self.points_to = say(
+            "carriage {axis} yaws when it turns round: check the side bearings of its guideway, and "
+            "where its drive takes hold beside its middle",
+            axis=Verbatim(axis.upper()),
         )
         self.columns = (f"approach_{axis}",)
 
@@ -78,23 +86,24 @@ class WindUp(Effect):
 
     formula = "e_a = ½·w·approach_a·(a − middle of the travel)"
     mechanism = "drive"
-    coefficients = (Parameter("um_per_m", "µm/m", 20.0),)
+    coefficients = (Parameter("um_per_m", unit("µm/m"), 20.0),)
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"windup_{axis}"
-        self.title = f"Wind-up of the drive of {axis.upper()}"
-        self.points_to = (
-            f"the drive of {axis.upper()} winds up, or is worn more at one end of the travel: check leadscrew, belt or rack, "
-            "its tension and its end bearings"
+        self.title = say("Wind-up of the drive of {axis}", axis=Verbatim(axis.upper()))
+        self.points_to = say(
+            "the drive of {axis} winds up, or is worn more at one end of the travel: check leadscrew, "
+            "belt or rack, its tension and its end bearings",
+            axis=Verbatim(axis.upper()),
         )
         self.columns = (f"approach_{axis}",)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, high = points.machine.travel(self.axis)
-        place = (points.readings[:, AXES.index(self.axis)] - 0.5 * (low + high)) / METRE
+        place = (points.readings[self.axis] - 0.5 * (low + high)) / METRE
         return along(self.axis, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}") * place)
 
 
@@ -107,16 +116,17 @@ class SpeedLag(Effect):
 
     formula = "e_a = lag·speed along a, in the sense of travel"
     mechanism = "controller"
-    coefficients = (Parameter("lag_ms", "ms", 1.0),)
+    coefficients = (Parameter("lag_ms", unit("ms"), 1.0),)
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"speed_lag_{axis}"
-        self.title = f"Lag of {axis.upper()} in proportion to speed"
-        self.points_to = (
-            f"the scale of {axis.upper()} and the trigger are read at different moments: check how the controller latches "
-            "this scale, and probe more slowly until then"
+        self.title = say("Lag of {axis} in proportion to speed", axis=Verbatim(axis.upper()))
+        self.points_to = say(
+            "the scale of {axis} and the trigger are read at different moments: check how the controller "
+            "latches this scale, and probe more slowly until then",
+            axis=Verbatim(axis.upper()),
         )
         self.columns = ("speed_mm_s", *(f"approach_{a}" for a in AXES))
 

@@ -10,10 +10,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from cmm_uq.messages import Verbatim, say
 from cmm_uq.physics.effect import Effect, Nonparametric, Parameter, along
 from cmm_uq.physics.kinematics import Chain, carried_offset
 from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, PPM
+from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
 
 
 class Scale(Effect):
@@ -21,19 +22,19 @@ class Scale(Effect):
 
     formula = "e_a = s · a"
     mechanism = "scale"
-    points_to = "the scale or its compensation: check the linear compensation of this axis"
+    points_to = say("the scale or its compensation: check the linear compensation of this axis")
 
-    coefficients = (Parameter("ppm", "ppm", 300.0),)
+    coefficients = (Parameter("ppm", unit("ppm"), 300.0),)
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"scale_{axis}"
-        self.title = f"Scale error of {axis.upper()}"
+        self.title = say("Scale error of {axis}", axis=Verbatim(axis.upper()))
         self.imitated_by = (Nonparametric(f"{axis}_mm", axis), Nonparametric("time_s", axis, scale=True))
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return along(self.axis, PPM * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, PPM * points.readings[self.axis])
 
 
 class Squareness(Effect):
@@ -41,19 +42,19 @@ class Squareness(Effect):
 
     formula = "xy: e_x = −S·y; yz: e_y = −S·z; zx: e_x = −S·z"
     mechanism = "frame"
-    points_to = "the axes are not square: adjust the guideways or the squareness in the compensation"
+    points_to = say("the axes are not square: adjust the guideways or the squareness in the compensation")
 
-    coefficients = (Parameter("angle_arcsec", "″", 500.0),)
+    coefficients = (Parameter("angle_arcsec", unit("″"), 500.0),)
 
     def __init__(self, plane: str, moved: str, lever: str) -> None:
         self.moved, self.lever = moved, lever
         self.name = f"squareness_{plane}"
-        self.title = f"Squareness {plane[0].upper()}–{plane[1].upper()}"
+        self.title = say("Squareness {plane}", plane=Verbatim("–".join(plane.upper())))
         self.imitated_by = (Nonparametric(f"{lever}_mm", moved),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return along(self.moved, -ARCSECOND * points.readings[:, AXES.index(self.lever)])
+        return along(self.moved, -ARCSECOND * points.readings[self.lever])
 
 
 class Straightness(Effect):
@@ -61,21 +62,25 @@ class Straightness(Effect):
 
     formula = "e_b = bow · (1 − (2(a − a0)/T − 1)²)"
     mechanism = "guideway"
-    points_to = "a bowed guideway: check straightness and its compensation"
+    points_to = say("a bowed guideway: check straightness and its compensation")
 
-    coefficients = (Parameter("bow_um", "µm", 50.0),)
+    coefficients = (Parameter("bow_um", unit("µm"), 50.0),)
 
     def __init__(self, axis: str, direction: str) -> None:
         self.axis, self.direction = axis, direction
         self.name = f"straightness_{axis}_{direction}"
-        self.title = f"Straightness of {axis.upper()} along {direction.upper()}"
+        self.title = say(
+            "Straightness of {axis} along {direction}",
+            axis=Verbatim(axis.upper()),
+            direction=Verbatim(direction.upper()),
+        )
         self.idealised_over = axis
         self.imitated_by = (Nonparametric(f"{axis}_mm", direction),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, high = points.machine.travel(self.axis)
-        place = 2 * (points.readings[:, AXES.index(self.axis)] - low) / (high - low) - 1
+        place = 2 * (points.readings[self.axis] - low) / (high - low) - 1
         return along(self.direction, MICROMETRE * (1 - place**2))
 
 
@@ -84,20 +89,24 @@ class Rotation(Effect):
 
     formula = "e = ε × what carriage a carries, ε_b = r·(a − a0)"
     mechanism = "guideway"
-    points_to = "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation"
+    points_to = say(
+        "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation"
+    )
 
-    coefficients = (Parameter("arcsec_per_m", "″/m", 60.0),)
+    coefficients = (Parameter("arcsec_per_m", unit("″/m"), 60.0),)
 
     def __init__(self, axis: str, about: str) -> None:
         self.axis, self.about = axis, about
         self.name = f"rotation_{axis}_{about}"
-        self.title = f"Rotation of carriage {axis.upper()} about {about.upper()}"
+        self.title = say(
+            "Rotation of carriage {axis} about {about}", axis=Verbatim(axis.upper()), about=Verbatim(about.upper())
+        )
         self.idealised_over = axis
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, _ = points.machine.travel(self.axis)
-        angle = ARCSECOND * (points.readings[:, AXES.index(self.axis)] - low) / METRE
+        angle = ARCSECOND * (points.readings[self.axis] - low) / METRE
         return turned(points, self.axis, self.about, angle)
 
 
@@ -106,7 +115,7 @@ def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
     chain = Chain.of(points.machine.chain)
     tip = np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
     acts_on_tip = points.machine.tip_on_every_carriage or axis == AXES[chain.order[-1]]
-    carried = carried_offset(axis, points.readings, tip if acts_on_tip else None, chain)
+    carried = carried_offset(axis, points.carriages, tip if acts_on_tip else None, chain)
     rotation = np.zeros((len(points), 3))
     rotation[:, AXES.index(about)] = angle
     return np.cross(rotation, carried)[:, :, None]

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.messages import Verbatim, say
 from cmm_uq.physics.effect import FURTHER, Effect, Parameter, along
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.uncertainty.air.edlen import harris_2004
-from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
 
 AIR = ("temp_air_c", "pressure_hpa", "humidity_pct")
 
@@ -30,22 +31,23 @@ class ScaleCurvature(Effect):
 
     formula = "e_a = bow·(1 − (2(a − a0)/T − 1)²)"
     mechanism = "scale"
-    coefficients = (Parameter("bow_um", "µm", 10.0),)
+    coefficients = (Parameter("bow_um", unit("µm"), 10.0),)
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"scale_curvature_{axis}"
-        self.title = f"Curvature of the scale of {axis.upper()}"
-        self.points_to = (
-            f"the scale of {axis.upper()} is stretched unevenly: check how its ends are clamped and its joints, and "
-            "compensate position by a table, which one factor cannot replace"
+        self.title = say("Curvature of the scale of {axis}", axis=Verbatim(axis.upper()))
+        self.points_to = say(
+            "the scale of {axis} is stretched unevenly: check how its ends are clamped and its joints, "
+            "and compensate position by a table, which one factor cannot replace",
+            axis=Verbatim(axis.upper()),
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, high = points.machine.travel(self.axis)
-        place = 2 * (points.readings[:, AXES.index(self.axis)] - low) / (high - low) - 1
+        place = 2 * (points.readings[self.axis] - low) / (high - low) - 1
         return along(self.axis, MICROMETRE * (1 - place**2))
 
 
@@ -57,22 +59,23 @@ class AirScale(Effect):
 
     formula = "e_a = −part·(n − n₀)·a"
     mechanism = "scale"
-    coefficients = (Parameter("part", "1", 1.0),)
+    coefficients = (Parameter("part", unit("1"), 1.0),)
     columns = AIR
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"air_scale_{axis}"
-        self.title = f"Refractive index of air on the laser scale of {axis.upper()}"
-        self.points_to = (
-            f"the laser of {axis.upper()} is not, or wrongly, corrected for air: check its sensors of air temperature, "
-            "pressure and humidity, and that the compensation uses them"
+        self.title = say("Refractive index of air on the laser scale of {axis}", axis=Verbatim(axis.upper()))
+        self.points_to = say(
+            "the laser of {axis} is not, or wrongly, corrected for air: check its sensors of air "
+            "temperature, pressure and humidity, and that the compensation uses them",
+            axis=Verbatim(axis.upper()),
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return along(self.axis, -index_change(points) * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, -index_change(points) * points.readings[self.axis])
 
 
 class DeadPath(Effect):
@@ -83,17 +86,18 @@ class DeadPath(Effect):
 
     formula = "e_a = −d·(n − n at the first point)"
     mechanism = "scale"
-    coefficients = (Parameter("path_mm", "mm", 300.0),)
+    coefficients = (Parameter("path_mm", unit("mm"), 300.0),)
     columns = AIR
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"dead_path_{axis}"
-        self.title = f"Dead path of the laser scale of {axis.upper()}"
-        self.points_to = (
-            f"the dead path of the laser of {axis.upper()} is not compensated: enter it in the compensation, or zero the axis "
-            "close to the interferometer"
+        self.title = say("Dead path of the laser scale of {axis}", axis=Verbatim(axis.upper()))
+        self.points_to = say(
+            "the dead path of the laser of {axis} is not compensated: enter it in the compensation, or "
+            "zero the axis close to the interferometer",
+            axis=Verbatim(axis.upper()),
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.messages import say
 from cmm_uq.physics.digitizer import euler_313
 from cmm_uq.physics.effect import FURTHER, Effect, Parameter
 from cmm_uq.physics.probing import normals_of
 from cmm_uq.points import Floats, Points
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 class DigitizerOffset(Effect):
@@ -24,14 +25,14 @@ class DigitizerOffset(Effect):
     """
 
     name = "digitizer_offset"
-    title = "Alignment of the digitizer"
+    title = say("Alignment of the digitizer")
     formula = "e = du·u + dv·v"
     mechanism = "digitizer"
-    points_to = (
-        "the digitizer is out of alignment, or has moved in its mount: tighten the mount and align it on the reference sphere "
-        "again, in every pose"
+    points_to = say(
+        "the digitizer is out of alignment, or has moved in its mount: tighten the mount and align "
+        "it on the reference sphere again, in every pose"
     )
-    coefficients = (Parameter("u_um", "µm", 20.0), Parameter("v_um", "µm", 20.0))
+    coefficients = (Parameter("u_um", unit("µm"), 20.0), Parameter("v_um", unit("µm"), 20.0))
     columns = ("gamma_deg",)
     tier = FURTHER
 
@@ -44,11 +45,13 @@ class DigitizerDepth(Effect):
     """Error in proportion to scan depth, from the column ``depth_mm`` (Feng 2001, Xi 2001)."""
 
     name = "digitizer_depth"
-    title = "Depth bias of the digitizer"
+    title = say("Depth bias of the digitizer")
     formula = "e = k·depth·v"
     mechanism = "digitizer"
-    points_to = "the digitizer's depth scale is wrong: calibrate it over its range, and scan in its middle until then"
-    coefficients = (Parameter("um_per_mm", "µm/mm", 1.0),)
+    points_to = say(
+        "the digitizer's depth scale is wrong: calibrate it over its range, and scan in its middle until then"
+    )
+    coefficients = (Parameter("um_per_mm", unit("µm/mm"), 1.0),)
     columns = ("gamma_deg", "depth_mm")
     tier = FURTHER
 
@@ -64,14 +67,17 @@ class DigitizerIncidence(Effect):
     """
 
     name = "digitizer_incidence"
-    title = "Incidence of the digitizer's light"
+    title = say("Incidence of the digitizer's light")
     formula = "e = (kᵢ·incident + kₚ·projected)·v"
     mechanism = "digitizer"
-    points_to = (
-        "the digitizer errs where its light meets the surface askew: turn it square to the surface, or correct its readings "
-        "for the angle"
+    points_to = say(
+        "the digitizer errs where its light meets the surface askew: turn it square to the surface, "
+        "or correct its readings for the angle"
     )
-    coefficients = (Parameter("incident_um_per_deg", "µm/°", 1.0), Parameter("projected_um_per_deg", "µm/°", 1.0))
+    coefficients = (
+        Parameter("incident_um_per_deg", unit("µm/°"), 1.0),
+        Parameter("projected_um_per_deg", unit("µm/°"), 1.0),
+    )
     columns = ("gamma_deg", "nx", "ny", "nz")
     tier = FURTHER
 

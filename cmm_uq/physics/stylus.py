@@ -9,11 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.messages import say
 from cmm_uq.physics.effect import FURTHER, Effect, Parameter
 from cmm_uq.physics.probing import normals_of
 from cmm_uq.physics.reversal import travel
 from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 REFERENCE_LENGTH = 100.0
 """mm; the length of stylus that bending is stated for."""
@@ -29,14 +30,14 @@ class PreTravel(Effect):
     """
 
     name = "pre_travel"
-    title = "Pre-travel of the probe"
+    title = say("Pre-travel of the probe")
     formula = "e = −amount·travel"
     mechanism = "probe"
-    points_to = (
-        "the probe's pre-travel or the stylus radius is wrong by as much in every direction: qualify the probe again, with "
-        "the speed and the force of the measurement"
+    points_to = say(
+        "the probe's pre-travel or the stylus radius is wrong by as much in every direction: qualify "
+        "the probe again, with the speed and the force of the measurement"
     )
-    coefficients = (Parameter("um", "µm", 10.0),)
+    coefficients = (Parameter("um", unit("µm"), 10.0),)
     columns = tuple(f"approach_{a}" for a in AXES)
     tier = FURTHER
 
@@ -52,14 +53,14 @@ class ProbeAxial(Effect):
     """
 
     name = "probe_axial"
-    title = "Deflection of the probe along its axis"
+    title = say("Deflection of the probe along its axis")
     formula = "e = amount·(n·t)·t"
     mechanism = "probe"
-    points_to = (
-        "the probe gives way differently along the stylus and across it: qualify it with points along the stylus too, and "
-        "check its trigger force"
+    points_to = say(
+        "the probe gives way differently along the stylus and across it: qualify it with points "
+        "along the stylus too, and check its trigger force"
     )
-    coefficients = (Parameter("um", "µm", 5.0),)
+    coefficients = (Parameter("um", unit("µm"), 5.0),)
     columns = ("nx", "ny", "nz")
     tier = FURTHER
 
@@ -77,14 +78,14 @@ class StylusBending(Effect):
     """
 
     name = "stylus_bending"
-    title = "Bending of the stylus"
+    title = say("Bending of the stylus")
     formula = "e = amount·(L/100 mm)³·(n − (n·t)t)"
     mechanism = "probe"
-    points_to = (
-        "the stylus bends under the probing force: take a shorter or stiffer one, or a lower force, and qualify each stylus "
-        "by itself"
+    points_to = say(
+        "the stylus bends under the probing force: take a shorter or stiffer one, or a lower force, "
+        "and qualify each stylus by itself"
     )
-    coefficients = (Parameter("um", "µm", 5.0),)
+    coefficients = (Parameter("um", unit("µm"), 5.0),)
     columns = ("nx", "ny", "nz", *_TIPS)
     tier = FURTHER
 
@@ -101,14 +102,14 @@ class TriggerDelay(Effect):
     """Delay between contact and reading."""
 
     name = "trigger_delay"
-    title = "Delay of the probe's trigger"
+    title = say("Delay of the probe's trigger")
     formula = "e = delay·speed·n"
     mechanism = "controller"
-    points_to = (
-        "the trigger reaches the controller late: check the probe's interface and cable, and qualify the probe at the speed "
-        "of the measurement"
+    points_to = say(
+        "the trigger reaches the controller late: check the probe's interface and cable, and qualify "
+        "the probe at the speed of the measurement"
     )
-    coefficients = (Parameter("delay_ms", "ms", 1.0),)
+    coefficients = (Parameter("delay_ms", unit("ms"), 1.0),)
     columns = ("nx", "ny", "nz", "speed_mm_s")
     tier = FURTHER
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from types import MappingProxyType
 
+from cmm_uq.messages import Verbatim, say
 from cmm_uq.physics.effect import Effect, Parameter, along
 from cmm_uq.physics.rigid_body import turned
 from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import ARCSECOND, METRE, REFERENCE_TEMPERATURE
+from cmm_uq.units import ARCSECOND, METRE, REFERENCE_TEMPERATURE, unit
 
-EXPANSION = Parameter("cte_per_k", "1/K", 12e-6)
+EXPANSION = Parameter("cte_per_k", unit("1/K"), 12e-6)
 """Coefficient of thermal expansion; glass 8, steel 11.5, aluminium 23 ppm/K bound what is possible."""
 
 
@@ -23,20 +24,20 @@ class ThermalScale(Effect):
 
     formula = "e_a = α·(temp_a − 20 °C)·a"
     mechanism = "temperature"
-    points_to = "the scale expands and its temperature is not, or wrongly, compensated"
+    points_to = say("the scale expands and its temperature is not, or wrongly, compensated")
 
     coefficients = (EXPANSION,)
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"thermal_scale_{axis}"
-        self.title = f"Thermal expansion of scale {axis.upper()}"
+        self.title = say("Thermal expansion of scale {axis}", axis=Verbatim(axis.upper()))
         self.columns = (f"temp_{axis}_c",)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         excess = points.column(f"temp_{self.axis}_c") - REFERENCE_TEMPERATURE
-        return along(self.axis, excess * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, excess * points.readings[self.axis])
 
 
 class ThermalArtefact(Effect):
@@ -46,10 +47,10 @@ class ThermalArtefact(Effect):
     """
 
     name = "thermal_artefact"
-    title = "Thermal expansion of the artefact"
+    title = say("Thermal expansion of the artefact")
     formula = "length = length at 20 °C · (1 + α·(temp_artefact − 20 °C))"
     mechanism = "artefact"
-    points_to = "the artefact expands and its temperature is not, or wrongly, compensated"
+    points_to = say("the artefact expands and its temperature is not, or wrongly, compensated")
     coefficients = (EXPANSION,)
     columns = ("temp_artefact_c",)
 
@@ -63,18 +64,18 @@ class ThermalGradient(Effect):
     """Table bent by a gradient: carriage x turns about y."""
 
     name = "thermal_gradient"
-    title = "Bending by the temperature gradient in the table"
+    title = say("Bending by the temperature gradient in the {what}", what=say("table"))
     formula = "e = ε × what carriage x carries, ε_y = k·(temp_table_top − temp_table_bottom)·(x − x0)"
     mechanism = "temperature"
-    points_to = "the table bends: top and bottom differ in temperature"
-    coefficients = (Parameter("arcsec_per_m_k", "″/(m·K)", 20.0),)
+    points_to = say("the table bends: top and bottom differ in temperature")
+    coefficients = (Parameter("arcsec_per_m_k", unit("″/(m·K)"), 20.0),)
     columns = ("temp_table_top_c", "temp_table_bottom_c")
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, _ = points.machine.travel("x")
         gradient = points.column("temp_table_top_c") - points.column("temp_table_bottom_c")
-        angle = ARCSECOND * gradient * (points.readings[:, 0] - low) / METRE
+        angle = ARCSECOND * gradient * (points.readings["x"] - low) / METRE
         return turned(points, "x", "y", angle)
 
 

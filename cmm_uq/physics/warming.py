@@ -10,16 +10,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.physics.effect import FURTHER, Effect, Parameter, Shape, along
 from cmm_uq.physics.rigid_body import turned
 from cmm_uq.physics.thermal import EXPANSION
 from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import ARCSECOND, HOUR, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE
+from cmm_uq.units import ARCSECOND, HOUR, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
 
-SETTLING = Shape("settling_h", "h", 0.2, 20.0)
+SETTLING = Shape("settling_h", unit("h"), 0.2, 20.0)
 """Time constant of warming: an electric cabinet takes minutes, a granite table a day."""
 
-LAG = Shape("lag_h", "h", 0.05, 5.0)
+LAG = Shape("lag_h", unit("h"), 0.05, 5.0)
 """Time constant of an artefact behind its thermometer: a thin bar minutes, a solid one an hour or more."""
 
 
@@ -29,23 +30,24 @@ class ScaleDrift(Effect):
     formula = "e_a = r·time·a"
     mechanism = "temperature"
 
-    coefficients = (Parameter("ppm_per_h", "ppm/h", 5.0),)
+    coefficients = (Parameter("ppm_per_h", unit("ppm/h"), 5.0),)
     columns = ("time_s",)
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"scale_drift_{axis}"
-        self.title = f"Scale of {axis.upper()} growing with time"
-        self.points_to = (
-            f"the scale of {axis.upper()} changes steadily while the machine or the room warms or cools: measure in thermal "
-            "equilibrium, and check the temperature compensation of this scale"
+        self.title = say("Scale of {axis} growing with time", axis=Verbatim(axis.upper()))
+        self.points_to = say(
+            "the scale of {axis} changes steadily while the machine or the room warms or cools: measure "
+            "in thermal equilibrium, and check the temperature compensation of this scale",
+            axis=Verbatim(axis.upper()),
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         hours = points.column("time_s") / HOUR
-        return along(self.axis, PPM * hours * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, PPM * hours * points.readings[self.axis])
 
 
 class Settling(Effect):
@@ -54,7 +56,7 @@ class Settling(Effect):
     formula = "e_a = A·(1 − exp(−time/τ))"
     mechanism = "temperature"
 
-    coefficients = (Parameter("um", "µm", 20.0),)
+    coefficients = (Parameter("um", unit("µm"), 20.0),)
     shape = (SETTLING,)
     columns = ("time_s",)
     tier = FURTHER
@@ -62,10 +64,11 @@ class Settling(Effect):
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"settling_{axis}"
-        self.title = f"Settling of {axis.upper()}"
-        self.points_to = (
-            f"the zero of {axis.upper()} moves and comes to rest: let machine, probe and artefact settle longer after "
-            "switching on, setting up or an open door"
+        self.title = say("Settling of {axis}", axis=Verbatim(axis.upper()))
+        self.points_to = say(
+            "the zero of {axis} moves and comes to rest: let machine, probe and artefact settle longer "
+            "after switching on, setting up or an open door",
+            axis=Verbatim(axis.upper()),
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -79,7 +82,7 @@ class ScaleSettling(Effect):
     formula = "e_a = s·(1 − exp(−time/τ))·a"
     mechanism = "temperature"
 
-    coefficients = (Parameter("ppm", "ppm", 20.0),)
+    coefficients = (Parameter("ppm", unit("ppm"), 20.0),)
     shape = (SETTLING,)
     columns = ("time_s",)
     tier = FURTHER
@@ -87,15 +90,16 @@ class ScaleSettling(Effect):
     def __init__(self, axis: str) -> None:
         self.axis = axis
         self.name = f"scale_settling_{axis}"
-        self.title = f"Scale of {axis.upper()} settling"
-        self.points_to = (
-            f"the scale of {axis.upper()} takes on another temperature and comes to rest: move the axis to warm it up before "
-            "measuring, and look at what heats or cools it, its motor or the air supply"
+        self.title = say("Scale of {axis} settling", axis=Verbatim(axis.upper()))
+        self.points_to = say(
+            "the scale of {axis} takes on another temperature and comes to rest: move the axis to warm "
+            "it up before measuring, and look at what heats or cools it, its motor or the air supply",
+            axis=Verbatim(axis.upper()),
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return along(self.axis, PPM * _settled(points, shape) * points.readings[:, AXES.index(self.axis)])
+        return along(self.axis, PPM * _settled(points, shape) * points.readings[self.axis])
 
 
 class ThermalSquareness(Effect):
@@ -106,23 +110,29 @@ class ThermalSquareness(Effect):
 
     formula = "as of squareness, with S = k·(mean of temp_x, temp_y, temp_z − 20 °C)"
     mechanism = "temperature"
-    coefficients = (Parameter("arcsec_per_k", "″/K", 4.0),)
+    coefficients = (Parameter("arcsec_per_k", unit("″/K"), 4.0),)
     columns = tuple(f"temp_{a}_c" for a in AXES)
     tier = FURTHER
 
     def __init__(self, plane: str, moved: str, lever: str) -> None:
         self.moved, self.lever = moved, lever
         self.name = f"thermal_squareness_{plane}"
-        self.title = f"Squareness {plane[0].upper()}–{plane[1].upper()} with temperature"
-        self.points_to = (
-            f"the angle between {plane[0].upper()} and {plane[1].upper()} follows the temperature of the frame: keep the "
-            "machine at the temperature of its calibration, or compensate squareness by temperature"
+        self.title = say(
+            "Squareness {one}–{other} with temperature",
+            one=Verbatim(plane[0].upper()),
+            other=Verbatim(plane[1].upper()),
+        )
+        self.points_to = say(
+            "the angle between {one} and {other} follows the temperature of the frame: keep the "
+            "machine at the temperature of its calibration, or compensate squareness by temperature",
+            one=Verbatim(plane[0].upper()),
+            other=Verbatim(plane[1].upper()),
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         excess = np.mean([points.column(name) for name in self.columns], axis=0) - REFERENCE_TEMPERATURE
-        return along(self.moved, -ARCSECOND * excess * points.readings[:, AXES.index(self.lever)])
+        return along(self.moved, -ARCSECOND * excess * points.readings[self.lever])
 
 
 class CarriageGradient(Effect):
@@ -133,13 +143,15 @@ class CarriageGradient(Effect):
 
     formula = "e = ε × what carriage a carries, ε_b = k·(difference)·(a − a0)"
     mechanism = "temperature"
-    coefficients = (Parameter("arcsec_per_m_k", "″/(m·K)", 20.0),)
+    coefficients = (Parameter("arcsec_per_m_k", unit("″/(m·K)"), 20.0),)
     tier = FURTHER
 
-    def __init__(self, what: str, axis: str, about: str, columns: tuple[str, str], points_to: str) -> None:
+    def __init__(
+        self, what: str, words: Text, axis: str, about: str, columns: tuple[str, str], points_to: Text
+    ) -> None:
         self.axis, self.about = axis, about
         self.name = f"thermal_gradient_{what}"
-        self.title = f"Bending by the temperature gradient in the {what}"
+        self.title = say("Bending by the temperature gradient in the {what}", what=words)
         self.points_to = points_to
         self.columns = columns
 
@@ -147,7 +159,7 @@ class CarriageGradient(Effect):
         """See :meth:`Effect.basis`."""
         low, _ = points.machine.travel(self.axis)
         gradient = points.column(self.columns[0]) - points.column(self.columns[1])
-        angle = ARCSECOND * gradient * (points.readings[:, AXES.index(self.axis)] - low) / METRE
+        angle = ARCSECOND * gradient * (points.readings[self.axis] - low) / METRE
         return turned(points, self.axis, self.about, angle)
 
 
@@ -159,12 +171,12 @@ class ArtefactLag(Effect):
     """
 
     name = "artefact_lag"
-    title = "Artefact lagging behind its thermometer"
+    title = say("Artefact lagging behind its thermometer")
     formula = "longer by α·(T′ − temp_artefact)·length, τ·dT′/dt = temp_artefact − T′"
     mechanism = "artefact"
-    points_to = (
-        "the artefact takes on the temperature later than its thermometer: let it soak longer, and fix the thermometer to its "
-        "body"
+    points_to = say(
+        "the artefact takes on the temperature later than its thermometer: let it soak longer, and "
+        "fix the thermometer to its body"
     )
     coefficients = (EXPANSION,)
     shape = (LAG,)
@@ -206,17 +218,23 @@ EFFECTS: tuple[Effect, ...] = (
     ThermalSquareness("zx", "x", "z"),
     CarriageGradient(
         "bridge",
+        say("bridge"),
         "y",
         "x",
-        ("temp_bridge_top_c", "temp_bridge_bottom_c"),
-        "the bridge bends: its upper and lower side differ in temperature, look for warm air, lamps or a draught above it",
+        (say("temp_bridge_top_c"), say("temp_bridge_bottom_c")),
+        say(
+            "the bridge bends: its upper and lower side differ in temperature, look for warm air, lamps or a draught above it"
+        ),
     ),
     CarriageGradient(
         "ram",
+        say("ram"),
         "z",
         "y",
-        ("temp_ram_front_c", "temp_ram_back_c"),
-        "the ram bends: its front and back differ in temperature, look for a motor, a lamp, sun or a draught at one side",
+        (say("temp_ram_front_c"), say("temp_ram_back_c")),
+        say(
+            "the ram bends: its front and back differ in temperature, look for a motor, a lamp, sun or a draught at one side"
+        ),
     ),
     ArtefactLag(),
 )

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.planning.directions import PLANES, attitudes_of_lines
 from cmm_uq.planning.placing import Pattern, Placing
@@ -22,7 +23,7 @@ _FIFTHS = (0.0, 0.25, 0.5, 0.75, 1.0)
 Shape = Callable[[Floats], Pattern | None]
 """The pattern for an attitude; ``None`` where it does not fit."""
 
-Attitudes = Callable[[Volume], list[tuple[str, Floats]]]
+Attitudes = Callable[[Volume], list[tuple[Text, Floats]]]
 """Ways of setting up an artefact that the fixtures of a volume allow, by their words."""
 
 
@@ -55,7 +56,7 @@ class Elsewhere:
         ------
         CmmUqError : there is none.
         """
-        ways = [("as recorded", recorded), *self.attitudes(volume)]
+        ways = [(say("as recorded"), recorded), *self.attitudes(volume)]
         return thinned(everywhere(volume, ways, lambda _: pattern), count, volume)
 
 
@@ -98,19 +99,19 @@ def candidates(setting: Setting, start: Start | None = None) -> tuple[Placing, .
     return setting.planning.candidates(setting, start)
 
 
-def along_lines(volume: Volume) -> list[tuple[str, Floats]]:
+def along_lines(volume: Volume) -> list[tuple[Text, Floats]]:
     """Attitudes of a bar or gauge, held along its length."""
     return [(title, way) for title, way in attitudes_of_lines(volume.size) if volume.allows(way[:, 0])]
 
 
-def across_planes(volume: Volume) -> list[tuple[str, Floats]]:
+def across_planes(volume: Volume) -> list[tuple[Text, Floats]]:
     """Attitudes of a plate, held by its normal."""
     return [(title, way) for title, way in PLANES if volume.allows(way[:, 2])]
 
 
-def upright(volume: Volume) -> list[tuple[str, Floats]]:
+def upright(volume: Volume) -> list[tuple[Text, Floats]]:
     """The one attitude of what looks alike from all sides."""
-    return [("upright", np.eye(3))]
+    return [(say("upright"), np.eye(3))]
 
 
 def thinned(placings: Iterator[Placing], count: int, volume: Volume) -> tuple[Placing, ...]:
@@ -127,13 +128,13 @@ def thinned(placings: Iterator[Placing], count: int, volume: Volume) -> tuple[Pl
             where="job.toml [plan]",
             fix=f"The volume is {' × '.join(f'{v:.0f}' for v in volume.size)} mm; allow other directions or heights, or use "
             "a smaller artefact",
-        )  # fmt: skip
+        )
     if len(found) <= count:
         return found
     return tuple(found[i] for i in np.unique(np.linspace(0, len(found) - 1, count).round().astype(int)))
 
 
-def everywhere(volume: Volume, ways: Sequence[tuple[str, Floats]], shape: Shape) -> Iterator[Placing]:
+def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: Shape) -> Iterator[Placing]:
     """Every attitude in the corners, on the edges and in the middle of the room that it has."""
     steps = _FIFTHS if len(ways) < 4 else THIRDS
     for title, attitude in ways:

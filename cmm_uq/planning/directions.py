@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.planning.placing import along
 from cmm_uq.points import AXES, Floats
 
 _NEGLIGIBLE = 0.02
 
 
-def words(direction: Floats) -> str:
+def words(direction: Floats) -> Text:
     """A direction as an operator says it, either way along it: ``along X``, ``along +X −Z, inclined 45°``."""
     u = direction / np.linalg.norm(direction)
     taken = [i for i in range(3) if abs(u[i]) > _NEGLIGIBLE]
     if len(taken) == 1:
-        return f"along {AXES[taken[0]].upper()}"
+        return say("along {axes}", axes=Verbatim(AXES[taken[0]].upper()))
     turned = u * np.sign(u[taken[0]])
-    named = "along " + " ".join(f"{'+' if turned[i] > 0 else '−'}{AXES[i].upper()}" for i in taken)
-    return f"{named}, inclined {np.degrees(np.arcsin(abs(u[2]))):.0f}°" if 2 in taken else named
+    axes = Verbatim(" ".join(f"{'+' if turned[i] > 0 else '−'}{AXES[i].upper()}" for i in taken))
+    if 2 not in taken:
+        return say("along {axes}", axes=axes)
+    return say("along {axes}, inclined {angle:.0f}°", axes=axes, angle=np.degrees(np.arcsin(abs(u[2]))))
 
 
 def cube() -> list[Floats]:
@@ -44,26 +47,26 @@ def _plane(first: tuple[float, float, float], second: tuple[float, float, float]
     return np.column_stack([u, v, np.cross(u, v)])
 
 
-PRINCIPAL_PLANES: tuple[tuple[str, Floats], ...] = (
-    ("flat", _plane((1, 0, 0), (0, 1, 0))),
-    ("upright along X", _plane((1, 0, 0), (0, 0, 1))),
-    ("upright along Y", _plane((0, 1, 0), (0, 0, 1))),
+PRINCIPAL_PLANES: tuple[tuple[Text, Floats], ...] = (
+    (say("flat"), _plane((1, 0, 0), (0, 1, 0))),
+    (say("upright along X"), _plane((1, 0, 0), (0, 0, 1))),
+    (say("upright along Y"), _plane((0, 1, 0), (0, 0, 1))),
 )
 """Attitudes of a plate."""
 
-PLANES: tuple[tuple[str, Floats], ...] = (
+PLANES: tuple[tuple[Text, Floats], ...] = (
     *PRINCIPAL_PLANES,
-    ("flat, turned by 45°", _plane((1, 1, 0), (-1, 1, 0))),
-    ("upright along X, turned by 45°", _plane((1, 0, 1), (-1, 0, 1))),
-    ("upright along Y, turned by 45°", _plane((0, 1, 1), (0, -1, 1))),
-    ("upright along +X +Y", _plane((1, 1, 0), (0, 0, 1))),
-    ("upright along +X −Y", _plane((1, -1, 0), (0, 0, 1))),
-    ("tilted about X", _plane((1, 0, 0), (0, 1, 1))),
-    ("tilted about Y", _plane((0, 1, 0), (1, 0, 1))),
+    (say("flat, turned by 45°"), _plane((1, 1, 0), (-1, 1, 0))),
+    (say("upright along X, turned by 45°"), _plane((1, 0, 1), (-1, 0, 1))),
+    (say("upright along Y, turned by 45°"), _plane((0, 1, 1), (0, -1, 1))),
+    (say("upright along +X +Y"), _plane((1, 1, 0), (0, 0, 1))),
+    (say("upright along +X −Y"), _plane((1, -1, 0), (0, 0, 1))),
+    (say("tilted about X"), _plane((1, 0, 0), (0, 1, 1))),
+    (say("tilted about Y"), _plane((0, 1, 0), (1, 0, 1))),
 )
 """More attitudes of a plate."""
 
 
-def attitudes_of_lines(size: Floats) -> list[tuple[str, Floats]]:
+def attitudes_of_lines(size: Floats) -> list[tuple[Text, Floats]]:
     """Attitudes of a bar or gauge, by their words."""
     return [(words(direction), along(direction)) for direction in lines(size)]

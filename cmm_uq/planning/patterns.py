@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 
 

@@ -6,13 +6,14 @@ placing in the machine's scale readings.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Message, Text, commas, say, signed
 from cmm_uq.points import AXES, Floats, Ints, Machine, Points
 
 VECTORS: Mapping[str, str] = {"approach": "approach_{}", "normal": "n{}"}
@@ -32,22 +33,22 @@ class Placing:
     points : everything measured there, as one measurement.
     """
 
-    title: str
+    title: Text
     points: Points
 
     @cached_property
     def middle(self) -> Floats:
         """(3,) of the points, in scale readings, mm."""
-        readings = self.points.readings
+        readings = self.points.machine_xyz
         return np.asarray(0.5 * (readings.min(axis=0) + readings.max(axis=0)))
 
     @property
-    def ends(self) -> str:
+    def ends(self) -> Text:
         """Scale readings of the first point and of the farthest from it, mm: ``(250, 0, −40) → (650, 0, −40)``."""
-        readings = self.points.readings
+        readings = self.points.machine_xyz
         far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
-        first, last = (", ".join(f"{value:.0f}" for value in readings[row]).replace("-", "−") for row in (0, far))
-        return f"({first}) → ({last})" if far else f"({first})"
+        first, last = (commas(signed(value, ".0f") for value in readings[row]) for row in (0, far))
+        return say("({first}) → ({last})", first=first, last=last) if far else say("({first})", first=first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +72,9 @@ class Pattern:
     @classmethod
     def of_recording(cls, points: Points) -> tuple[Pattern, Floats, Floats]:
         """The pattern of one recorded placing, with its attitude (3, 3) and its middle (3,) in scale readings."""
-        about = points.readings - points.readings.mean(axis=0)
+        xyz = points.machine_xyz
+        middle = np.asarray(xyz.mean(axis=0))
+        about = xyz - middle
         attitude = _attitude(about)
         turned = {
             key: np.column_stack([points.columns[name.format(a)] for a in AXES]) @ attitude
@@ -81,7 +84,7 @@ class Pattern:
         taken = {name.format(a) for key, name in VECTORS.items() if key in turned for a in AXES}
         columns = {name: values for name, values in points.columns.items() if name not in taken}
         pattern = cls(about @ attitude, points.point, points.repeat, columns, turned)
-        return pattern, attitude, np.asarray(points.readings.mean(axis=0))
+        return pattern, attitude, middle
 
     def once(self) -> Pattern:
         """Without its repeats."""
@@ -106,7 +109,7 @@ class Pattern:
         """Body (n, 3) along the machine's axes for an attitude (3, 3), whose columns are the artefact's axes."""
         return np.asarray(self.body @ attitude.T)
 
-    def placed(self, machine: Machine, attitude: Floats, middle: Floats, title: str) -> Placing:
+    def placed(self, machine: Machine, attitude: Floats, middle: Floats, title: Text) -> Placing:
         """Set up with its middle at scale readings ``middle`` (3,)."""
         columns = dict(self.columns)
         for key, vectors in self.vectors.items():
@@ -114,7 +117,7 @@ class Pattern:
             if key == "approach":
                 values = np.where(np.abs(values) > _LEVEL, np.sign(values), 0.0)
             columns |= {VECTORS[key].format(a): values[:, i] for i, a in enumerate(AXES)}
-        xyz = middle + self.turned(attitude) - machine.origin_mm
+        xyz = machine.coordinates(middle + self.turned(attitude))
         one = np.ones(len(xyz), dtype=np.int64)
         return Placing(title, Points(xyz, one, self.point, self.repeat, machine, columns))
 
@@ -172,10 +175,14 @@ def _concatenated(parts: Sequence[Points]) -> Points:
     )  # fmt: skip
 
 
-def split(points: Points, title: str = "measurement {}") -> tuple[Placing, ...]:
+def _measurement(number: int) -> Message:
+    return say("measurement {number}", number=number)
+
+
+def split(points: Points, title: Callable[[int], Message] = _measurement) -> tuple[Placing, ...]:
     """The placings of a recording, in ascending order of their numbers."""
     return tuple(
-        Placing(title.format(number), points.select(points.measurement == number))
+        Placing(title(number), points.select(points.measurement == number))
         for number in np.unique(points.measurement).tolist()
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, Verbatim
 from cmm_uq.planning.directions import words
 from cmm_uq.planning.placing import Placing
 from cmm_uq.planning.setting import Setting
@@ -15,7 +16,7 @@ ACROSS = " (across it)"
 """How a plate stands to the direction by which it is held."""
 
 
-def ready_plan(setting: Setting) -> tuple[str, tuple[Placing, ...]]:
+def ready_plan(setting: Setting) -> tuple[Text, tuple[Placing, ...]]:
     """Name and placings of the ready plan that a job asks for, or of the usual one for its kind.
 
     Raises
@@ -24,7 +25,7 @@ def ready_plan(setting: Setting) -> tuple[str, tuple[Placing, ...]]:
     """
     ready, kind = setting.planning.ready, setting.artefact.kind
     usual = next(iter(ready))
-    name = setting.plan.ready or usual
+    name = Verbatim(setting.plan.ready or usual)
     if name not in ready:
         raise CmmUqError(f"{name!r} is no plan for a job of kind {kind!r}", where="job.toml [plan] ready",
                          fix=f"Leave it out: the usual plan is {usual!r}")  # fmt: skip

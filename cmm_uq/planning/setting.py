@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts, Job
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import Kind, Observe
@@ -53,7 +55,7 @@ class Planning:
     candidates: Callable[[Setting, Start | None], tuple[Placing, ...]]
     elsewhere: Callable[[Artefact, Volume, int], tuple[Placing, ...]] | None = None
     shared: bool = False
-    free: Callable[[Setting, Points, str], tuple[str, ...]] | None = None
+    free: Callable[[Setting, Points, str], tuple[Text, ...]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +96,7 @@ class Setting:
         if not facts.model.effects and planning.free is None:
             raise CmmUqError("no effect is named, so there is nothing to determine", where="job.toml [model] effects",
                              fix="Name the error factors that the measurement shall determine")  # fmt: skip
-        recorded = job.points.readings if len(job.points) else None
+        recorded = job.points.carriages if len(job.points) else None
         stated = facts.recording.u_coordinate_um
         return cls(
             facts.artefact, observe, planning, plan, Volume.of(job.points.machine, plan, recorded),

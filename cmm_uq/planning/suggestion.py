@@ -17,8 +17,9 @@ import numpy as np
 from cmm_uq.diagnosis.comparison.explanations import shapes
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.messages import Text, number, say
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Observe, Observed
 from cmm_uq.model.measurement import ARTEFACT
@@ -50,7 +51,7 @@ class Suggestion:
     """
 
     separates: tuple[str, str]
-    what: str
+    what: Text
     repetitions: int
     odds: float
 
@@ -95,12 +96,14 @@ def suggestions(
         facts = facts.model_copy(update={"length_mm": artefact.sizes[0].nominal})
     try:
         points = artefact.points
-        volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.readings)
+        volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.carriages)
         places = planning.elsewhere(artefact, volume, _CANDIDATES)
         known = _information(diagnosis.after, model, partial(observe, facts), places, shared_freedoms=planning.shared)
     except CmmUqError:  # nowhere else to put it
         return ()
-    found = [_best(diagnosis.after, known, places, artefact.title.lower(), pair) for pair in pairs]
+    found = [
+        _best(diagnosis.after, known, places, say("{artefact:small}", artefact=artefact.title), pair) for pair in pairs
+    ]
     return tuple(suggestion for suggestion in found if suggestion is not None)
 
 
@@ -141,7 +144,7 @@ def _information(
 
 
 def _best(
-    after: MeasurementModel, known: _Information, places: Sequence[Placing], title: str, pair: tuple[str, str]
+    after: MeasurementModel, known: _Information, places: Sequence[Placing], title: Text, pair: tuple[str, str]
 ) -> Suggestion | None:
     sizes = {name: _size(after, name, pair) for name in pair}
     before = float(_expected(known, known.recorded[None], pair, sizes)[0])
@@ -150,11 +153,15 @@ def _best(
         best = int(np.argmax(log_odds))
         if log_odds[best] >= np.log(ODDS):
             odds = float(np.exp(min(log_odds[best], 50.0)))
-            times = "once" if repetitions == 1 else f"{repetitions} times"
-            what = (
-                f"Place the {title} at {places[best].ends} mm in scale readings and measure it {times}: odds of "
-                f"{_round(odds)} : 1 for the true one are to be expected, {_round(float(np.exp(min(before, 50.0))))} : 1 "
-                "without it."
+            times = say("once") if repetitions == 1 else say("{repetitions} times", repetitions=repetitions)
+            what = say(
+                "Place the {title} at {ends} mm in scale readings and measure it {times}: odds of {odds} : "
+                "1 for the true one are to be expected, {before} : 1 without it.",
+                title=title,
+                ends=places[best].ends,
+                times=times,
+                odds=_round(odds),
+                before=_round(float(np.exp(min(before, 50.0)))),
             )
             return Suggestion(pair, what, repetitions, odds)
     return None
@@ -183,5 +190,5 @@ def _expected(known: _Information, information: Floats, pair: tuple[str, str], s
     return np.asarray(np.minimum(found[0], found[1]), dtype=np.float64)
 
 
-def _round(odds: float) -> str:
-    return f"{odds:.0f}" if odds < 1000 else "more than 1000"
+def _round(odds: float) -> Text:
+    return number(odds, ".0f") if odds < 1000 else say("more than 1000")

@@ -9,6 +9,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.messages import Text
 from cmm_uq.planning.placing import Pattern, Placing
 from cmm_uq.points import AXES, Floats, Machine
 
@@ -88,7 +89,7 @@ class Volume:
         room[2] = max(room[2, 0], self.heights[0]), min(room[2, 1], self.heights[1])
         return room if room[2, 0] <= room[2, 1] + _ROUNDING else None
 
-    def set_up(self, pattern: Pattern, attitude: Floats, place: Sequence[float], title: str) -> Placing:
+    def set_up(self, pattern: Pattern, attitude: Floats, place: Sequence[float], title: Text) -> Placing:
         """A pattern at a place (3,) of its room, 0 … 1 along each axis.
 
         Raises
@@ -102,7 +103,7 @@ class Volume:
         middle = room[:, 0] + (room[:, 1] - room[:, 0]) * np.asarray(place, dtype=np.float64)
         return pattern.placed(self.machine, attitude, middle, title)
 
-    def too_small(self, turned: Floats, title: str) -> CmmUqError:
+    def too_small(self, turned: Floats, title: Text) -> CmmUqError:
         """Why a body (n, 3) has no room."""
         extent = np.ptp(turned, axis=0)
         over = extent - self.size

@@ -11,13 +11,14 @@ from itertools import combinations
 
 import numpy as np
 
+from cmm_uq.messages import Text, Verbatim, commas, plural, say
 from cmm_uq.points import AXES, Floats, Ints
 from cmm_uq.screening.shape import Shape
 
-UNITS = ((25.4, "inches"), (1e3, "metres"), (1e-3, "micrometres"), (10.0, "centimetres"))
+UNITS = ((25.4, say("inches")), (1e3, say("metres")), (1e-3, say("micrometres")), (10.0, say("centimetres")))
 """Millimetres in what the recording may hold instead."""
 
-TWICE = ((1 / 25.4, "inches converted twice"),)
+TWICE = ((1 / 25.4, say("inches converted twice")),)
 
 COORDINATES = tuple(f"{a}_mm" for a in AXES)
 
@@ -37,8 +38,8 @@ class Change:
     """
 
     kind: str
-    what: str
-    fix: str
+    what: Text
+    fix: Text
     columns: tuple[str, ...]
     apply: Callable[[Floats, Floats], tuple[Floats, Floats]]
     edges: int = 0
@@ -58,7 +59,7 @@ def changes(shape: Shape) -> tuple[Change, ...]:
 def changes_of_blocks(shape: Shape) -> tuple[Change, ...]:
     """Mistakes that concern many rows together, or none: columns that slipped by a row, faces counted from the other end."""
     found = []
-    for by, way in ((-1, "down"), (1, "up")):
+    for by, way in ((-1, say("down")), (1, say("up"))):
         found += [_shift((i,), (name,), by, way, of_references=False) for i, name in enumerate(COORDINATES)]
         if shape.names:
             found.append(_shift(tuple(range(len(shape.names))), shape.names, by, way, of_references=True))
@@ -66,21 +67,30 @@ def changes_of_blocks(shape: Shape) -> tuple[Change, ...]:
             found += [_shift((i,), (name,), by, way, of_references=True) for i, name in enumerate(shape.names)]
     if shape.names == ("reference_mm",):
         found.append(
-            Change("swapped", "its faces seem counted from the other end", "Turn the order of reference_mm round", shape.names,
-                   _on(True, _from_the_other_end))
-        )  # fmt: skip
+            Change(
+                "swapped",
+                say("its faces seem counted from the other end"),
+                say("Turn the order of reference_mm round"),
+                shape.names,
+                _on(True, _from_the_other_end),
+            )
+        )
     return tuple(found)
 
 
 def _units(
-    names: tuple[str, ...], *, of_references: bool, units: tuple[tuple[float, str], ...] = UNITS
+    names: tuple[str, ...], *, of_references: bool, units: tuple[tuple[float, Text], ...] = UNITS
 ) -> Iterator[Change]:
     for factor, unit in units:
         for chosen in (tuple(range(len(names))), *((i,) for i in range(len(names)) if len(names) > 1)):
             concerned = tuple(names[i] for i in chosen)
             scale = np.where(np.isin(np.arange(len(names)), chosen), factor, 1.0)
             yield Change(
-                "unit", f"{_verb(concerned, 'look')} like {unit}, not mm", f"Convert to mm (times {factor:g})", concerned,
+                "unit", plural(
+                    len(concerned),
+                    one=say("{columns} looks like {unit}, not mm", columns=_named(concerned), unit=unit),
+                    many=say("{columns} look like {unit}, not mm", columns=_named(concerned), unit=unit),
+                ), say("Convert to mm (times {factor:g})", factor=factor), concerned,
                 _on(of_references, _times(scale)),
             )  # fmt: skip
 
@@ -90,7 +100,11 @@ def _signs(names: tuple[str, ...], *, of_references: bool) -> Iterator[Change]:
     for chosen in (*((i,) for i in range(3)), *several):
         concerned = tuple(names[i] for i in chosen)
         sign = np.where(np.isin(np.arange(3), chosen), -1.0, 1.0)
-        yield Change("sign", f"{_verb(concerned, 'seem')} to have the wrong sign", "Turn the sign round", concerned,
+        yield Change("sign", plural(
+            len(concerned),
+            one=say("{columns} seems to have the wrong sign", columns=_named(concerned)),
+            many=say("{columns} seem to have the wrong sign", columns=_named(concerned)),
+        ), say("Turn the sign round"), concerned,
                      _on(of_references, _times(sign)))  # fmt: skip
 
 
@@ -98,20 +112,37 @@ def _exchanges(names: tuple[str, ...], *, of_references: bool) -> Iterator[Chang
     for i, j in combinations(range(3), 2):
         order = np.arange(3)
         order[[i, j]] = j, i
-        yield Change("exchanged coordinates", f"{names[i]} and {names[j]} seem exchanged", "Exchange them",
-                     (names[i], names[j]), _on(of_references, _reordered(order)))  # fmt: skip
+        yield Change(
+            "exchanged coordinates",
+            say("{one} and {other} seem exchanged", one=Verbatim(names[i]), other=Verbatim(names[j])),
+            say("Exchange them"),
+            (names[i], names[j]),
+            _on(of_references, _reordered(order)),
+        )
 
 
-def _shift(chosen: tuple[int, ...], names: tuple[str, ...], by: int, way: str, *, of_references: bool) -> Change:
+def _shift(chosen: tuple[int, ...], names: tuple[str, ...], by: int, way: Text, *, of_references: bool) -> Change:
     def shifted(values: Floats) -> Floats:
         values = values.copy()
         values[:, chosen] = np.roll(values[:, chosen], by, axis=0)
         return values
 
     return Change(
-        "shifted column", f"{_verb(names, 'seem')} shifted {way} by one row against the other columns",
-        "Move the column back beside the others", names, _on(of_references, shifted), 1,
-    )  # fmt: skip
+        "shifted column",
+        plural(
+            len(names),
+            one=say(
+                "{columns} seems shifted {way} by one row against the other columns", columns=_named(names), way=way
+            ),
+            many=say(
+                "{columns} seem shifted {way} by one row against the other columns", columns=_named(names), way=way
+            ),
+        ),
+        say("Move the column back beside the others"),
+        names,
+        _on(of_references, shifted),
+        1,
+    )
 
 
 def _from_the_other_end(reference: Floats) -> Floats:
@@ -120,8 +151,8 @@ def _from_the_other_end(reference: Floats) -> Floats:
     return np.asarray(faces[::-1][rank].reshape(reference.shape), dtype=np.float64)
 
 
-def _verb(columns: tuple[str, ...], verb: str) -> str:
-    return f"{', '.join(columns)} {verb}{'s' if len(columns) == 1 else ''}"
+def _named(columns: tuple[str, ...]) -> Text:
+    return commas(Verbatim(column) for column in columns)
 
 
 def _times(factors: Floats) -> Callable[[Floats], Floats]:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.messages import Text, Verbatim, alternatives, say
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.screening.finding import Finding, at_lines, finding, span
 
@@ -29,14 +30,14 @@ class Bounds:
 
     low: float
     high: float
-    why: str
-    units: tuple[tuple[str, float, float], ...] = ()
+    why: Text
+    units: tuple[tuple[Text, float, float], ...] = ()
 
     def wrong(self, values: Floats) -> Rows:
         """(n,) outside the bounds."""
         return np.asarray((values < self.low) | (values > self.high))
 
-    def unit(self, values: Floats) -> str | None:
+    def unit(self, values: Floats) -> Text | None:
         """The unit in which all these values are plausible: value · factor + offset."""
         for name, factor, offset in self.units:
             if not np.any(self.wrong(factor * values + offset)):
@@ -45,21 +46,24 @@ class Bounds:
 
 
 _TEMPERATURE = Bounds(
-    -30.0, 55.0, "no measuring room is so cold or hot; is it in °C?",
-    (("kelvin", 1.0, -273.15), ("°F", 5 / 9, -160 / 9), ("thousandths of °C", 1e-3, 0.0)),
+    -30.0, 55.0, say("no measuring room is so cold or hot; is it in °C?"),
+    ((say("kelvin"), 1.0, -273.15), (Verbatim("°F"), 5 / 9, -160 / 9), (say("thousandths of °C"), 1e-3, 0.0)),
 )  # fmt: skip
 
 BOUNDS: Mapping[str, Bounds] = MappingProxyType(
     {
-        "radius_mm": Bounds(1e-9, np.inf, "a radius is positive"),
-        "fit_rms_um": Bounds(0.0, np.inf, "an rms is not negative"),
-        "n_points": Bounds(1.0, np.inf, "a fit needs points"),
-        "humidity_pct": Bounds(0.0, 100.0, "relative humidity lies between 0 and 100 %"),
+        "radius_mm": Bounds(1e-9, np.inf, say("a radius is positive")),
+        "fit_rms_um": Bounds(0.0, np.inf, say("an rms is not negative")),
+        "n_points": Bounds(1.0, np.inf, say("a fit needs points")),
+        "humidity_pct": Bounds(0.0, 100.0, say("relative humidity lies between 0 and 100 %")),
         "pressure_hpa": Bounds(
-            500.0, 1100.0, "air pressure lies between 500 and 1100 hPa; is it in hPa?",
-            (("Pa", 1e-2, 0.0), ("kPa", 10.0, 0.0), ("bar", 1e3, 0.0), ("inHg", 33.86, 0.0)),
+            500.0, 1100.0, say("air pressure lies between 500 and 1100 hPa; is it in hPa?"),
+            (
+                (Verbatim("Pa"), 1e-2, 0.0), (Verbatim("kPa"), 10.0, 0.0), (Verbatim("bar"), 1e3, 0.0),
+                (Verbatim("inHg"), 33.86, 0.0),
+            ),
         ),
-        "speed_mm_s": Bounds(0.0, np.inf, "a speed is not negative"),
+        "speed_mm_s": Bounds(0.0, np.inf, say("a speed is not negative")),
         **dict.fromkeys(TEMPERATURES, _TEMPERATURE),
     }
 )  # fmt: skip
@@ -87,19 +91,22 @@ def _impossible(points: Points) -> Iterator[Finding]:
             continue
         values = points.columns[column][rows]
         unit = bounds.unit(values)
-        told = f"{column} = {span(values)}: {bounds.why}"
+        told = say("{column} = {span}: {why}", column=Verbatim(column), span=span(values), why=bounds.why)
         if unit is None:
             yield finding("impossible", points, rows, told, column)
         else:
-            yield finding("unit", points, rows, f"{told} It looks like {unit}: convert it", column)
+            yield finding(
+                "unit", points, rows, say("{told} It looks like {unit}: convert it", told=told, unit=unit), column
+            )
 
 
 def _fraction(points: Points) -> Iterator[Finding]:
     humidity = points.columns.get("humidity_pct", np.zeros(0))
     if np.any(humidity > 0) and np.all(humidity <= 1):
         every = np.ones(len(points), dtype=bool)
-        why = (
-            f"humidity_pct = {span(humidity)}: no air is so dry; it looks like a fraction of 1, not %: multiply by 100"
+        why = say(
+            "humidity_pct = {span}: no air is so dry; it looks like a fraction of 1, not %: multiply by 100",
+            span=span(humidity),
         )
         yield finding("unit", points, every, why, "humidity_pct")
 
@@ -113,11 +120,29 @@ def _time(points: Points, balls: bool) -> Iterator[Finding]:
     steps = np.abs(np.diff(time))[within]
     usual, every = float(np.median(steps)) if len(steps) else 0.0, np.ones(len(points), dtype=bool)
     if usual > LONGEST_PAUSE:
-        yield finding("unit", points, every, f"time_s: {usual:.3g} s from point to point of one placing is longer than "
-                      "anybody waits; it looks like milliseconds: divide by 1000", "time_s")  # fmt: skip
+        yield finding(
+            "unit",
+            points,
+            every,
+            say(
+                "time_s: {usual:.3g} s from point to point of one placing is longer than anybody waits; it "
+                "looks like milliseconds: divide by 1000",
+                usual=usual,
+            ),
+            "time_s",
+        )
     elif balls and 0 < usual < SHORTEST_BALL:
-        yield finding("unit", points, every, f"time_s: {usual:.3g} s from ball to ball is shorter than a machine can "
-                      "probe one; it looks like minutes or hours: give seconds", "time_s")  # fmt: skip
+        yield finding(
+            "unit",
+            points,
+            every,
+            say(
+                "time_s: {usual:.3g} s from ball to ball is shorter than a machine can probe one; it looks "
+                "like minutes or hours: give seconds",
+                usual=usual,
+            ),
+            "time_s",
+        )
     else:
         yield from _moments(points, time)
 
@@ -133,13 +158,17 @@ def _moments(points: Points, time: Floats) -> Iterator[Finding]:
         if not low <= high or low <= time[row] <= high:
             continue
         rest = np.delete(time, row)
-        unit = next((u for f, u in ((1e-3, "milliseconds"), (60.0, "minutes"), (3600.0, "hours"))
+        unit = next((u for f, u in ((1e-3, say("milliseconds")), (60.0, say("minutes")), (3600.0, say("hours")))
                      if low <= f * time[row] * (1 + 1e-9) and f * time[row] <= high * (1 + 1e-9)), None)  # fmt: skip
         if unit is not None and np.all(np.diff(rest) >= 0):
             rows = np.array([row])
-            why = (
-                f"{at_lines(points, rows)}: time_s = {time[row]:g} between {low:g} and {high:g} looks like {unit}: "
-                "give seconds"
+            why = say(
+                "{at_lines}: time_s = {time:g} between {low:g} and {high:g} looks like {unit}: give seconds",
+                at_lines=at_lines(points, rows),
+                time=time[row],
+                low=low,
+                high=high,
+                unit=unit,
             )
             yield finding("unit", points, rows, why, "time_s")
 
@@ -156,9 +185,12 @@ def _stuck(points: Points) -> Iterator[Finding]:
         if np.mean(outside != 0) >= _MOVING:
             last = firsts[start + length] if start + length < len(firsts) else len(values)
             rows = np.arange(firsts[start], last)
-            why = (
-                f"{column} is stuck at {values[rows[0]]:g} in {at_lines(points, rows)}, where it changed from placing to "
-                "placing before or after: look at the sensor"
+            why = say(
+                "{column} is stuck at {values:g} in {at_lines}, where it changed from placing to placing "
+                "before or after: look at the sensor",
+                column=Verbatim(column),
+                values=values[rows[0]],
+                at_lines=at_lines(points, rows),
             )
             yield finding("stuck", points, rows, why, column)
 
@@ -172,11 +204,15 @@ def _slipped(points: Points) -> Iterator[Finding]:
     for column, values in _measured(points):
         if _constant_in_groups(points.group, values):
             continue
-        ways = [way for by, way in ((-1, "down"), (1, "up")) if _of_placings(np.roll(values, by), firsts, sizes)]
+        ways = [
+            way for by, way in ((-1, say("down")), (1, say("up"))) if _of_placings(np.roll(values, by), firsts, sizes)
+        ]
         if ways:
-            why = (
-                f"{column} changes inside every placing and would be the same for all points of each if it were moved back: "
-                f"it is shifted {' or '.join(ways)} by one row against the other columns: move it back"
+            why = say(
+                "{column} changes inside every placing and would be the same for all points of each if it "
+                "were moved back: it is shifted {ways} by one row against the other columns: move it back",
+                column=Verbatim(column),
+                ways=alternatives(ways),
             )
             yield finding("shifted column", points, np.ones(len(points), dtype=bool), why, column)
 
@@ -198,16 +234,19 @@ def _approach(points: Points) -> Iterator[Finding]:
     if not outward.any():
         return
     every = np.ones(len(points), dtype=bool)
-    for by, way in ((-1, "down"), (1, "up")):
+    for by, way in ((-1, say("down")), (1, say("up"))):
         back = np.einsum("ni,ni->n", np.roll(travel, by, axis=0), normals) > 0.3
         if outward.mean() > 0.1 and back.sum() <= 1:
-            why = f"approach_x, approach_y, approach_z are shifted {way} by one row against the normals: move them back"
+            why = say(
+                "approach_x, approach_y, approach_z are shifted {way} by one row against the normals: move them back",
+                way=way,
+            )
             yield finding("shifted column", points, every, why, "approach_x")
             return
     if outward.mean() > 0.95:
-        why = (
-            "approach_x, approach_y, approach_z point along the outward normal: "
-            "no probe reaches a surface from inside: turn their signs round"
+        why = say(
+            "approach_x, approach_y, approach_z point along the outward normal: no probe reaches a "
+            "surface from inside: turn their signs round"
         )
         yield finding("sign", points, outward, why, "approach_x")
 

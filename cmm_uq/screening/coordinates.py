@@ -11,6 +11,7 @@ from collections.abc import Collection
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import say
 from cmm_uq.model.kind import Observed
 from cmm_uq.points import AXES, Points
 from cmm_uq.screening.changes import Change, changes, changes_of_blocks
@@ -64,8 +65,11 @@ def _refuse_absurd_size(shape: Shape, where: str) -> None:
     if np.isfinite(shape.size) or not shape.is_bar or low <= shape.extent <= high:
         return
     unit = "metres" if shape.extent < low else "micrometres"
-    raise CmmUqError(f"the recorded bars are about {shape.extent:.3g} mm long: the coordinates look like {unit}, not mm",
-                     where=where, fix="Give x_mm, y_mm, z_mm in mm")  # fmt: skip
+    raise CmmUqError(
+        f"the recorded bars are about {shape.extent:.3g} mm long: the coordinates look like {unit}, not mm",
+        where=where,
+        fix="Give x_mm, y_mm, z_mm in mm",
+    )
 
 
 def _refuse_whole(search: Search, where: str) -> None:
@@ -87,8 +91,11 @@ def _refuse_whole(search: Search, where: str) -> None:
                          where=f"{where}, column {best.columns[0]}", fix=best.fix)  # fmt: skip
     for axis, column in zip(AXES, points.xyz.T, strict=True):
         if np.ptp(column) == 0 and bad > MOST * len(points):
-            raise CmmUqError(f"{told}: {axis}_mm is stuck at {column[0]:g} in every row", where=f"{where}, column {axis}_mm",
-                             fix="Export the recording again")  # fmt: skip
+            raise CmmUqError(
+                f"{told}: {axis}_mm is stuck at {column[0]:g} in every row",
+                where=f"{where}, column {axis}_mm",
+                fix="Export the recording again",
+            )
 
 
 def _astray(points: Points) -> float:
@@ -131,9 +138,12 @@ def _reversed_bars(points: Points, shape: Shape) -> list[Finding]:
             continue
         fewer = own[against] if against.sum() <= len(own) / 2 else own[~against]
         rows = ends[fewer].ravel()
-        why = (
-            f"{at_lines(points, rows)}: balls 1 and 2 of measurement {number} are exchanged against its other repeats. The "
-            "length does not show it; what was recorded beside each ball (approach, temperatures) may be exchanged too"
+        why = say(
+            "{at_lines}: balls 1 and 2 of measurement {number} are exchanged against its other repeats. "
+            "The length does not show it; what was recorded beside each ball (approach, temperatures) "
+            "may be exchanged too",
+            at_lines=at_lines(points, rows),
+            number=number,
         )
         found.append(finding("swapped", points, rows, why))
     return found

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.messages import Text, commas, listed, number, say
 from cmm_uq.points import Floats, Ints, Points
 
 
@@ -29,32 +31,39 @@ class Finding:
     kind: str
     measurements: tuple[int, ...]
     lines: tuple[int, ...]
-    why: str
+    why: Text
     column: str | None = None
     set_aside: bool = False
     rows: tuple[int, ...] = ()
 
 
-def finding(kind: str, points: Points, rows: NDArray[np.bool_] | Ints, why: str, column: str | None = None) -> Finding:
+def finding(kind: str, points: Points, rows: NDArray[np.bool_] | Ints, why: Text, column: str | None = None) -> Finding:
     """A finding about some rows of a recording."""
     lines = tuple(points.lines[rows].tolist()) if len(points.lines) else ()
     return Finding(kind, tuple(dict.fromkeys(points.measurement[rows].tolist())), lines, why, column)
 
 
-def span(values: Floats) -> str:
+def span(values: Floats) -> Text:
     """One value, or the lowest and the highest."""
     low, high = float(values.min()), float(values.max())
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    return number(low, "g") if low == high else say("{low:g} to {high:g}", low=low, high=high)
 
 
-def at_lines(points: Points, rows: Ints) -> str:
+def at_lines(points: Points, rows: Ints) -> Text:
     """``line 12``, ``lines 12 to 15`` or ``lines 3, 9 and 17``; rows from 1 where there is no file."""
-    numbers = sorted(points.lines[rows].tolist()) if len(points.lines) else sorted((rows + 1).tolist())
-    word = "line" if len(points.lines) else "row"
+    known = bool(len(points.lines))
+    numbers = sorted(points.lines[rows].tolist()) if known else sorted((rows + 1).tolist())
     if len(numbers) == 1:
-        return f"{word} {numbers[0]}"
+        return say("line {n}", n=numbers[0]) if known else say("row {n}", n=numbers[0])
+    which = _which(numbers)
+    return say("lines {which}", which=which) if known else say("rows {which}", which=which)
+
+
+def _which(numbers: Sequence[int]) -> Text:
+    """Several numbers, in ascending order: from and to, all, or the first six of them."""
     if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
-        return f"{word}s {numbers[0]} to {numbers[-1]}"
-    shown = [str(n) for n in numbers[:6]]
-    rest = f" and {len(numbers) - 6} more" if len(numbers) > 6 else ""
-    return f"{word}s {', '.join(shown)}{rest}" if rest else f"{word}s {', '.join(shown[:-1])} and {shown[-1]}"
+        return say("{first} to {last}", first=numbers[0], last=numbers[-1])
+    shown = [number(n) for n in numbers[:6]]
+    if len(numbers) > 6:
+        return say("{shown} and {count} more", shown=commas(shown), count=len(numbers) - 6)
+    return listed(shown)

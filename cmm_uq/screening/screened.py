@@ -17,7 +17,8 @@ from scipy import linalg, special
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.linear_model import LinearModel
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.messages import NOTHING, Text, Verbatim, comma_or, say
 from cmm_uq.model.kind import Observe
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.screening.columns import SENSORS, about_whole_column, column_findings
@@ -118,14 +119,20 @@ def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
     if all(f"n{a}" in points.columns for a in AXES):
         norm = np.linalg.norm([points.columns[f"n{a}"] for a in AXES], axis=0)
         if np.any(rows := np.abs(norm - 1) > _UNIT_LENGTH):
-            found.append(finding("impossible", points, rows, "the normal nx, ny, nz has no unit length", "nx"))
+            found.append(finding("impossible", points, rows, say("the normal nx, ny, nz has no unit length"), "nx"))
     outside = outside_travel(points)
     for i, axis in enumerate(AXES):
         if np.any(rows := outside[:, i]):
             low, high = points.machine.travel_mm[i]
-            why = (
-                f"scale readings of {axis.upper()} ({axis}_mm + origin) of {span(points.readings[rows, i])} mm lie outside "
-                f"the travel {low:g} to {high:g} mm{_hint(points, i)}"
+            why = say(
+                "scale readings of {axis} ({column}_mm + origin) of {span} mm lie outside the travel {low:g} "
+                "to {high:g} mm{hint}",
+                axis=Verbatim(axis.upper()),
+                column=Verbatim(axis),
+                span=span(points.readings[axis][rows]),
+                low=low,
+                high=high,
+                hint=_hint(points, i),
             )
             found.append(finding("impossible", points, rows, why, f"{axis}_mm"))
     return found
@@ -179,17 +186,24 @@ def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
     both = np.isin(points.group, (*originals, *later))
     if len(run) == 1:
         a, b = _measurement(points, originals[0]), _measurement(points, later[0])
-        why = f"measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement"
+        why = say(
+            "measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement",
+            b=b,
+            a=a,
+        )
         return finding("duplicate", points, both, why)
     ends = [_measurement(points, group) for group in (later[0], later[-1], originals[0], originals[-1])]
-    why = (
-        "measurements {} to {} repeat the coordinates of measurements {} to {} to the last digit: a block ".format(
-            *ends
-        )
-        + "pasted twice, whose copies say nothing: remove them, or record what was measured"
+    first, last, original, final = ends
+    block = say(
+        "measurements {first} to {last} repeat the coordinates of measurements {original} to {final} to the last digit: a "
+        "block pasted twice, whose copies say nothing: remove them, or record what was measured",
+        first=first,
+        last=last,
+        original=original,
+        final=final,
     )
     rows = tuple(np.flatnonzero(np.isin(points.group, later)).tolist())
-    return replace(finding("repeated block", points, both, why), rows=rows)
+    return replace(finding("repeated block", points, both, block), rows=rows)
 
 
 def _runs(copies: Sequence[tuple[int, int]]) -> list[list[tuple[int, int]]]:
@@ -220,7 +234,11 @@ def _reversal(found: Finding, points: Points, needed: Collection[str]) -> Findin
     ]
     if not differing:
         return found
-    why = f"{found.why}; the model uses {differing[0]}: number the balls as in the other repeats"
+    why = say(
+        "{why}; the model uses {differing}: number the balls as in the other repeats",
+        why=found.why,
+        differing=Verbatim(differing[0]),
+    )
     return replace(found, set_aside=True, rows=tuple(rows.tolist()), why=why)
 
 
@@ -235,23 +253,26 @@ def _told(found: Finding, damaged: Sequence[Finding]) -> bool:
     return found.kind == "impossible" and found.column in ("x_mm", "y_mm", "z_mm") and set(found.lines) <= lines
 
 
-def _hint(points: Points, axis: int) -> str:
+def _hint(points: Points, axis: int) -> Text:
     """What would bring most readings of an axis inside: the origin, a sign, another axis."""
     if outside_travel(points)[:, axis].mean() < 0.5:
-        return ""
+        return NOTHING
     low, high = points.machine.travel_mm[axis]
 
     def inside(readings: Floats) -> bool:
         return bool(np.mean((readings >= low) & (readings <= high)) > 0.95)
 
     origin = points.machine.origin_mm
-    hints = [f"{AXES[axis]}_mm with the wrong sign"] if inside(origin[axis] - points.xyz[:, axis]) else []
+    own = Verbatim(f"{AXES[axis]}_mm")
+    hints = [say("a missing origin_mm")]
+    if inside(origin[axis] - points.xyz[:, axis]):
+        hints.append(say("{column} with the wrong sign", column=own))
     hints += [
-        f"{AXES[axis]}_mm exchanged with {AXES[j]}_mm"
+        say("{column} exchanged with {other}", column=own, other=Verbatim(f"{AXES[j]}_mm"))
         for j in range(3)
         if j != axis and inside(origin[axis] + points.xyz[:, j])
     ]
-    return f": look for {', or '.join(['a missing origin_mm', *hints])}"
+    return say(": look for {hints}", hints=comma_or(hints))
 
 
 def _place(where: str, found: Finding) -> str:

@@ -9,6 +9,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.messages import Text, Verbatim, plural, say
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.screening.changes import Change, changes, changes_of_blocks
 from cmm_uq.screening.finding import Finding, at_lines, finding
@@ -30,7 +31,7 @@ class Cause:
 
     kind: str
     rows: Ints
-    why: str
+    why: Text
     column: str | None = None
     mended: tuple[Floats, Floats] | None = None
 
@@ -72,7 +73,7 @@ class Search:
                 found.append(self._finding(cause))
         groups = self.points.group if self.shape.together else np.arange(len(self.points))
         unknown = [np.flatnonzero(self._open & (groups == group)) for group in np.unique(groups[self._open])]
-        why = "no known mistake explains it: measure again"
+        why = say("no known mistake explains it: measure again")
         return found + [self._finding(Cause("outlier", rows, why)) for rows in unknown]
 
     def changed(self, change: Change, rows: Ints) -> tuple[Floats, Floats]:
@@ -83,7 +84,7 @@ class Search:
 
     def _wrong(self, misfit: Floats) -> NDArray[np.bool_]:
         low, high = self.points.machine.travel_mm.T
-        beyond = np.maximum(low - self.points.readings, self.points.readings - high)
+        beyond = np.maximum(low - self.points.carriages, self.points.carriages - high)
         astray = np.any(beyond > high - low, axis=1)
         missed = misfit > self.shape.tolerance
         return np.asarray(missed | astray if astray.mean() <= MOST else missed)
@@ -100,10 +101,13 @@ class Search:
     def _finding(self, cause: Cause) -> Finding:
         rows = cause.rows
         amount = float(self.misfit[rows].max())
-        by = f"by {amount:.3g} mm, " if np.isfinite(amount) else ""
-        missed = f"the artefact is missed {by}far more than any machine's error"
-        what = missed if amount > self.shape.tolerance else "the readings lie far outside the travel"
-        told = f"{at_lines(self.points, rows)}: {what}; {cause.why}"
+        missed = (
+            say("the artefact is missed by {amount:.3g} mm, far more than any machine's error", amount=amount)
+            if np.isfinite(amount)
+            else say("the artefact is missed far more than any machine's error")
+        )
+        what = missed if amount > self.shape.tolerance else say("the readings lie far outside the travel")
+        told = say("{at_lines}: {what}; {why}", at_lines=at_lines(self.points, rows), what=what, why=cause.why)
         lost = tuple(int(row) for row in self._lost_with(rows))
         return replace(finding(cause.kind, self.points, rows, told, cause.column), set_aside=True, rows=lost)
 
@@ -127,11 +131,13 @@ class Search:
         block, source = np.array(rows, dtype=np.int64), np.array(originals, dtype=np.int64)
         offset = np.diff(block - source, prepend=0, append=0) if len(block) else block
         for start, end in pairwise(sorted({0, *np.flatnonzero(offset).tolist(), len(block)})):
-            copied = (
-                f"the coordinates of {at_lines(self.points, source[start:end])} to the last digit: copied, not measured"
+            lines = at_lines(self.points, source[start:end])
+            why = plural(
+                end - start,
+                one=say("it has the coordinates of {lines} to the last digit: copied, not measured", lines=lines),
+                many=say("they have the coordinates of {lines} to the last digit: copied, not measured", lines=lines),
             )
-            kind, has = ("duplicate", "it has") if end - start == 1 else ("repeated block", "they have")
-            yield Cause(kind, block[start:end], f"{has} {copied}")
+            yield Cause("duplicate" if end - start == 1 else "repeated block", block[start:end], why)
 
     def _other_place(self, rows: Ints, others: Ints) -> NDArray[np.bool_]:
         keys = np.column_stack([self.points.measurement, self.points.point])
@@ -149,10 +155,18 @@ class Search:
             xyz = self._xyz.copy()
             xyz[chosen] = xyz[chosen[::-1]]
             if self._fit(chosen, xyz, self._reference):
-                names = [f"point {self.points.point[i]} of measurement {self.points.measurement[i]}" for i in chosen]
-                other = ", or the other ends of these bars," if self.shape.is_bar else ""
-                why = f"{names[0]} and {names[1]}{other} are exchanged: exchange their coordinates"
+                why = self._exchanged(chosen)
                 yield Cause("swapped", chosen, why, None, (xyz, self._reference))
+
+    def _exchanged(self, pair: Ints) -> Text:
+        one, other = (
+            say("point {point} of measurement {measurement}", point=point, measurement=measurement)
+            for point, measurement in zip(self.points.point[pair], self.points.measurement[pair], strict=True)
+        )
+        if self.shape.is_bar:
+            return say("{one} and {other}, or the other ends of these bars, are exchanged: exchange their coordinates",
+                       one=one, other=other)  # fmt: skip
+        return say("{one} and {other} are exchanged: exchange their coordinates", one=one, other=other)
 
     def _blocks(self) -> Iterator[Cause]:
         """Measurements, runs of rows and repeats that fit as a whole once one mistake is undone in all their rows."""
@@ -162,7 +176,7 @@ class Search:
                 yield cause
         for rows in self._candidates():
             if self._open[rows].mean() >= _PART and self._numbered_otherwise(rows):
-                why = "its points seem numbered in another order than the references: number them alike"
+                why = say("its points seem numbered in another order than the references: number them alike")
                 yield Cause("swapped", rows, why)
 
     def _candidates(self) -> Iterator[Ints]:
@@ -192,7 +206,7 @@ class Search:
         if same.sum() != 1:
             return None
         column = f"{AXES[int(np.argmax(same))]}_mm"
-        why = f"{column} seems stuck at the value of the row before. Measure again"
+        why = say("{column} seems stuck at the value of the row before. Measure again", column=Verbatim(column))
         return Cause("stuck", np.array([row]), why, column)
 
     def _first(self, every: Iterable[Change], rows: Ints) -> Cause | None:
@@ -201,7 +215,7 @@ class Search:
                 continue
             xyz, reference = self.changed(change, rows)
             if self._fit(rows, xyz, reference, change.edges):
-                why = f"{change.what}. {change.fix}"
+                why = say("{what}. {fix}", what=change.what, fix=change.fix)
                 return Cause(change.kind, rows, why, change.columns[0], (xyz, reference))
         return None
 
@@ -239,5 +253,5 @@ class Search:
 def outside_travel(points: Points) -> NDArray[np.bool_]:
     """(n, 3) whether a scale reading lies outside its travel."""
     low, high = points.machine.travel_mm.T
-    readings = points.readings
+    readings = points.carriages
     return np.asarray((readings < low - _TRAVEL_TOLERANCE) | (readings > high + _TRAVEL_TOLERANCE))

@@ -6,7 +6,7 @@ are lines of their own, so that the shares always add up to one; a share is nega
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import copysign, inf, isfinite, sqrt
 from typing import TYPE_CHECKING, Any
@@ -14,18 +14,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import NOTHING, Number, Text, Verbatim, foreign, say, signed
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.degrees_of_freedom import coverage_factor
 from cmm_uq.uncertainty.distributions import Distribution
 from cmm_uq.uncertainty.propagation import Propagated
 from cmm_uq.uncertainty.rounding import figure, rounded, significant
+from cmm_uq.units import unit_as_written
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from cmm_uq.uncertainty.measurement_model import MeasurementModel
 
-CERTIFICATE, SPECIFICATION, REPEATS, JUDGEMENT = "certificate", "specification", "repeats", "judgement"
+CERTIFICATE, SPECIFICATION = say("certificate"), say("specification")
+REPEATS, JUDGEMENT = say("repeats"), say("judgement")
 """Where a figure comes from, in the fewest words; a line may say more (``"certificate 4711"``)."""
 
 
@@ -51,11 +54,11 @@ class Line:
     shared : whether repetitions share it, so that it does not average out.
     """
 
-    name: str
+    name: Text
     u: float | None
-    origin: str
+    origin: Text
     value: float | None = None
-    unit: str = ""
+    unit: Text = NOTHING
     distribution: str = "normal"
     dof: float = inf
     sensitivity: float | None = 1.0
@@ -91,8 +94,17 @@ class Labels:
 def line_of(name: str, given: Distribution, labels: Labels | None = None, sensitivity: float = 1.0) -> Line:
     """Line of an input by its distribution."""
     told = labels or Labels()
-    origin, unit = told.origins.get(name, "not stated"), told.units.get(name, "")
-    return Line(name, float(given.u), origin, float(given.mean), unit, given.kind, float(given.dof), sensitivity)
+    origin, unit = told.origins.get(name, say("not stated")), unit_as_written(told.units.get(name, ""))
+    return Line(
+        Verbatim(name),
+        float(given.u),
+        foreign(origin),
+        float(given.mean),
+        unit,
+        given.kind,
+        float(given.dof),
+        sensitivity,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,14 +123,14 @@ class Budget:
     statement : what kind of uncertainty this is and what it is not, for the reader.
     """
 
-    measurand: str
+    measurand: Text
     lines: Sequence[Line]
     value: float | None = None
-    unit: str = ""
+    unit: Text = NOTHING
     coverage: float = 0.95
     effective_dof: float | None = None
     factor: float | None = None
-    statement: str = ""
+    statement: Text = NOTHING
 
     @property
     def variance(self) -> float:
@@ -156,11 +168,11 @@ class Budget:
         variance = self.variance
         return [line.part / variance if variance else 0.0 for line in self.lines]
 
-    def as_line(self, name: str, sensitivity: float = 1.0) -> Line:
+    def as_line(self, name: Text, sensitivity: float = 1.0) -> Line:
         """Its result as one line of another budget."""
-        return Line(name, self.u, "budget", self.value, self.unit, "normal", self.dof, sensitivity, parts=self)
+        return Line(name, self.u, say("budget"), self.value, self.unit, "normal", self.dof, sensitivity, parts=self)
 
-    def mean_of(self, repetitions: int, measurand: str) -> Budget:
+    def mean_of(self, repetitions: int, measurand: Text) -> Budget:
         """Budget of the mean of repetitions: what they do not share is divided by √n."""
         lines = [line if line.shared else replace(line, variance=line.part / repetitions) for line in self.lines]
         return replace(self, measurand=measurand, lines=lines)
@@ -197,45 +209,51 @@ class Budget:
 
         return pd.DataFrame(self.as_rows())
 
-    def as_text(self) -> list[tuple[str, ...]]:
+    def as_text(self) -> list[tuple[Text, ...]]:
         """The same as rows of text under :data:`HEADINGS`, for a page."""
         return [_text(depth, line, share) for depth, line, share in self.flat()]
 
 
 HEADINGS = (
-    "Quantity",
-    "Estimate",
-    "Standard uncertainty",
-    "Unit",
-    "Distribution",
-    "ν",
-    "Sensitivity",
-    "Contribution",
-    "Share",
-    "Origin",
-)
+    say("Quantity"), say("Estimate"), say("Standard uncertainty"), say("Unit"), say("Distribution"), say("ν"),
+    say("Sensitivity"), say("Contribution"), say("Share"), say("Origin"),
+)  # fmt: skip
 
 
-def _text(depth: int, line: Line, share: float) -> tuple[str, ...]:
-    value, u = "", "" if line.u is None else significant(line.u)
+def _text(depth: int, line: Line, share: float) -> tuple[Text, ...]:
+    value, u = NOTHING, (NOTHING if line.u is None else significant(line.u))
     if line.value is not None and line.u is not None:
         value, u = rounded(line.value, line.u)
     return (
-        "\u2003" * depth + line.name,
+        say("{indent}{name}", indent=Verbatim("\u2003" * depth), name=line.name),
         value,
         u,
-        "" if line.unit == "1" else line.unit,
-        line.distribution.replace("_", " "),
-        "" if line.u is None else "∞" if not isfinite(line.dof) else figure(line.dof, 3),
-        "" if line.sensitivity is None else figure(line.sensitivity),
+        NOTHING if line.unit == "1" else line.unit,
+        _DISTRIBUTIONS.get(line.distribution, NOTHING),
+        NOTHING if line.u is None else figure(line.dof, 3) if isfinite(line.dof) else Number("∞"),
+        NOTHING if line.sensitivity is None else figure(line.sensitivity),
         _signed(line.contribution),
-        f"{100 * share:.1f} %".replace("-", "−"),
+        say("{share} %", share=signed(100 * share, ".1f")),
         line.origin,
     )
 
 
-def _signed(contribution: float) -> str:
-    return ("−" if contribution < 0 else "") + significant(abs(contribution))
+_DISTRIBUTIONS = {
+    "normal": say("normal"),
+    "t": say("t"),
+    "rectangular": say("rectangular"),
+    "rectangular_uncertain": say("rectangular uncertain"),
+    "trapezoidal": say("trapezoidal"),
+    "triangular": say("triangular"),
+    "arcsine": say("arcsine"),
+    "exponential": say("exponential"),
+    "gamma": say("gamma"),
+}
+"""By the names of JCGM 101 table 1 as model files write them."""
+
+
+def _signed(contribution: float) -> Text:
+    return Number(("−" if contribution < 0 else "") + significant(abs(contribution)))
 
 
 def budget_of(
@@ -252,33 +270,42 @@ def budget_of(
     told, name = labels or Labels(), propagated.outputs[output]
     lines = [line_of(key, given, told, slopes[key]) for key, given in model.inputs.items()]
     joint = 2 * np.triu(np.outer(contribution, contribution) * propagated.correlation, 1)
-    lines += _joint_lines("correlation of", names, joint)
+    lines += _joint_lines(_of_pairs, names, joint)
     rounding = _ROUNDING * float(propagated.covariance[output, output])
     bending = propagated.bending[output]
-    lines += _joint_lines("second order:", names, np.where(np.abs(bending) > rounding, bending, 0.0))
+    lines += _joint_lines(_of_squares, names, np.where(np.abs(bending) > rounding, bending, 0.0))
     cubic = float(propagated.cubic[output])
     if abs(cubic) > rounding:
-        lines.append(joint_line("third derivatives", cubic))
+        lines.append(joint_line(say("third derivatives"), cubic))
     return Budget(
-        name,
+        Verbatim(name),
         lines,
         float(propagated.value[output]),
-        told.units.get(name, ""),
+        unit_as_written(told.units.get(name, "")),
         coverage,
         float(propagated.dof[output]),
     )
 
 
-def joint_line(name: str, variance: float) -> Line:
+def joint_line(name: Text, variance: float) -> Line:
     """Line that is no quantity but what several of them add to, or take from, the variance together."""
-    return Line(name, None, "model", distribution="", sensitivity=None, variance=variance)
+    return Line(name, None, say("model"), distribution="", sensitivity=None, variance=variance)
 
 
-def _joint_lines(what: str, names: Sequence[str], variance: Floats) -> list[Line]:
+def _of_squares(one: Text, other: Text) -> Text:
+    return (
+        say("second order: {one} squared", one=one)
+        if one == other
+        else say("second order: {one}, {other}", one=one, other=other)
+    )
+
+
+def _of_pairs(one: Text, other: Text) -> Text:
+    return say("correlation of {one}, {other}", one=one, other=other)
+
+
+def _joint_lines(words: Callable[[Text, Text], Text], names: Sequence[str], variance: Floats) -> list[Line]:
     return [
-        joint_line(
-            f"{what} {names[i]}" + (f", {names[j]}" if i != j else " squared"),
-            float(variance[i, j]),
-        )
+        joint_line(words(Verbatim(names[i]), Verbatim(names[j])), float(variance[i, j]))
         for i, j in zip(*np.nonzero(variance), strict=True)
     ]

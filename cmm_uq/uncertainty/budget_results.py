@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import NOTHING, Number, Text, Verbatim, commas, number, say
 from cmm_uq.uncertainty.budget import Budget
 from cmm_uq.uncertainty.evaluation import Evaluation, Stated
 from cmm_uq.uncertainty.monte_carlo import Simulated
@@ -114,64 +115,92 @@ def _simulated(found: Simulated | None, row: int) -> dict[str, Any] | None:
     }
 
 
-SUMMARY = ("Quantity", "Estimate", "Standard uncertainty", "Unit", "Interval", "k", "ν", "Method")
+SUMMARY = (
+    say("Quantity"),
+    say("Estimate"),
+    say("Standard uncertainty"),
+    say("Unit"),
+    say("Interval"),
+    say("k"),
+    say("ν"),
+    say("Method"),
+)
 
 
-def summary_rows(evaluation: Evaluation) -> list[tuple[str, ...]]:
+def summary_rows(evaluation: Evaluation) -> list[tuple[Text, ...]]:
     """One row of text an output under :data:`SUMMARY`, rounded to the digits asked for."""
     return [_summary(name, stated, min(evaluation.request.digits, 2)) for name, stated in evaluation.stated.items()]
 
 
-_METHODS: Mapping[str, str] = {"first": "first order", "second": "second order", "monte_carlo": "Monte Carlo"}
+_METHODS: Mapping[str, Text] = {
+    "first": say("first order"),
+    "second": say("second order"),
+    "monte_carlo": say("Monte Carlo"),
+}
 
 
-def _summary(name: str, stated: Stated, digits: int) -> tuple[str, ...]:
+def _summary(name: str, stated: Stated, digits: int) -> tuple[Text, ...]:
     value, u = rounded(stated.value, stated.u, digits)
     low, high = (rounded(end, stated.u, digits)[0] for end in stated.interval)
     return (
-        name,
+        Verbatim(name),
         value,
         u,
-        "" if stated.budget.unit == "1" else stated.budget.unit,
-        f"[{low}, {high}]",
+        (NOTHING if stated.budget.unit == "1" else stated.budget.unit),
+        say("[{low}, {high}]", low=low, high=high),
         figure(stated.coverage_factor, 3),
-        figure(np.floor(stated.dof), 3) if isfinite(stated.dof) else "∞",
+        (figure(np.floor(stated.dof), 3) if isfinite(stated.dof) else Number("∞")),
         _METHODS[stated.method],
     )
 
 
-COMPARISON = ("Method", "Estimate", "Standard uncertainty", "Interval", "Trials")
+COMPARISON = (say("Method"), say("Estimate"), say("Standard uncertainty"), say("Interval"), say("Trials"))
 
 
-def comparison_rows(evaluation: Evaluation, output: str) -> list[tuple[str, ...]]:
+def comparison_rows(evaluation: Evaluation, output: str) -> list[tuple[Text, ...]]:
     """One row of text for each method that was possible, under :data:`COMPARISON`."""
     told = results_of(evaluation)["outputs"][output]
-    rows: list[tuple[str, ...]] = []
+    rows: list[tuple[Text, ...]] = []
     for method, name in _METHODS.items():
         if found := told[method]:
             value, u = rounded(found["value"], found["u"])
             ends = [rounded(end, found["u"])[0] for end in found["interval"] or ()]
-            interval = f"[{', '.join(ends)}]" if ends else ""
-            rows.append((f"{name[0].upper()}{name[1:]}", value, u, interval, str(found.get("trials", ""))))
+            interval = say("[{ends}]", ends=commas(ends)) if ends else NOTHING
+            rows.append((say("{name:capital}", name=name), value, u, interval, number(found.get("trials", ""))))
     return rows
 
 
-def statement(evaluation: Evaluation, output: str) -> str:
+def statement(evaluation: Evaluation, output: str) -> Text:
     """The result of one output as a sentence that a certificate could carry (JCGM 100:2008 7.2.4)."""
     stated, coverage = evaluation.stated[output], evaluation.request.coverage
     unit = stated.budget.unit
-    end = "" if unit in ("", "1") else f" {unit}"
+    end = NOTHING if unit in ("", "1") else say(" {unit}", unit=unit)
     percent = figure(100 * coverage)
     if stated.method == "monte_carlo":
         low, high = (rounded(e, stated.u)[0] for e in stated.interval)
         value, u = rounded(stated.value, stated.u)
-        return (
-            f"{output} = {value}{end} with standard uncertainty {u}{end}; the shortest {percent} % coverage interval is "
-            f"[{low}, {high}]{end}."
+        return say(
+            "{output} = {value}{end} with standard uncertainty {u}{end}; the shortest {percent} % "
+            "coverage interval is [{low}, {high}]{end}.",
+            output=Verbatim(output),
+            value=value,
+            end=end,
+            u=u,
+            percent=percent,
+            low=low,
+            high=high,
         )
     value, expanded = rounded(stated.value, stated.coverage_factor * stated.u)
-    known = f" for ν = {figure(np.floor(stated.dof), 4)}" if isfinite(stated.dof) else ""
-    return (
-        f"{output} = {value}{end} ± {expanded}{end}, the expanded uncertainty U = k u with u = {significant(stated.u)}{end} "
-        f"and k = {figure(stated.coverage_factor, 3)}{known}, coverage probability {percent} %."
+    known = say(" for ν = {figure}", figure=figure(np.floor(stated.dof), 4)) if isfinite(stated.dof) else NOTHING
+    return say(
+        "{output} = {value}{end} ± {expanded}{end}, the expanded uncertainty U = k u with u = "
+        "{u}{end} and k = {figure}{known}, coverage probability {percent} %.",
+        output=Verbatim(output),
+        value=value,
+        end=end,
+        expanded=expanded,
+        u=significant(stated.u),
+        figure=figure(stated.coverage_factor, 3),
+        known=known,
+        percent=percent,
     )

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import NOTHING, Text, after, foreign, say, semicolons
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.uncertainty.monte_carlo import Simulated, numerical_tolerance
 from cmm_uq.uncertainty.propagation import Propagated, first_order, second_order
@@ -19,7 +20,11 @@ Method = Literal["first", "second", "monte_carlo"]
 _ROUNDING = 4e-16
 
 PROPAGATION: tuple[Method, ...] = ("first", "second")
-NAMES: Mapping[Method, str] = {"first": "first order", "second": "second order", "monte_carlo": "Monte Carlo"}
+NAMES: Mapping[Method, Text] = {
+    "first": say("first order"),
+    "second": say("second order"),
+    "monte_carlo": say("Monte Carlo"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +34,7 @@ class Ways:
     first: Propagated | None = None
     second: Propagated | None = None
     simulated: Simulated | None = None
-    problems: Mapping[Method, str] = field(default_factory=dict)
+    problems: Mapping[Method, Text] = field(default_factory=dict)
 
     def propagated(self, method: Method) -> Propagated | None:
         """Result by the law of propagation."""
@@ -39,12 +44,12 @@ class Ways:
 def by_propagation(model: MeasurementModel) -> Ways:
     """First and second order, as far as they are possible."""
     found: dict[Method, Propagated] = {}
-    problems: dict[Method, str] = {}
+    problems: dict[Method, Text] = {}
     for method, propagate in zip(PROPAGATION, (first_order, second_order), strict=True):
         try:
             found[method] = propagate(model)
         except CmmUqError as error:
-            problems[method] = error.problem
+            problems[method] = foreign(error.problem)
     return Ways(found.get("first"), found.get("second"), None, problems)
 
 
@@ -68,14 +73,14 @@ def must_be_possible(model: MeasurementModel, ways: Ways, method: Method) -> Non
             )
 
 
-def beside(ways: Ways, method: Method, row: int, digits: int) -> str:
+def beside(ways: Ways, method: Method, row: int, digits: int) -> Text:
     """What the other order says, where it says something else."""
     if ways.first is None or ways.second is None:
-        return ""
+        return NOTHING
     other = ways.second if method == "first" else ways.first
     name = NAMES["second" if method == "first" else "first"]
     differs = _differ(ways.first, ways.second, row, digits)
-    return f" {name.capitalize()} gives u = {figure(other.u[row], digits)}." if differs else ""
+    return say("{name:capital} gives u = {u}.", name=name, u=figure(other.u[row], digits)) if differs else NOTHING
 
 
 def _differ(first: Propagated, second: Propagated, row: int, digits: int) -> bool:
@@ -90,60 +95,74 @@ def is_flat(model: MeasurementModel, found: Propagated, row: int) -> bool:
     return uncertain and bool(found.u[row] <= _ROUNDING * abs(found.value[row]))
 
 
-def stability(ways: Ways, digits: int) -> str:
+def stability(ways: Ways, digits: int) -> Text:
     """A sentence where Monte Carlo gave up before its figures were stable, else nothing."""
     if ways.simulated is None or ways.simulated.stable:
-        return ""
-    return f" Monte Carlo is not stable to {digits} digits after {ways.simulated.trials} trials."
+        return NOTHING
+    return say(
+        "Monte Carlo is not stable to {digits} digits after {trials} trials.",
+        digits=digits,
+        trials=ways.simulated.trials,
+    )
 
 
-def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[Method, str]:
+def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[Method, Text]:
     """Method for one output, and why."""
     if ways.simulated is None:
         return _without_monte_carlo(ways, row, digits)
-    findings: list[str] = []
+    findings: list[Text] = []
     told = stability(ways, digits)
     for method in PROPAGATION:
         confirmed, finding = _finding(model, ways, ways.simulated, method, row, digits)
-        findings.append(f"{NAMES[method]} {finding}")
+        findings.append(say("{names} {finding}", names=NAMES[method], finding=finding))
         if confirmed:
-            return method, _sentence(findings) + told
-    return "monte_carlo", _sentence(findings) + told
+            return method, after(_sentence(findings), told)
+    return ("monte_carlo", after(_sentence(findings), told))
 
 
 def _finding(
     model: MeasurementModel, ways: Ways, simulated: Simulated, method: Method, row: int, digits: int
-) -> tuple[bool, str]:
+) -> tuple[bool, Text]:
     """Whether Monte Carlo confirms the method for one output, and what to say of it."""
     found = ways.propagated(method)
     if found is None:
-        return False, f"is impossible ({ways.problems[method]})"
+        return (False, say("is impossible ({problems})", problems=ways.problems[method]))
     if is_flat(model, found, row):
-        return False, "gives u = 0, since the model is flat at the estimates"
+        return (False, say("gives u = 0, since the model is flat at the estimates"))
     if found.dof[row] < 1:
-        return False, f"has no interval, with {found.dof[row]:.2g} effective degrees of freedom"
+        return (False, say("has no interval, with {dof:.2g} effective degrees of freedom", dof=found.dof[row]))
     comparison = compare(found, simulated, row, digits)
     if not comparison.clear:
-        doubt = f", but Monte Carlo's own error is {figure(comparison.error, 2)}"
-        return max(comparison.low, comparison.high) <= comparison.tolerance + 2 * comparison.error, (
-            f"is neither confirmed nor refuted: {comparison.words}{doubt}"
+        error = figure(comparison.error, 2)
+        return (
+            max(comparison.low, comparison.high) <= comparison.tolerance + 2 * comparison.error,
+            say(
+                "is neither confirmed nor refuted: {words}, but Monte Carlo's own error is {error}",
+                words=comparison.words,
+                error=error,
+            ),
         )
-    return comparison.agrees, ("is confirmed: " if comparison.agrees else "is not enough: ") + comparison.words
+    words = comparison.words
+    return comparison.agrees, (
+        say("is confirmed: {words}", words=words) if comparison.agrees else say("is not enough: {words}", words=words)
+    )
 
 
-def _sentence(findings: Sequence[str]) -> str:
-    said = "; ".join(findings)
-    return f"{said[0].upper()}{said[1:]} (JCGM 101 clause 8)."
+def _sentence(findings: Sequence[Text]) -> Text:
+    said = semicolons(findings)
+    return say("{said:capital} (JCGM 101 clause 8).", said=said)
 
 
-def _without_monte_carlo(ways: Ways, row: int, digits: int) -> tuple[Method, str]:
+def _without_monte_carlo(ways: Ways, row: int, digits: int) -> tuple[Method, Text]:
     first, second = ways.first, ways.second
-    unchecked = f"Not confirmed by Monte Carlo, which is impossible here: {ways.problems['monte_carlo']}."
+    unchecked = say(
+        "Not confirmed by Monte Carlo, which is impossible here: {problems}.", problems=ways.problems["monte_carlo"]
+    )
     if first is None or first.u[row] == 0:
         raise CmmUqError(
             f"no method gives an uncertainty of {first.outputs[row] if first else 'the outputs'}: "
             f"{ways.problems.get('first', 'the derivatives vanish')}; {ways.problems['monte_carlo']}"
         )
     if second is not None and _differ(first, second, row, digits):
-        return "second", f"The terms of second order are not negligible. {unchecked}"
-    return "first", unchecked
+        return ("second", say("The terms of second order are not negligible. {unchecked}", unchecked=unchecked))
+    return ("first", unchecked)

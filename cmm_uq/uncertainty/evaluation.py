@@ -13,6 +13,7 @@ from math import inf
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, names, say
 from cmm_uq.overflow import must_be_finite, refusing_overflow
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.budget import Budget, Labels, budget_of, joint_line, line_of
@@ -25,6 +26,7 @@ from cmm_uq.uncertainty.monte_carlo import HIGHEST_COVERAGE, LARGEST, Simulated,
 from cmm_uq.uncertainty.propagation import Propagated
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.uncertainty.validation import simulate_to_validate
+from cmm_uq.units import unit_as_written
 
 METHODS = ("first", "second", "monte_carlo", "auto")
 
@@ -75,7 +77,7 @@ class Stated:
     """
 
     method: Method
-    reason: str
+    reason: Text
     value: float
     u: float
     dof: float
@@ -162,12 +164,16 @@ def _ways(model: MeasurementModel, asked: Request) -> Ways:
 
 
 def _with_validation(model: MeasurementModel, ways: Ways, asked: Request) -> Ways:
-    problem = ""
+    problem = NOTHING
     without = [name for name, given in model.inputs.items() if not np.isfinite(given.standard_deviation)]
     if without:
-        problem = f"{', '.join(without)} has too few degrees of freedom for a standard deviation (ν ≤ 2)"
+        problem = say(
+            "{inputs} has too few degrees of freedom for a standard deviation (ν ≤ 2)", inputs=commas(names(without))
+        )
     elif asked.coverage > HIGHEST_COVERAGE:
-        problem = f"a coverage probability above {HIGHEST_COVERAGE} needs too many trials"
+        problem = say(
+            "a coverage probability above {highest_coverage} needs too many trials", highest_coverage=HIGHEST_COVERAGE
+        )
     if problem:
         return replace(ways, problems={**ways.problems, "monte_carlo": problem})
     candidates = [found for found in (ways.first, ways.second) if found is not None]
@@ -175,13 +181,13 @@ def _with_validation(model: MeasurementModel, ways: Ways, asked: Request) -> Way
     return replace(ways, simulated=simulated)
 
 
-def _chosen(model: MeasurementModel, ways: Ways, row: int, asked: Request) -> tuple[Method, str]:
+def _chosen(model: MeasurementModel, ways: Ways, row: int, asked: Request) -> tuple[Method, Text]:
     if asked.method == "auto":
         return choose(model, ways, row, asked.digits)
     if asked.method == "monte_carlo":
-        return "monte_carlo", "Asked for." + stability(ways, asked.digits)
+        return ("monte_carlo", after(say("Asked for."), stability(ways, asked.digits)))
     method: Method = "first" if asked.method == "first" else "second"
-    return method, "Asked for; not confirmed by Monte Carlo." + beside(ways, method, row, asked.digits)
+    return method, after(say("Asked for; not confirmed by Monte Carlo."), beside(ways, method, row, asked.digits))
 
 
 def _covariance(ways: Ways, methods: Collection[Method]) -> Floats:
@@ -197,7 +203,7 @@ def _propagated(
     found: Propagated,
     row: int,
     method: Method,
-    reason: str,
+    reason: Text,
     coverage: float,
     labels: Labels,
 ) -> Stated:
@@ -208,20 +214,21 @@ def _propagated(
 
 
 def _simulated(
-    model: MeasurementModel, simulated: Simulated, row: int, reason: str, alone: Floats, labels: Labels
+    model: MeasurementModel, simulated: Simulated, row: int, reason: Text, alone: Floats, labels: Labels
 ) -> Stated:
     name, value, u = simulated.outputs[row], float(simulated.value[row]), float(simulated.u[row])
     lines = []
     for (quantity, given), variance in zip(model.inputs.items(), alone.tolist(), strict=True):
         line = line_of(quantity, given, labels)
         lines.append(replace(line, variance=variance, sensitivity=variance**0.5 / line.u if line.u else 0.0))
-    lines.append(joint_line("together", u**2 - float(np.sum(alone))))
-    statement = (
-        "Each quantity's contribution is what it does alone, the others held at their estimates (JCGM 101 annex B); "
-        "“together” is what they add or take away jointly, by correlation or nonlinearity."
+    lines.append(joint_line(say("together"), u**2 - float(np.sum(alone))))
+    statement = say(
+        "Each quantity's contribution is what it does alone, the others held at their estimates "
+        "(JCGM 101 annex B); “together” is what they add or take away jointly, by correlation or "
+        "nonlinearity."
     )
-    unit = labels.units.get(name, "")
-    budget = Budget(name, lines, value, unit, simulated.coverage, effective_dof=inf, statement=statement)
+    unit = unit_as_written(labels.units.get(name, ""))
+    budget = Budget(Verbatim(name), lines, value, unit, simulated.coverage, effective_dof=inf, statement=statement)
     low, high = map(float, simulated.interval[row])
     return Stated("monte_carlo", reason, value, u, inf, (low, high), (high - low) / (2 * u) if u else 0.0, budget)
 

@@ -20,7 +20,8 @@ from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.content import content_of, text_of
 from cmm_uq.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT
 from cmm_uq.files.toml import toml_of
-from cmm_uq.uncertainty.budget import Labels
+from cmm_uq.messages import say
+from cmm_uq.uncertainty.budget import REPEATS, Labels
 from cmm_uq.uncertainty.distributions import Distribution
 from cmm_uq.uncertainty.evaluation import Evaluation, Request, evaluate
 from cmm_uq.uncertainty.expression import Expression, name_problem, parse
@@ -272,7 +273,7 @@ class _Reader:
                 unit = derived_unit(expression, units) or ""
             units[name] = unit
         origins = {
-            name: keys.get("source") or ("repeats" if "samples" in keys else "not stated")
+            name: keys.get("source") or (REPEATS if "samples" in keys else say("not stated"))
             for name, keys in given.items()
         }
         return Labels(units, origins)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.points import Floats
+from cmm_uq.units import Unit
 
 
 @dataclass(frozen=True)
@@ -23,10 +24,10 @@ class Quantity:
     value: float
     u: float
     interval95: tuple[float, float]
-    unit: str
+    unit: Unit
 
     @classmethod
-    def of_draws(cls, draws: Floats, unit: str, value: float | None = None) -> Quantity:
+    def of_draws(cls, draws: Floats, unit: Unit, value: float | None = None) -> Quantity:
         """From draws (N,) of a distribution; its mean is the estimate unless one is given."""
         low, high = np.quantile(draws, [0.025, 0.975])
         estimate = float(draws.mean()) if value is None else value
@@ -43,7 +44,7 @@ class Quantity:
         """K = U/u; ``None`` where nothing is uncertain."""
         return self.expanded / self.u if self.u > 0 else None
 
-    def times(self, factor: float, unit: str) -> Quantity:
+    def times(self, factor: float, unit: Unit) -> Quantity:
         """The quantity multiplied by an exact factor, of either sign, in the unit of the product."""
         low, high = sorted(factor * end for end in self.interval95)
         return Quantity(self.value * factor, self.u * abs(factor), (low, high), unit)

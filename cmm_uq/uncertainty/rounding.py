@@ -12,6 +12,7 @@ from decimal import ROUND_HALF_UP, ROUND_UP, Decimal
 from math import isfinite, isinf, isnan
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Number
 
 MINUS = "−"
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -20,7 +21,7 @@ _PLAIN_INTEGER_DIGITS = 15
 _LARGEST_LOSS = Decimal("0.05")
 
 
-def significant(u: float, digits: int = 2) -> str:
+def significant(u: float, digits: int = 2) -> Number:
     """An uncertainty to some significant digits.
 
     Parameters
@@ -35,7 +36,7 @@ def significant(u: float, digits: int = 2) -> str:
     return rounded(0.0, u, digits)[1]
 
 
-def rounded(value: float, u: float, digits: int = 2) -> tuple[str, str]:
+def rounded(value: float, u: float, digits: int = 2) -> tuple[Number, Number]:
     """A value and its uncertainty, both to the decimal place that the uncertainty supports.
 
     Parameters
@@ -64,15 +65,15 @@ def rounded(value: float, u: float, digits: int = 2) -> tuple[str, str]:
     _check(value, u, digits)
     exact = _decimal(value)
     if u == 0:
-        return _plain(exact.normalize()), "0"
+        return (_plain(exact.normalize()), Number("0"))
     if isinf(u):
-        return _plain(_to_place(exact, exact.adjusted() - digits + 1)) if value else "0", "∞"
+        return _plain(_to_place(exact, exact.adjusted() - digits + 1)) if value else Number("0"), Number("∞")
     shown = _rounded_uncertainty(_decimal(u), digits)
     place = shown.adjusted() - digits + 1
     return _as_text(_to_place(exact, place), shown, place)
 
 
-def figure(number: float, digits: int = 4) -> str:
+def figure(number: float, digits: int = 4) -> Number:
     """A number that has no uncertainty of its own, such as a sensitivity, to some significant digits.
 
     Trailing zeros say nothing here and are left out; a power of ten is split off below 0.001 and from a million on.
@@ -81,7 +82,7 @@ def figure(number: float, digits: int = 4) -> str:
     mantissa, exponent = f"{number:.{digits - 1}e}".split("e")
     if -3 <= int(exponent) < 6:
         return _plain(Decimal(f"{number:.{digits}g}").normalize())
-    return _plain(Decimal(mantissa).normalize()) + _power(int(exponent))
+    return Number(_plain(Decimal(mantissa).normalize()) + _power(int(exponent)))
 
 
 def _check(value: float, u: float, digits: int) -> None:
@@ -108,20 +109,21 @@ def _rounded_uncertainty(u: Decimal, digits: int) -> Decimal:
     return _to_place(u, place, ROUND_UP) if u - nearest > _LARGEST_LOSS * u else nearest
 
 
-def _as_text(value: Decimal, u: Decimal, place: int) -> tuple[str, str]:
+def _as_text(value: Decimal, u: Decimal, place: int) -> tuple[Number, Number]:
     exponent = max(value.adjusted() if value else u.adjusted(), u.adjusted())
     if -place <= _PLAIN_DECIMALS and exponent < _PLAIN_INTEGER_DIGITS:
         return _plain(value, place), _plain(u, place)
     power = _power(exponent)
     scaled_place = place - exponent
-    return _plain(value.scaleb(-exponent), scaled_place) + power, _plain(u.scaleb(-exponent), scaled_place) + power
+    shown = (_plain(number.scaleb(-exponent), scaled_place) + power for number in (value, u))
+    return Number(next(shown)), Number(next(shown))
 
 
 def _power(exponent: int) -> str:
     return "×10" + str(exponent).translate(_SUPERSCRIPT)
 
 
-def _plain(number: Decimal, place: int | None = None) -> str:
+def _plain(number: Decimal, place: int | None = None) -> Number:
     """Without exponent; with as many decimals as the place asks."""
     text = f"{number:f}" if place is None else f"{number:.{max(0, -place)}f}"
-    return text.replace("-", MINUS) if number else text.replace("-", "")
+    return Number(text.replace("-", MINUS if number else ""))

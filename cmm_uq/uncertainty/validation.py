@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cmm_uq.messages import Text, say
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.degrees_of_freedom import coverage_factor
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
@@ -50,10 +51,13 @@ class Comparison:
         return 2 * self.error <= max(difference, self.tolerance / _OF_TOLERANCE)
 
     @property
-    def words(self) -> str:
+    def words(self) -> Text:
         """The comparison as part of a sentence."""
         low, high, tolerance = (figure(number, 2) for number in (self.low, self.high, self.tolerance))
-        return f"its interval's ends differ from Monte Carlo's by {low} and {high}, numerical tolerance {tolerance}"
+        return say(
+            "its interval's ends differ from Monte Carlo's by {low} and {high}, numerical tolerance {tolerance}",
+            low=low, high=high, tolerance=tolerance,
+        )  # fmt: skip
 
 
 def compare(propagated: Propagated, simulated: Simulated, row: int, digits: int) -> Comparison:

@@ -78,17 +78,19 @@ def test_arviz_computes_the_r_hat_and_effective_samples_that_results_json_says(
 
 
 def test_arviz_counts_as_many_effective_samples_as_the_sampler_does(found: Report, results: dict[str, Any]) -> None:
-    """By another estimator, and of the quantities instead of the sampler's own coordinates; strung together they would be
-    counted nearly three times over.
+    """By another estimator, and of the quantities instead of the sampler's own coordinates. The least is that of the noise:
+    all else is drawn independently, given it. Strung together, its draws would be counted too often.
     """
     sampler = results["sampling"]["ess_min"]
-    assert results["posterior"]["ess_bulk_min"] == pytest.approx(sampler, rel=0.15)
-    strung = arviz.ess({"x": found.posterior["scale_x.ppm"].swapaxes(0, 1).reshape(4, -1)})
-    assert float(strung["x"]) > 2 * sampler
+    assert results["posterior"]["ess_bulk_min"] == pytest.approx(sampler, rel=0.3)
+    noise = found.posterior["noise.coordinate_um"]
+    strung = arviz.ess({"x": noise.swapaxes(0, 1).reshape(4, -1)})
+    assert float(strung["x"]) > 1.3 * float(arviz.ess({"x": noise})["x"])
+    assert float(arviz.ess({"x": found.posterior["scale_x.ppm"]})["x"]) > 0.5 * found.posterior["scale_x.ppm"].size
 
 
 def test_it_is_frozen_and_shows_itself_in_one_line_and_in_escaped_html(found: Report) -> None:
-    assert repr(found) == "<Report of iota-1102-20C: 8 estimates, ASME B89.4.1-1997 fail, consistent>"
+    assert repr(found) == "<Report of iota-1102-20C: 11 estimates, ASME B89.4.1-1997 fail, consistent>"
     page = found._repr_html_()
     assert "squareness_xy.angle_arcsec" in page
     assert "<td>fail</td>" in page
@@ -115,8 +117,9 @@ def test_a_kind_without_named_draws_says_so() -> None:
     shift = cmm_uq.report(ROOT / "examples" / "shift-simulated")
     assert shift.estimates.loc["scale_x.ppm", "unit"] == "ppm"
     assert "simulated" in shift.warnings[0]
+    without = dataclasses.replace(shift, outcome=dataclasses.replace(shift.outcome, draws=None))
     with pytest.raises(cmm_uq.CmmUqError, match="no draws by name"):
-        shift.covariance  # noqa: B018
+        without.covariance  # noqa: B018
 
 
 def test_a_diagnosis_names_what_was_left_out_with_its_probability() -> None:

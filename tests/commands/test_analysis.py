@@ -76,7 +76,9 @@ def test_the_posterior_agrees_with_least_squares_where_the_data_speak(uncompensa
     for unknown, value in zip(uncompensated.least_squares.unknowns, uncompensated.least_squares.value, strict=True):
         if unknown.key[0] != "artefact":
             sampled = uncompensated.parameters[unknown.key[0]][unknown.key[1]]
-            assert abs(sampled.value - value) < 0.1 * sampled.u
+            assert (
+                abs(sampled.value - value) < 0.3 * sampled.u
+            )  # noise by axis weighs the directions a little otherwise
 
 
 def test_without_a_certificate_the_common_scale_is_said_to_be_free(compensated: Result) -> None:
@@ -160,12 +162,13 @@ def test_a_stated_noise_that_the_residuals_contradict_is_not_believed(job: Path)
     assert found.parameters["squareness_xy"]["angle_arcsec"].u > 5.0
 
 
-def test_a_stated_noise_that_fits_is_used_as_it_is(job: Path) -> None:
+def test_a_stated_noise_is_what_is_known_beforehand(job: Path) -> None:
     state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nu_coordinate_um = 9.0')
     found = analyse(job)
     assert not found.noise.contradicts_stated
-    assert found.noise.coordinate.value == 9.0
-    assert found.noise.coordinate.u == 0.0
+    low, high = found.noise.coordinate.interval95
+    assert low < 9.0 < high
+    assert found.noise.coordinate.u < 0.25 * 9.0  # good to a fifth, and the residuals say nothing else
 
 
 def test_coordinates_in_metres_are_recognised(job: Path) -> None:

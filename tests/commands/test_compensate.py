@@ -42,7 +42,7 @@ def test_squareness_alone_moves_points_by_its_angles(job: Path, tmp_path: Path) 
     before = read_job(job).points
     write_compensated(named(job, straight()), tmp_path / "out")
     after = read_job(tmp_path / "out").points
-    _, y, z = before.readings.T
+    _, y, z = before.carriages.T
     second = np.pi / 648000
     e = np.column_stack([173 * second * y - 21 * second * z, 19 * second * z, 0 * z])
     np.testing.assert_allclose(after.xyz - before.xyz, e, atol=2e-7)

@@ -74,7 +74,7 @@ def test_squareness_is_interpolated_with_the_maps_at_the_mean_temperature_of_the
     """e_x = −Sxy·y − Szx·z, e_y = −Syz·z (Harris 2004, equations 11 and 12) is all that it adds to the maps without it."""
     for name in ("with", "without"):
         at(Path(shutil.copytree(iota, tmp_path / name)), temperature)
-    _, y, z = read_job(tmp_path / "with").points.readings.T
+    _, y, z = read_job(tmp_path / "with").points.carriages.T
     own = compensated(with_maps(tmp_path / "with", {t: stated(s) for t, s in TABLE_7.items()}), tmp_path / "a")
     none = compensated(with_maps(tmp_path / "without", dict.fromkeys(TABLE_7, "")), tmp_path / "b")
     xy, yz, zx = ARCSECOND * np.array(expected)
@@ -85,7 +85,7 @@ def test_one_squareness_for_all_maps_is_wrong_by_tens_of_micrometres_at_25_degre
     """Of table 7, 20 instead of 25 °C: 5″ of XY over y, 21″ of ZX over z, 15″ of YZ over z."""
     for name in ("own", "one"):
         at(Path(shutil.copytree(iota, tmp_path / name)), (25.0, 25.0, 25.0))
-    _, y, z = read_job(tmp_path / "own").points.readings.T
+    _, y, z = read_job(tmp_path / "own").points.carriages.T
     own = compensated(with_maps(tmp_path / "own", {t: stated(s) for t, s in TABLE_7.items()}), tmp_path / "a")
     shared = stated(TABLE_7[20]).removeprefix(", ") + "\n"
     one = compensated(with_maps(tmp_path / "one", dict.fromkeys(TABLE_7, ""), shared), tmp_path / "b")

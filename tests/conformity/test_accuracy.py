@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.conformity.accuracy import figures, with_uncertainty
+from cmm_uq.conformity.accuracy import Repeated, figures, with_uncertainty
+from cmm_uq.points import Floats, Ints
 
 # Lengths printed in figures C 1/C 2 (uncompensated) and C 3/C 4 (compensated) of Harris 2004, mm.
 UNCOMPENSATED = [
@@ -16,6 +17,11 @@ COMPENSATED = [
     404.2388, 404.2404, 404.2273, 404.2286, 404.2571, 404.2565, 404.2508, 404.2162, 404.2173, 404.2407, 404.2312, 404.2521,
     404.2437, 404.2311, 404.2384, 404.2115, 404.2418, 404.2311, 404.2310, 404.2280,
 ]  # fmt: skip
+
+
+def white(sigma: float, n: int) -> Repeated:
+    """Independent noise of ``n`` lengths."""
+    return lambda chosen, times, random: sigma * random.standard_normal((len(chosen), times, n))
 
 
 @pytest.mark.parametrize(
@@ -37,7 +43,7 @@ def test_the_uncertainty_of_mean_and_scatter_is_the_textbook_one() -> None:
     """Pure noise: u(mean) = σ/√n, u(s) = σ·√(1 − c4²) with c4 of twenty lengths 0.98693 (ISO 7870-2)."""
     sigma, n = 5e-3, 20
     lengths = 404 + sigma * np.random.default_rng(1).standard_normal(n)
-    found = with_uncertainty(lengths, np.full((500, n), 404.0), np.full((500, n), sigma), seed=3)
+    found = with_uncertainty(lengths, np.full((500, n), 404.0), white(sigma, n), seed=3)
     assert found["mean_length_mm"].u == pytest.approx(sigma / np.sqrt(n), rel=0.02)
     assert found["rms_accuracy_error_um"].u == pytest.approx(5.0 * np.sqrt(1 - 0.98693**2), rel=0.02)
     assert found["b89_range_um"].u == pytest.approx(5.0 * 0.7287, rel=0.02)  # d3 of twenty (ISO 7870-2)
@@ -46,7 +52,7 @@ def test_the_uncertainty_of_mean_and_scatter_is_the_textbook_one() -> None:
 def test_the_value_is_that_of_the_recording_and_lies_in_its_interval() -> None:
     lengths = np.array(COMPENSATED)
     predicted = np.tile(lengths.mean(), (100, 20))
-    for name, quantity in with_uncertainty(lengths, predicted, np.full((100, 20), 12e-3), seed=0).items():
+    for name, quantity in with_uncertainty(lengths, predicted, white(12e-3, 20), seed=0).items():
         assert quantity.value == figures(lengths)[name]
         assert quantity.interval95[0] < quantity.value < quantity.interval95[1]
 
@@ -55,16 +61,20 @@ def test_the_uncertainty_is_the_scatter_of_repetitions_and_not_the_spread_of_the
     """Three hundred lengths leave numbers for ten repetitions of each of a thousand draws, whose models lie 0.1 mm apart."""
     sigma, m = 5e-3, 300
     models = 404 + 0.1 * np.arange(1000.0)[:, None] + np.zeros(m)
-    found = with_uncertainty(np.full(m, 404.0), models, np.full((1000, m), sigma), seed=2)
+    found = with_uncertainty(np.full(m, 404.0), models, white(sigma, m), seed=2)
     assert found["mean_length_mm"].u == pytest.approx(sigma / np.sqrt(m), rel=0.02)
 
 
 def test_every_draw_has_its_part_in_the_uncertainty() -> None:
     """Half of the draws with a noise of 1 µm, half with 7: √((1² + 7²)/2) = 5 µm, over √20."""
-    noise = np.array([[1e-3], [7e-3]]) + np.zeros(20)
+    sigma = np.array([1e-3, 7e-3])
+
+    def noise(chosen: Ints, times: int, random: np.random.Generator) -> Floats:
+        return sigma[chosen][:, None, None] * random.standard_normal((len(chosen), times, 20))
+
     found = with_uncertainty(np.full(20, 404.0), np.full((2, 20), 404.0), noise, seed=4)
     assert found["mean_length_mm"].u == pytest.approx(5e-3 / np.sqrt(20), rel=0.15)
-    one = with_uncertainty(np.full(20, 404.0), np.full((1, 20), 404.0), noise[1:], seed=4)
+    one = with_uncertainty(np.full(20, 404.0), np.full((1, 20), 404.0), white(7e-3, 20), seed=4)
     assert one["mean_length_mm"].u == pytest.approx(7e-3 / np.sqrt(20), rel=0.3)
 
 
@@ -73,9 +83,7 @@ def test_the_interval_leans_to_the_side_on_which_the_true_figure_lies() -> None:
     that repetitions show on average is what was found less the error.
     """
     lengths = np.array([404.0, 404.0 + 1e-2])
-    found = with_uncertainty(lengths, np.full((1000, 2), 404.0), np.full((1000, 2), 5e-3), seed=6)[
-        "rms_accuracy_error_um"
-    ]
+    found = with_uncertainty(lengths, np.full((1000, 2), 404.0), white(5e-3, 2), seed=6)["rms_accuracy_error_um"]
     low, high = (end - found.value for end in found.interval95)
     assert low == pytest.approx(-5.0 * (2.2414 - 0.7979), rel=0.03)
     assert high == pytest.approx(5.0 * (0.7979 - 0.0313), rel=0.03)
@@ -89,7 +97,7 @@ def test_intervals_cover_the_figure_that_repetitions_would_show() -> None:
     hits = dict.fromkeys(many, 0)
     for seed in range(400):
         lengths = true + noise * random.standard_normal(20)
-        found = with_uncertainty(lengths, np.tile(true, (20, 1)), np.full((20, 20), noise), seed)
+        found = with_uncertainty(lengths, np.tile(true, (20, 1)), white(noise, 20), seed)
         for name, quantity in found.items():
             hits[name] += quantity.interval95[0] <= many[name].mean() <= quantity.interval95[1]
     for name, count in hits.items():

@@ -10,19 +10,13 @@ import pytest
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import (
-    ConformityFacts,
-    FalseAccept,
-    GuardBand,
-    MaximumPermissibleError,
-    Rule,
-    Standard,
-)
+from cmm_uq.jobs.conformity import ConformityFacts, FalseAccept, GuardBand, MaximumPermissibleError, Rule
 from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.kinds.sphere.observe import Sphere
 from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.kind import BARS
 from cmm_uq.points import Machine, Points
 from cmm_uq.uncertainty.quantity import Quantity
 from tests.conformity.recorded import DIAGONALS, SEVEN, again, bars, copied_runs, gauge, sphere
@@ -36,7 +30,7 @@ TRAVEL_KEY = "[machine] travel_mm of all three axes"
 
 def judged(
     artefact: Artefact,
-    standard: Standard = ISO_2,
+    standard: str = ISO_2,
     *,
     rule: Rule = "ISO 14253-1",
     range_um: float = 5.0,
@@ -47,7 +41,7 @@ def judged(
     wish = ConformityFacts(standard=standard, rule=rule, **limit)
     kind = kind_named(artefact.kind)
     assert kind is not None
-    return statement(wish, artefact, {"b89_range_um": span}, "[[conformity]] 1", kind.standards)
+    return statement(wish, artefact, {"b89_range_um": span}, "[[conformity]] 1", kind.tested)
 
 
 def at(bar: Ballbar, machine: Machine) -> Ballbar:
@@ -143,7 +137,7 @@ def test_one_length_that_fails_fails_the_test_though_others_are_undecided() -> N
 
 
 @pytest.mark.parametrize("standard", [ISO_2, "VDI/VDE 2617"])
-def test_seven_positions_of_five_lengths_three_times_pass(standard: Standard) -> None:
+def test_seven_positions_of_five_lengths_three_times_pass(standard: str) -> None:
     found = judged(gauge(), standard)
     assert (found.outcome, found.scope, found.missing, found.characteristic) == ("pass", "complete", (), "E0")
     assert any("like ISO 10360-2" in text for text in found.remarks) == (standard == "VDI/VDE 2617")
@@ -341,8 +335,8 @@ def test_a_correction_makes_no_copy_a_measurement() -> None:
     """Corrected by an amount that depends on time, a copy is no longer one to the last digit."""
     recorded, wish = again(bars(), {18: 14}), ConformityFacts(standard=B89, limit_um=60.0)
     span = {"b89_range_um": Quantity(5.0, 0.5, (4.0, 6.0), "µm")}
-    assert statement(wish, bars(), span, "", [B89]).outcome == "pass"
-    assert statement(wish, bars(), span, "", [B89], recorded).outcome == "incomplete"
+    assert statement(wish, bars(), span, "", [BARS]).outcome == "pass"
+    assert statement(wish, bars(), span, "", [BARS], recorded).outcome == "incomplete"
 
 
 # --- ISO 10360-5 -----------------------------------------------------------------------------------------------------

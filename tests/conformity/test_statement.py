@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from cmm_uq.conformity.decision import decide
 from cmm_uq.conformity.statement import Decided, Statement
-from cmm_uq.jobs.job import ConformityFacts, MaximumPermissibleError, Rule
+from cmm_uq.jobs.conformity import ConformityFacts, MaximumPermissibleError, Rule
+from cmm_uq.messages import Text, say
 
 MPE = MaximumPermissibleError(a_um=2.5, k=300.0)
 FACTS = ConformityFacts(standard="ISO 10360-2:2009", mpe=MPE)
@@ -15,8 +16,8 @@ def length(mm: float, error_um: float, u_um: float, rule: Rule = "simple") -> De
     return Decided(error_um, u_um, limit, decide(error_um, u_um, limit, rule, signed=True), length_mm=mm)
 
 
-def statement(*errors: Decided, missing: tuple[str, ...] = ()) -> Statement:
-    return Statement(FACTS, "error", "lengths", errors, missing, ())
+def statement(*errors: Decided, missing: tuple[Text, ...] = ()) -> Statement:
+    return Statement(FACTS, "E0", say("error"), say("lengths"), errors, missing, ())
 
 
 def test_without_an_uncertainty_the_least_room_under_its_own_limit_is_named() -> None:
@@ -49,7 +50,7 @@ def test_the_gravest_outcome_is_named_before_the_least_probable_one() -> None:
 
 
 def test_what_is_named_is_given_with_its_own_figures() -> None:
-    found = statement(length(20.0, 1.0, 0.01), length(800.0, -5.1, 0.4), missing=("a length",))
+    found = statement(length(20.0, 1.0, 0.01), length(800.0, -5.1, 0.4), missing=(say("a length"),))
     assert (found.value_um, found.u_um, found.limit_um) == (5.1, 0.4, 2.5 + 800 / 300)
     assert found.decision is found.errors[1].decision
     assert (found.outcome, found.scope) == ("incomplete", "partial")

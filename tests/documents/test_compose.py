@@ -57,12 +57,13 @@ def test_the_error_factors_stand_beside_their_least_squares_estimate(document: D
     assert rows["Squareness X–Y"][5] == "″"
 
 
-def test_the_budget_of_one_length_says_where_each_figure_comes_from(document: Document) -> None:
-    """u = √(2·9.5² + 5²) µm: the readings of both balls and the certified length."""
+def test_the_budget_of_one_length_says_where_each_figure_comes_from(document: Document, result: Result) -> None:
+    """u = √(2·σ² + 5²) µm: the readings of both balls and the certified length."""
     rows = {row[0]: row for row in table(document, "Contributions to the deviation of one length").rows}
     assert rows["Certified length"][-1] == "certificate Harris 2004, Table 21"
     assert any("residuals" in cell for cell in rows["Coordinate of a ball, along the bar, twice"])
-    share = 2 * 9.506**2 / (2 * 9.506**2 + 5.0**2)
+    sigma = result.noise.coordinate.value
+    share = 2 * sigma**2 / (2 * sigma**2 + 5.0**2)
     cells = [cell.replace("\u00a0", " ") for cell in rows["Coordinate of a ball, along the bar, twice"]]
     assert f"{100 * share:.1f} %" in cells
 
@@ -116,7 +117,7 @@ def test_free_scales_are_not_given_figures_but_their_differences_are(uncalibrate
     document = outcome_of(uncalibrated).document
     rows = {row[0]: row for row in table(document, "Error factors of the machine").rows}
     assert rows["Scale error of X"][1:5] == ("not determined", "", "", "")
-    assert rows["Squareness X–Y"][1] == "1"
+    assert rows["Squareness X–Y"][1] == "2"
     differences = table(document, "Differences that are determined").rows
     assert differences[0][0] == "Scale error of Y − Scale error of X"
     assert float(differences[0][2]) < 60

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.documents.wording import expanded, listed, measured, probability, title_of
+from cmm_uq.documents.wording import expanded, measured, probability, title_of
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.uncertainty.quantity import Quantity
 
@@ -51,14 +51,6 @@ def test_the_named_error_has_the_digits_that_its_uncertainty_supports(
 ) -> None:
     statement: Any = SimpleNamespace(value_um=value, u_um=u)
     assert measured(statement) == text
-
-
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [(["one"], "one"), (["one", "two"], "one and two"), (["one", "two", "three"], "one, two and three")],
-)
-def test_words_are_listed_with_an_and(words: list[str], text: str) -> None:
-    assert listed(words) == text
 
 
 def test_a_parameter_is_named_by_its_effect_and_where_there_are_several_by_itself() -> None:

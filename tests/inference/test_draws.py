@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.inference.draws import Draws, by_chain
+from cmm_uq.inference.draws import Draws, by_chain, by_ensemble, evenly
 from cmm_uq.inference.ensembles import ENSEMBLES, run_ensembles
 
 
@@ -28,6 +28,26 @@ def test_a_chain_is_the_path_of_one_walker() -> None:
     assert chains.shape == (ENSEMBLES * walkers, steps)
     for number, chain in enumerate(chains):
         assert chain.tolist() == [100 * (number // walkers) + 10 * (number % walkers) + step for step in range(steps)]
+
+
+def test_kept_draws_of_an_ensemble_are_its_walkers_paths_one_behind_the_other() -> None:
+    """480 draws, numbered as above, of which 96 are kept: 24 of each ensemble, two of each walker, the earlier step first."""
+    steps, walkers = 10, 12
+    e, s, w = np.meshgrid(np.arange(ENSEMBLES), np.arange(steps), np.arange(walkers), indexing="ij")
+    every = (10_000 * e + 100 * w + s).ravel()
+    kept = evenly(len(every), 96)
+    chains = by_ensemble(every[kept], steps, len(every))
+    assert chains.shape == (ENSEMBLES, 24)
+    assert sorted(chains.ravel()) == sorted(every[kept])
+    for ensemble, chain in enumerate(chains):
+        assert set(chain // 10_000) == {ensemble}
+        assert np.all(np.diff(chain) > 0)  # walker by walker, and step by step
+    assert kept[0] == 0
+    assert kept[-1] == len(every) - 1
+
+
+def test_no_more_draws_are_kept_than_there_are() -> None:
+    assert evenly(8, 2000).tolist() == list(range(8))
 
 
 def test_the_sampler_gives_its_draws_in_the_order_that_chains_are_made_of() -> None:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.reading import NAMEABLE, read_job
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ConformityFacts
+from cmm_uq.jobs.conformity import ConformityFacts, uncertainty_missing
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.kinds import artefact_facts
 
@@ -37,7 +38,7 @@ def test_the_example_is_read_with_its_machine_and_points(iota: Path) -> None:
     assert job.facts.job.id == "iota-1102-20C"
     assert job.points.xyz.shape == (40, 3)
     assert job.points.machine.travel("z") == (-500.0, 0.0)
-    np.testing.assert_allclose(job.points.readings[0], [-496.6823 + 805, -134.2409 + 303, 27.7912 - 294])
+    np.testing.assert_allclose(job.points.carriages[0], [-496.6823 + 805, -134.2409 + 303, 27.7912 - 294])
     assert set(job.points.columns) == {"radius_mm", "fit_rms_um", "n_points"}
 
 
@@ -69,7 +70,7 @@ def test_every_input_is_hashed(iota: Path) -> None:
         (r"^length_mm = .*", "length_mn = 404.2", r"\[artefact\] length_mn: unknown key\. Did you mean 'length_mm'"),
         (r"^cte_per_k = .*", "cte_per_k = 12", r"12 is no expansion coefficient"),
         (r"^\[model\]$", "[modle]", r"\[modle\]: unknown key\. Did you mean 'model'|\[model\]: is missing"),
-        (r"^standard = .*", 'standard = "ISO 9001"', r"\[conformity\] 0\.standard: input should be 'ASME"),
+        (r"^standard = .*", 'standard = "ISO 9001"', r"\[conformity\] 0\.standard: no such standard is decided\. Known: ASME"),
         (r"^rule = .*", 'rule = "lenient"', r"\[conformity\] 0\.rule"),
         (r"^limit_um = .*", "", r"give either limit_um or mpe"),
         (r"^limit_um = .*", "limit_um = -1", r"limit_um: input should be greater than 0"),
@@ -165,11 +166,13 @@ def test_simple_acceptance_and_figures_without_a_certificate_need_no_uncertainty
 
 def test_a_test_sphere_without_its_form_is_refused_by_name() -> None:
     wish = ConformityFacts(standard="ISO 10360-5:2010", limit_um=3.0)
-    assert wish.uncertainty_missing(artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1)) == "form_um"
-    assert wish.uncertainty_missing(artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.1)) is None
+    missing = partial(uncertainty_missing, wish, standards=NAMEABLE.standards)
+    assert missing(artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1)) == "form_um"
+    assert missing(artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.1)) is None
 
 
 def test_references_in_the_recording_count_as_certified_unless_they_are_nominal() -> None:
     wish = ConformityFacts(standard="VDI/VDE 2617", limit_um=3.0)
-    assert wish.uncertainty_missing(artefact_facts(kind="step_gauge")) == "u_um"
-    assert wish.uncertainty_missing(artefact_facts(kind="step_gauge", nominal=True)) is None
+    missing = partial(uncertainty_missing, wish, standards=NAMEABLE.standards)
+    assert missing(artefact_facts(kind="step_gauge")) == "u_um"
+    assert missing(artefact_facts(kind="step_gauge", nominal=True)) is None

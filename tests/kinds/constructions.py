@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.inference.least_squares import LeastSquares
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import artefact_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects

@@ -21,7 +21,7 @@ from cmm_uq.commands.simulate import write_simulation
 from cmm_uq.documents.origin import file_name
 from cmm_uq.documents.outcome import OwnAnalysis, Page
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import BUILT_IN, kind_named, names
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import Kind
@@ -37,6 +37,7 @@ EXAMPLE = {
     "triangle": "triangle-simulated", "sphere": "sphere-simulated", "plane": "plane-simulated",
 }  # fmt: skip
 OUTSIDE = "tracker_length"
+PLUGINS = {OUTSIDE: {"outside-kinds": "0.1.0"}}
 TRUTH = "seed = 7\n[noise]\ncoordinate_um = 0.5\n"
 TRACKER_JOB = """
 [job]
@@ -114,6 +115,7 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
     if kind.offers("plan", Planning):
         plan = write_plan(job, out, power=False)
         assert json.loads(plan.results)["schema"] == "cmm-uq/plan/1"
+        assert json.loads(plan.results)["software"].get("plugins", {}) == PLUGINS.get(name, {})
     else:
         refused(kind, "planned", lambda: write_plan(job, out, power=False), out)
 
@@ -132,6 +134,8 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
         page, pdf = (file_name(document, read_job(job).origin) for document in CERTIFICATE)
         assert {page, pdf, "results.json"} <= set(report.files)
         assert report.summary[0][0] == "Measured"
+        assert results["software"].get("plugins", {}) == PLUGINS.get(name, {})
+        assert ("with outside-kinds 0.1.0" in report.files[page].read_text(encoding="utf-8")) == (name == OUTSIDE)
         if name == OUTSIDE:
             assert results["tracker"] == {"distances": 26}
             assert "Distances by laser tracker" in report.files[page].read_text(encoding="utf-8")
@@ -140,7 +144,9 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
 
     out = tmp_path / "diagnosis"
     if own.diagnose or observed:
-        verdict = json.loads(write_diagnosis(job, out).results)["diagnosis"]["verdict"]
+        diagnosis = json.loads(write_diagnosis(job, out).results)
+        verdict = diagnosis["diagnosis"]["verdict"]
+        assert diagnosis["software"].get("plugins", {}) == PLUGINS.get(name, {})
         assert verdict in ("consistent", "explained", "partial", "unexplained")
         assert verdict == "consistent" or not observed  # nothing but white noise was drawn
     else:
@@ -238,7 +244,7 @@ def test_a_kind_that_nobody_offers_is_refused_with_those_that_there_are(tracker:
 
 @pytest.mark.parametrize(
     ("where", "told"),
-    [("nowhere:KIND", "cannot be loaded: ModuleNotFoundError"), ("math:pi", "'math:pi' is no Kind of the name 'odd'")],
+    [("nowhere:KIND", "fails with ModuleNotFoundError"), ("math:pi", "is no Kind but float")],
 )
 def test_a_broken_package_is_named(where: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     describe(tmp_path / "site", "odd-kinds", "1.0", {"cmm_uq.kinds": {"odd": where}})

@@ -85,8 +85,8 @@ def test_rigid_transformations_and_first_order_agree_within_a_tenth_of_a_microme
 def test_recorded_coordinates_are_readings_less_the_origin():
     points = recording()
     compensated = compensate_points(points, machine_compensation(points, maps()))
-    expected, _ = Compensation(maps()).compensate(points.readings)
-    np.testing.assert_allclose(compensated.readings, expected, atol=1e-12)
+    expected, _ = Compensation(maps()).compensate(points.carriages)
+    np.testing.assert_allclose(compensated.carriages, expected, atol=1e-12)
     assert "extrapolated" not in compensated.columns
     np.testing.assert_allclose(
         indicate_points(compensated, machine_compensation(points, maps())).xyz, points.xyz, atol=1e-9

@@ -42,7 +42,7 @@ def moved(component: Floats, axis: str) -> Floats:
 
 
 POINTS = recording()
-X, Y, Z = POINTS.readings.T
+X, Y, Z = POINTS.carriages.T
 COLUMN = POINTS.columns
 
 FORMULAS: dict[str, tuple[dict[str, float], Callable[[], Floats]]] = {
@@ -93,7 +93,7 @@ def test_an_effect_moves_points_by_its_formula(name: str) -> None:
 
 def test_the_rotation_of_the_table_carriage_in_the_chain_yxz_carries_x_and_z() -> None:
     points = recording("YXZ")
-    x, y, _ = points.readings.T
+    x, y, _ = points.carriages.T
     e = CATALOGUE["rotation_y_z"].displacement(points, {"arcsec_per_m": 10.0})
     np.testing.assert_allclose(e, moved(x * 10 * ARCSECOND * y / 1000, "y"), atol=1e-15)
 

@@ -39,7 +39,7 @@ def recording() -> Points:
 
 
 POINTS = recording()
-X, Y, Z = POINTS.readings.T
+X, Y, Z = POINTS.carriages.T
 C = POINTS.columns
 NORMALS = np.column_stack([C["nx"], C["ny"], C["nz"]])
 TRAVELS = np.column_stack([C["approach_x"], C["approach_y"], C["approach_z"]])
@@ -121,7 +121,7 @@ def test_a_laser_scale_without_correction_counts_fringes_of_todays_air_as_those_
     standard = 1.0 + 271.307e-6  # 20 °C, 760 mm Hg, 50 %
     indicated = fringes(X, index_of(POINTS)) / fringes(np.ones_like(X), np.full_like(X, standard))
     true = POINTS.at(POINTS.xyz + along(0, indicated - X))
-    np.testing.assert_allclose(true.readings[:, 0] + error("air_scale_x", true, part=1.0)[:, 0], X, atol=1e-6)
+    np.testing.assert_allclose(true.readings["x"] + error("air_scale_x", true, part=1.0)[:, 0], X, atol=1e-6)
 
 
 def test_the_dead_path_changes_its_optical_length_while_nothing_moves() -> None:

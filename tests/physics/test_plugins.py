@@ -11,7 +11,7 @@ import pytest
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.physics.catalogue import EVERY, effects, every, plugins
-from cmm_uq.physics.plugins import BrokenPluginError
+from cmm_uq.plugins import BrokenPluginError
 from cmm_uq.points import Machine
 from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
 from tests.recordings import TRAVEL, bars
@@ -69,7 +69,7 @@ def test_an_outside_effect_stands_in_the_catalogue_behind_the_others(site: Path)
 def test_an_outside_effect_moves_points_as_its_own_code_says(site: Path) -> None:
     """10″ in the middle of Y turn the ram about Y: x moves by z · 10″, and nothing at the ends."""
     install(OUTSIDE_EFFECTS, site)
-    _, y, z = POINTS.readings.T
+    _, y, z = POINTS.carriages.T
     e = effects(["beam_twist"])[0].displacement(POINTS, {"twist_arcsec": 10.0})
     expected = z * np.radians(10 / 3600) * (1 - ((y - 275) / 275) ** 2)
     np.testing.assert_allclose(e, np.column_stack([expected, 0 * y, 0 * y]), atol=1e-15)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.physics.catalogue import effects

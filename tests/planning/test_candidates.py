@@ -23,8 +23,8 @@ def test_candidates_lie_inside_and_can_be_recorded(kind: str) -> None:
     found = candidates(chosen)
     assert 10 < len(found) <= 60
     for placing in found:
-        assert np.all(placing.points.readings >= chosen.volume.box[:, 0] - 1e-6)
-        assert np.all(placing.points.readings <= chosen.volume.box[:, 1] + 1e-6)
+        assert np.all(placing.points.machine_xyz >= chosen.volume.box[:, 0] - 1e-6)
+        assert np.all(placing.points.machine_xyz <= chosen.volume.box[:, 1] + 1e-6)
         if kind != "sphere":  # of a hemisphere the ball is held, not the middle of its points
             assert -450.0 - 1e-6 <= placing.middle[2] <= -150.0 + 1e-6
     assert len(artefact_of(facts, joined(found)).noise_scale) >= len(found)

@@ -27,8 +27,8 @@ def test_every_artefact_has_a_plan_inside_the_volume_that_can_be_recorded(kind: 
     assert name == next(iter(chosen.planning.ready))
     box = chosen.volume.box
     for placing in placings:
-        assert np.all(placing.points.readings >= box[:, 0] - 1e-6)
-        assert np.all(placing.points.readings <= box[:, 1] + 1e-6)
+        assert np.all(placing.points.machine_xyz >= box[:, 0] - 1e-6)
+        assert np.all(placing.points.machine_xyz <= box[:, 1] + 1e-6)
     if kind != "shift":
         assert len(artefact_of(facts, joined(placings)).noise_scale) > 0
 
@@ -98,11 +98,11 @@ def test_twenty_five_points_cover_the_hemisphere_with_normals_away_from_the_midd
 def test_shift_series_are_the_same_places_moved_by_each_shift() -> None:
     facts, _ = EVERY_KIND["shift"]
     _, placings = ready_plan(setting(facts, named=(), repeats=1))
-    first = placings[0].points.readings
+    first = placings[0].points.machine_xyz
     assert len(first) == 23
     np.testing.assert_allclose(np.diff(first[:, 0]), 20.0)
     for placing, shift in zip(placings, (0.0, 20.0, 50.0), strict=True):
-        np.testing.assert_allclose(placing.points.readings - first, [[shift, 0, 0]] * 23, atol=1e-9)
+        np.testing.assert_allclose(placing.points.machine_xyz - first, [[shift, 0, 0]] * 23, atol=1e-9)
 
 
 def test_a_swept_bar_keeps_its_length_from_one_centre() -> None:
@@ -111,7 +111,7 @@ def test_a_swept_bar_keeps_its_length_from_one_centre() -> None:
     _, placings = ready_plan(chosen)
     assert len(placings) == 25
     centre = chosen.volume.box.mean(axis=1)
-    reach = [np.linalg.norm(placing.points.readings - centre, axis=1) for placing in placings]
+    reach = [np.linalg.norm(placing.points.machine_xyz - centre, axis=1) for placing in placings]
     np.testing.assert_allclose(reach, 300.0)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import artefact_of, kind_named
 from cmm_uq.kinds.ballbar.plan import ballbar
 from cmm_uq.model import MeasurementModel, Noise

@@ -46,8 +46,8 @@ def test_a_bar_longer_than_the_volume_is_refused_with_its_axis() -> None:
 def test_places_run_from_edge_to_edge() -> None:
     volume = Volume.of(MACHINE, PlanFacts(margin_mm=0.0))
     bar = ballbar(BALLBAR, PlanFacts(repeats=1))
-    low = volume.set_up(bar, along(np.array([1.0, 0.0, 0.0])), (0.0, 0.0, 0.0), "low").points.readings
-    high = volume.set_up(bar, along(np.array([1.0, 0.0, 0.0])), (1.0, 1.0, 1.0), "high").points.readings
+    low = volume.set_up(bar, along(np.array([1.0, 0.0, 0.0])), (0.0, 0.0, 0.0), "low").points.machine_xyz
+    high = volume.set_up(bar, along(np.array([1.0, 0.0, 0.0])), (1.0, 1.0, 1.0), "high").points.machine_xyz
     np.testing.assert_allclose(low.min(axis=0), TRAVEL[:, 0], atol=1e-9)
     np.testing.assert_allclose(high.max(axis=0), TRAVEL[:, 1], atol=1e-9)
 

@@ -11,7 +11,7 @@ import pytest
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import artefact_facts
 from cmm_uq.points import Floats, Points
 from cmm_uq.screening.screened import Screened

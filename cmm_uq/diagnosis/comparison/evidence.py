@@ -35,7 +35,7 @@ class _Noise:
     the determinant.
     """
 
-    whitening: sparse.csr_array | Floats
+    whitening: sparse.csr_array
     rows: Floats
     log: float
 
@@ -114,7 +114,7 @@ class Comparison:
 
     def noise(self, kind: Kind, random: np.random.Generator, draws: int) -> Floats:
         """What the baseline leaves (m, draws) of noise of one kind, a reading's standard deviation being one."""
-        found = kind.noise(random.standard_normal((len(self.observed), draws)))
+        found = kind.noise(random, draws)
         if self.certified.size:
             found += self.certified @ random.standard_normal((self.certified.shape[1], draws))
         return self.rest(found)
@@ -126,8 +126,9 @@ class Comparison:
             Q, R = np.linalg.qr(kind.white(self._reached))
             log = float(np.log(kind.probability)) + kind.log_factor + kind.log_whitening - _log_diagonal(R)
             rows = kind.whitening.T @ Q
-            if self.certified.size:
-                white = kind.white(self.certified)
+            shared = [columns for columns in (self.certified, kind.slow) if columns.size]
+            if shared:
+                white = kind.white(np.hstack(shared))
                 white -= Q @ (Q.T @ white)
                 factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white)
                 log -= _log_diagonal(factor)
@@ -172,9 +173,19 @@ class Comparison:
         return {}
 
     def over_sigma(self, squares: Floats) -> Floats:
-        """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape, from a table over ln(squares)."""
-        nodes, values = self._table
-        return np.interp(np.log(np.maximum(squares, 1e-300)), nodes, values)
+        """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape: in closed form if ln σ is uniform, else from a table."""
+        found = np.log(np.maximum(squares, 1e-300))
+        if np.ptp(self.log_sigma) > 0:
+            return np.interp(found, *self._table)
+        half = 0.5 * self.degrees_of_freedom
+        found *= -half
+        return found + self._uniform
+
+    @cached_property
+    def _uniform(self) -> float:
+        """Constant of the gamma integral over a uniform ln σ."""
+        half, step = 0.5 * self.degrees_of_freedom, float(np.log(self.sigma[1] / self.sigma[0]))
+        return float(special.gammaln(half) + (half - 1) * np.log(2) + self.log_sigma[0] - np.log(step))
 
     @cached_property
     def _table(self) -> tuple[Floats, Floats]:
@@ -192,6 +203,17 @@ class Comparison:
             for noise, squares in zip(self._noises, self.squares, strict=True)
         ])  # fmt: skip
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
+
+    def nothing(self, random: np.random.Generator, draws: int) -> Floats:
+        """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, their noise by its posterior."""
+        weight = self.noise_posterior()
+        chosen = random.choice(weight.size, draws, p=weight.ravel() / weight.sum())
+        kind, size = np.unravel_index(chosen, weight.shape)
+        found = np.empty((len(self.left), draws))
+        for g in np.unique(kind):
+            columns = np.flatnonzero(kind == g)
+            found[:, columns] = self.sigma[size[columns]] * self.noise(self.kinds[g], random, len(columns))
+        return found
 
     def log_evidence(
         self,

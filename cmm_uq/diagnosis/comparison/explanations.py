@@ -12,11 +12,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect, Nonparametric
-from cmm_uq.physics.plugins import BrokenPluginError
-from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.plugins import BrokenPluginError
+from cmm_uq.points import Floats, Points
 
 EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
 
@@ -70,7 +71,7 @@ class Explanation:
     weight : how readily it is thought of, beside others of its kind.
     """
 
-    name: str
+    name: Text
     kind: str
     members: tuple[Member, ...]
     covariate: Floats | None = None
@@ -114,7 +115,9 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
         if any(np.any(member.columns) for member in members):
             members = (*members, *_roughly(model, effect, points, values))
             weight = effect.prior_weight
-            found.append(Explanation(effect.name, EFFECT, members, imitated_by=effect.imitated_by, weight=weight))
+            found.append(
+                Explanation(Verbatim(effect.name), EFFECT, members, imitated_by=effect.imitated_by, weight=weight)
+            )
     return found
 
 
@@ -123,7 +126,7 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
     over = effect.idealised_over
     if over is None:
         return
-    along = points.readings[:, AXES.index(over)] if over in AXES else points.column(over)
+    along = points.readings[over] if over in points.readings else points.column(over)
     span = float(np.ptp(along))
     if span == 0:
         return
@@ -173,7 +176,9 @@ def several(singles: Sequence[Explanation]) -> list[Explanation]:
     together = np.hstack(columns)
     rms = np.sqrt(np.mean(together**2, axis=0))
     return [
-        Explanation("several effects together", SEVERAL, (Member(UNKNOWN_SD * together / np.where(rms > 0, rms, 1.0)),))
+        Explanation(
+            say("several effects together"), SEVERAL, (Member(UNKNOWN_SD * together / np.where(rms > 0, rms, 1.0)),)
+        )
     ]
 
 
@@ -183,7 +188,7 @@ def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
     if axis is None:
         yield from effect.trials()
         return
-    readings = points.readings[:, AXES.index(axis)]
+    readings = points.readings[axis]
     span = float(np.ptp(readings))
     if span <= 2 * _SHORTEST_PERIOD:
         return

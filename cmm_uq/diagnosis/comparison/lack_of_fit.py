@@ -34,13 +34,7 @@ def log_prior(candidates: Sequence[Explanation]) -> Floats:
 def lack_of_fit(comparison: Comparison, seed: int) -> tuple[float, Floats]:
     """Probability, under nothing, of as much evidence for something; and the largest of a nonparametric term under nothing."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
-    draws = np.empty((len(comparison.left), DRAWS))
-    sizes = comparison.sigma[comparison.noise_posterior().argmax(axis=1)]
-    probability = np.array([kind.probability for kind in comparison.kinds])
-    chosen = random.choice(len(sizes), DRAWS, p=probability / probability.sum())
-    for g in np.unique(chosen):
-        columns = np.flatnonzero(chosen == g)
-        draws[:, columns] = sizes[g] * comparison.noise(comparison.kinds[g], random, len(columns))
+    draws = comparison.nothing(random, DRAWS)
     statistic, odds = statistic_of(comparison, np.column_stack([comparison.left, draws]))
     unknowns = [i for i, e in enumerate(comparison.explanations) if e.kind == UNKNOWN]
     maxima = odds[unknowns, 1:].max(axis=0) if unknowns else np.zeros(0)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from cmm_uq.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD, Explanation, Member
+from cmm_uq.messages import Verbatim, say
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.effect import Nonparametric
 from cmm_uq.points import AXES, Floats, Points
@@ -49,32 +50,43 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
         functions = _functions(covariate) if name in _SUDDEN else ((f, 1.0) for f in smooth_functions(covariate))
         members = tuple(Member(f, weight=weight, values=f) for f, weight in functions)
         term = Nonparametric(name)
-        found.append(Explanation(f"error as a function of {name}", UNKNOWN, members, covariate, name, term))
+        found.append(
+            Explanation(
+                say("error as a function of {name}", name=Verbatim(name)), UNKNOWN, members, covariate, name, term
+            )
+        )
     return found
 
 
 def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
     """Errors along each axis as functions of each reading."""
-    for i, axis in enumerate(AXES):
-        readings = points.readings[:, i]
+    for axis, readings in points.readings.items():
         if np.ptp(readings) < 1.0:
             continue
         functions = list(_functions(readings))
         for j, direction in enumerate(AXES):
             members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
-            name = f"error along {direction.upper()} as a function of {axis.upper()}"
+            name = say(
+                "error along {direction} as a function of {axis}",
+                direction=Verbatim(direction.upper()),
+                axis=Verbatim(axis.upper()),
+            )
             term = Nonparametric(f"{axis}_mm", direction)
             yield Explanation(name, UNKNOWN, members, readings, term.of, term)
 
 
 def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
     """Errors along each axis as functions of the place in the volume."""
-    if np.sum(np.ptp(points.readings, axis=0) > 1.0) < 2:
+    if np.sum(np.ptp(points.machine_xyz, axis=0) > 1.0) < 2:
         return
-    factors = list(_smooth_in_space(points.readings))
+    factors = list(_smooth_in_space(points.machine_xyz))
     for j, direction in enumerate(AXES):
         members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
-        yield Explanation(f"error along {direction.upper()} as a function of the place", UNKNOWN, members)
+        yield Explanation(
+            say("error along {direction} as a function of the place", direction=Verbatim(direction.upper())),
+            UNKNOWN,
+            members,
+        )
 
 
 def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
@@ -83,7 +95,7 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
     if time is None or len(np.unique(time)) < 3:
         return
     for i, axis in enumerate(AXES):
-        readings = points.readings[:, i]
+        readings = points.readings[axis]
         half = 0.5 * float(np.ptp(readings))
         if half < 1.0:
             continue
@@ -91,7 +103,7 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
         members = tuple(
             Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in _functions(time)
         )
-        name = f"scale of {axis.upper()} as a function of time"
+        name = say("scale of {axis} as a function of time", axis=Verbatim(axis.upper()))
         yield Explanation(name, UNKNOWN, members, time, "time_s", Nonparametric("time_s", axis, scale=True))
 
 
@@ -101,18 +113,19 @@ def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:
     if len(np.unique(np.round(among, 3), axis=0)) < _MANY_DIRECTIONS:
         return
     members = tuple(Member(factor) for factor in _smooth_in_space(among, _DIRECTION_LENGTHS))
-    yield Explanation("error as a function of the probing direction", UNKNOWN, members)
+    yield Explanation(say("error as a function of the probing direction"), UNKNOWN, members)
     azimuth = np.arctan2(among[:, 1], among[:, 0])
     waves = [UNKNOWN_SD * np.column_stack([np.cos(k * azimuth), np.sin(k * azimuth)]) for k in _LOBES]
     members = tuple(Member(wave, values=wave) for wave in waves)
-    yield Explanation("error in lobes about Z", UNKNOWN, members, np.degrees(azimuth), "azimuth_deg")
+    yield Explanation(say("error in lobes about Z"), UNKNOWN, members, np.degrees(azimuth), "azimuth_deg")
 
 
 def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
     """One scale of all axes, about their zero or their middle, as a function of each further column."""
-    middle = 0.5 * (points.readings.min(axis=0) + points.readings.max(axis=0))
-    span = 0.5 * float(np.ptp(points.readings, axis=0).max())
-    levers = [(points.readings - about) / span for about in (np.zeros(3), middle)]
+    readings = points.carriages
+    middle = 0.5 * (readings.min(axis=0) + readings.max(axis=0))
+    span = 0.5 * float(np.ptp(readings, axis=0).max())
+    levers = [(readings - about) / span for about in (np.zeros(3), middle)]
     for name, column in points.columns.items():
         if name.startswith(_PLACED) or len(np.unique(column)) < 3:
             continue
@@ -121,7 +134,9 @@ def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> I
             for lever in levers
             for f in smooth_functions(column)
         )
-        yield Explanation(f"scale of all axes as a function of {name}", UNKNOWN, members, column, name)
+        yield Explanation(
+            say("scale of all axes as a function of {name}", name=Verbatim(name)), UNKNOWN, members, column, name
+        )
 
 
 def directions(model: MeasurementModel) -> Floats:

@@ -8,14 +8,16 @@ from typing import Any, cast
 import numpy as np
 
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import refusal
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.distances.adjustment import Setting, settings
 from cmm_uq.kinds.distances.equations import DistanceSolution, second_way_data, solve_distances
 from cmm_uq.kinds.distances.lengths import Lengths, lengths_of
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.uncertainty.budget import Budget, Line
 from cmm_uq.uncertainty.budget_results import budget_data
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +27,7 @@ class BallbarFigures:
     lengths: Lengths
     budget: Budget
     settings: tuple[Setting, ...]
-    second_way: DistanceSolution | str
+    second_way: DistanceSolution | Text
 
 
 def figures(result: Result) -> BallbarFigures:
@@ -52,26 +54,33 @@ def results(result: Result) -> dict[str, Any]:
 def _budget(result: Result, bar: Ballbar) -> Budget:
     """What one length's deviation from the reference is uncertain by: the readings, and the certified length."""
     coordinate = result.noise.coordinate
-    origin = "residuals of this recording" if coordinate.u > 0 else "stated in the job"
+    origin = say("residuals of this recording") if coordinate.u > 0 else say("stated in the job")
     dof = float(result.least_squares.degrees_of_freedom) if coordinate.u > 0 else np.inf
     lines = [
-        Line("Coordinate of a ball, along the bar, twice", coordinate.value, origin, unit="µm", dof=max(dof, 1.0),
-             sensitivity=float(bar.noise_scale[0]))
-    ]  # fmt: skip
+        Line(
+            say("Coordinate of a ball, along the bar, twice"),
+            coordinate.value,
+            origin,
+            unit=unit("µm"),
+            dof=max(dof, 1.0),
+            sensitivity=float(bar.noise_scale[0]),
+        )
+    ]
     size = bar.sizes[0]
     if size.certified and size.sd > 0:
         chain = result.job.facts.artefact.certificate
-        source = " ".join(filter(None, ("certificate", chain.number if chain else "")))
-        lines.append(Line("Certified length", size.sd / MICROMETRE, source, unit="µm", sensitivity=-1.0))
-    return Budget("deviation of one length", lines, unit="µm")
+        number = chain.number if chain else ""
+        source = say("certificate {number}", number=Verbatim(number)) if number else say("certificate")
+        lines.append(Line(say("Certified length"), size.sd / MICROMETRE, source, unit=unit("µm"), sensitivity=-1.0))
+    return Budget(say("deviation of one length"), lines, unit=unit("µm"))
 
 
-def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | str:
+def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | Text:
     """The distance equations of all used lengths, or why they have no solution."""
     size, ends, used = bar.sizes[0], bar.ends(), result.model.used
     if not size.certified:
-        return "The length of the bar is not certified."
+        return say("The length of the bar is not certified.")
     try:
         return solve_distances((ends[:, 1] - ends[:, 0])[used], (size.nominal * bar.expansion)[used])
-    except CmmUqError as refusal:
-        return str(refusal)
+    except CmmUqError as error:
+        return refusal(error)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.model.kind import Kind
+from cmm_uq.model.kind import BARS, LENGTHS, Kind
 
 KIND = Kind(
     name="ballbar",
@@ -10,5 +10,5 @@ KIND = Kind(
     screen="cmm_uq.kinds.ballbar.screen:SCREENING",
     plan="cmm_uq.kinds.ballbar.plan:PLANNING",
     page="cmm_uq.kinds.ballbar.page:PAGE",
-    standards=("ASME B89.4.1-1997", "ISO 10360-2:2009", "VDI/VDE 2617"),
+    tested=(BARS, LENGTHS),
 )

@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact, Indications, Size
 from cmm_uq.model.recorded import check_length, expansion
 from cmm_uq.points import Floats, Points
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 class Ballbar(Artefact):
@@ -30,7 +31,7 @@ class Ballbar(Artefact):
     """
 
     kind = "ballbar"
-    title = "Ballbar"
+    title = say("Ballbar")
 
     def __init__(self, facts: ArtefactFacts, points: Points, *, where: str | None = None) -> None:
         self.points = points
@@ -46,11 +47,18 @@ class Ballbar(Artefact):
                              fix="Record the centres of two different balls")  # fmt: skip
         mean = float(lengths.mean())
         if facts.length_mm is None:
-            self.sizes = (Size("length_mm", "Length of the bar", "mm", mean, np.inf),)
+            self.sizes = (Size("length_mm", say("Length of the bar"), unit("mm"), mean, np.inf, say("length")),)
         else:
             check_length(mean, facts.length_mm, "the recorded bars", where)
             self.sizes = (
-                Size("length_mm", "Length of the bar", "mm", facts.length_mm, (facts.u_um or 0.0) * MICROMETRE),
+                Size(
+                    "length_mm",
+                    say("Length of the bar"),
+                    unit("mm"),
+                    facts.length_mm,
+                    (facts.u_um or 0.0) * MICROMETRE,
+                    say("length"),
+                ),
             )
 
     def lengths(self) -> Floats:

@@ -8,11 +8,13 @@ from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import residual_volume
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import numbered
 from cmm_uq.kinds.ballbar.analysis import figures, results
 from cmm_uq.kinds.distances import page as adjustment_section
 from cmm_uq.kinds.distances.lengths import Lengths
+from cmm_uq.messages import NOTHING, Text, say
 from cmm_uq.uncertainty.rounding import rounded
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 _ROWS_SHOWN = 60
 
@@ -20,44 +22,64 @@ _ROWS_SHOWN = 60
 def sections(result: Result) -> list[Section]:
     """Lengths by position, and residuals in the volume."""
     found, size = figures(result), result.artefact.sizes[0]
-    lengths, name = found.lengths, "certified length" if size.certified else "mean length"
+    lengths, name = found.lengths, (say("certified length") if size.certified else say("mean length"))
     deviations, residuals, expanded = lengths.deviation_um, lengths.residual_um, lengths.expanded_um
     plot = length_plot(
-        lengths.measurement.astype(float), deviations, residuals, flagged=lengths.flagged,
-        expanded_before_um=expanded, expanded_after_um=expanded, reference=f"{name} {lengths.reference:.4f}\u00a0mm",
+        lengths.measurement.astype(float),
+        deviations,
+        residuals,
+        flagged=lengths.flagged,
+        expanded_before_um=expanded,
+        expanded_after_um=expanded,
+        reference=say("{name} {length:.4f}\u00a0mm", name=name, length=lengths.reference),
         reference_expanded_um=2 * size.sd / MICROMETRE if size.certified else 0.0,
-        caption=f"Deviation of each length from the {name}, as recorded and after the fitted model, with U (k = 2).",
-        alternative=(
-            f"{len(deviations)} lengths: as recorded they deviate by {deviations.min():.0f} to {deviations.max():.0f} µm from "
-            f"the {name}; after the fitted model {residuals.min():.0f} to {residuals.max():.0f} µm remain."
+        caption=say(
+            "Deviation of each length from the {name}, as recorded and after the fitted model, with U (k = 2).",
+            name=name,
         ),
-    )  # fmt: skip
-    volume = residual_volume(result, "bars")
+        alternative=say(
+            "{count} lengths: as recorded they deviate by {low:.0f} to {high:.0f} µm from the {name}; "
+            "after the fitted model {low_after:.0f} to {high_after:.0f} µm remain.",
+            count=len(deviations),
+            low=deviations.min(),
+            high=deviations.max(),
+            name=name,
+            low_after=residuals.min(),
+            high_after=residuals.max(),
+        ),
+    )
+    volume = residual_volume(result, say("bars"))
     return [
-        Section("Lengths", (plot, volume, _table(lengths, name))),
-        Section("Budget of one length", tuple(budget_blocks("the deviation of one length", found.budget))),
+        Section(say("Lengths"), (plot, volume, _table(lengths, name))),
+        Section(say("Budget of one length"), tuple(budget_blocks(say("the deviation of one length"), found.budget))),
         adjustment_section.section(result, found.settings, found.second_way),
     ]
 
 
-def _table(lengths: Lengths, name: str) -> Table:
+def _table(lengths: Lengths, name: Text) -> Table:
     expanded, repeated = lengths.expanded_um, lengths.repeat.max() > 1
     rows = []
     for i in range(min(len(lengths.length), _ROWS_SHOWN)):
         shown, _ = rounded(float(lengths.length[i]), expanded * MICROMETRE)
         deviation, _ = rounded(float(lengths.deviation_um[i]), expanded)
         residual, _ = rounded(float(lengths.residual_um[i]), expanded)
-        place = f"{lengths.measurement[i]}" + (f" ({lengths.repeat[i]})" if repeated else "")
-        mark = "set aside" if not lengths.used[i] else "see warnings" if lengths.flagged[i] else ""
+        place = numbered(lengths.measurement[i], lengths.repeat[i] if repeated else None)
+        mark = say("set aside") if not lengths.used[i] else say("see warnings") if lengths.flagged[i] else NOTHING
         rows.append((place, shown, deviation, residual, mark))
     columns = (
-        Column("Position", numeric=False), Column("Length", "mm"), Column(f"From the {name}", "µm"),
-        Column("Residual", "µm"), Column("Remark", numeric=False),
-    )  # fmt: skip
+        Column(say("Position"), numeric=False),
+        Column(say("Length"), unit("mm")),
+        Column(say("From the {name}", name=name), unit("µm")),
+        Column(say("Residual"), unit("µm")),
+        Column(say("Remark"), numeric=False),
+    )
     left = len(lengths.length) - len(rows)
-    note = f"U = {rounded(0.0, expanded)[1]} µm (k = 2) for each length, from the standard uncertainty of a coordinate."
-    notes = (note, f"{left} more lengths are in the attached recording.") if left > 0 else (note,)
-    return Table("Lengths brought to 20 °C", columns, tuple(rows), notes)
+    note = say(
+        "U = {U} µm (k = 2) for each length, from the standard uncertainty of a coordinate.",
+        U=rounded(0.0, expanded)[1],
+    )
+    notes = (note, say("{left} more lengths are in the attached recording.", left=left)) if left > 0 else (note,)
+    return Table(say("Lengths brought to 20 °C"), columns, tuple(rows), notes)
 
 
 PAGE = Page(sections, results)

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from cmm_uq.conformity.plans import B89
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
 from cmm_uq.planning.directions import words

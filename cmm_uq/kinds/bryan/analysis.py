@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import refusal
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.bryan.observe import Bryan
 from cmm_uq.kinds.distances.adjustment import Setting, settings
 from cmm_uq.kinds.distances.equations import DistanceSolution, second_way_data
 from cmm_uq.kinds.distances.lengths import Lengths, lengths_of
+from cmm_uq.messages import Text
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +21,7 @@ class BryanFigures:
 
     lengths: Lengths
     settings: tuple[Setting, ...]
-    second_way: DistanceSolution | str
+    second_way: DistanceSolution | Text
 
 
 def figures(result: Result) -> BryanFigures:
@@ -27,9 +29,9 @@ def figures(result: Result) -> BryanFigures:
     bar = cast("Bryan", result.artefact)
     distances = bar.distances(bar.points.xyz, None) / bar.expansion
     try:
-        second_way: DistanceSolution | str = bar.in_two_steps()[0]
-    except CmmUqError as refusal:
-        second_way = str(refusal)
+        second_way: DistanceSolution | Text = bar.in_two_steps()[0]
+    except CmmUqError as error:
+        second_way = refusal(error)
     return BryanFigures(lengths_of(result, distances, float(distances.mean())), settings(result), second_way)
 
 

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds.distances.equations import DistanceSolution, solve_distances
+from cmm_uq.messages import say
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.radial import Radial
 from cmm_uq.model.recorded import expansion, place
@@ -31,9 +32,10 @@ class Bryan(Radial):
     """
 
     kind = "bryan"
-    title = "Bryan gauge"
+    title = say("Bryan gauge")
     per_size = 1.0
-    size_title = "Length of the bar"
+    size_title = say("Length of the bar")
+    size_what = say("length")
     plural = "the recorded bars"
 
     def __init__(self, facts: ArtefactFacts, points: Points, *, where: str | None = None) -> None:
@@ -41,8 +43,9 @@ class Bryan(Radial):
             raise CmmUqError(
                 f"measurement {points.measurement[np.argmax(other)]} has a point {points.point[np.argmax(other)]}: only the "
                 "swept ball is recorded, as point 1; the fixed ball's centre is estimated",
-                where=place(points, other, where), fix="Leave the fixed ball out, or mend [artefact] kind in job.toml",
-            )  # fmt: skip
+                where=place(points, other, where),
+                fix="Leave the fixed ball out, or mend [artefact] kind in job.toml",
+            )
         whole_job = np.zeros(len(points), dtype=np.int64)
         super().__init__(facts, points, Placings(whole_job, np.array([0])), expansion(facts, points), where)
 

@@ -9,8 +9,9 @@ from cmm_uq.documents.residual_volume import residual_volume
 from cmm_uq.documents.result import Result
 from cmm_uq.kinds.bryan.analysis import figures, results
 from cmm_uq.kinds.distances import page as adjustment_section
+from cmm_uq.messages import say
 
-IN_TWO_STEPS = (
+IN_TWO_STEPS = say(
     "The fixed ball is found first, as if the machine had no errors, and its centre takes up part of them. The fitted model "
     "finds all at once and is the better."
 )
@@ -22,17 +23,29 @@ def sections(result: Result) -> list[Section]:
     lengths = found.lengths
     deviations, residuals = lengths.deviation_um, lengths.residual_um
     plot = length_plot(
-        lengths.measurement.astype(float), deviations, residuals, expanded_before_um=lengths.expanded_um,
-        expanded_after_um=lengths.expanded_um, reference="mean distance from the best centre", flagged=lengths.flagged,
-        position_label="Position of the swept ball",
-        caption="Distance of the swept ball from the fixed one, as recorded and after the fitted model, with U (k = 2).",
-        alternative=(
-            f"{len(deviations)} positions: about the best centre the distances deviate by {deviations.min():.1f} to "
-            f"{deviations.max():.1f} µm; after the fitted model {residuals.min():.1f} to {residuals.max():.1f} µm remain."
+        lengths.measurement.astype(float),
+        deviations,
+        residuals,
+        expanded_before_um=lengths.expanded_um,
+        expanded_after_um=lengths.expanded_um,
+        reference=say("mean distance from the best centre"),
+        flagged=lengths.flagged,
+        position_label=say("Position of the swept ball"),
+        caption=say(
+            "Distance of the swept ball from the fixed one, as recorded and after the fitted model, with U (k = 2)."
         ),
-    )  # fmt: skip
+        alternative=say(
+            "{count} positions: about the best centre the distances deviate by {low:.1f} to {high:.1f} "
+            "µm; after the fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
+            count=len(deviations),
+            low=deviations.min(),
+            high=deviations.max(),
+            low_after=residuals.min(),
+            high_after=residuals.max(),
+        ),
+    )
     return [
-        Section("Distances", (plot, residual_volume(result, "swept positions"))),
+        Section(say("Distances"), (plot, residual_volume(result, say("swept positions")))),
         adjustment_section.section(result, found.settings, found.second_way, IN_TWO_STEPS),
     ]
 

@@ -39,7 +39,7 @@ def elsewhere(artefact: Artefact, volume: Volume, count: int) -> tuple[Placing, 
 def _centre(artefact: Artefact) -> Floats:
     """Of the fixed ball (3,), in scale readings, mm."""
     bar = cast("Bryan", artefact)
-    return np.asarray(bar.centres(bar.points.readings, bar.sizes[0].nominal)[0], dtype=np.float64)
+    return np.asarray(bar.centres(bar.points.machine_xyz, bar.sizes[0].nominal)[0], dtype=np.float64)
 
 
 PLANNING = Planning({"swept bar": swept_bar}, candidates, elsewhere, shared=True)

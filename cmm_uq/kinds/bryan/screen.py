@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.points import Points
 from cmm_uq.screening.shape import Screening, Shape, ball_misfit, no_references
 

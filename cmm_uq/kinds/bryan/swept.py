@@ -46,7 +46,7 @@ def swept(volume: Volume, length: float, count: int, repeats: int, centre: Float
     chosen = _spread(places[fitting], min(count, len(fitting)))
     found = []
     for i in fitting[chosen]:
-        xyz = np.tile(places[i] - volume.machine.origin_mm, (repeats, 1))
+        xyz = volume.machine.coordinates(np.tile(places[i], (repeats, 1)))
         one = np.ones(repeats, dtype=np.int64)
         points = Points(xyz, one, one, np.arange(1, repeats + 1), volume.machine)
         found.append(Placing(words(spiral[i]), points))

@@ -15,9 +15,10 @@ import numpy as np
 
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.results_file import quantity_data
+from cmm_uq.messages import Text, say
 from cmm_uq.physics.rigid_body import SCALE, SQUARENESS
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
+from cmm_uq.units import ARCSECOND, MICROMETRE, PPM, unit
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Adjustment:
     """
 
     effect: str
-    what: str
+    what: Text
     sign: float
     axis: str
 
@@ -42,12 +43,12 @@ ADJUSTMENTS: Mapping[str, Adjustment] = MappingProxyType(
     {
         adjustment.effect: adjustment
         for adjustment in (
-            Adjustment(SCALE["x"].name, "Scale of X: lengthen what it reads by", 1.0, "x"),
-            Adjustment(SCALE["y"].name, "Scale of Y: lengthen what it reads by", 1.0, "y"),
-            Adjustment(SCALE["z"].name, "Scale of Z: lengthen what it reads by", 1.0, "z"),
-            Adjustment(SQUARENESS["xy"].name, "Guide of Y: turn about +Z by", -1.0, "y"),
-            Adjustment(SQUARENESS["yz"].name, "Guide of Z: turn about +X by", -1.0, "z"),
-            Adjustment(SQUARENESS["zx"].name, "Guide of Z: turn about +Y by", 1.0, "z"),
+            Adjustment(SCALE["x"].name, say("Scale of X: lengthen what it reads by"), 1.0, "x"),
+            Adjustment(SCALE["y"].name, say("Scale of Y: lengthen what it reads by"), 1.0, "y"),
+            Adjustment(SCALE["z"].name, say("Scale of Z: lengthen what it reads by"), 1.0, "z"),
+            Adjustment(SQUARENESS["xy"].name, say("Guide of Y: turn about +Z by"), -1.0, "y"),
+            Adjustment(SQUARENESS["yz"].name, say("Guide of Z: turn about +X by"), -1.0, "z"),
+            Adjustment(SQUARENESS["zx"].name, say("Guide of Z: turn about +Y by"), 1.0, "z"),
         )
     }
 )
@@ -101,5 +102,7 @@ def settings(result: Result) -> tuple[Setting, ...]:
         figure = quantity.times(adjustment.sign, quantity.unit)
         low, high = result.artefact.points.machine.travel_mm["xyz".index(adjustment.axis)]
         per_unit = (PPM if quantity.unit == "ppm" else ARCSECOND) * float(high - low) / MICROMETRE
-        found.append(Setting(adjustment, name, figure, figure.times(per_unit, "µm") if np.isfinite(per_unit) else None))
+        found.append(
+            Setting(adjustment, name, figure, figure.times(per_unit, unit("µm")) if np.isfinite(per_unit) else None)
+        )
     return tuple(found)

@@ -17,6 +17,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.distances.symmetric_systems import by_doolittle, by_jacobi
+from cmm_uq.messages import Text, commas, plural, say
 from cmm_uq.physics.rigid_body import SCALE, SQUARENESS
 from cmm_uq.points import Floats
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
@@ -38,11 +39,11 @@ SOLUTIONS: dict[str, Callable[[Floats, Floats], Floats]] = {
 }
 """Orthogonal factorisation, which is reported, and the patent's two ways to solve its normal equations."""
 
-PLACINGS: dict[str, tuple[int, int, int]] = {
-    "along X": (1, 0, 0), "along Y": (0, 1, 0), "along Z": (0, 0, 1),
-    "along a diagonal of X and Y": (1, 1, 0), "along the other diagonal of X and Y": (1, -1, 0),
-    "along a diagonal of Y and Z": (0, 1, 1), "along the other diagonal of Y and Z": (0, 1, -1),
-    "along a diagonal of Z and X": (1, 0, 1), "along the other diagonal of Z and X": (1, 0, -1),
+PLACINGS: dict[Text, tuple[int, int, int]] = {
+    say("along X"): (1, 0, 0), say("along Y"): (0, 1, 0), say("along Z"): (0, 0, 1),
+    say("along a diagonal of X and Y"): (1, 1, 0), say("along the other diagonal of X and Y"): (1, -1, 0),
+    say("along a diagonal of Y and Z"): (0, 1, 1), say("along the other diagonal of Y and Z"): (0, 1, -1),
+    say("along a diagonal of Z and X"): (1, 0, 1), say("along the other diagonal of Z and X"): (1, 0, -1),
 }  # fmt: skip
 
 
@@ -105,7 +106,7 @@ class DistanceSolution:
         return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", jacobian, self.covariance, jacobian)), dtype=np.float64)
 
 
-def second_way_data(second_way: DistanceSolution | str) -> dict[str, Any]:
+def second_way_data(second_way: DistanceSolution | Text) -> dict[str, Any]:
     """A solution, or why there is none, for results.json."""
     return {"refused": second_way} if isinstance(second_way, str) else second_way.as_data()
 
@@ -143,7 +144,7 @@ def quadratic_terms(differences: Floats) -> Floats:
     return np.column_stack([x * x, 2 * x * y, 2 * x * z, y * y, 2 * y * z, z * z])
 
 
-def missing_placings(differences: Floats) -> tuple[str, ...]:
+def missing_placings(differences: Floats) -> tuple[Text, ...]:
     """Placings, in words and as few as possible, that determine what these (m, 3) leave open; none when they leave nothing."""
     directions = differences / np.linalg.norm(differences, axis=1, keepdims=True)
     candidates = np.array(list(PLACINGS.values()), dtype=np.float64)
@@ -168,25 +169,31 @@ def refuse_poor_placings(differences: Floats) -> None:
     """
     apart = np.linalg.norm(differences, axis=1)
     if np.any(apart == 0):
-        raise CmmUqError(f"distance {int(np.argmin(apart)) + 1} is zero: both positions are the same", where="recording",
-                         fix="Record two different positions")  # fmt: skip
+        raise CmmUqError(
+            say("distance {number} is zero: both positions are the same", number=int(np.argmin(apart)) + 1),
+            where="recording", fix=say("Record two different positions"),
+        )  # fmt: skip
     wanted = missing_placings(differences)
     if not wanted:
         return
     directions = differences / apart[:, None]
-    spread = np.linalg.svd(directions, compute_uv=False)
+    spread, count = np.linalg.svd(directions, compute_uv=False), len(differences)
     if len(differences) < UNKNOWNS:
-        problem = f"{len(differences)} distances are too few for the six factors of scale and squareness"
+        problem = say("{count} distances are too few for the six factors of scale and squareness", count=count)
     elif spread[1] < POORLY_POSED * spread[0]:
-        problem = f"all {len(differences)} distances are parallel, so they tell the scale in one direction only"
+        problem = say("all {count} distances are parallel, so they tell the scale in one direction only", count=count)
     elif spread[2] < POORLY_POSED * spread[0]:
-        problem = f"all {len(differences)} distances lie in one plane, so they tell nothing of the axis across it"
+        problem = say("all {count} distances lie in one plane, so they tell nothing of the axis across it", count=count)
     else:
-        problem = f"the directions of the {len(differences)} distances leave a factor of scale or squareness open"
+        problem = say("the directions of the {count} distances leave a factor of scale or squareness open", count=count)
     raise CmmUqError(
         problem,
         where="recording",
-        fix=f"Add {len(wanted)} placing{'s' if len(wanted) > 1 else ''}: {', '.join(wanted)}",
+        fix=plural(
+            len(wanted),
+            one=say("Add {count} placing: {wanted}", count=len(wanted), wanted=commas(wanted)),
+            many=say("Add {count} placings: {wanted}", count=len(wanted), wanted=commas(wanted)),
+        ),
     )
 
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cmm_uq.messages import Text, Verbatim, commas, listed, number, say
 from cmm_uq.physics.error_map import COLUMNS, ErrorMap
 from cmm_uq.points import AXES, Floats
 from cmm_uq.screening.finding import Finding
-from cmm_uq.units import ARCSECOND, METRE, MICROMETRE
+from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, Unit, unit
 
 LEAST_POSITIONS = 4
 """Positions that the maps of a column must share."""
@@ -52,7 +53,7 @@ class MapColumn:
     temperatures: Floats
 
     @property
-    def title(self) -> str:
+    def title(self) -> Text:
         """In words."""
         return title_of(self.axis, self.component)
 
@@ -67,29 +68,33 @@ class MapColumn:
         return self.component < 3 and not self.is_scale
 
     @property
-    def unit(self) -> tuple[str, float]:
+    def unit(self) -> tuple[Unit, float]:
         """Unit as printed, and its size in ``values``."""
-        return ("µm", MICROMETRE) if self.component < 3 else ("″", ARCSECOND * METRE)
+        return (unit("µm"), MICROMETRE) if self.component < 3 else (unit("″"), ARCSECOND * METRE)
 
 
-def title_of(axis: str, component: int) -> str:
+def title_of(axis: str, component: int) -> Text:
     """An error of a carriage in words."""
     along = AXES[component % 3].upper()
     if component >= 3:
-        return f"rotation of {axis.upper()} about {along}"
-    return f"scale error of {along}" if along == axis.upper() else f"straightness of {axis.upper()} along {along}"
+        return say("rotation of {axis} about {along}", axis=Verbatim(axis.upper()), along=Verbatim(along))
+    return (
+        say("scale error of {along}", along=Verbatim(along))
+        if along == axis.upper()
+        else say("straightness of {axis} along {along}", axis=Verbatim(axis.upper()), along=Verbatim(along))
+    )
 
 
 def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]]:
     """Errors that at least two maps give with figures of their own, and all that is odd; stray readings are left out."""
     columns: list[MapColumn] = []
     findings: list[Finding] = []
-    same: dict[tuple[float, ...], list[str]] = {}
-    unmeasured: list[str] = []
+    same: dict[tuple[float, ...], list[Text]] = {}
+    unmeasured: list[Text] = []
     for axis, carriage in enumerate(AXES):
         shared = _shared([m.axes[axis].positions for m in maps])
         for component in range(6):
-            title, number = title_of(carriage, component), MICROMETRE if component < 3 else ARCSECOND * METRE
+            title, size = title_of(carriage, component), MICROMETRE if component < 3 else ARCSECOND * METRE
             lever = 1.0 if component < 3 else METRE
             values = np.array([
                 lever * m.axes[axis].errors[np.isin(m.axes[axis].positions, shared), component] for m in maps
@@ -103,14 +108,18 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
                 same.setdefault(copied, []).append(title)
             if len(own) < 2 or len(shared) < LEAST_POSITIONS:
                 continue
-            kept, stray = _without_stray(shared, values[own], number)
+            kept, stray = _without_stray(shared, values[own], size)
             temperatures = np.array([maps[k].temperature for k in own])
             columns.append(MapColumn(carriage, component, shared[kept], values[own][:, kept], temperatures))
             findings += [
-                _stray(title, shared[i], maps[own[k]], values[own][k, i] / number, COLUMNS[component]) for k, i in stray
+                _stray(title, shared[i], maps[own[k]], values[own][k, i] / size, COLUMNS[component]) for k, i in stray
             ]
         if len(shared) < LEAST_POSITIONS:
-            why = f"the maps share {len(shared)} positions of axis {carriage}: they are not compared. Map the same positions"
+            why = say(
+                "the maps share {count} positions of axis {carriage}: they are not compared. Map the same positions",
+                count=len(shared),
+                carriage=Verbatim(carriage),
+            )
             findings.append(Finding("positions", (), (), why))
     return columns, [*_alike(same, unmeasured), *findings]
 
@@ -165,27 +174,34 @@ def _without_stray(positions: Floats, values: Floats, unit: float) -> tuple[Floa
     return kept, stray
 
 
-def _stray(title: str, position: float, error_map: ErrorMap, value: float, column: str) -> Finding:
-    why = (
-        f"the {title} at {position:g} mm in the map at {error_map.temperature:g} °C, {value:.4g}, is far off its neighbours "
-        "and the other maps; the position is left out. Measure it again"
+def _stray(title: Text, position: float, error_map: ErrorMap, value: float, column: str) -> Finding:
+    why = say(
+        "the {title} at {position:g} mm in the map at {temperature:g} °C, {value:.4g}, is far off "
+        "its neighbours and the other maps; the position is left out. Measure it again",
+        title=title,
+        position=position,
+        temperature=error_map.temperature,
+        value=value,
     )
     return Finding("outlier", (), (), why, column=column, set_aside=True)
 
 
-def _alike(same: dict[tuple[float, ...], list[str]], unmeasured: list[str]) -> Iterator[Finding]:
+def _alike(same: dict[tuple[float, ...], list[Text]], unmeasured: list[Text]) -> Iterator[Finding]:
     for temperatures, titles in same.items():
-        listed = ", ".join(f"{t:g}" for t in temperatures)
-        why = (
-            f"{_listed(titles)}: the maps at {listed} °C give the same figures. They were measured once, and say nothing of "
-            "how the maps differ; measure them at each temperature"
+        shown = commas(number(t, "g") for t in temperatures)
+        why = say(
+            "{titles}: the maps at {temperatures} °C give the same figures. They were measured once, and say "
+            "nothing of how the maps differ; measure them at each temperature",
+            titles=listed(titles),
+            temperatures=shown,
         )
         yield Finding("copied", (), (), why, set_aside=True)
     if unmeasured:
         yield Finding(
-            "not measured", (), (), f"{_listed(unmeasured)}: zero in every map, so they were not measured", None, True
+            "not measured",
+            (),
+            (),
+            say("{titles}: zero in every map, so they were not measured", titles=listed(unmeasured)),
+            None,
+            True,
         )
-
-
-def _listed(titles: Sequence[str]) -> str:
-    return titles[0] if len(titles) == 1 else f"{', '.join(titles[:-1])} and {titles[-1]}"

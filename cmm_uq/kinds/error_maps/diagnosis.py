@@ -14,6 +14,7 @@ from cmm_uq.inference.posterior import Posterior, Progress
 from cmm_uq.kinds.error_maps.columns import MapColumn, turned
 from cmm_uq.kinds.error_maps.fit import expansion, function, held_out, noise_of, residual
 from cmm_uq.kinds.error_maps.search import ColumnComparison, Rival, column_comparison
+from cmm_uq.messages import Text, say
 from cmm_uq.physics.catalogue import effects as effects_named
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
@@ -46,7 +47,7 @@ class Difference:
     column: MapColumn
     rival: Rival
     probability: float
-    instead: tuple[str, ...]
+    instead: tuple[Text, ...]
     region: tuple[float, float]
     p_value: float
     amplitude: float
@@ -190,7 +191,7 @@ def _improvement(comparisons: Sequence[ColumnComparison], alpha: float) -> Impro
         float(np.sqrt(np.mean(np.concatenate(v) ** 2))) / MICROMETRE if v else 0.0 for v in rms
     )
     se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0
-    return Improvement(left, modelled, before_um, after_um, float(gain.sum()), se, "parts of the travel")
+    return Improvement(left, modelled, before_um, after_um, float(gain.sum()), se, say("parts of the travel"))
 
 
 def _noise(comparisons: Sequence[ColumnComparison], alpha: float, *, rotations: bool) -> Quantity | None:

@@ -112,7 +112,7 @@ def expansion(compared: ColumnComparison, index: int) -> Posterior:
         versions = compared.combinations.found[key].versions
         for kind, share in zip(compared.comparison.kinds, compared.comparison.noise_probability(versions), strict=True):
             if share > _FOLLOWED:
-                white, _ = linear.uncorrelated(_whitening(compared, kind, versions, index))
+                white = linear.uncorrelated(_whitening(compared, kind, versions, index))
                 draws.append(sample(white, compared.seed))
                 weights.append(probability * share)
     return mixed(draws, np.array(weights) / sum(weights))
@@ -123,7 +123,7 @@ def _whitening(
 ) -> Callable[[Floats], Floats]:
     """What whitens noise of one kind together with the given rivals but one."""
     columns, spread = compared.columns_of([v for v in versions if v.explanation != index])
-    factor = kind.noise(np.eye(len(compared.observed)))
+    factor = kind.coloured(np.eye(len(compared.observed)))
     lower = np.linalg.cholesky(factor @ factor.T + (columns * spread**2) @ columns.T)
     return lambda some: np.asarray(linalg.solve_triangular(lower, some, lower=True), dtype=np.float64)
 

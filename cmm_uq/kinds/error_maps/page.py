@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.diagnosis_words import VERDICT_WORDS, sentence
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.plots import curve_with_band
 from cmm_uq.documents.results_file import effect_data, finding_data, head, improvement_data, quantity_data
@@ -16,6 +16,8 @@ from cmm_uq.kinds.error_maps.diagnosis import Difference
 from cmm_uq.kinds.error_maps.search import ColumnComparison
 from cmm_uq.kinds.error_maps.squareness import squareness_data, squareness_sections
 from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, lines, names, number, say
+from cmm_uq.units import unit
 
 _PICTURES = 3
 
@@ -28,7 +30,8 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
     return {
         **head(found.job, effects=False),
         "sampling": {
-            "sampler": d.sampler, "seed": seed,
+            "sampler": d.sampler,
+            "seed": seed,
             "ess_min": min((p.ess_min for p in d.posteriors), default=None),
             "rhat_max": max((p.rhat_max for p in d.posteriors), default=None),
             "converged": all(p.converged for p in d.posteriors),
@@ -37,62 +40,97 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
             "verdict": d.verdict,
             "p_value": d.p_value,
             "where": [
-                {"covariate": f"{item.column.axis}_mm", "region": list(item.region), "p_value": min(1.0, item.p_value),
-                 "amplitude_um": item.amplitude_um, "what": item.rival.name, "probability": item.probability,
-                 "instead": list(item.instead), "sign_turned": item.turned}
+                {
+                    "covariate": f"{item.column.axis}_mm",
+                    "region": list(item.region),
+                    "p_value": min(1.0, item.p_value),
+                    "amplitude_um": item.amplitude_um,
+                    "what": item.rival.name,
+                    "probability": item.probability,
+                    "instead": list(item.instead),
+                    "sign_turned": item.turned,
+                }
                 for item in d.differences
             ],
             "effects": [effect_data(item, d.improvement) for item in d.effects],
             "indistinguishable": [],
             "suggested_measurements": [
-                {"separates": list(names), "what": what, "repetitions": 1, "odds": None} for names, what in next_words(d)
+                {"separates": list(names), "what": what, "repetitions": 1, "odds": None}
+                for names, what in next_words(d)
             ],
             "noise": {
                 "stated_coordinate_um": None,
                 "coordinate_um": nothing if noise is None else quantity_data(noise),
                 "rotation_arcsec": nothing if d.rotation is None else quantity_data(d.rotation),
-                "placing_um": nothing, "correlated_in_time": False, "heavy_tails": False, "contradicts_stated": False,
+                "placing_um": nothing,
+                "correlated_in_time": False,
+                "heavy_tails": False,
+                "contradicts_stated": False,
             },
             "screening": [finding_data(finding, "") for finding in found.findings],
             "improvement": improvement_data(d.improvement),
             "compared": [
-                {"what": compared.column.title, "positions": len(compared.column.positions),
-                 "temperatures_c": compared.column.temperatures.tolist(), "p_value": d.p_of(compared),
-                 "explanations": [
-                     {"together": [compared.rivals[i].name for i in key], "probability": p}
-                     for key, p in sorted(compared.combinations.probability.items(), key=lambda item: -item[1])[:6]
-                 ]}
+                {
+                    "what": compared.column.title,
+                    "positions": len(compared.column.positions),
+                    "temperatures_c": compared.column.temperatures.tolist(),
+                    "p_value": d.p_of(compared),
+                    "explanations": [
+                        {"together": [compared.rivals[i].name for i in key], "probability": p}
+                        for key, p in sorted(compared.combinations.probability.items(), key=lambda item: -item[1])[:6]
+                    ],
+                }
                 for compared in d.comparisons
             ],
             **({"squareness_arcsec": squareness} if squareness else {}),
         },
-    }  # fmt: skip
+    }
 
 
 def maps_document(found: MapsDiagnosed, seed: int) -> Document:
     """The page of a diagnosis of error maps."""
     facts, d = found.job.facts, found.diagnosis
-    maps = "\n".join(f"{given.file}, {given.temperature_c:g} °C" for given in facts.machine.error_map)
+    maps = lines(
+        say("{file}, {temperature_c:g} °C", file=Verbatim(given.file), temperature_c=given.temperature_c)
+        for given in facts.machine.error_map
+    )
     sections = (
-        Section("What makes the maps differ", _told(found)),
-        Section("Before and after", (_before_after(found),)),
-        Section("Errors compared", (_compared(found),)),
+        Section(say("What makes the maps differ"), _told(found)),
+        Section(say("Before and after"), (_before_after(found),)),
+        Section(say("Errors compared"), (_compared(found),)),
         *squareness_sections(found.maps),
-        Section("Noise", tuple(Paragraph(text) for text in noise_words(d))),
-        Section("What to measure next", tuple(Paragraph(what) for _, what in next_words(d))),
+        Section(say("Noise"), tuple(Paragraph(text) for text in noise_words(d))),
+        Section(say("What to measure next"), tuple(Paragraph(what) for _, what in next_words(d))),
     )
     return working_page(
-        facts, "Diagnosis of error maps", facts.job.date.isoformat(),
+        facts,
+        say("Diagnosis of error maps"),
+        day(facts.job.date),
         particulars=(
-            Facts((("Verdict", d.verdict), ("p-value of “the maps differ by noise alone”", f"{d.p_value:.2g}"),
-                   ("False-alarm rate", f"{100 * d.alpha:g} %"))),
-            Facts((("Machine", facts.machine.name), ("Error maps", maps),
-                   ("Effects that the job names", ", ".join(facts.model.effects) or "none"))),
+            Facts(
+                (
+                    (say("Verdict"), VERDICT_WORDS[d.verdict]),
+                    (say("p-value of “the maps differ by noise alone”"), number(d.p_value, ".2g")),
+                    (say("False-alarm rate"), say("{alpha:g} %", alpha=100 * d.alpha)),
+                )
+            ),
+            Facts(
+                (
+                    (say("Machine"), Verbatim(facts.machine.name)),
+                    (say("Error maps"), maps),
+                    (say("Effects that the job names"), (commas(names(facts.model.effects)) or say("none"))),
+                )
+            ),
         ),
-        warnings=(f"{f.why[0].upper()}{f.why[1:]}." for f in found.findings),
+        warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
         sections=sections,
-        produced_by=", ".join(filter(None, (f"cmm-uq {__version__}", d.sampler, f"seed {seed}"))),
-    )  # fmt: skip
+        produced_by=_produced_by(d.sampler, seed),
+    )
+
+
+def _produced_by(sampler: str | None, seed: int) -> Text:
+    program = say("cmm-uq {version}", version=Verbatim(__version__))
+    return commas((program, *names(filter(None, (sampler,))), say("seed {seed}", seed=seed)))
 
 
 def _told(found: MapsDiagnosed) -> tuple[Block, ...]:
@@ -110,46 +148,78 @@ def _picture(difference: Difference) -> Block:
     x, y, u = difference.curve
     unit = difference.column.unit[0]
     return curve_with_band(
-        x, y, 2 * u, x_label=f"{difference.column.axis.upper()} / mm", y_label=f"Difference / {unit}",
-        caption=f"{difference.rival.name[0].upper()}{difference.rival.name[1:]}: the difference, with U (k = 2).",
-        alternative=f"A function with a largest value of {difference.amplitude:.3g} {unit}.",
-    )  # fmt: skip
+        x,
+        y,
+        2 * u,
+        x_label=say("{axis} / mm", axis=Verbatim(difference.column.axis.upper())),
+        y_label=say("Difference / {unit}", unit=unit),
+        caption=say("{name:capital}: the difference, with U (k = 2).", name=difference.rival.name),
+        alternative=say(
+            "A function with a largest value of {amplitude:.3g} {unit}.", amplitude=difference.amplitude, unit=unit
+        ),
+    )
 
 
 def _before_after(found: MapsDiagnosed) -> Table:
     gain = found.diagnosis.improvement
     rows = (
-        ("Rms of how the maps differ", f"{gain.rms_before_um:.2f}", f"{gain.rms_after_um:.2f}", "µm"),
-        ("Rms on held-out parts of the travel", f"{gain.heldout_rms_before_um:.2f}", f"{gain.heldout_rms_after_um:.2f}",
-         "µm"),
-        ("Gain in log predictive density", "", f"{gain.elpd_gain:.1f} ± {gain.elpd_gain_se:.1f}", ""),
-    )  # fmt: skip
-    heads = (Column("Quantity", numeric=False), Column("Before"), Column("After"), Column("Unit", numeric=False))
-    note = (
-        "A fifth of the travel at a time is predicted from the rest. Rotations count at a lever of one metre; ± is one "
-        "standard error."
+        (
+            say("Rms of how the maps differ"),
+            number(gain.rms_before_um, ".2f"),
+            number(gain.rms_after_um, ".2f"),
+            unit("µm"),
+        ),
+        (
+            say("Rms on held-out parts of the travel"),
+            number(gain.heldout_rms_before_um, ".2f"),
+            number(gain.heldout_rms_after_um, ".2f"),
+            unit("µm"),
+        ),
+        (
+            say("Gain in log predictive density"),
+            NOTHING,
+            say("{elpd_gain:.1f} ± {elpd_gain_se:.1f}", elpd_gain=gain.elpd_gain, elpd_gain_se=gain.elpd_gain_se),
+            NOTHING,
+        ),
     )
-    return Table("Improvement", heads, rows, (note,))
+    heads = (
+        Column(say("Quantity"), numeric=False),
+        Column(say("Before")),
+        Column(say("After")),
+        Column(say("Unit"), numeric=False),
+    )
+    note = say(
+        "A fifth of the travel at a time is predicted from the rest. Rotations count at a lever of "
+        "one metre; ± is one standard error."
+    )
+    return Table(say("Improvement"), heads, rows, (note,))
 
 
 def _compared(found: MapsDiagnosed) -> Table:
     d = found.diagnosis
     rows = tuple(
-        (compared.column.title, f"{len(compared.column.values)}", f"{len(compared.column.positions)}",
-         f"{d.p_of(compared):.2g}", *_most_probable(compared))
+        (
+            compared.column.title,
+            number(len(compared.column.values)),
+            number(len(compared.column.positions)),
+            number(d.p_of(compared), ".2g"),
+            *_most_probable(compared),
+        )
         for compared in d.comparisons
-    )  # fmt: skip
-    heads = (Column("Error", numeric=False), Column("Maps"), Column("Positions"), Column("p"),
-             Column("Most probable explanation", numeric=False), Column("Probability"))  # fmt: skip
-    note = "p is corrected for having looked at all of them. Each error is a free function of position that the maps share."
-    return Table("What was compared", heads, rows, (note,))
+    )
+    heads = (Column(say("Error"), numeric=False), Column(say("Maps")), Column(say("Positions")), Column(say("p")),
+             Column(say("Most probable explanation"), numeric=False), Column(say("Probability")))  # fmt: skip
+    note = say(
+        "p is corrected for having looked at all of them. Each error is a free function of position "
+        "that the maps share."
+    )
+    return Table(say("What was compared"), heads, rows, (note,))
 
 
-def _most_probable(compared: ColumnComparison) -> tuple[str, str]:
-    names = [_short(compared, i) for i in sorted(compared.best)]
-    return ", ".join(names) or "noise", probability(compared.combinations.probability[compared.best])
+def _most_probable(compared: ColumnComparison) -> tuple[Text, Text]:
+    shown = [_short(compared, i) for i in sorted(compared.best)]
+    return ((commas(shown) or say("noise")), probability(compared.combinations.probability[compared.best]))
 
 
-def _short(compared: ColumnComparison, index: int) -> str:
-    rival = compared.rivals[index]
-    return rival.name if rival.effect else rival.name.removeprefix(compared.column.title).strip(" ,")
+def _short(compared: ColumnComparison, index: int) -> Text:
+    return compared.rivals[index].short

@@ -20,8 +20,10 @@ from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanatio
 from cmm_uq.diagnosis.comparison.lack_of_fit import lack_of_fit
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.diagnosis.comparison.unknown_functions import smooth_functions
-from cmm_uq.diagnosis.noise import kinds, tails
+from cmm_uq.diagnosis.noise import tails
 from cmm_uq.kinds.error_maps.columns import MapColumn, roughness
+from cmm_uq.kinds.error_maps.noise import kinds_along
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.physics.thermal import EXPANSION, SCALE_EXPANSION
 from cmm_uq.points import Floats
 from cmm_uq.units import REFERENCE_TEMPERATURE
@@ -38,10 +40,12 @@ _WHITE, _CORRELATIONS = 0.5, (0.4, 0.6, 0.8, 0.9)
 class Rival:
     """An explanation of how the maps of a column differ: over the maps (k,), and over position (p, r) mm.
 
-    ``map`` is the one that differs, if one does; ``effect`` the effect's name, if it is one.
+    ``map`` is the one that differs, if one does; ``effect`` the effect's name, if it is one;
+    ``short`` its name beside the column's.
     """
 
-    name: str
+    name: Text
+    short: Text
     over_maps: Floats
     functions: tuple[Floats, ...]
     map: int | None = None
@@ -101,10 +105,7 @@ class ColumnComparison:
         left = self.observed - Q @ (Q.T @ self.observed)
         sigma = np.geomspace(rough / 10, 4 * max(rough, float(left.std())), _SIGMAS)
         contrast = np.repeat(np.arange(m // p), p)
-        noises = kinds(
-            np.arange(m), np.tile(np.arange(p, dtype=np.float64), m // p), np.column_stack([contrast, np.zeros((m, 2))]),
-            white=_WHITE, correlations=_CORRELATIONS,
-        )  # fmt: skip
+        noises = kinds_along(contrast, _WHITE, _CORRELATIONS)
         explanations = [
             Explanation(
                 rival.name, EFFECT if rival.effect else UNKNOWN,
@@ -179,14 +180,22 @@ def column_comparison(column: MapColumn, named: Sequence[str], seed: int) -> Col
     if column.is_scale and changes:
         effect = SCALE_EXPANSION[column.axis].name
         excess = temperatures - REFERENCE_TEMPERATURE
-        expansion = Rival(effect, excess, (EXPANSION.prior_sd * place[:, None],), effect=effect)
+        expansion = Rival(
+            Verbatim(effect), Verbatim(effect), excess, (EXPANSION.prior_sd * place[:, None],), effect=effect
+        )
         (given if effect in named else rivals).append(expansion)
     if len(temperatures) == 2:
-        rivals.append(Rival(f"{column.title}, difference of the two maps", np.array([-0.5, 0.5]), functions))
+        short = say("difference of the two maps")
+        name = say("{error}, difference of the two maps", error=column.title)
+        rivals.append(Rival(name, short, np.array([-0.5, 0.5]), functions))
     else:
         if changes:
             share = (temperatures - temperatures.mean()) / np.ptp(temperatures)
-            rivals.append(Rival(f"{column.title}, in proportion to the temperature", share, functions))
+            short = say("in proportion to the temperature")
+            name = say("{error}, in proportion to the temperature", error=column.title)
+            rivals.append(Rival(name, short, share, functions))
         for k, one in enumerate(np.eye(len(temperatures))):
-            rivals.append(Rival(f"{column.title} in the map at {temperatures[k]:g} °C", one, functions, map=k))
+            short = say("in the map at {temperature:g} °C", temperature=temperatures[k])
+            name = say("{error} in the map at {temperature:g} °C", error=column.title, temperature=temperatures[k])
+            rivals.append(Rival(name, short, one, functions, map=k))
     return ColumnComparison(column, tuple(rivals), tuple(given), seed)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.documents.document import Column, Section, Table
+from cmm_uq.messages import Text, Verbatim, commas, number, say
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.screening.finding import Finding
 from cmm_uq.units import ARCSECOND
@@ -28,12 +29,18 @@ def squareness_findings(maps: Sequence[ErrorMap]) -> list[Finding]:
         same.setdefault(tuple(m.squareness.tolist()), []).append(m.temperature)
     return [
         Finding(
-            "copied", (), (),
-            f"squareness: the maps at {', '.join(f'{t:g}' for t in temperatures)} °C give the same figures. They were "
-            "measured once, and say nothing of how it changes; measure it at each temperature",
+            "copied",
+            (),
+            (),
+            say(
+                "squareness: the maps at {temperatures} °C give the same figures. They were measured once, and say "
+                "nothing of how it changes; measure it at each temperature",
+                temperatures=commas(number(t, "g") for t in temperatures),
+            ),
         )
-        for temperatures in same.values() if len(temperatures) > 1
-    ]  # fmt: skip
+        for temperatures in same.values()
+        if len(temperatures) > 1
+    ]
 
 
 def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
@@ -42,16 +49,20 @@ def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
         return ()
     ordered = _by_temperature(maps)
     figures = np.array([m.squareness for m in ordered]) / ARCSECOND
-    rows = [
-        (f"{m.temperature:g}\u00a0°C", *(f"{value:.5g}" for value in row)) for m, row in zip(ordered, figures, strict=True)
-    ]  # fmt: skip
-    rows.append(("Largest less smallest", *(f"{value:.5g}" for value in np.ptp(figures, axis=0))))
-    heads = (Column("Map", numeric=False), *(Column(f"{pair} / ″") for pair in ("XY", "YZ", "ZX")))
-    note = (
-        "There is one figure a map, without an uncertainty: whether they differ is not tested. One arc second moves a point "
-        "by 2.4 µm over 500 mm."
+    rows: list[tuple[Text, ...]] = [
+        (say("{temperature:g}\u00a0°C", temperature=m.temperature), *(number(value, ".5g") for value in row))
+        for m, row in zip(ordered, figures, strict=True)
+    ]
+    rows.append((say("Largest less smallest"), *(number(value, ".5g") for value in np.ptp(figures, axis=0))))
+    heads = (
+        Column(say("Map"), numeric=False),
+        *(Column(say("{pair} / ″", pair=Verbatim(pair))) for pair in ("XY", "YZ", "ZX")),
     )
-    return (Section("Squareness of the axes", (Table("Squareness", heads, tuple(rows), (note,)),)),)
+    note = say(
+        "There is one figure a map, without an uncertainty: whether they differ is not tested. One "
+        "arc second moves a point by 2.4 µm over 500 mm."
+    )
+    return (Section(say("Squareness of the axes"), (Table(say("Squareness"), heads, tuple(rows), (note,)),)),)
 
 
 def _stated(maps: Sequence[ErrorMap]) -> bool:

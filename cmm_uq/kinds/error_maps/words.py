@@ -2,76 +2,91 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.wording import probability
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.kinds.error_maps.diagnosis import Difference, MapsDiagnosis
+from cmm_uq.messages import Text, Verbatim, listed, number, say, semicolons, sentences
 
-VERDICTS = {
-    "consistent": "The maps agree with each other within their noise.",
-    "explained": "The maps differ from each other, and what makes them differ is found.",
-    "partial": "The maps differ from each other; something that makes them differ is found, but it does not account for all.",
-    "unexplained": "The maps differ from each other, and no known effect accounts for it.",
+VERDICTS: Mapping[str, Text] = {
+    "consistent": say("The maps agree with each other within their noise."),
+    "explained": say("The maps differ from each other, and what makes them differ is found."),
+    "partial": say(
+        "The maps differ from each other; something that makes them differ is found, but it does not account for all."
+    ),
+    "unexplained": say("The maps differ from each other, and no known effect accounts for it."),
 }
 
 
-def lines(found: MapsDiagnosed) -> list[str]:
+def lines(found: MapsDiagnosed) -> list[Text]:
     """Verdict and everything that follows from it, a sentence or two each."""
     d = found.diagnosis
-    said = [VERDICTS[d.verdict]]
+    said: list[Text] = [VERDICTS[d.verdict]]
     said += [sentence(item, d.improvement) for item in d.effects]
     said += [difference_words(difference) for difference in d.differences]
     return [*said, *noise_words(d), *(what for _, what in next_words(d))]
 
 
-def difference_words(difference: Difference) -> str:
+def difference_words(difference: Difference) -> Text:
     """Where maps differ, by how much, and which of them it may be."""
-    unit, rival = difference.column.unit[0], difference.rival
+    rival = difference.rival
     low, high = difference.region
-    axis = difference.column.axis.upper()
-    size = f"by up to {difference.amplitude:.2g}\u00a0{unit}, most of all from {axis} = {low:g} to {high:g}\u00a0mm"
-    what = f"{rival.name[0].upper()}{rival.name[1:]}"
+    size = say(
+        "by up to {amplitude:.2g}\u00a0{unit}, most of all from {axis} = {low:g} to {high:g}\u00a0mm",
+        amplitude=difference.amplitude, unit=difference.column.unit[0], axis=Verbatim(difference.column.axis.upper()),
+        low=low, high=high,
+    )  # fmt: skip
+    chance = probability(difference.probability)
     if rival.map is not None:
-        text = f"{what} differs from the others {size}"
+        told = say("{what:capital} differs from the others {size} (probability {chance}).",
+                   what=rival.name, size=size, chance=chance)  # fmt: skip
     elif len(difference.column.temperatures) == 2:
-        text = f"{what}: {size}; which of the two is right they cannot say"
+        told = say("{what:capital}: {size}; which of the two is right they cannot say (probability {chance}).",
+                   what=rival.name, size=size, chance=chance)  # fmt: skip
     else:
-        text = f"{what}, changes {size}"
-    text += f" (probability {probability(difference.probability)})."
+        told = say("{what:capital}, changes {size} (probability {chance}).", what=rival.name, size=size, chance=chance)
+    said: list[Text] = [told]
     if difference.turned:
-        text += " With the sign of its figures turned it would agree."
+        said.append(say("With the sign of its figures turned it would agree."))
     if difference.instead:
-        text += f" It could also be: {'; '.join(difference.instead)}."
-    return text
+        said.append(say("It could also be: {others}.", others=semicolons(difference.instead)))
+    return sentences(said)
 
 
-def noise_words(d: MapsDiagnosis) -> list[str]:
+def noise_words(d: MapsDiagnosis) -> list[Text]:
     """Scatter of a reading about smooth functions."""
-    found = []
-    for what, noise in (("displacement", d.displacement), ("rotation", d.rotation)):
+    found: list[Text] = []
+    for what, noise in ((say("displacement"), d.displacement), (say("rotation"), d.rotation)):
         if noise is not None:
             low, high = noise.interval95
             found.append(
-                f"Standard uncertainty of one reading of a {what} {noise.value:.2g}\u00a0{noise.unit} "
-                f"(95\u00a0% interval {low:.2g} to {high:.2g}\u00a0{noise.unit})."
+                say(
+                    "Standard uncertainty of one reading of a {what} {value:.2g}\u00a0{unit} (95\u00a0% interval "
+                    "{low:.2g} to {high:.2g}\u00a0{unit}).",
+                    what=what,
+                    value=noise.value,
+                    unit=noise.unit,
+                    low=low,
+                    high=high,
+                )
             )
     return found
 
 
-def next_words(d: MapsDiagnosis) -> list[tuple[tuple[str, ...], str]]:
+def next_words(d: MapsDiagnosis) -> list[tuple[tuple[Text, ...], Text]]:
     """What to measure next, once for each error: explanations that it would part, and in words."""
-    found = []
+    found: list[tuple[tuple[Text, ...], Text]] = []
     for title in dict.fromkeys(difference.column.title for difference in d.differences):
         some = [difference for difference in d.differences if difference.column.title == title]
         names = tuple(dict.fromkeys(name for one in some for name in (one.rival.name, *one.instead)))
         temperatures = some[0].column.temperatures
         if len(temperatures) == 2:
-            what = f"Map the {title} a third time: with two maps nothing says which of them is off."
+            what = say("Map the {title} a third time: with two maps nothing says which of them is off.", title=title)
         else:
             chosen = [t for t in temperatures if any(name.endswith(f" {t:g} °C") for name in names)]
-            listed = [f"{t:g}" for t in (chosen if len(chosen) == 1 else temperatures)]
-            what = (
-                f"Measure the {title} again at {' and '.join(filter(None, (', '.join(listed[:-1]), listed[-1])))} °C."
-            )
+            shown = [number(t, "g") for t in (chosen if len(chosen) == 1 else temperatures)]
+            what = say("Measure the {title} again at {temperatures} °C.", title=title, temperatures=listed(shown))
         found.append((names, what))
     return found

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from cmm_uq.jobs.job import ReferencedFacts
-from cmm_uq.model.kind import Kind
+from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.model.kind import LENGTHS, Kind
 
 KIND = Kind(
     name="gauge_blocks",
@@ -12,5 +12,5 @@ KIND = Kind(
     screen="cmm_uq.kinds.gauge_lines.screen:SCREENING",
     plan="cmm_uq.kinds.gauge_blocks.plan:PLANNING",
     page="cmm_uq.kinds.gauge_lines.page:PAGE",
-    standards=("ISO 10360-2:2009", "VDI/VDE 2617"),
+    tested=(LENGTHS,),
 )

@@ -12,6 +12,7 @@ from cmm_uq.conformity.plans import ISO_10360_2
 from cmm_uq.documents.result import Result
 from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
+from cmm_uq.messages import Text
 from cmm_uq.units import MICROMETRE, PPM
 
 
@@ -28,7 +29,7 @@ class LineFigures:
     """
 
     line: GaugeLine
-    position: str
+    position: Text
     share: float | None
     expanded_scale_ppm: float
     expanded_gap_um: float | None
@@ -42,17 +43,24 @@ class LineFigures:
         """For results.json."""
         line, periodic = self.line, self.line.periodic
         return {
-            "measurement": line.measurement, "position": self.position, "length_mm": line.length, "faces": line.faces,
+            "measurement": line.measurement,
+            "position": self.position,
+            "length_mm": line.length,
+            "faces": line.faces,
             "slope_ppm": {"value": line.scale_ppm, "U": self.expanded_scale_ppm},
             "off_slope_um": line.linearity / MICROMETRE,
-            "bidirectional_um": None if line.gap is None else {
-                "value": line.gap / MICROMETRE, "U": self.expanded_gap_um
-            },
-            "periodic": None if periodic is None else {
-                "amplitude_um": periodic.amplitude / MICROMETRE, "period_mm": periodic.period, "p_value": periodic.p_value
+            "bidirectional_um": None
+            if line.gap is None
+            else {"value": line.gap / MICROMETRE, "U": self.expanded_gap_um},
+            "periodic": None
+            if periodic is None
+            else {
+                "amplitude_um": periodic.amplitude / MICROMETRE,
+                "period_mm": periodic.period,
+                "p_value": periodic.p_value,
             },
             "share_of_travel": self.share,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +68,7 @@ class GaugeFigures:
     """Every line, and which of the seven positions of ISO 10360-2:2009 were not measured."""
 
     lines: tuple[LineFigures, ...]
-    missing: tuple[str, ...]
+    missing: tuple[Text, ...]
 
 
 def figures(result: Result) -> GaugeFigures:

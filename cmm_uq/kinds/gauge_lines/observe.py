@@ -15,11 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import ReferencedFacts
+from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact, Indications, Size
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
 from cmm_uq.points import AXES, Floats, Ints, Points
+from cmm_uq.units import unit
 
 _SAME_FACE = 1e-6
 """mm; certified distances closer than this belong to one face."""
@@ -57,7 +59,7 @@ class StepGauge(Artefact):
     """
 
     kind = "step_gauge"
-    title = "Step gauge"
+    title = say("Step gauge")
 
     def __init__(self, facts: ReferencedFacts, points: Points, *, where: str | None = None) -> None:
         self.points = points
@@ -71,7 +73,16 @@ class StepGauge(Artefact):
         self.expansion = expansion(facts, points)
         longest = float(self._lines.sums(self._ends * self.reference).max())
         length = facts.length_mm or longest
-        self.sizes = (Size("length_mm", f"Length of the {self.title.lower()}", "mm", length, certified_sd(facts)),)
+        self.sizes = (
+            Size(
+                "length_mm",
+                say("Length of the {title:small}", title=self.title),
+                unit("mm"),
+                length,
+                certified_sd(facts),
+                say("length"),
+            ),
+        )
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """See :meth:`Artefact.fit`: every point moved along its line to its certified distance."""
@@ -165,8 +176,9 @@ class StepGauge(Artefact):
         if np.any(at := (points.point == 1) & (np.abs(self.reference) > _SAME_FACE)):
             raise CmmUqError(
                 f"point 1 has reference_mm = {self.reference[np.argmax(at)]:g}: distances count from point 1, so it has 0",
-                where=place(points, at, where), fix="Subtract the first distance from all of the measurement",
-            )  # fmt: skip
+                where=place(points, at, where),
+                fix="Subtract the first distance from all of the measurement",
+            )
         spans = lines.sums(self._ends * self.reference)
         if np.any(single := spans <= _SAME_FACE):
             at = points.measurement == lines.numbers[np.argmax(single)]
@@ -174,12 +186,15 @@ class StepGauge(Artefact):
                 f"measurement {lines.numbers[np.argmax(single)]} has a single face, so it tells no length of the {what}",
                 where=place(points, at, where),
                 fix="Record at least two faces of different reference_mm in each measurement, or leave it out",
-            )  # fmt: skip
+            )
         bars = np.linalg.norm(lines.sums(self._ends[:, None] * points.xyz), axis=1)
         if np.any(bars == 0):
             at = points.measurement == lines.numbers[np.argmin(bars)]
-            raise CmmUqError(f"the first and the farthest face of measurement {lines.numbers[np.argmin(bars)]} lie in one "
-                             "place", where=place(points, at, where), fix="Mend its coordinates or reference_mm")  # fmt: skip
+            raise CmmUqError(
+                f"the first and the farthest face of measurement {lines.numbers[np.argmin(bars)]} lie in one place",
+                where=place(points, at, where),
+                fix="Mend its coordinates or reference_mm",
+            )
         check_length(float(bars.mean()), float(spans.mean()), "the recorded lines", where)
 
 
@@ -187,7 +202,7 @@ class GaugeBlocks(StepGauge):
     """Gauge blocks: the two faces of each, in one or several places."""
 
     kind = "gauge_blocks"
-    title = "Gauge blocks"
+    title = say("Gauge blocks")
 
 
 def _ends(reference: Floats, lines: Placings) -> Floats:

@@ -12,12 +12,12 @@ from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import residual_volume
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import listed
 from cmm_uq.kinds.gauge_lines.analysis import GaugeFigures, LineFigures, figures, results
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
+from cmm_uq.messages import NOTHING, Text, listed, number, say, semicolons, sentences
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.rounding import rounded
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 def sections(result: Result) -> list[Section]:
@@ -25,24 +25,37 @@ def sections(result: Result) -> list[Section]:
     gauge = cast("StepGauge", result.artefact)
     found = figures(result)
     blocks: list[Block] = [_plot(result, gauge), _table(result, found.lines)]
-    blocks += [*_periodic(found.lines), *_positions(found), residual_volume(result, "faces")]
-    return [Section("Deviations along the gauge", tuple(blocks))]
+    blocks += [*_periodic(found.lines), *_positions(found), residual_volume(result, say("faces"))]
+    return [Section(say("Deviations along the gauge"), tuple(blocks))]
 
 
 def _plot(result: Result, gauge: StepGauge) -> Block:
     deviations, residuals = gauge.deviations() / MICROMETRE, result.residuals / MICROMETRE
     expanded = 2 * result.noise.coordinate.value
     return length_plot(
-        _side_by_side(gauge), deviations, residuals, expanded_before_um=expanded, expanded_after_um=expanded,
-        reference="certified distance, mean of each line", flagged=result.flagged,
-        position_label="Certified distance from the first face / mm (lines side by side)",
-        caption="Deviation of each face from its certified distance, as recorded and after the fitted model, with U (k = 2).",
-        alternative=(
-            f"{len(deviations)} faces on {len(set(gauge.measurement.tolist()))} lines: as recorded they deviate by "
-            f"{deviations.min():.1f} to {deviations.max():.1f} µm from the mean of their line; after the fitted model "
-            f"{residuals.min():.1f} to {residuals.max():.1f} µm remain."
+        _side_by_side(gauge),
+        deviations,
+        residuals,
+        expanded_before_um=expanded,
+        expanded_after_um=expanded,
+        reference=say("certified distance, mean of each line"),
+        flagged=result.flagged,
+        position_label=say("Certified distance from the first face / mm (lines side by side)"),
+        caption=say(
+            "Deviation of each face from its certified distance, as recorded and after the fitted model, "
+            "with U (k = 2)."
         ),
-    )  # fmt: skip
+        alternative=say(
+            "{faces} faces on {lines} lines: as recorded they deviate by {low:.1f} to {high:.1f} µm "
+            "from the mean of their line; after the fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
+            faces=len(deviations),
+            lines=len(set(gauge.measurement.tolist())),
+            low=deviations.min(),
+            high=deviations.max(),
+            low_after=residuals.min(),
+            high_after=residuals.max(),
+        ),
+    )
 
 
 def _side_by_side(gauge: StepGauge) -> Floats:
@@ -55,60 +68,97 @@ def _side_by_side(gauge: StepGauge) -> Floats:
 def _table(result: Result, found: tuple[LineFigures, ...]) -> Table:
     noise = 2 * result.noise.coordinate.value
     both = any(one.line.gap is not None for one in found)
-    rows = []
+    rows: list[tuple[Text, ...]] = []
     for one in found:
         line = one.line
         scale, U = rounded(line.scale_ppm, one.expanded_scale_ppm)
         linearity = rounded(line.linearity / MICROMETRE, noise)[0]
-        row = [str(line.measurement), one.position, f"{line.length:.10g}", str(line.faces), scale, U, linearity]
+        row: list[Text] = [
+            number(line.measurement),
+            one.position,
+            number(line.length, ".10g"),
+            number(line.faces),
+            scale,
+            U,
+            linearity,
+        ]
         if both:
             row += _gap(one)
         rows.append(tuple(row))
     columns = [
-        Column("Line", numeric=False), Column("Position", numeric=False), Column("Length", "mm"), Column("Faces"),
-        Column("Slope", "µm/m"), Column("U", "µm/m"), Column("Off slope", "µm"),
-    ]  # fmt: skip
+        Column(say("Line"), numeric=False),
+        Column(say("Position"), numeric=False),
+        Column(say("Length"), unit("mm")),
+        Column(say("Faces")),
+        Column(say("Slope"), unit("µm/m")),
+        Column(say("U"), unit("µm/m")),
+        Column(say("Off slope"), unit("µm")),
+    ]
     notes = [
-        "Slope: indicated minus certified distance, over the distance. Off slope: largest deviation of a face from it."
+        say(
+            "Slope: indicated minus certified distance, over the distance. Off slope: largest deviation "
+            "of a face from it."
+        )
     ]
     if both:
-        columns += [Column("Bidirectional", "µm"), Column("U", "µm")]
+        columns += [Column(say("Bidirectional"), unit("µm")), Column(say("U"), unit("µm"))]
         notes.append(
-            "Bidirectional: faces met travelling away from the first face minus the same faces met on the way back."
+            say(
+                "Bidirectional: faces met travelling away from the first face minus the same faces met on the way back."
+            )
         )
     notes.append(
-        "U (k = 2) from the standard uncertainty of a coordinate, for the slope also from the gauge's certificate."
+        say("U (k = 2) from the standard uncertainty of a coordinate, for the slope also from the gauge's certificate.")
     )
-    return Table("Each line by itself, at 20 °C", tuple(columns), tuple(rows), tuple(notes))
+    return Table(say("Each line by itself, at 20 °C"), tuple(columns), tuple(rows), tuple(notes))
 
 
-def _gap(one: LineFigures) -> tuple[str, str]:
+def _gap(one: LineFigures) -> tuple[Text, Text]:
     if one.line.gap is None or one.expanded_gap_um is None:
-        return "", ""
+        return (NOTHING, NOTHING)
     return rounded(one.line.gap / MICROMETRE, one.expanded_gap_um)
 
 
 def _periodic(lines: tuple[LineFigures, ...]) -> list[Block]:
     found = [
-        f"line {line.measurement}: amplitude {line.periodic.amplitude / MICROMETRE:.2g} µm, period "
-        f"{line.periodic.period:.3g} mm (p = {line.periodic.p_value:.1g})"
+        say(
+            "line {measurement}: amplitude {amplitude:.2g} µm, period {period:.3g} mm (p = {p_value:.1g})",
+            measurement=line.measurement,
+            amplitude=line.periodic.amplitude / MICROMETRE,
+            period=line.periodic.period,
+            p_value=line.periodic.p_value,
+        )
         for line in (one.line for one in lines)
         if line.periodic is not None
     ]
-    text = f"Periodic along the line, beyond what scatter explains: {'; '.join(found)}."
+    text = say("Periodic along the line, beyond what scatter explains: {lines}.", lines=semicolons(found))
     return [Paragraph(text)] if found else []
 
 
 def _positions(found: GaugeFigures) -> list[Block]:
     """Which of the seven positions of ISO 10360-2 are there, and long enough."""
-    short = [f"line {one.line.measurement} ({100 * one.share:.0f} %)" for one in found.lines if one.share and one.short]
+    short = [
+        say("line {measurement} ({share:.0f} %)", measurement=one.line.measurement, share=100 * one.share)
+        for one in found.lines
+        if one.share and one.short
+    ]
     texts = []
     if found.missing:
-        texts.append(f"Not measured of the seven positions of ISO 10360-2:2009: {listed(list(found.missing))}.")
+        texts.append(
+            say(
+                "Not measured of the seven positions of ISO 10360-2:2009: {positions}.", positions=listed(found.missing)
+            )
+        )
     if short:
-        least = f"{100 * ISO_10360_2.least_share:.0f} %"
-        texts.append(f"Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {listed(short)}.")
-    return [Paragraph(" ".join(texts), tone="note")] if texts else []
+        least = say("{least_share:.0f} %", least_share=100 * ISO_10360_2.least_share)
+        texts.append(
+            say(
+                "Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {short}.",
+                least=least,
+                short=listed(short),
+            )
+        )
+    return [Paragraph(sentences(texts), tone="note")] if texts else []
 
 
 PAGE = Page(sections, results)

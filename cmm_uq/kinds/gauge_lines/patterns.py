@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.planning.directions import words
 from cmm_uq.planning.patterns import length_of

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.table import Length, Uncertainty
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.plane.facts import PlaneFacts
+from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact, Size
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import place
@@ -60,7 +61,7 @@ class PlaneSurface(Artefact):
     """
 
     kind = "plane"
-    title = "Plane"
+    title = say("Plane")
 
     def __init__(self, facts: PlaneFacts, points: Points, *, where: str | None = None) -> None:
         self.points = points
@@ -144,9 +145,10 @@ class PlaneSurface(Artefact):
             if not len(self._ahead(number)):
                 raise CmmUqError(
                     f"measurement {number} has no direction point (point 0), so that nothing says to which side the probe's "
-                    "offset goes", where=place(points, points.measurement == number, where),
+                    "offset goes",
+                    where=place(points, points.measurement == number, where),
                     fix="Record a point 0 just before contact, or leave out probe_offset_mm",
-                )  # fmt: skip
+                )
             try:
                 self._surface(number, offset, 1.0)  # an angle depends on no uncertainty
             except DirectionPointError as rejected:

@@ -6,9 +6,10 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.kinds.plane.facts import PlaneFacts
+from cmm_uq.messages import say
 from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, across_planes
 from cmm_uq.planning.placing import Pattern, Placing
 from cmm_uq.planning.setting import Planning, Setting
@@ -32,7 +33,7 @@ def surface(facts: ArtefactFacts, plan: PlanFacts, size: Floats) -> Pattern:
 def surface_places(setting: Setting) -> tuple[Placing, ...]:
     """A grid over the lower face of the volume."""
     pattern = surface(setting.artefact, setting.plan, setting.volume.size[:2])
-    return (setting.volume.set_up(pattern, np.eye(3), (0.5, 0.5, 0.0), "flat"),)
+    return (setting.volume.set_up(pattern, np.eye(3), (0.5, 0.5, 0.0), say("flat")),)
 
 
 def _shape(setting: Setting) -> Shape:

@@ -13,7 +13,7 @@ from cmm_uq.kinds.plate.observe import Plate
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE, PPM
+from cmm_uq.units import MICROMETRE, PPM, unit
 
 STEEL = 11.5e-6
 """Expansion of a plate whose own is not stated, 1/K."""
@@ -139,5 +139,5 @@ def _common(result: Result) -> CommonScale | None:
     columns = {unknown.key[0]: i for i, unknown in enumerate(result.posterior.unknowns)}
     draws = result.posterior.draws[:, [columns[name] for name in scales]].mean(axis=1)
     cte = result.job.facts.artefact.cte_per_k or STEEL
-    change = Quantity.of_draws(draws, "ppm")
-    return CommonScale(change, cte, change.times(-PPM / cte, "K"))
+    change = Quantity.of_draws(draws, unit("ppm"))
+    return CommonScale(change, cte, change.times(-PPM / cte, unit("K")))

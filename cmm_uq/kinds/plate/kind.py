@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.kinds.plate.facts import PlateFacts
-from cmm_uq.model.kind import Kind
+from cmm_uq.model.kind import LENGTHS, Kind
 
 KIND = Kind(
     name="plate",
@@ -12,5 +12,5 @@ KIND = Kind(
     screen="cmm_uq.kinds.plate.screen:SCREENING",
     plan="cmm_uq.kinds.plate.plan:PLANNING",
     page="cmm_uq.kinds.plate.page:PAGE",
-    standards=("ISO 10360-2:2009", "VDI/VDE 2617"),
+    tested=(LENGTHS,),
 )

@@ -12,11 +12,13 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.earlier import NOISE_RATIO
 from cmm_uq.kinds.plate.facts import PlateFacts
+from cmm_uq.messages import say
 from cmm_uq.model.artefact import Indications, Size
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
 from cmm_uq.model.rigid import Rigid
 from cmm_uq.points import Floats, Points
+from cmm_uq.units import unit
 
 REFERENCES = ("reference_x_mm", "reference_y_mm", "reference_z_mm")
 
@@ -36,7 +38,7 @@ class Plate(Rigid):
     """
 
     kind = "plate"
-    title = "Plate"
+    title = say("Plate")
 
     def __init__(self, facts: PlateFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(points)
@@ -47,7 +49,16 @@ class Plate(Rigid):
         longest = float(np.linalg.norm(self.reference - self.reference[0], axis=1).max())
         body = self.reference * self.expansion[:, None]
         self.body = body - self.placings.means(body)
-        self.sizes = (Size("length_mm", "Length of the plate", "mm", facts.length_mm or longest, certified_sd(facts)),)
+        self.sizes = (
+            Size(
+                "length_mm",
+                say("Length of the plate"),
+                unit("mm"),
+                facts.length_mm or longest,
+                certified_sd(facts),
+                say("length"),
+            ),
+        )
         self._refuse_another_plate(where)
 
     def shape(self, sizes: Floats) -> Floats:

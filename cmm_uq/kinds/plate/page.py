@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot
 from typing import cast
 
@@ -12,12 +13,13 @@ from cmm_uq.documents.vector_plot import vector_plot
 from cmm_uq.documents.wording import expanded
 from cmm_uq.kinds.plate.analysis import Arrows, PlateFigures, arrows, compared, figures, results
 from cmm_uq.kinds.plate.observe import Plate
+from cmm_uq.messages import NOTHING, Text, Verbatim, day, number, say, sentences
 from cmm_uq.uncertainty.rounding import rounded
-from cmm_uq.units import PPM
+from cmm_uq.units import PPM, unit
 
 _PLATES_SHOWN = 6
-_CERTIFIED = ("Positions on the plate", "Found minus certified", "After the fitted model")
-_COMPARED = ("What changed between the two dates", "Now minus then", "After the fitted change")
+_CERTIFIED = (say("Positions on the plate"), say("Found minus certified"), say("After the fitted model"))
+_COMPARED = (say("What changed between the two dates"), say("Now minus then"), say("After the fitted change"))
 
 
 def sections(result: Result) -> list[Section]:
@@ -35,39 +37,62 @@ def _confounded(result: Result, found: PlateFigures) -> list[Block]:
     if not compared(result):
         return []
     facts = result.job.facts
-    since = f" of {facts.recording.earlier_date.isoformat()}" if facts.recording.earlier_date else ""
-    texts = [
-        f"References are the positions found by the earlier recording{since}; the error factors of this certificate are what "
-        "changed since. Errors of machine and plate that were there on both dates cancel, as long as the plate stood in the "
-        "same places."
+    since = say(" of {date}", date=day(facts.recording.earlier_date)) if facts.recording.earlier_date else NOTHING
+    texts: list[Text] = [
+        say(
+            "References are the positions found by the earlier recording{since}; the error factors of "
+            "this certificate are what changed since. Errors of machine and plate that were there on "
+            "both dates cancel, as long as the plate stood in the same places.",
+            since=since,
+        )
     ]
     if found.common is not None:
         common, cte = found.common, found.common.cte_per_k / PPM
         value, U, _ = expanded(common.change)
         kelvin = rounded(abs(common.warmer.value), 2 * common.warmer.u)[0]
-        temperature, size = ("colder", "shrunk") if common.colder else ("warmer", "grown")
-        texts.append(
-            f"The common part of the scales changed by {value} ppm, U = {U} ppm. A plate that was {temperature} by {kelvin} K "
-            f"(at {cte:.3g} ppm/K) than its recorded temperatures account for looks the same, and so does "
-            f"one that has {size} by as much."
+        told = say("The common part of the scales changed by {value} ppm, U = {U} ppm.", value=value, U=U)
+        texts += [told, _alike(kelvin, cte, colder=common.colder)]
+    texts.append(say("A plate that has sheared or bent since looks like squareness or straightness of its plane."))
+    return [Paragraph(sentences(texts))]
+
+
+def _alike(kelvin: Text, cte: float, *, colder: bool) -> Text:
+    if colder:
+        return say(
+            "A plate that was colder by {kelvin} K (at {cte:.3g} ppm/K) than its recorded temperatures account for looks the "
+            "same, and so does one that has shrunk by as much.",
+            kelvin=kelvin,
+            cte=cte,
         )
-    texts.append("A plate that has sheared or bent since looks like squareness or straightness of its plane.")
-    return [Paragraph(" ".join(texts))]
+    return say(
+        "A plate that was warmer by {kelvin} K (at {cte:.3g} ppm/K) than its recorded temperatures account for looks the "
+        "same, and so does one that has grown by as much.",
+        kelvin=kelvin,
+        cte=cte,
+    )
 
 
-def _picture(one: Arrows, titles: list[str]) -> Block:
+def _picture(one: Arrows, titles: Sequence[Text]) -> Block:
     largest = [max(hypot(*arrow) for arrow in arrows.tolist()) for arrows in (one.before, one.after)]
     first, second = ("xyz"[axis] for axis in one.axes)
     return vector_plot(
-        one.place, tuple(zip(titles, (one.before, one.after), strict=True)),
-        axis_labels=(f"Plate {first} / mm", f"Plate {second} / mm"),
-        caption=f"Measurement {one.measurement}: displacement of each ball in the plane of the plate, "
-        "placed by least squares.",
-        alternative=(
-            f"Arrows at {len(one.place)} balls: up to {largest[0]:.1f} µm as recorded, up to {largest[1]:.1f} µm after the "
-            "fitted model."
+        one.place,
+        tuple(zip(titles, (one.before, one.after), strict=True)),
+        axis_labels=(
+            say("Plate {first} / mm", first=Verbatim(first)),
+            say("Plate {second} / mm", second=Verbatim(second)),
         ),
-    )  # fmt: skip
+        caption=say(
+            "Measurement {measurement}: displacement of each ball in the plane of the plate, placed by least squares.",
+            measurement=one.measurement,
+        ),
+        alternative=say(
+            "Arrows at {count} balls: up to {before:.1f} µm as recorded, up to {after:.1f} µm after the fitted model.",
+            count=len(one.place),
+            before=largest[0],
+            after=largest[1],
+        ),
+    )
 
 
 def _table(result: Result, found: PlateFigures) -> Table:
@@ -75,13 +100,20 @@ def _table(result: Result, found: PlateFigures) -> Table:
     rows = []
     for one in found.spread:
         sizes = (one.rms_before_um, one.largest_before_um, one.rms_after_um, one.largest_after_um)
-        rows.append((str(one.measurement), str(one.count), *(rounded(size, noise)[0] for size in sizes)))
+        rows.append((number(one.measurement), number(one.count), *(rounded(size, noise)[0] for size in sizes)))
     columns = (
-        Column("Placing", numeric=False), Column("Balls"), Column("rms before", "µm"), Column("Largest before", "µm"),
-        Column("rms after", "µm"), Column("Largest after", "µm"),
-    )  # fmt: skip
-    note = "Coordinates of every ball minus its reference position, before and after the fitted model; the placing is fitted."
-    return Table("Deviation of a coordinate", columns, tuple(rows), (note,))
+        Column(say("Placing"), numeric=False),
+        Column(say("Balls")),
+        Column(say("rms before"), unit("µm")),
+        Column(say("Largest before"), unit("µm")),
+        Column(say("rms after"), unit("µm")),
+        Column(say("Largest after"), unit("µm")),
+    )
+    note = say(
+        "Coordinates of every ball minus its reference position, before and after the fitted model; "
+        "the placing is fitted."
+    )
+    return Table(say("Deviation of a coordinate"), columns, tuple(rows), (note,))
 
 
 PAGE = Page(sections, results)

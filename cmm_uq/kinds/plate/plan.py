@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, across_planes
 from cmm_uq.planning.directions import PRINCIPAL_PLANES

@@ -17,12 +17,12 @@ from cmm_uq.kinds.shift_axis.shift_integration import Method
 from cmm_uq.kinds.shift_axis.undetermined import Undetermined, undetermined
 from cmm_uq.kinds.shifting.correction_table import correction_table
 from cmm_uq.kinds.shifting.facts import KnownLength, ShiftFacts, shift_facts
+from cmm_uq.kinds.shifting.found import Reported, ShiftFound, listed_draws
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats, Ints, Points
-from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE, PPM
+from cmm_uq.units import MICROMETRE, PPM, unit
 
 KNOWN = "job.toml [artefact] known"
 _FINE = 101
@@ -31,18 +31,15 @@ _MISREAD = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class ShiftResult:
-    """All that is known of a shift job after its analysis.
+class ShiftResult(ShiftFound):
+    """All that is known of a shift job after its analysis; see also :class:`~cmm_uq.kinds.shifting.found.ShiftFound`.
 
     Parameters
     ----------
-    job : what was analysed.
-    estimate : curve with its posterior.
     undetermined : what no reading shows.
     integrated : the paper's integrations of two complete series, by method; empty otherwise.
     """
 
-    job: Job
     estimate: CurveEstimate
     undetermined: Undetermined
     integrated: dict[Method, IntegratedCurve]
@@ -65,26 +62,37 @@ class ShiftResult:
     @cached_property
     def scale(self) -> Quantity | None:
         """Mean sensitivity error, ppm; ``None`` where nothing determines it."""
-        return Quantity.of_draws(self.estimate.scale / PPM, "ppm") if self.estimate.scale_known else None
+        return Quantity.of_draws(self.estimate.scale / PPM, unit("ppm")) if self.estimate.scale_known else None
 
     @cached_property
     def linearity(self) -> Quantity:
         """Linearity error: peak to valley of the curve about the line through its ends at the first series, µm."""
         about = self._about_the_ends
-        return Quantity.of_draws(np.ptp(about, axis=1) / MICROMETRE, "µm", _ptp(about.mean(axis=0)))
+        return Quantity.of_draws(np.ptp(about, axis=1) / MICROMETRE, unit("µm"), _ptp(about.mean(axis=0)))
 
     @cached_property
-    def covariance(self) -> Covariance:
-        """Of linearity error and, where it is determined, mean sensitivity error."""
-        draws = {f"linearity_{self.axis}.peak_to_valley_um": (np.ptp(self._about_the_ends, axis=1) / MICROMETRE, "µm")}
+    def reported(self) -> Reported:
+        """See :attr:`ShiftFound.reported`: linearity error and, where it is determined, mean sensitivity error."""
+        found = {f"linearity_{self.axis}.peak_to_valley_um": (np.ptp(self._about_the_ends, axis=1) / MICROMETRE, "µm")}
         if self.estimate.scale_known:
-            draws[f"{SCALE[self.axis].name}.ppm"] = self.estimate.scale / PPM, "ppm"
-        return Covariance.of_draws(draws)
+            found[f"{SCALE[self.axis].name}.ppm"] = self.estimate.scale / PPM, "ppm"
+        return found
+
+    @cached_property
+    def listed(self) -> Reported:
+        """See :attr:`ShiftFound.listed`: shifts that are not known exactly, the curve, the artefact where it has a scale."""
+        estimate = self.estimate
+        shifts = estimate.shifts.T if estimate.series.u_shift > 0 else ()
+        return {
+            **{f"shifts[{i}].mm": (draws, "mm") for i, draws in enumerate(shifts) if i > 0},
+            **listed_draws(f"curves.linearity_{self.axis}.error_um", estimate.curve.draws / MICROMETRE, "µm"),
+            **(listed_draws("artefact.distance_mm", estimate.artefact, "mm") if estimate.scale_known else {}),
+        }
 
     @cached_property
     def shifts(self) -> tuple[Quantity, ...]:
         """Of each series against the first, mm."""
-        return tuple(Quantity.of_draws(draws, "mm") for draws in self.estimate.shifts.T)
+        return tuple(Quantity.of_draws(draws, unit("mm")) for draws in self.estimate.shifts.T)
 
     @cached_property
     def distances(self) -> tuple[Floats, Floats] | None:
@@ -106,22 +114,6 @@ class ShiftResult:
         if self.estimate.scale_known:
             draws -= self.estimate.scale[:, None] * (curve.position - ends[0])
         return np.asarray(draws, dtype=np.float64)
-
-    @cached_property
-    def disagreement_um(self) -> tuple[float, float]:
-        """Root mean square of what the placings disagree by, without and with the curve, µm."""
-        without, with_curve = (rms_um(values) for values in self.estimate.residuals)
-        return without, with_curve
-
-    @property
-    def repeatability(self) -> Quantity:
-        """Standard uncertainty of one reading, µm."""
-        return Quantity.of_draws(self.estimate.sigma / MICROMETRE, "µm")
-
-
-def rms_um(values: Floats) -> float:
-    """Root mean square of mm, in µm."""
-    return float((values**2).mean() ** 0.5) / MICROMETRE
 
 
 def _ptp(values: Floats) -> float:

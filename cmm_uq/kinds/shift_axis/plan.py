@@ -11,6 +11,7 @@ from cmm_uq.kinds.gauge_lines.patterns import faces_of
 from cmm_uq.kinds.shift_axis.analysis import recorded_series
 from cmm_uq.kinds.shift_axis.undetermined import undetermined
 from cmm_uq.kinds.shifting.facts import ShiftFacts
+from cmm_uq.messages import Text, say
 from cmm_uq.planning.placing import Pattern, Placing
 from cmm_uq.planning.setting import Planning, Setting, Start
 from cmm_uq.points import AXES, Points
@@ -36,14 +37,16 @@ def shift_series(setting: Setting) -> tuple[Placing, ...]:
     i = AXES.index(facts.axis)
     reach = float(places[-1] + np.ptp(facts.shifts_mm))
     if reach > volume.size[i]:
-        raise volume.too_small(np.outer([0.0, reach], np.eye(3)[i]), "with its farthest shift")
+        raise volume.too_small(np.outer([0.0, reach], np.eye(3)[i]), say("with its farthest shift"))
     start = volume.box.mean(axis=1)
     start[i] = volume.box[i, 0] - min(facts.shifts_mm)
     n = len(places)
     body = np.outer(places, np.eye(3)[i])
     pattern = Pattern(body, np.arange(1, n + 1), np.ones(n, dtype=np.int64)).repeated(plan.repeats)
     return tuple(
-        pattern.placed(setting.machine, np.eye(3), start + shift * np.eye(3)[i], f"shifted by {shift:g} mm")
+        pattern.placed(
+            setting.machine, np.eye(3), start + shift * np.eye(3)[i], say("shifted by {shift:g} mm", shift=shift)
+        )
         for shift in facts.shifts_mm
     )
 
@@ -60,7 +63,7 @@ def candidates(setting: Setting, start: Start | None) -> tuple[Placing, ...]:
                      where="job.toml [plan] criterion", fix="Leave it out; shifts_mm says what is measured")  # fmt: skip
 
 
-def free(setting: Setting, points: Points, where: str) -> tuple[str, ...]:
+def free(setting: Setting, points: Points, where: str) -> tuple[Text, ...]:
     """What no reading of these series shows.
 
     Raises
@@ -71,13 +74,19 @@ def free(setting: Setting, points: Points, where: str) -> tuple[str, ...]:
     series = recorded_series(facts, points, where)
     left = undetermined(series, scale_known=facts.known is not None)
     found = [
-        f"errors that repeat every {left.period:.4g} mm, or a half, a third … of it: every shift is a multiple of it"
+        say(
+            "errors that repeat every {period:.4g} mm, or a half, a third … of it: every shift is a multiple of it",
+            period=left.period,
+        )
     ]
     if facts.known is None:
-        found.append("the mean scale of the axis: no length of the artefact is known")
+        found.append(say("the mean scale of the axis: no length of the artefact is known"))
     if left.patterns.shape[1]:
         found.append(
-            f"{left.patterns.shape[1]} independent patterns of error at the places read, unless errors are smooth"
+            say(
+                "{shape} independent patterns of error at the places read, unless errors are smooth",
+                shape=left.patterns.shape[1],
+            )
         )
     return tuple(found)
 

@@ -111,16 +111,16 @@ def shifted_series(points: Points, axis: str, shifts: Floats, u_shift: float, wh
     _check_order(reading, series, placings, means.point, means.line, where)
     _check_common(series, point, numbers, placings, where)
     _check_places(reading, series, point, shifts, placings, where)
-    scatter, drift = _repeats(points, means, along)
+    scatter, drift = _repeats(points, means, axis)
     return ShiftedSeries(
         axis, reading, series.astype(np.int64), point.astype(np.int64), means.noise_scale, means.time, shifts, u_shift,
         _cosines(means.readings, series, along), numbers, scatter, drift,
     )  # fmt: skip
 
 
-def _repeats(points: Points, means: Means, along: int) -> tuple[Scatter | None, RepeatedDrift | None]:
+def _repeats(points: Points, means: Means, axis: str) -> tuple[Scatter | None, RepeatedDrift | None]:
     """What repeats tell of the repeatability, and of a drift between them."""
-    left = (points.readings[:, along] - means.readings[means.of, along]) / means.ratio
+    left = (points.readings[axis] - means.readings[means.of, AXES.index(axis)]) / means.ratio
     drift = None
     if means.time is not None:
         later = (points.columns["time_s"] - means.time[means.of]) / means.ratio

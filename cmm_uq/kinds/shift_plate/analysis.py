@@ -9,26 +9,25 @@ import numpy as np
 
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
-from cmm_uq.kinds.shift_axis.analysis import check_facts, check_known, known_points, rms_um
+from cmm_uq.kinds.shift_axis.analysis import check_facts, check_known, known_points
 from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
 from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate, placed_plate
 from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
 from cmm_uq.kinds.shifting.correction_table import plane_correction_table
 from cmm_uq.kinds.shifting.facts import KnownLength, shift_facts
+from cmm_uq.kinds.shifting.found import Reported, ShiftFound, listed_draws
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.points import AXES, Floats
-from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
+from cmm_uq.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneShiftResult:
+class PlaneShiftResult(ShiftFound):
     """All that is known of a plate's placings after their analysis."""
 
-    job: Job
     estimate: PlaneEstimate
 
     @property
@@ -53,30 +52,42 @@ class PlaneShiftResult:
     def scalars(self) -> dict[str, dict[str, Quantity]]:
         """Squareness, scales and sizes of the curves, by name and parameter; what is not determined is left out."""
         found: dict[str, dict[str, Quantity]] = {}
-        for (name, parameter), (draws, unit, value) in self._draws.items():
-            found.setdefault(name, {})[parameter] = Quantity.of_draws(draws, unit, value)
+        for (name, parameter), (draws, own, value) in self._draws.items():
+            found.setdefault(name, {})[parameter] = Quantity.of_draws(draws, own, value)
         return found
 
     @cached_property
-    def covariance(self) -> Covariance:
-        """Of them all."""
-        return Covariance.of_draws({".".join(key): (draws, unit) for key, (draws, unit, _) in self._draws.items()})
+    def reported(self) -> Reported:
+        """See :attr:`ShiftFound.reported`."""
+        return {".".join(key): (draws, unit) for key, (draws, unit, _) in self._draws.items()}
 
     @cached_property
-    def _draws(self) -> dict[tuple[str, str], tuple[Floats, str, float | None]]:
+    def listed(self) -> Reported:
+        """See :attr:`ShiftFound.listed`: the curves, and the places of the balls."""
+        found: dict[str, tuple[Floats, str]] = {}
+        for name, curve in self.curves.items():
+            found |= listed_draws(f"curves.{name}.error_um", curve.draws / MICROMETRE, "µm")
+        for name, curve in self.rotations.items():
+            found |= listed_draws(f"curves.{name}.error_arcsec", curve.draws / ARCSECOND, "″")
+        for k, name in enumerate(("first_mm", "second_mm")):
+            found |= listed_draws(f"artefact.{name}", self.estimate.balls[:, :, k], "mm")
+        return found
+
+    @cached_property
+    def _draws(self) -> dict[tuple[str, str], tuple[Floats, Unit, float | None]]:
         """Draws (N,), unit, and estimate where that is not their mean."""
         free = self.estimate.free.names
-        found: dict[tuple[str, str], tuple[Floats, str, float | None]] = {}
+        found: dict[tuple[str, str], tuple[Floats, Unit, float | None]] = {}
         square = SQUARENESS[self.plane].name
         if square not in free:
-            found[square, "angle_arcsec"] = self.estimate.squareness / ARCSECOND, "″", None
+            found[square, "angle_arcsec"] = (self.estimate.squareness / ARCSECOND, unit("″"), None)
         axes = [AXES[axis] for axis in self.estimate.plate.axes]
         for axis, draws in zip(axes, self.estimate.scales, strict=True):
             if SCALE[axis].name not in free:
-                found[SCALE[axis].name, "ppm"] = draws / PPM, "ppm", None
+                found[SCALE[axis].name, "ppm"] = (draws / PPM, unit("ppm"), None)
         if (SCALE[axes[0]].name, SCALE[axes[1]].name) in self.estimate.free.combinations:
             difference = self.estimate.scales[1] - self.estimate.scales[0]
-            found[f"{SCALE[axes[1]].name}_minus_{axes[0]}", "ppm"] = difference / PPM, "ppm", None
+            found[f"{SCALE[axes[1]].name}_minus_{axes[0]}", "ppm"] = (difference / PPM, unit("ppm"), None)
         for name, curve in self.curves.items():
             if name not in free:
                 draws = curve.draws
@@ -84,24 +95,13 @@ class PlaneShiftResult:
                     part = (curve.position - curve.position[0]) / np.ptp(curve.position)
                     draws = draws - draws[:, -1:] * part
                 value = float(np.ptp(draws.mean(axis=0))) / MICROMETRE
-                found[name, "peak_to_valley_um"] = np.ptp(draws, axis=1) / MICROMETRE, "µm", value
+                found[name, "peak_to_valley_um"] = (np.ptp(draws, axis=1) / MICROMETRE, unit("µm"), value)
         return found
 
     @cached_property
     def balls(self) -> tuple[Floats, Floats]:
         """(p, 2) places of the balls from the first, mm, and their standard uncertainties."""
         return self.estimate.balls.mean(axis=0), self.estimate.balls.std(axis=0, ddof=1)
-
-    @cached_property
-    def disagreement_um(self) -> tuple[float, float]:
-        """Root mean square of what the placings disagree by, without and with the curves, µm."""
-        without, with_curves = (rms_um(values) for values in self.estimate.residuals)
-        return without, with_curves
-
-    @property
-    def repeatability(self) -> Quantity:
-        """Standard uncertainty of one coordinate of one reading, µm."""
-        return Quantity.of_draws(self.estimate.sigma / MICROMETRE, "µm")
 
     @cached_property
     def table(self) -> ErrorMap:
@@ -112,15 +112,7 @@ class PlaneShiftResult:
 def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) -> PlaneShiftResult:
     """Analyse a shift job with a plate in a plane.
 
-    Parameters
-    ----------
-    job : as read; ``[artefact] plane`` says which plane.
-    seed : of everything random; the same seed gives the same result.
-    progress : told the part of the sampling done, from 0 to 1.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be analysed as it stands.
+    ``[artefact] plane`` says which plane; all else as :func:`~cmm_uq.kinds.shift_axis.analysis.analyse_shift`.
     """
     check_facts(job)
     facts, stated = shift_facts(job), job.facts.recording.u_coordinate_um

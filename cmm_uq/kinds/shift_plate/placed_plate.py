@@ -112,7 +112,7 @@ def placed_plate(points: Points, plane: str, where: str = "") -> PlacedPlate:
     balls, turned, moved = _laid_over(flat, placing, ball, placings, where)
     _check_balls(flat, placing, ball, (balls, turned, moved), means, where)
     _check_placings(flat, placing, placings, turned, moved, where)
-    left = ((points.readings - means.readings[means.of])[:, axes] / means.ratio[:, None]).ravel()
+    left = ((points.carriages - means.readings[means.of])[:, axes] / means.ratio[:, None]).ravel()
     dof = 2 * (len(points) - len(means.point))
     return PlacedPlate(
         plane, means.readings, placing.astype(np.int64), ball.astype(np.int64), means.noise_scale, placings, numbers, balls,

@@ -15,6 +15,7 @@ from scipy import linalg
 from cmm_uq.kinds.shift_axis.undetermined import common_period
 from cmm_uq.kinds.shift_plate.model import PlaneModel
 from cmm_uq.kinds.shift_plate.placed_plate import PlacedPlate
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.points import AXES, Floats
 
@@ -23,12 +24,23 @@ _ALIKE = 0.02
 _SQUARE_DEG = 5.0
 """Placings turned by less than this against each other are shifts of each other."""
 
-_TITLES = {
-    **{effect.name: f"scale of {a.upper()}" for a, effect in SCALE.items()},
-    **{effect.name: f"squareness {'–'.join(plane.upper())}" for plane, effect in SQUARENESS.items()},
-    **{effect.name: f"straightness of {a.upper()} along {b.upper()}" for (a, b), effect in STRAIGHTNESS.items()},
-    **{effect.name: f"rotation of {a.upper()} about {b.upper()}" for (a, b), effect in ROTATION.items()},
-    **{f"linearity_{a}": f"linearity of {a.upper()}" for a in AXES},
+_TITLES: dict[str, Text] = {
+    **{effect.name: say("scale of {axis}", axis=Verbatim(a.upper())) for a, effect in SCALE.items()},
+    **{
+        effect.name: say("squareness {plane}", plane=Verbatim("–".join(plane.upper())))
+        for plane, effect in SQUARENESS.items()
+    },
+    **{
+        effect.name: say(
+            "straightness of {axis} along {direction}", axis=Verbatim(a.upper()), direction=Verbatim(b.upper())
+        )
+        for (a, b), effect in STRAIGHTNESS.items()
+    },
+    **{
+        effect.name: say("rotation of {axis} about {about}", axis=Verbatim(a.upper()), about=Verbatim(b.upper()))
+        for (a, b), effect in ROTATION.items()
+    },
+    **{f"linearity_{a}": say("linearity of {axis}", axis=Verbatim(a.upper())) for a in AXES},
 }
 
 
@@ -120,6 +132,6 @@ def _period(shifts: Floats) -> float | None:
     return common_period(apart) if len(apart) > 1 else None
 
 
-def title(name: str) -> str:
+def title(name: str) -> Text:
     """A name in words, as of an effect: ``straightness_x_y`` is the straightness of X along Y."""
     return _TITLES[name]

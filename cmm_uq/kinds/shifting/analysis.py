@@ -5,6 +5,7 @@ from __future__ import annotations
 from cmm_uq import __version__
 from cmm_uq.documents.compose import certificate_of
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
+from cmm_uq.documents.posterior_file import posterior_file
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.shift_axis import page as axis_page
@@ -15,6 +16,7 @@ from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult, analyse_plane
 from cmm_uq.kinds.shift_plate.results import plane_shift_results
 from cmm_uq.kinds.shifting.correction_table import table_text
 from cmm_uq.kinds.shifting.facts import shift_facts
+from cmm_uq.messages import Verbatim, say
 
 
 def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult | PlaneShiftResult:
@@ -38,9 +40,17 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
         sections, warnings, rows = plane_page.sections(found), plane_page.warnings(found), plane_page.summary(found)
         results = plane_shift_results(found)
     chains, table = found.estimate.chains, axis_page.table_file(found.job)
-    produced_by = f"cmm-uq {__version__}, {chains.sampler}, seed {found.estimate.seed}"
-    document = certificate_of(found.job, sections, warnings, produced_by, (table,))
-    return Outcome(found, document, results, tuple(rows), warnings, {table: table_text(found.table)})
+    draws = posterior_file(found.draws, found.job.origin)
+    produced_by = say(
+        "cmm-uq {version}, {sampler}, seed {seed}",
+        version=Verbatim(__version__),
+        sampler=Verbatim(chains.sampler),
+        seed=found.estimate.seed,
+    )
+    document = certificate_of(found.job, sections, warnings, produced_by, (Verbatim(table), Verbatim(draws.name)))
+    files = {table: table_text(found.table), draws.name: draws.content}
+    results["posterior"] = draws.entry
+    return Outcome(found, document, results, tuple(rows), warnings, files, draws=found.draws)
 
 
 OWN = OwnAnalysis(report=Recipe(analyse, outcome))

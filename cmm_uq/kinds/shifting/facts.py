@@ -7,7 +7,8 @@ from typing import Annotated, Literal, Self, cast
 from pydantic import Field, model_validator
 
 from cmm_uq.files.limits import LISTED
-from cmm_uq.jobs.job import ArtefactFacts, Job
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.table import Length, Number, Position, Table, Uncertainty
 
 

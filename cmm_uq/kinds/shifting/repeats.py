@@ -20,7 +20,7 @@ class Means:
     Parameters
     ----------
     measurement, point : (m,) as recorded.
-    readings : (m, 3) scale readings, mm, weighted by the noise of each repeat.
+    readings : (m, 3) scale readings of x, y, z, mm, weighted by the noise of each repeat.
     noise_scale : (m,) standard uncertainty of each mean over that of one ordinary reading.
     time : (m,) s; ``None`` where it was not recorded.
     line : (m,) of the first repeat in its file; 0 where there is none.
@@ -56,7 +56,7 @@ def means_over_repeats(points: Points, where: str = "") -> Means:
     of = of.ravel()
     weight = 1 / ratio**2
     total = np.bincount(of, weight)
-    readings = np.column_stack([np.bincount(of, weight * x) / total for x in points.readings.T])
+    readings = np.column_stack([np.bincount(of, weight * x) / total for x in points.carriages.T])
     time = points.columns.get("time_s")
     line = points.lines[first] if len(points.lines) else np.zeros(len(keys), dtype=np.int64)
     return Means(

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
+from cmm_uq.inference.draws import evenly
 from cmm_uq.inference.ensembles import Chains, Progress, refined, run_ensembles
 from cmm_uq.inference.posterior import SIGMA_BOUNDS
 from cmm_uq.kinds.shifting.smooth_function import LONGEST, SmoothFunction
@@ -261,5 +262,5 @@ def sampled(model: SmoothModel, seed: int, progress: Progress | None) -> tuple[C
     chains = run_ensembles(
         model.log_density, centre, factor, seed, progress, effective_samples=EFFECTIVE_SAMPLES, steps_at_once=200
     )
-    chosen = chains.draws[np.linspace(0, len(chains.draws) - 1, min(DRAWS, len(chains.draws))).astype(int)]
+    chosen = chains.draws[evenly(len(chains.draws), DRAWS)]
     return model.draw(chosen, np.random.default_rng(np.random.SeedSequence([seed, 1]))), chains

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.kinds.sphere.facts import SphereFacts
-from cmm_uq.model.kind import Kind
+from cmm_uq.model.kind import FORMS, Kind
 
 KIND = Kind(
     name="sphere",
@@ -12,5 +12,5 @@ KIND = Kind(
     screen="cmm_uq.kinds.sphere.screen:SCREENING",
     plan="cmm_uq.kinds.sphere.plan:PLANNING",
     page="cmm_uq.kinds.sphere.page:PAGE",
-    standards=("ISO 10360-5:2010",),
+    tested=(FORMS,),
 )

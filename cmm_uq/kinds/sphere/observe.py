@@ -12,6 +12,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry import fit_sphere
 from cmm_uq.kinds.sphere.facts import SphereFacts
+from cmm_uq.messages import say
 from cmm_uq.model.artefact import Forms
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.radial import Radial
@@ -60,9 +61,10 @@ class Sphere(Radial):
     """
 
     kind = "sphere"
-    title = "Sphere"
+    title = say("Sphere")
     per_size = 0.5
-    size_title = "Diameter of the sphere"
+    size_title = say("Diameter of the sphere")
+    size_what = say("diameter")
     plural = "the diameters of the recorded spheres"
 
     def __init__(self, facts: SphereFacts, points: Points, *, where: str | None = None) -> None:

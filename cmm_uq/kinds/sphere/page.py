@@ -8,17 +8,21 @@ from cmm_uq.documents.document import Column, Plot, Section, Table
 from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot, volume_plot
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import numbered
 from cmm_uq.kinds.sphere.analysis import about_centre, deviations_um, results
 from cmm_uq.kinds.sphere.observe import Sphere
+from cmm_uq.messages import Number, Text, number, say
 from cmm_uq.uncertainty.rounding import rounded
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 def sections(result: Result) -> list[Section]:
     """Form and size (ISO 10360-5), radial deviations by point, residuals over the sphere."""
     sphere = cast("Sphere", result.artefact)
     return [
-        Section("Probing of the sphere", (_table(result, sphere), _by_point(result, sphere), _over(result, sphere)))
+        Section(
+            say("Probing of the sphere"), (_table(result, sphere), _by_point(result, sphere), _over(result, sphere))
+        )
     ]
 
 
@@ -26,49 +30,71 @@ def _table(result: Result, sphere: Sphere) -> Table:
     probed, size = sphere.probed(), sphere.sizes[0]
     noise = 2 * result.noise.coordinate.value
     repeated = probed.repeat.max() > 1
-    rows = []
-    for i, number in enumerate(probed.measurement):
-        place = f"{number}" + (f" ({probed.repeat[i]})" if repeated else "")
+    rows: list[tuple[Text, ...]] = []
+    for i, measurement in enumerate(probed.measurement):
+        place = numbered(measurement, probed.repeat[i] if repeated else None)
         form = rounded(float(probed.form[i]) / MICROMETRE, max(sphere.form / MICROMETRE, noise / 10))[0]
-        row = [place, str(probed.count[i]), form]
+        row: list[Text] = [place, number(probed.count[i]), form]
         if size.certified:
             row.append(rounded(float(probed.size[i]) / MICROMETRE, noise)[0])
         rows.append(tuple(row))
-    columns = [Column("Sphere", numeric=False), Column("Points"), Column("Form error", "µm")]
-    notes = ["Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010)."]
+    columns = [Column(say("Sphere"), numeric=False), Column(say("Points")), Column(say("Form error"), unit("µm"))]
+    notes = [say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")]
     if size.certified:
-        columns.append(Column("Size error", "µm"))
-        u = rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else "0"
+        columns.append(Column(say("Size error"), unit("µm")))
+        u = rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0")
         notes.append(
-            f"Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2)."
+            say(
+                "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).",
+                u=u,
+            )
         )
-    return Table("Probing errors", tuple(columns), tuple(rows), tuple(notes))
+    return Table(say("Probing errors"), tuple(columns), tuple(rows), tuple(notes))
 
 
 def _by_point(result: Result, sphere: Sphere) -> Plot:
     size = sphere.sizes[0]
     deviations = deviations_um(sphere)
     residuals, expanded = result.residuals / MICROMETRE, 2 * result.noise.coordinate.value
-    name = "certified radius" if size.certified else "mean radius"
+    name = say("certified radius") if size.certified else say("mean radius")
     return length_plot(
-        sphere.points.point, deviations, residuals, expanded_before_um=expanded, expanded_after_um=expanded,
-        reference=name, reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0, flagged=result.flagged,
-        position_label="Point on the sphere",
-        caption=f"Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = 2).",
-        alternative=(
-            f"{len(deviations)} points: as recorded they deviate by {deviations.min():.1f} to {deviations.max():.1f} µm "
-            f"from the {name}; after the fitted model {residuals.min():.1f} to {residuals.max():.1f} µm remain."
+        sphere.points.point,
+        deviations,
+        residuals,
+        expanded_before_um=expanded,
+        expanded_after_um=expanded,
+        reference=name,
+        reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0,
+        flagged=result.flagged,
+        position_label=say("Point on the sphere"),
+        caption=say(
+            "Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = 2).", name=name
         ),
-    )  # fmt: skip
+        alternative=say(
+            "{count} points: as recorded they deviate by {low:.1f} to {high:.1f} µm from the {name}; "
+            "after the fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
+            count=len(deviations),
+            low=deviations.min(),
+            high=deviations.max(),
+            name=name,
+            low_after=residuals.min(),
+            high_after=residuals.max(),
+        ),
+    )
 
 
 def _over(result: Result, sphere: Sphere) -> Plot:
     residuals = result.residuals / MICROMETRE
     return volume_plot(
-        about_centre(sphere), residuals,
-        caption="Residuals after the fitted model over the sphere (all spheres, about their centres).",
-        alternative=f"Three projections of the sphere; residuals of {residuals.min():.1f} to {residuals.max():.1f} µm.",
-    )  # fmt: skip
+        about_centre(sphere),
+        residuals,
+        caption=say("Residuals after the fitted model over the sphere (all spheres, about their centres)."),
+        alternative=say(
+            "Three projections of the sphere; residuals of {low:.1f} to {high:.1f} µm.",
+            low=residuals.min(),
+            high=residuals.max(),
+        ),
+    )
 
 
 PAGE = Page(sections, results)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.messages import say
 from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, upright
 from cmm_uq.planning.patterns import length_of
 from cmm_uq.planning.placing import Pattern, Placing
@@ -35,7 +36,7 @@ def sphere(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
 def sphere_places(setting: Setting) -> tuple[Placing, ...]:
     """Once in the middle of the volume."""
     pattern = sphere(setting.artefact, setting.plan)
-    return (setting.volume.set_up(pattern, np.eye(3), MIDDLE, "in the middle"),)
+    return (setting.volume.set_up(pattern, np.eye(3), MIDDLE, say("in the middle")),)
 
 
 def _shape(setting: Setting) -> Shape:

@@ -10,13 +10,15 @@ from typing import Any, cast
 import numpy as np
 
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import refusal
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.triangle.equations import PARAMETERS, solve_equations
 from cmm_uq.kinds.triangle.observe import Triangle
 from cmm_uq.kinds.triangle.standard import DRAWS
+from cmm_uq.messages import Text
 from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats, Ints
-from cmm_uq.units import ARCSECOND, MICROMETRE
+from cmm_uq.units import ARCSECOND, MICROMETRE, Unit
 
 SIDES = ("1–2", "2–3", "3–1")
 
@@ -72,7 +74,7 @@ class ByEquations:
     u: float
 
     @property
-    def title(self) -> str:
+    def title(self) -> Text:
         """Of the effect."""
         return every()[self.effect].title
 
@@ -82,7 +84,7 @@ class ByEquations:
         return every()[self.effect].reported[0].name
 
     @property
-    def unit(self) -> str:
+    def unit(self) -> Unit:
         """As printed."""
         return every()[self.effect].reported[0].unit
 
@@ -120,13 +122,13 @@ class TriangleFigures:
         return Sides(measurement, before, after, 2 * float(np.sqrt(2)) * self.result.noise.coordinate.value)
 
     @cached_property
-    def equations(self) -> tuple[ByEquations, ...] | str:
+    def equations(self) -> tuple[ByEquations, ...] | Text:
         """Parameters by the source's equations, or why there are none."""
         triangle = self._triangle
         try:
             solution = solve_equations(triangle)
-        except CmmUqError as refusal:
-            return str(refusal)
+        except CmmUqError as error:
+            return refusal(error)
         u = solution.u(self.result.noise.coordinate.value * MICROMETRE, triangle.standard.u)
         return tuple(
             ByEquations(name, float(value), float(own))

@@ -20,6 +20,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.triangle.observe import Triangle
 from cmm_uq.kinds.triangle.placings import PLANES
 from cmm_uq.kinds.triangle.standard import SIDES_OF_DIMENSIONS, corners
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.placings import Placings
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS
 from cmm_uq.points import AXES, Floats
@@ -91,8 +92,11 @@ def solve_equations(triangle: Triangle) -> TriangleSolution:
     """
     machine = triangle.points.machine
     if machine.chain != "YXZ":
-        raise CmmUqError(f"the source's equations are those of the chain YXZ, not {machine.chain}",
-                         where="job.toml [machine] chain", fix="Use the fitted model, which serves every chain")  # fmt: skip
+        raise CmmUqError(
+            say("the source's equations are those of the chain YXZ, not {chain}", chain=Verbatim(machine.chain)),
+            where="job.toml [machine] chain",
+            fix=say("Use the fitted model, which serves every chain"),
+        )
     lower = np.array([machine.travel(axis)[0] for axis in AXES])
     xyz, dimensions = triangle.points.xyz, triangle.standard.dimensions
 
@@ -164,20 +168,21 @@ def _plane(corner: Floats, number: int) -> str:
         if along[a] > _ALIGNED and up[b] > _ALIGNED:
             return plane
     raise CmmUqError(
-        f"measurement {number}: side 1–2 and the height over it do not lie along X and Y, Y and Z, or X and Z",
-        where="recording", fix="Align the triangle, or use the fitted model, which serves every placing",
+        say("measurement {number}: side 1–2 and the height over it do not lie along X and Y, Y and Z, or X and Z",
+            number=number),
+        where="recording", fix=say("Align the triangle, or use the fitted model, which serves every placing"),
     )  # fmt: skip
 
 
 def _in_turn(found: list[Defects], lower: Floats) -> Floats:
     """The fifteen parameters (15,), each from what is known before it."""
-    low, high = _pair(found, "XY", _Z, "horizontal again, higher, over the same place")
-    left, right = _pair(found, "YZ", _X, "vertical in YZ again, at the other end of X, with the same tip")
+    low, high = _pair(found, "XY", _Z, say("horizontal again, higher, over the same place"))
+    left, right = _pair(found, "YZ", _X, say("vertical in YZ again, at the other end of X, with the same tip"))
     short, long = _pair(
-        found, "YZ", _TIP_X, "vertical in YZ again, at the same scale readings, with a longer tip along X"
+        found, "YZ", _TIP_X, say("vertical in YZ again, at the same scale readings, with a longer tip along X")
     )
     zx, zx_long = _pair(
-        found, "ZX", _TIP_Y, "vertical in ZX again, at the same scale readings, with a longer tip along Y"
+        found, "ZX", _TIP_Y, say("vertical in ZX again, at the same scale readings, with a longer tip along Y")
     )
     c, h = low.base, low.height
     z_low, z_high = (float(d.start[2] + d.tip[2]) for d in (low, high))
@@ -212,7 +217,7 @@ def _in_turn(found: list[Defects], lower: Floats) -> Floats:
     return np.concatenate([scales, np.array([xy, yz, szx]) / ARCSECOND, rates])
 
 
-def _pair(found: list[Defects], plane: str, differing: int, missing: str) -> tuple[Defects, Defects]:
+def _pair(found: list[Defects], plane: str, differing: int, missing: Text) -> tuple[Defects, Defects]:
     """The two placings in a plane farthest apart in one of readings and tip (6,), and alike in the rest."""
     own = [d for d in found if d.plane == plane]
     at = np.array([[*d.start, *d.tip] for d in own]).reshape(-1, 6)
@@ -220,7 +225,14 @@ def _pair(found: list[Defects], plane: str, differing: int, missing: str) -> tup
     alike = np.all(np.delete(apart, differing, axis=2) < _ANOTHER_PLACE, axis=2)
     gain = np.where(alike, apart[:, :, differing], 0.0)
     if not len(own) or gain.max() < _ANOTHER_PLACE:
-        raise CmmUqError(f"{len(own)} placings in {plane} lack one that the source's equations compare",
-                         where="recording", fix=f"Add a placing: {missing}")  # fmt: skip
+        raise CmmUqError(
+            say(
+                "{count} placings in {plane} lack one that the source's equations compare",
+                count=len(own),
+                plane=Verbatim(plane),
+            ),
+            where="recording",
+            fix=say("Add a placing: {missing}", missing=missing),
+        )
     i, j = sorted(np.unravel_index(int(np.argmax(gain)), gain.shape), key=lambda k: float(at[k, differing]))
     return own[i], own[j]

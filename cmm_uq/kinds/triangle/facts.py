@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.jobs.job import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.table import Triple, Uncertainty
 
 

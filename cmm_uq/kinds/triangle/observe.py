@@ -13,12 +13,16 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.triangle.facts import TriangleFacts
 from cmm_uq.kinds.triangle.standard import DIMENSIONS, SIDES_OF_DIMENSIONS, TriangleStandard, corner_changes, corners
+from cmm_uq.messages import say
 from cmm_uq.model.artefact import Size
 from cmm_uq.model.recorded import check_length, expansion, place
 from cmm_uq.model.rigid import Rigid
 from cmm_uq.points import Floats, Points
+from cmm_uq.units import unit
 
-_TITLES = ("Block 1–2", "Block 2–3", "Block 3–1", "Cylinder 1", "Cylinder 2", "Cylinder 3")
+_TITLES = (
+    say("Block 1–2"), say("Block 2–3"), say("Block 3–1"), say("Cylinder 1"), say("Cylinder 2"), say("Cylinder 3"),
+)  # fmt: skip
 
 
 class Triangle(Rigid):
@@ -39,7 +43,7 @@ class Triangle(Rigid):
     """
 
     kind = "triangle"
-    title = "Triangle standard"
+    title = say("Triangle standard")
 
     def __init__(self, facts: TriangleFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(replace(points, machine=replace(points.machine, tip_on_every_carriage=True)))
@@ -48,7 +52,7 @@ class Triangle(Rigid):
         _refuse_missing_corners(points, where)
         self._corner = points.point - 1
         self.sizes = tuple(
-            Size(f"{name}_mm", title, "mm", float(nominal), float(u))
+            Size(f"{name}_mm", title, unit("mm"), float(nominal), float(u))
             for name, title, nominal, u in zip(
                 DIMENSIONS, _TITLES, self.standard.dimensions, self.standard.u, strict=True
             )
@@ -81,5 +85,7 @@ def _refuse_missing_corners(points: Points, where: str | None) -> None:
         missing = sorted({1, 2, 3} - set(present.tolist()))[0]
         raise CmmUqError(
             f"measurement {points.measurement[row]}, repeat {points.repeat[row]} has no point {missing}: the triangle does "
-            "not close", where=place(points, short, where), fix="Record all three cylinders, or leave out the measurement",
-        )  # fmt: skip
+            "not close",
+            where=place(points, short, where),
+            fix="Record all three cylinders, or leave out the measurement",
+        )

@@ -10,77 +10,110 @@ from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
 from cmm_uq.kinds.triangle.analysis import SIDES, ByEquations, Sides, Standard, TriangleFigures, results
+from cmm_uq.messages import NOTHING, Text, Verbatim, say, semicolons, signed
 from cmm_uq.uncertainty.rounding import rounded
-from cmm_uq.units import ARCSECOND
+from cmm_uq.units import ARCSECOND, unit
 
 
 def sections(result: Result) -> list[Section]:
     """The standard, its sides as found, and the parameters by the fitted model and by the source's equations."""
     found = TriangleFigures(result)
     return [
-        Section("The triangle", (_standard(found.standard), _sides(found.sides))),
-        Section("Parameters by two ways", (*_two_ways(result, found.equations), *_alike(result, found))),
+        Section(say("The triangle"), (_standard(found.standard), _sides(found.sides))),
+        Section(say("Parameters by two ways"), (*_two_ways(result, found.equations), *_alike(result, found))),
     ]
 
 
 def _standard(standard: Standard) -> Table:
-    rows = [(f"Side {name}", *rounded(*side), "mm") for name, side in zip(SIDES, standard.sides, strict=True)]
+    rows: list[tuple[Text, ...]] = [
+        (say("Side {name}", name=Verbatim(name)), *rounded(*side), unit("mm"))
+        for name, side in zip(SIDES, standard.sides, strict=True)
+    ]
     for i, (angle, spread) in enumerate(standard.angles, 1):
         shown = rounded(degrees(angle), degrees(spread))[0]
-        rows.append((f"Angle at {i}", shown, f"{rounded(0.0, spread / ARCSECOND)[1]}″", "°"))
-    rows.append(("Height over side 1–2", *rounded(*standard.height), "mm"))
-    columns = (Column("Figure", numeric=False), Column("Value"), Column("U"), Column("Unit", numeric=False))
-    note = (
-        f"U (k = 2) by Monte Carlo, {standard.draws} draws of the dimensions of blocks and cylinders; angles by the cosine "
-        "rule."
+        rows.append((say("Angle at {i}", i=i), shown, say("{U}″", U=rounded(0.0, spread / ARCSECOND)[1]), unit("°")))
+    rows.append((say("Height over side 1–2"), *rounded(*standard.height), unit("mm")))
+    columns = (
+        Column(say("Figure"), numeric=False),
+        Column(say("Value")),
+        Column(say("U")),
+        Column(say("Unit"), numeric=False),
     )
-    return Table("Sides and angles of the standard at 20 °C", columns, tuple(rows), (note,))
+    note = say(
+        "U (k = 2) by Monte Carlo, {draws} draws of the dimensions of blocks and cylinders; angles by the cosine rule.",
+        draws=standard.draws,
+    )
+    return Table(say("Sides and angles of the standard at 20 °C"), columns, tuple(rows), (note,))
 
 
 def _sides(sides: Sides) -> Plot:
     before, after = sides.before_um.ravel(), sides.after_um.ravel()
     return length_plot(
-        sides.measurement.repeat(3).astype(float), before, after, expanded_before_um=sides.expanded_um,
-        expanded_after_um=sides.expanded_um, reference="certified side",
-        position_label="Placing (its three sides side by side)",
-        caption="Each side minus its certified length, as recorded and after the fitted model, with U (k = 2).",
-        alternative=(
-            f"{len(before)} sides: as recorded they deviate by {before.min():.1f} to {before.max():.1f} µm; after the fitted "
-            f"model {after.min():.1f} to {after.max():.1f} µm remain."
+        sides.measurement.repeat(3).astype(float),
+        before,
+        after,
+        expanded_before_um=sides.expanded_um,
+        expanded_after_um=sides.expanded_um,
+        reference=say("certified side"),
+        position_label=say("Placing (its three sides side by side)"),
+        caption=say("Each side minus its certified length, as recorded and after the fitted model, with U (k = 2)."),
+        alternative=say(
+            "{count} sides: as recorded they deviate by {low:.1f} to {high:.1f} µm; after the fitted "
+            "model {low_after:.1f} to {high_after:.1f} µm remain.",
+            count=len(before),
+            low=before.min(),
+            high=before.max(),
+            low_after=after.min(),
+            high_after=after.max(),
         ),
-    )  # fmt: skip
+    )
 
 
-def _two_ways(result: Result, equations: tuple[ByEquations, ...] | str) -> list[Block]:
+def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> list[Block]:
     if isinstance(equations, str):
-        return [Paragraph(f"The source's equations have no solution here. {equations}", tone="note")]
+        return [
+            Paragraph(
+                say("The source's equations have no solution here. {equations}", equations=equations), tone="note"
+            )
+        ]
     rows = []
     for one in equations:
         value, U = rounded(one.value, 2 * one.u)
-        fitted = ("", "")
+        fitted: tuple[Text, ...] = (NOTHING, NOTHING)
         if one.effect in result.parameters:
             quantity = next(iter(result.parameters[one.effect].values()))
-            fitted = ("not determined", "") if one.effect in result.free else expanded(quantity)[:2]
+            fitted = (say("not determined"), NOTHING) if one.effect in result.free else expanded(quantity)[:2]
         rows.append((one.title, value, U, *fitted, one.unit))
     columns = (
-        Column("Parameter", numeric=False), Column("Equations"), Column("U"), Column("Fitted model"), Column("U"),
-        Column("Unit", numeric=False),
-    )  # fmt: skip
-    notes = (
-        "Equations: one after the other from the sides of aligned placings (Manlay, Fast checking of CMM geometry with a "
-        "patented tool), U (k = 2). Fitted model: all observations at once.",
+        Column(say("Parameter"), numeric=False),
+        Column(say("Equations")),
+        Column(say("U")),
+        Column(say("Fitted model")),
+        Column(say("U")),
+        Column(say("Unit"), numeric=False),
     )
-    return [Table("Scale, squareness, pitch, yaw and roll", columns, tuple(rows), notes)]
+    notes = (
+        say(
+            "Equations: one after the other from the sides of aligned placings (Manlay, Fast checking of "
+            "CMM geometry with a patented tool), U (k = 2). Fitted model: all observations at once."
+        ),
+    )
+    return [Table(say("Scale, squareness, pitch, yaw and roll"), columns, tuple(rows), notes)]
 
 
 def _alike(result: Result, found: TriangleFigures) -> list[Block]:
     """Pairs of effects that these placings hardly tell apart."""
     titles = {effect.name: effect.title for effect in result.model.effects}
     pairs = [
-        f"{titles[one]} and {titles[other]} ({correlation:+.2f})".replace("-", "−")
+        say(
+            "{one} and {other} ({correlation})",
+            one=titles[one],
+            other=titles[other],
+            correlation=signed(correlation, "+.2f"),
+        )
         for one, other, correlation in found.alike
     ]
-    text = f"Hardly told apart by these placings (correlation): {'; '.join(pairs)}."
+    text = say("Hardly told apart by these placings (correlation): {pairs}.", pairs=semicolons(pairs))
     return [Paragraph(text, tone="note")] if pairs else []
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.triangle.standard import corners
+from cmm_uq.messages import Text, say
 from cmm_uq.points import AXES, Floats, Machine, Points
 
 PLANES: Mapping[str, tuple[int, int]] = MappingProxyType({"XY": (0, 1), "YZ": (1, 2), "ZX": (0, 2)})
@@ -32,23 +33,23 @@ class Placing:
     long_tip : whether the longer of two tips is mounted.
     """
 
-    title: str
+    title: Text
     plane: str
     place: tuple[float, float, float]
     long_tip: bool = False
 
 
 SEVEN_PLACINGS = (
-    Placing("horizontal, low", "XY", (0.0, 0.5, 0.0)),
-    Placing("horizontal, high", "XY", (0.0, 0.5, 1.0)),
-    Placing("vertical in YZ, left", "YZ", (0.0, 0.5, 0.0)),
-    Placing("vertical in YZ, right", "YZ", (1.0, 0.5, 0.0)),
-    Placing("vertical in YZ, right, longer tip", "YZ", (1.0, 0.5, 0.0), long_tip=True),
-    Placing("vertical in ZX", "ZX", (0.5, 0.5, 0.0)),
-    Placing("vertical in ZX, longer tip", "ZX", (0.5, 0.5, 0.0), long_tip=True),
+    Placing(say("horizontal, low"), "XY", (0.0, 0.5, 0.0)),
+    Placing(say("horizontal, high"), "XY", (0.0, 0.5, 1.0)),
+    Placing(say("vertical in YZ, left"), "YZ", (0.0, 0.5, 0.0)),
+    Placing(say("vertical in YZ, right"), "YZ", (1.0, 0.5, 0.0)),
+    Placing(say("vertical in YZ, right, longer tip"), "YZ", (1.0, 0.5, 0.0), long_tip=True),
+    Placing(say("vertical in ZX"), "ZX", (0.5, 0.5, 0.0)),
+    Placing(say("vertical in ZX, longer tip"), "ZX", (0.5, 0.5, 0.0), long_tip=True),
 )
 
-SHIFTED = Placing("horizontal, low, shifted along X", "XY", (1.0, 0.5, 0.0))
+SHIFTED = Placing(say("horizontal, low, shifted along X"), "XY", (1.0, 0.5, 0.0))
 """The eighth."""
 
 
@@ -95,7 +96,7 @@ def placed_triangle(
     n = 3 * repeats * len(placings)
     readings, offsets = np.vstack(xyz), np.vstack(tips)
     return Points(
-        readings - machine.origin_mm, np.repeat(np.arange(1, len(placings) + 1), 3 * repeats),
+        machine.coordinates(readings), np.repeat(np.arange(1, len(placings) + 1), 3 * repeats),
         np.tile([1, 2, 3], n // 3), np.tile(np.repeat(np.arange(1, repeats + 1), 3), len(placings)), machine,
         {f"tip_{axis}_mm": offsets[:, i] for i, axis in enumerate(AXES)},
     )  # fmt: skip

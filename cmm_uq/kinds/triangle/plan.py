@@ -14,6 +14,7 @@ from cmm_uq.kinds.triangle.facts import TriangleFacts
 from cmm_uq.kinds.triangle.placings import PLANES, SEVEN_PLACINGS, placed_triangle
 from cmm_uq.kinds.triangle.placings import Placing as TrianglePlacing
 from cmm_uq.kinds.triangle.standard import TriangleStandard
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.planning.candidates import THIRDS, Elsewhere, across_planes, thinned
 from cmm_uq.planning.placing import Placing, split
 from cmm_uq.planning.ready import ACROSS, check_allowed
@@ -38,6 +39,11 @@ def candidates(setting: Setting, start: Start | None) -> tuple[Placing, ...]:
     return thinned(_everywhere(setting), setting.plan.candidates, setting.volume)
 
 
+def _title(plane: str, *, longer: bool) -> Text:
+    named = Verbatim(plane)
+    return say("in the plane {plane}, longer tip", plane=named) if longer else say("in the plane {plane}", plane=named)
+
+
 def _everywhere(setting: Setting) -> Iterator[Placing]:
     """Every plane, place and tip."""
     volume = setting.volume
@@ -48,7 +54,7 @@ def _everywhere(setting: Setting) -> Iterator[Placing]:
         if not volume.allows(normal):
             continue
         tipped = [
-            TrianglePlacing(f"in the plane {plane}{', longer tip' if long else ''}", plane, (x, y, z), long)
+            TrianglePlacing(_title(plane, longer=long), plane, (x, y, z), long)
             for x, y, z in product(THIRDS, repeat=3)
             for long in (False, True)
         ]

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.messages import say
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.air.ciddor import ciddor
 from cmm_uq.uncertainty.air.edlen import birch_downs_1994, edlen_1966, harris_2004, modified_edlen
 from cmm_uq.uncertainty.air.water_vapour import relative_humidity
-from cmm_uq.uncertainty.budget import JUDGEMENT, Labels
+from cmm_uq.uncertainty.budget import Labels
 from cmm_uq.uncertainty.distributions import Distribution, Number, constant, normal, rectangular
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.uncertainty.propagation import first_order
@@ -117,8 +118,10 @@ class Air:
     @property
     def labels(self) -> Labels:
         """Units, and where each figure comes from."""
-        origins = dict.fromkeys(self.inputs, "measured") | dict.fromkeys(self.assumed, f"{JUDGEMENT}: not measured")
-        return Labels(_UNITS, {**origins, "equation": "literature"})
+        origins = dict.fromkeys(self.inputs, say("measured")) | dict.fromkeys(
+            self.assumed, say("judgement: not measured")
+        )
+        return Labels(_UNITS, {**origins, "equation": say("literature")})
 
 
 _UNITS: Mapping[str, str] = {

@@ -15,9 +15,10 @@ from math import sqrt
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, Verbatim, foreign, say
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.budget import CERTIFICATE, JUDGEMENT, REPEATS, SPECIFICATION, Budget, Line, joint_line
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,45 +63,60 @@ def ballbar_length(position: BallbarPosition) -> Budget:
     """
     w, length = np.asarray(position.direction), position.length_mm
     scatter = float(w @ position.centre_covariance_mm2 @ w)
-    lines = [Line(f"scatter of the points, ball {ball}", sqrt(scatter), REPEATS, unit="mm") for ball in (1, 2)]
-    lines += [_limit(f"form of ball {ball}", position.form_shift_mm, CERTIFICATE) for ball in (1, 2)]
-    lines += [_limit(f"probing system at ball {ball}", position.probe_mm, SPECIFICATION) for ball in (1, 2)]
+    lines = [
+        Line(say("scatter of the points, ball {ball}", ball=ball), sqrt(scatter), REPEATS, unit=unit("mm"))
+        for ball in (1, 2)
+    ]
+    lines += [_limit(say("form of ball {ball}", ball=ball), position.form_shift_mm, CERTIFICATE) for ball in (1, 2)]
+    lines += [
+        _limit(say("probing system at ball {ball}", ball=ball), position.probe_mm, SPECIFICATION) for ball in (1, 2)
+    ]
     if position.probe_mm and position.probe_common:
         # the length is a difference, so what shifts both balls alike cancels
         shared = -2 * position.probe_common * position.probe_mm**2 / 3
-        both = joint_line("both balls shifted alike by the probing system", shared)
+        both = joint_line(say("both balls shifted alike by the probing system"), shared)
         lines.append(replace(both, shared=True))
     lines += [
-        _limit(f"scale {axis}", position.scale_mm[k], CERTIFICATE, float(w[k] ** 2)) for k, axis in enumerate("xyz")
+        _limit(say("scale {axis}", axis=Verbatim(axis)), position.scale_mm[k], CERTIFICATE, float(w[k] ** 2))
+        for k, axis in enumerate("xyz")
     ]
     for name, (i, j), u in zip(("xy", "yz", "zx"), ((0, 1), (1, 2), (2, 0)), position.u_squareness_rad, strict=True):
         slope = float(abs(w[i] * w[j])) * length
-        lines.append(Line(f"squareness {name}", u, CERTIFICATE, unit="rad", sensitivity=slope, shared=True))
+        lines.append(
+            Line(
+                say("squareness {name}", name=Verbatim(name)),
+                u,
+                CERTIFICATE,
+                unit=unit("rad"),
+                sensitivity=slope,
+                shared=True,
+            )
+        )
     warm, slope = position.u_temperature_k, position.cte_per_k * length
-    lines.append(Line("temperature of the bar", warm, JUDGEMENT, unit="K", sensitivity=slope, shared=True))
-    told = [replace(line, origin=position.origins.get(line.name, line.origin)) for line in lines if line.part]
-    return Budget("length of the ballbar, one position", told, length, "mm")
+    lines.append(Line(say("temperature of the bar"), warm, JUDGEMENT, unit=unit("K"), sensitivity=slope, shared=True))
+    told = [replace(line, origin=foreign(position.origins.get(line.name, line.origin))) for line in lines if line.part]
+    return Budget(say("length of the ballbar, one position"), told, length, unit("mm"))
 
 
-def _limit(name: str, limit_mm: float, origin: str, sensitivity: float = 1.0) -> Line:
+def _limit(name: Text, limit_mm: float, origin: Text, sensitivity: float = 1.0) -> Line:
     u = limit_mm / sqrt(3)
-    return Line(name, u, origin, 0.0, "mm", "rectangular", sensitivity=sensitivity, shared=True)
+    return Line(name, u, origin, 0.0, unit("mm"), "rectangular", sensitivity=sensitivity, shared=True)
 
 
 def harris_compensated() -> Budget:
     """Harris 2004 section 6.2.3: one length from compensated points, as printed (± 20 µm, 19 before rounding)."""
     centre = Budget(
-        "centre of a sphere",
+        say("centre of a sphere"),
         [
-            Line("digitizer point accuracy", 9 * MICROMETRE, SPECIFICATION, unit="mm"),
-            Line("rms residual of the sphere fit", 10 * MICROMETRE, "residuals", unit="mm"),
+            Line(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
+            Line(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
         ],
-        unit="mm",
+        unit=unit("mm"),
     )
     return Budget(
-        "length of the ballbar, as printed in Harris 2004 section 6.2.3",
-        [centre.as_line("centre of ball 1"), centre.as_line("centre of ball 2")],
-        unit="mm",
+        say("length of the ballbar, as printed in Harris 2004 section 6.2.3"),
+        [centre.as_line(say("centre of ball 1")), centre.as_line(say("centre of ball 2"))],
+        unit=unit("mm"),
         statement=_PRINTED,
     )
 
@@ -113,22 +129,28 @@ def harris_uncompensated(scale_um: Sequence[float] = (12.0, 18.0, 6.0)) -> Budge
     scale_um : (3,) largest scale errors of x, y, z; those of 20 °C, or (21, 30, 12) at 25 °C and (26, 38, 20) at 30 °C.
     """
     return Budget(
-        "length of the ballbar, as printed in Harris 2004 section 6.4.1",
+        say("length of the ballbar, as printed in Harris 2004 section 6.4.1"),
         [
-            Line("digitizer point accuracy", 9 * MICROMETRE, SPECIFICATION, unit="mm"),
-            Line("rms residual of the sphere fit", 10 * MICROMETRE, "residuals", unit="mm"),
+            Line(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
+            Line(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
             *(
-                Line(f"largest scale error of {axis}", limit * MICROMETRE, "error map", unit="mm")
+                Line(
+                    say("largest scale error of {axis}", axis=Verbatim(axis)),
+                    limit * MICROMETRE,
+                    say("error map"),
+                    unit=unit("mm"),
+                )
                 for axis, limit in zip("xyz", scale_um, strict=True)
             ),
         ],
-        unit="mm",
+        unit=unit("mm"),
         statement=_PRINTED,
     )
 
 
-_PRINTED = (
-    "As printed. It takes a specification and largest errors for standard uncertainties, the rms residual of a fit to "
-    "thousands of points for the uncertainty of its centre, counts one ball of the two in section 6.4.1, and divides "
-    "what all positions share by the root of their number."
+_PRINTED = say(
+    "As printed. It takes a specification and largest errors for standard uncertainties, the rms "
+    "residual of a fit to thousands of points for the uncertainty of its centre, counts one ball "
+    "of the two in section 6.4.1, and divides what all positions share by the root of their "
+    "number."
 )

@@ -12,26 +12,31 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, say
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.budget import CERTIFICATE, JUDGEMENT, REPEATS, Budget, Line
-from cmm_uq.units import REFERENCE_TEMPERATURE
+from cmm_uq.units import REFERENCE_TEMPERATURE, unit
 
 FACTOR = 2.0
 """Coverage factor that ISO/TS 23165 and ISO 15530-3 prescribe."""
 
-SIMULATION = "simulation"
+SIMULATION = say("simulation")
 
 FEWEST_READINGS = 20
 """Of the calibrated workpiece, in ten cycles or more (ISO 15530-3:2011)."""
 
-TEST = (
-    "Test uncertainty (ISO/TS 23165): of the test value. The machine's own errors are what is tested and are not in it; "
-    "it is not the uncertainty of a measurement made with the machine."
+TEST = say(
+    "Test uncertainty (ISO/TS 23165): of the test value. The machine's own errors are what is "
+    "tested and are not in it; it is not the uncertainty of a measurement made with the machine."
 )
-USE = (
-    "Uncertainty of measurements made with the machine ({source}): valid for the same task, machine, strategy and "
-    "conditions. It is not the test uncertainty of an acceptance or verification test."
-)
+
+
+def _use(source: Text) -> Text:
+    return say(
+        "Uncertainty of measurements made with the machine ({source}): valid for the same task, machine, strategy and "
+        "conditions. It is not the test uncertainty of an acceptance or verification test.",
+        source=source,
+    )
 
 
 def length_test_uncertainty(
@@ -54,22 +59,22 @@ def length_test_uncertainty(
     u_alignment_mm, u_fixturing_mm : by misalignment and by what the clamping does to the length.
     """
     return Budget(
-        f"test value of the error of length measurement, {length_mm:g} mm",
+        say("test value of the error of length measurement, {length_mm:g} mm", length_mm=length_mm),
         [
-            Line("calibration of the artefact", u_calibration_mm, CERTIFICATE, unit="mm"),
-            _expansion("expansion coefficient of the artefact", u_cte_per_k, length_mm, temperature_c),
+            Line(say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=unit("mm")),
+            _expansion(say("expansion coefficient of the artefact"), u_cte_per_k, length_mm, temperature_c),
             Line(
-                "temperature of the artefact",
+                say("temperature of the artefact"),
                 u_temperature_k,
                 JUDGEMENT,
                 temperature_c,
-                "K",
+                unit("K"),
                 sensitivity=length_mm * cte_per_k,
             ),
-            Line("alignment of the artefact", u_alignment_mm, JUDGEMENT, unit="mm"),
-            Line("fixturing of the artefact", u_fixturing_mm, JUDGEMENT, unit="mm"),
+            Line(say("alignment of the artefact"), u_alignment_mm, JUDGEMENT, unit=unit("mm")),
+            Line(say("fixturing of the artefact"), u_fixturing_mm, JUDGEMENT, unit=unit("mm")),
         ],
-        unit="mm",
+        unit=unit("mm"),
         factor=FACTOR,
         statement=TEST,
     )
@@ -78,12 +83,12 @@ def length_test_uncertainty(
 def probing_test_uncertainty(form_mm: float, u_form_mm: float) -> Budget:
     """Test uncertainty of a probing error P from the test sphere's form F (ISO/TS 23165:2006), mm."""
     return Budget(
-        "test value of the probing error",
+        say("test value of the probing error"),
         [
-            Line("form of the test sphere, F/2", form_mm / 2, CERTIFICATE, unit="mm"),
-            Line("calibration of the form", u_form_mm, CERTIFICATE, unit="mm"),
+            Line(say("form of the test sphere, F/2"), form_mm / 2, CERTIFICATE, unit=unit("mm")),
+            Line(say("calibration of the form"), u_form_mm, CERTIFICATE, unit=unit("mm")),
         ],
-        unit="mm",
+        unit=unit("mm"),
         factor=FACTOR,
         statement=TEST,
     )
@@ -122,20 +127,32 @@ def use_by_calibrated_workpiece(
             f"{len(readings)} readings of the calibrated workpiece",
             fix=f"ISO 15530-3 asks for {FEWEST_READINGS} in ten cycles or more",
         )
-    expansion = "expansion coefficient of "
     return Budget(
-        "systematic error of the measurement process",
+        say("systematic error of the measurement process"),
         [
-            Line("calibration of the workpiece", u_calibration_mm, CERTIFICATE, unit="mm"),
-            Line("scatter of the process", float(readings.std(ddof=1)), REPEATS, unit="mm", dof=len(readings) - 1.0),
-            _expansion(expansion + "the calibrated workpiece", u_cte_calibrated_per_k, calibrated_mm, temperature_c),
-            _expansion(expansion + "the workpieces", u_cte_workpieces_per_k, calibrated_mm, temperature_c),
-            Line("form and surface of the workpieces", u_form_mm, JUDGEMENT, unit="mm"),
+            Line(say("calibration of the workpiece"), u_calibration_mm, CERTIFICATE, unit=unit("mm")),
+            Line(
+                say("scatter of the process"),
+                float(readings.std(ddof=1)),
+                REPEATS,
+                unit=unit("mm"),
+                dof=len(readings) - 1.0,
+            ),
+            _expansion(
+                say("expansion coefficient of the calibrated workpiece"),
+                u_cte_calibrated_per_k,
+                calibrated_mm,
+                temperature_c,
+            ),
+            _expansion(
+                say("expansion coefficient of the workpieces"), u_cte_workpieces_per_k, calibrated_mm, temperature_c
+            ),
+            Line(say("form and surface of the workpieces"), u_form_mm, JUDGEMENT, unit=unit("mm")),
         ],
         float(readings.mean()) - calibrated_mm,
-        "mm",
+        unit("mm"),
         factor=FACTOR,
-        statement=USE.format(source="ISO 15530-3, by a calibrated workpiece"),
+        statement=_use(say("ISO 15530-3, by a calibrated workpiece")),
     )
 
 
@@ -164,19 +181,21 @@ def use_by_simulation(
     if len(errors) < 100:
         raise CmmUqError(f"{len(errors)} simulated measurements", fix="Simulate a hundred or more")
     return Budget(
-        "error of the measurement task",
+        say("error of the measurement task"),
         [
-            Line("simulated scatter", float(errors.std(ddof=1)), SIMULATION, unit="mm", dof=len(errors) - 1.0),
+            Line(
+                say("simulated scatter"), float(errors.std(ddof=1)), SIMULATION, unit=unit("mm"), dof=len(errors) - 1.0
+            ),
             *not_simulated,
         ],
         float(errors.mean()),
-        "mm",
+        unit("mm"),
         coverage=coverage,
-        statement=USE.format(source="ISO 15530-4, by simulation"),
+        statement=_use(say("ISO 15530-4, by simulation")),
     )
 
 
-def _expansion(name: str, u_cte_per_k: float, length_mm: float, temperature_c: float) -> Line:
+def _expansion(name: Text, u_cte_per_k: float, length_mm: float, temperature_c: float) -> Line:
     """L |t − 20 °C| u(α)."""
     slope = length_mm * abs(temperature_c - REFERENCE_TEMPERATURE)
-    return Line(name, u_cte_per_k, JUDGEMENT, unit="1/K", sensitivity=slope)
+    return Line(name, u_cte_per_k, JUDGEMENT, unit=unit("1/K"), sensitivity=slope)

@@ -12,8 +12,10 @@ from math import inf, sqrt
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.points import Floats
-from cmm_uq.uncertainty.budget import CERTIFICATE, REPEATS, Budget, Line
+from cmm_uq.uncertainty.budget import REPEATS, Budget, Line
+from cmm_uq.units import unit
 
 PARAMETERS = ("x", "y", "z", "radius")
 
@@ -45,7 +47,7 @@ def sphere_budgets(
     form_shift_mm: Sequence[float] | Floats,
     *,
     dof: float = inf,
-    form_origin: str = f"{CERTIFICATE} of the ball",
+    form_origin: Text = say("certificate of the ball"),
     further: Sequence[Line] = (),
 ) -> dict[str, Budget]:
     """Budgets of x, y, z and radius.
@@ -63,11 +65,11 @@ def sphere_budgets(
         variance = float(np.asarray(covariance_mm2)[k, k])
         if not variance > 0:
             raise CmmUqError(f"a variance of {variance} mm² of {name}", fix="Give the covariance matrix of the fit")
-        lines = [Line("scatter of the points", sqrt(variance), REPEATS, unit="mm", dof=dof)]
+        lines = [Line(say("scatter of the points"), sqrt(variance), REPEATS, unit=unit("mm"), dof=dof)]
         shift = float(form_shift_mm[k])
         if shift:
-            lines.append(Line("form of the ball", shift / sqrt(3), form_origin, 0.0, "mm", "rectangular"))
-        budgets[name] = Budget(name, [*lines, *further], float(estimate_mm[k]), "mm")
+            lines.append(Line(say("form of the ball"), shift / sqrt(3), form_origin, 0.0, unit("mm"), "rectangular"))
+        budgets[name] = Budget(Verbatim(name), [*lines, *further], float(estimate_mm[k]), unit("mm"))
     return budgets
 
 

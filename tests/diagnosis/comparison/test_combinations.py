@@ -13,9 +13,9 @@ from cmm_uq.diagnosis.comparison.combinations import EFFECTS, UNKNOWNS, Prior, e
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Version
-from cmm_uq.diagnosis.noise import kinds, sigma_grid
+from cmm_uq.diagnosis.noise import sigma_grid
 from cmm_uq.points import Floats
-from tests.diagnosis.dense_noise import covariance, rest
+from tests.diagnosis.dense_noise import covariance, rest, some_kinds
 
 M = 30
 
@@ -27,7 +27,7 @@ def rivals(random: np.random.Generator, effects: int = 8) -> list[Explanation]:
 
 
 def comparison(observed: Floats, explanations: list[Explanation]) -> Comparison:
-    noise = kinds(np.repeat(np.arange(M // 2), 2), np.arange(M, dtype=np.float64), np.zeros((M, 3)))
+    noise = some_kinds(np.full(M, np.sqrt(2)))
     sigma, log_sigma = sigma_grid(0.01, 0.02)
     return Comparison(observed, np.ones((M, 1)), noise, sigma, log_sigma, explanations, np.full(M, np.sqrt(2)), 0.01)
 

@@ -13,7 +13,7 @@ from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.physics.effect import FURTHER
-from cmm_uq.physics.plugins import BrokenPluginError
+from cmm_uq.plugins import BrokenPluginError
 from cmm_uq.points import Machine, Points
 from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
 from tests.recordings import bar_facts, bars

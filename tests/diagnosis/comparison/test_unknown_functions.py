@@ -58,7 +58,7 @@ def test_a_scale_may_depend_on_a_column_about_the_middle_of_the_volume() -> None
     values = model.estimate().least_squares.value
     points = model.artefact.points.at(model.placed(values))
     found = {e.name: e for e in unknown(model, values)}
-    middle = 0.5 * (points.readings.min(axis=0) + points.readings.max(axis=0))
+    middle = 0.5 * (points.carriages.min(axis=0) + points.carriages.max(axis=0))
     u = (load - load.mean()) / np.ptp(load)
-    what = model.seen(((1 + u - u**2)[:, None] * (points.readings - middle))[:, :, None], values)[:, 0]
+    what = model.seen(((1 + u - u**2)[:, None] * (points.carriages - middle))[:, :, None], values)[:, 0]
     assert reached(found["scale of all axes as a function of load_kg"], what) > 0.999

@@ -2,24 +2,27 @@
 
 from collections.abc import Sequence
 
+from cmm_uq.messages import say
 from cmm_uq.physics.effect import Effect, Parameter
 from cmm_uq.physics.rigid_body import turned
 from cmm_uq.points import Floats, Points
-from cmm_uq.units import ARCSECOND
+from cmm_uq.units import ARCSECOND, unit
 
 
 class BeamTwist(Effect):
     """The beam, held at both ends, twists under the ram in front of it, most in the middle of its travel T from y0."""
 
     name = "beam_twist"
-    title = "Twist of the beam"
+    title = say("Twist of the beam")
     formula = "e = ε × what carriage y carries, ε_y = twist·(1 − (2(y − y0)/T − 1)²)"
     mechanism = "guideway"
-    points_to = "the beam twists under the weight of the ram: check the ram's counterbalance and how the beam is held"
-    coefficients = (Parameter("twist_arcsec", "″", 10.0),)
+    points_to = say(
+        "the beam twists under the weight of the ram: check the ram's counterbalance and how the beam is held"
+    )
+    coefficients = (Parameter("twist_arcsec", unit("″"), 10.0),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         low, high = points.machine.travel("y")
-        place = 2 * (points.readings[:, 1] - low) / (high - low) - 1
+        place = 2 * (points.readings["y"] - low) / (high - low) - 1
         return turned(points, "y", "y", ARCSECOND * (1 - place**2))

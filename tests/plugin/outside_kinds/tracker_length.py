@@ -10,8 +10,9 @@ import numpy as np
 from cmm_uq.documents.document import Column, Section, Table
 from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.result import Result
-from cmm_uq.jobs.job import ReferencedFacts
+from cmm_uq.jobs.artefact import ReferencedFacts
 from cmm_uq.jobs.table import Uncertainty
+from cmm_uq.messages import number, say
 from cmm_uq.model.artefact import Artefact, Size
 from cmm_uq.model.kind import Kind
 from cmm_uq.model.recorded import columns_needed
@@ -23,7 +24,7 @@ from cmm_uq.planning.ready import MIDDLE, check_allowed
 from cmm_uq.planning.setting import Planning, Setting
 from cmm_uq.points import Floats, Points
 from cmm_uq.screening import shape as screening
-from cmm_uq.units import METRE, MICROMETRE
+from cmm_uq.units import METRE, MICROMETRE, unit
 
 COLUMN = "tracker_mm"
 
@@ -38,7 +39,7 @@ class TrackerLength(Artefact):
     """m distances of 2m points; their direction and place cancel, the tracker's scale is common to all."""
 
     kind = "tracker_length"
-    title = "Laser tracker"
+    title = say("Laser tracker")
 
     def __init__(self, facts: TrackerFacts, points: Points, *, where: str | None = None) -> None:
         self.points = points
@@ -50,7 +51,9 @@ class TrackerLength(Artefact):
         longest = facts.length_mm or float(self.reference.max())
         u = MICROMETRE * float(np.hypot(facts.u_um or 0.0, facts.u_um_per_m * longest / METRE))
         self.sizes = (
-            Size("length_mm", "Longest distance of the tracker", "mm", longest, np.inf if facts.nominal else u),
+            Size(
+                "length_mm", say("Longest distance of the tracker"), unit("mm"), longest, np.inf if facts.nominal else u
+            ),
         )
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
@@ -119,13 +122,16 @@ def sections(result: Result) -> list[Section]:
     found, residuals = result.artefact, result.residuals / MICROMETRE
     assert isinstance(found, TrackerLength)
     rows = tuple(
-        (str(number), f"{distance:.4f}", f"{deviation / MICROMETRE:.1f}", f"{residual:.1f}")
-        for number, distance, deviation, residual in zip(
+        (number(measurement), number(distance, ".4f"), number(deviation / MICROMETRE, ".1f"), number(residual, ".1f"))
+        for measurement, distance, deviation, residual in zip(
             found.measurement, found.reference, found.deviations(), residuals, strict=True
         )
     )
-    columns = Column("Measurement"), Column("Tracker", "mm"), Column("Deviation", "µm"), Column("Residual", "µm")
-    return [Section("Distances by laser tracker", (Table("Distances", columns, rows),))]
+    columns = (
+        Column(say("Measurement")), Column(say("Tracker"), unit("mm")), Column(say("Deviation"), unit("µm")),
+        Column(say("Residual"), unit("µm")),
+    )  # fmt: skip
+    return [Section(say("Distances by laser tracker"), (Table(say("Distances"), columns, rows),))]
 
 
 _PLACES = Everywhere(along_lines, _shape, Elsewhere(along_lines))

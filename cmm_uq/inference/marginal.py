@@ -1,0 +1,163 @@
+"""The posterior of a linear model under a noise of several components: everything linear integrated out, and drawn, exactly.
+
+Given the sizes of the components, all else is normal. The observations enter through one matrix of inner products for each
+class of observations with equal variance, so that the density at new sizes costs nothing that grows with their number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.inference.least_squares import LeastSquares
+from cmm_uq.inference.linear_model import LinearModel, reached
+from cmm_uq.inference.noise import Components, Sizes
+from cmm_uq.points import Floats
+
+SIGMA_BOUNDS = (1e-6, 10.0)
+"""mm: from a nanometre to a centimetre; between them an unknown noise is uniform in its logarithm."""
+
+_JITTER = 1e-11
+"""Relative; a recording that a model explains to the last digit leaves nothing to factorise."""
+
+_NUMBERS = 4_000_000
+"""In one batch of matrices."""
+
+
+@dataclass(frozen=True, eq=False)
+class Marginal:
+    """Log density of the sizes of the noise, and exact draws of the model's parameters for each.
+
+    Parameters
+    ----------
+    model : linear about its estimate.
+    noise : its components; observations as in the model.
+    estimate : least squares of the model: deviations from it leave digits that lengths of half a metre would not.
+    """
+
+    model: LinearModel
+    noise: Components
+    estimate: LeastSquares
+
+    @cached_property
+    def _scale(self) -> float:
+        """Mm."""
+        return float(max(self.estimate.sigma_of_residuals, SIGMA_BOUNDS[0]))
+
+    @cached_property
+    def _placing(self) -> Floats:
+        """(m, q) orthonormal basis of what the placing reaches."""
+        return reached(self.model.placing)
+
+    @cached_property
+    def _length(self) -> Floats:
+        """(c,) by which columns [placing, slow, parameters, observations] are divided."""
+        design = self.model.design
+        priors = np.array([0.0 if np.isinf(u.prior_sd) else 1 / self._sd(i) for i, u in enumerate(self.model.unknowns)])
+        parameters = np.sqrt(np.sum(design**2, axis=0) / self._scale**2 + priors**2)
+        others = np.full(self._placing.shape[1] + self.noise.slow.shape[1], 1 / self._scale)
+        return np.concatenate([others, np.where(parameters > 0, parameters, 1.0), [1.0]])
+
+    def _sd(self, i: int) -> float:
+        """Prior standard deviation; a certificate without uncertainty is taken as good to a millionth of a typical size."""
+        unknown = self.model.unknowns[i]
+        return float(max(unknown.prior_sd, 1e-6 * unknown.scale))
+
+    @cached_property
+    def _products(self) -> tuple[Floats, Floats]:
+        """Inner products (c, P²) of the columns, by class of the observations, and of the prior (P²,), which is data too."""
+        model, value = self.model, self.estimate.value
+        left = model.observed - model.design @ value
+        columns = np.hstack([self._placing, self.noise.slow, model.design, left[:, None]])
+        turned = np.asarray(self.noise.turn @ columns) / self._length
+        index, shares = self.noise.classes
+        size = turned.shape[1]
+        found = np.zeros((len(shares), size, size))
+        order = np.argsort(index, kind="stable")
+        for i, rows in enumerate(np.split(order, np.cumsum(np.bincount(index, minlength=len(shares)))[:-1])):
+            found[i] = turned[rows].T @ turned[rows]
+        first = size - 1 - len(value)
+        prior = np.zeros((len(value), size))
+        for i, unknown in enumerate(model.unknowns):
+            if np.isfinite(unknown.prior_sd):
+                prior[i, first + i] = 1 / self._sd(i)
+                prior[i, -1] = (unknown.prior_mean - value[i]) / self._sd(i)
+        prior = prior / self._length
+        return found.reshape(len(shares), -1), (prior.T @ prior).ravel()
+
+    @cached_property
+    def _counts(self) -> Floats:
+        return np.bincount(self.noise.classes[0], minlength=len(self.noise.classes[1])).astype(np.float64)
+
+    def _factors(self, sizes: Sizes) -> tuple[Floats, Floats]:
+        """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them."""
+        variances, slow = self.noise.variances(sizes)
+        v = variances @ self.noise.classes[1].T
+        products, prior = self._products
+        P = len(self._length)
+        whole = ((1 / v) @ products + prior).reshape(-1, P, P)
+        log = -0.5 * np.log(v) @ self._counts
+        q, c = self._placing.shape[1], slow.shape[1]
+        if c:
+            at = np.arange(q, q + c)
+            least = np.maximum(slow, (1e-6 * self._scale) ** 2)
+            whole[:, at, at] += 1 / (least * self._length[at] ** 2)
+            log -= 0.5 * np.log(least).sum(axis=1)
+        diagonal = np.arange(P)
+        whole[:, diagonal, diagonal] *= 1 + _JITTER
+        return _cholesky(whole), log
+
+    def _batches(self, count: int) -> list[slice]:
+        size = max(1, _NUMBERS // len(self._length) ** 2)
+        return [slice(i, i + size) for i in range(0, count, size)]
+
+    def log_density(self, latent: Floats) -> Floats:
+        """(w,) up to a constant, of the numbers (w, d) that say the sizes; minus infinity out of bounds."""
+        low, high = np.log(SIGMA_BOUNDS)
+        inside = (latent[:, 0] > low) & (latent[:, 0] < high)
+        held = np.where(np.isfinite(latent), latent, 0.0)
+        held[:, 0] = np.clip(held[:, 0], low, high)
+        sizes = self.noise.sizes(held)
+        log, squares = self.log_likelihood(sizes)
+        value = log - 0.5 * squares + self.noise.log_prior(held, sizes)
+        return np.where(inside & np.isfinite(value), value, -np.inf)
+
+    def log_likelihood(self, sizes: Sizes) -> tuple[Floats, Floats]:
+        """Log likelihood (w,) of w sizes but for the sum of squares, and that sum (w,), of which half is to be subtracted."""
+        logs, squares = np.empty(len(sizes.placing)), np.empty(len(sizes.placing))
+        for part in self._batches(len(logs)):
+            factors, log = self._factors(sizes.at(part))
+            diagonal = np.einsum("wii->wi", factors)
+            logs[part] = log - np.log(diagonal[:, :-1]).sum(axis=1)
+            squares[part] = diagonal[:, -1] ** 2
+        return logs, squares
+
+    def draw(self, sizes: Sizes, random: np.random.Generator) -> Floats:
+        """One exact draw (w, k) of the parameters for each of w sizes."""
+        count, k = len(sizes.placing), len(self.model.unknowns)
+        if not k:
+            return np.zeros((count, 0))
+        found = np.empty((count, k))
+        for part in self._batches(count):
+            factors, _ = self._factors(sizes.at(part))
+            # the parameters stand last before the observations: the lower right of the factor is all that they need
+            own, mean = factors[:, -1 - k : -1, -1 - k : -1], factors[:, -1, -1 - k : -1]
+            normal = mean + random.standard_normal(mean.shape)
+            found[part] = np.linalg.solve(own.transpose(0, 2, 1), normal[:, :, None])[:, :, 0]
+        return np.asarray(self.estimate.value + found / self._length[-1 - k : -1])
+
+
+def _cholesky(matrices: Floats) -> Floats:
+    """Lower factors; ``nan`` for those that are not positive definite."""
+    try:
+        return np.asarray(np.linalg.cholesky(matrices))
+    except np.linalg.LinAlgError:
+        found = np.full_like(matrices, np.nan)
+        for i, matrix in enumerate(matrices):
+            try:
+                found[i] = np.linalg.cholesky(matrix)
+            except np.linalg.LinAlgError:
+                continue
+        return found

@@ -1,0 +1,239 @@
+"""Noise as a sum of named components, of unknown sizes: what each does to the observations, and what is known beforehand.
+
+    covariance = Tᵀ · diag(v) · T + S · diag(s) · Sᵀ,   v = shares · variances
+
+T turns the observations once into coordinates in which all components but slow noise are independent: along the machine's
+axes, where a point has several observations, and to the mean and the contrasts of repeats. So many observations have one
+variance that sums over them are made once, whatever the sizes.
+
+Each size but the first is a ratio to the reading noise, with a probability that the component is absent. It is a function of
+a standard normal number, zero up to the quantile of that probability, so that a sampler in those numbers weighs presence
+and absence without changing dimension.
+
+Why the priors: an axis rarely scatters more than three times as much as another; a set-up offset and slow noise are as
+large as the reading noise within some factor, but may be ten times as large (a half-Cauchy distribution forgives that, a
+half-normal one does not: its intervals hold too seldom, Gelman 2006, Bayesian Analysis 1(3)); slow noise may change within
+a few readings or not at all during the recording, and no rate between is preferred.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse, special
+
+from cmm_uq.points import Floats, Ints
+
+AXES, PLACING, GROWTH, SLOW = "axes", "placing", "growth", "slow"
+
+ABSENT = {AXES: 0.5, PLACING: 0.5, GROWTH: 0.8, SLOW: 0.6}
+"""Probability, beforehand, that a component is absent."""
+
+AXES_SPREAD = 0.7
+"""Scale (half-normal) of the spread of the logarithms of the axes' noise, where they differ."""
+
+RATIO = {PLACING: 1.0, GROWTH: 1.0, SLOW: 1.0}
+"""Scale (half-Cauchy) of a component's standard deviation over that of a reading."""
+
+LARGEST_RATIO = 300.0
+
+FREQUENCIES = 72
+"""Cosines of slow noise, of all axes together; what is faster counts as independent."""
+
+FASTEST = 200.0
+"""Largest rate of slow noise, over the duration of the recording."""
+
+_CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]).T / np.sqrt([6.0, 2.0])
+_FARTHEST = 5.0
+"""Largest logarithm of an axis' noise over the mean of all."""
+
+_MOST_CLASSES, _STEPS = 48, 20
+_VARIANCES = 6
+"""Columns of ``shares``: reading noise along x, y, z; set-up offset; growing noise; the fast part of slow noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """Sizes of the components in each of w draws, mm.
+
+    Parameters
+    ----------
+    reading : (w, 3) standard deviation of a reading along each axis.
+    placing : (w,) of a set-up offset.
+    growth : (w,) of the growing part, at the longest length.
+    slow : (w,) of slow noise; ``rate`` (w,), in units of one over the duration of the recording.
+    """
+
+    reading: Floats
+    placing: Floats
+    growth: Floats
+    slow: Floats
+    rate: Floats
+
+    @property
+    def coordinate(self) -> Floats:
+        """(w,) root mean square of the axes' reading noise."""
+        return np.asarray(np.sqrt(np.mean(self.reading**2, axis=1)), dtype=np.float64)
+
+    @property
+    def typical(self) -> Sizes:
+        """A single draw of median sizes; what is more probably absent than not is absent."""
+        others = (self.placing, self.growth, self.slow, self.rate)
+        return Sizes(
+            np.median(self.reading, axis=0, keepdims=True), *(np.median(part, keepdims=True) for part in others)
+        )
+
+    def at(self, chosen: Ints | slice) -> Sizes:
+        """Some of the draws."""
+        return Sizes(*(part[chosen] for part in (self.reading, self.placing, self.growth, self.slow, self.rate)))
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """The components that a recording could show.
+
+    Parameters
+    ----------
+    turn : (m, m) T, orthonormal.
+    shares : (m, 6) of each variance in that of each turned observation.
+    slow : (m, 3·…) columns S of the untold observations, (m, 0) where no time is recorded.
+    frequency : of each of those columns, in half turns over the recording; 0 is a constant.
+    possible : which components could show here.
+    stated : standard uncertainty of a coordinate, mm, as the job states it.
+    """
+
+    turn: sparse.csr_array
+    shares: Floats
+    slow: Floats
+    frequency: Floats
+    possible: tuple[str, ...]
+    stated: float | None = None
+    names: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        latent = {AXES: ("spread", "first", "second"), PLACING: (PLACING,), GROWTH: (GROWTH,), SLOW: (SLOW, "rate")}
+        names = ["log_sigma", *(name for component in self.possible for name in latent[component])]
+        object.__setattr__(self, "names", tuple(names))
+
+    @property
+    def dimension(self) -> int:
+        """Of the numbers that say the sizes."""
+        return len(self.names)
+
+    def sizes(self, latent: Floats) -> Sizes:
+        """Sizes in each of w rows of ``latent`` (w, d): ln σ of a reading in mm, then standard normal numbers."""
+        column = {name: latent[:, i] for i, name in enumerate(self.names)}
+        sigma, nothing = np.exp(column["log_sigma"]), np.zeros(len(latent))
+        reading = np.repeat(sigma[:, None], 3, axis=1)
+        if AXES in self.possible:
+            spread = _half_normal(column["spread"], ABSENT[AXES], AXES_SPREAD)
+            apart = spread[:, None] * (np.column_stack([column["first"], column["second"]]) @ _CONTRASTS.T)
+            most = np.abs(apart).max(axis=1, keepdims=True)
+            reading = reading * np.exp(apart * np.minimum(1.0, _FARTHEST / np.maximum(most, 1e-9)))
+        ratios = {
+            name: sigma * _half_cauchy(column[name], ABSENT[name], RATIO[name]) if name in self.possible else nothing
+            for name in (PLACING, GROWTH, SLOW)
+        }
+        rate = np.exp(special.ndtr(column["rate"]) * np.log(FASTEST)) if SLOW in self.possible else 1 + nothing
+        return Sizes(reading, ratios[PLACING], ratios[GROWTH], ratios[SLOW], rate)
+
+    def variances(self, sizes: Sizes) -> tuple[Floats, Floats]:
+        """Six variances (w, 6), mm², that ``shares`` refers to, and those of the slow columns (w, c)."""
+        slow, fast = slow_variances(sizes.slow, sizes.rate, self.frequency)
+        each = [*(sizes.reading.T**2), sizes.placing**2, sizes.growth**2, fast]
+        return np.column_stack(each), slow
+
+    def log_prior(self, latent: Floats, sizes: Sizes) -> Floats:
+        """(w,) of the standard normal numbers; that of a coordinate has a uniform logarithm, or is near what is stated."""
+        known = self.log_prior_of_sigma(np.log(sizes.coordinate))
+        return np.asarray(known - 0.5 * np.sum(latent[:, 1:] ** 2, axis=1))
+
+    def log_prior_of_sigma(self, log_sigma: Floats) -> Floats:
+        """A stated value is good to a fifth (as if from a dozen readings), or now and then simply wrong."""
+        if self.stated is None:
+            return np.zeros_like(log_sigma)
+        off = log_sigma - np.log(self.stated)
+        near = np.log(0.9 / 0.2) - 0.5 * (off / 0.2) ** 2
+        return np.asarray(np.logaddexp(near, np.log(0.1) - 0.5 * off**2))
+
+    def repeated(self, sizes: Sizes, repetitions: int, random: np.random.Generator) -> Floats:
+        """Noise (w, repetitions, m), mm, of the recording made anew with these sizes."""
+        variances, slow = self.variances(sizes)
+        w, m = len(variances), len(self.shares)
+        scale = np.sqrt(variances @ self.shares.T)
+        turned = scale[:, None, :] * random.standard_normal((w, repetitions, m))
+        found = np.asarray((self.turn.T @ turned.reshape(-1, m).T).T, dtype=np.float64).reshape(turned.shape)
+        if self.slow.shape[1] and np.any(slow):
+            waves = np.sqrt(slow)[:, None, :] * random.standard_normal((w, repetitions, slow.shape[1]))
+            found = found + waves @ self.slow.T
+        return found
+
+    def white(self, sizes: Sizes) -> Callable[[Floats], Floats]:
+        """What turns columns (m, r), mm, of such noise into white noise with the standard deviation of a reading.
+
+        Parameters
+        ----------
+        sizes : of a single draw.
+        """
+        variances, slow = self.variances(sizes)
+        scale = float(sizes.coordinate[0]) / np.sqrt((variances @ self.shares.T)[0])[:, None]
+        waves = scale * np.asarray(self.turn @ (self.slow * np.sqrt(slow[0]))) / float(sizes.coordinate[0])
+        U, s, _ = np.linalg.svd(waves, full_matrices=False)
+
+        def whitened(columns: Floats) -> Floats:
+            each = scale * np.asarray(self.turn @ columns)
+            # (1 + A·Aᵀ) to the power of −½, by the singular values of A
+            return np.asarray(each + U @ ((1 / np.sqrt(1 + s**2) - 1)[:, None] * (U.T @ each)))
+
+        return whitened
+
+    @cached_property
+    def classes(self) -> tuple[Ints, Floats]:
+        """Class of each turned observation (m,), and the shares (c, 6) of each class.
+
+        Where nearly every observation has a direction of its own, those of nearly one direction are a class; its shares are
+        the mean of theirs.
+        """
+        exact = np.round(self.shares, 9)
+        _, index, count = np.unique(exact, axis=0, return_inverse=True, return_counts=True)
+        if len(count) > _MOST_CLASSES:
+            total = self.shares[:, :3].sum(axis=1, keepdims=True)
+            rough = np.round(np.hstack([_STEPS * self.shares / total, _STEPS * np.log(total)]))
+            _, index, count = np.unique(rough, axis=0, return_inverse=True, return_counts=True)
+        index = index.ravel()
+        shares = np.zeros((len(count), _VARIANCES))
+        np.add.at(shares, index, self.shares)
+        return index, shares / count[:, None]
+
+
+def slow_variances(sd: Floats, rate: Floats, frequency: Floats) -> tuple[Floats, Floats]:
+    """Variances (w, c) of the cosines of slow noise, and of what is faster than the fastest of them (w,).
+
+    An Ornstein–Uhlenbeck process of standard deviation ``sd`` (w,) and ``rate`` (w,), over the duration, has the spectral
+    density 2·rate·sd²/(rate² + ω²), of which Σ over all half turns is coth(rate) − 1/rate; the constant has the rest of sd².
+    """
+    if not len(frequency):
+        return np.zeros((len(sd), 0)), np.zeros_like(sd)
+    rate = rate[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cosine = 2 * rate / (rate**2 + (np.pi * frequency) ** 2)
+        mean = 1 - 1 / np.tanh(rate) + 1 / rate
+    each = np.where(frequency == 0, mean, cosine)
+    shown = each[:, np.unique(frequency, return_index=True)[1]].sum(axis=1)
+    return sd[:, None] ** 2 * each, sd**2 * np.maximum(1 - shown, 0.0)
+
+
+def _present(latent: Floats, absent: float) -> Floats:
+    """Standard normal numbers as probabilities within what is left when the component is absent, 0 where it is."""
+    return np.asarray(np.clip((special.ndtr(latent) - absent) / (1 - absent), 0.0, 1 - 1e-9))
+
+
+def _half_normal(latent: Floats, absent: float, scale: float) -> Floats:
+    return np.asarray(scale * special.ndtri(0.5 + 0.5 * _present(latent, absent)))
+
+
+def _half_cauchy(latent: Floats, absent: float, scale: float) -> Floats:
+    return np.asarray(np.minimum(scale * np.tan(0.5 * np.pi * _present(latent, absent)), LARGEST_RATIO))

@@ -1,0 +1,56 @@
+"""The posterior of a linear model and of its noise: emcee over the sizes of the noise, exact draws of all that is linear."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Progress, run_ensembles, tempered
+from cmm_uq.inference.least_squares import LeastSquares
+from cmm_uq.inference.linear_model import LinearModel
+from cmm_uq.inference.marginal import Marginal
+from cmm_uq.inference.noise import Components
+from cmm_uq.inference.posterior import NoisyPosterior
+from cmm_uq.points import Floats
+
+
+def sample_with_noise(
+    model: LinearModel, noise: Components, estimate: LeastSquares, seed: int, progress: Progress | None = None
+) -> NoisyPosterior:
+    """Sample the posterior.
+
+    Parameters
+    ----------
+    model : linear about its estimate.
+    noise : the components that its observations could show.
+    estimate : least squares of the model.
+    seed : the same seed gives the same draws.
+    progress : told the part done, from 0 to 1.
+    """
+    marginal = Marginal(model, noise, estimate)
+    centre, factor = tempered(marginal.log_density, *start(marginal), seed)
+    chains = run_ensembles(
+        marginal.log_density,
+        centre,
+        factor,
+        seed,
+        progress,
+        effective_samples=LEAST_EFFECTIVE_SAMPLES,
+        steps_at_once=100,
+        least_walkers=16,
+    )  # everything but the noise is drawn independently, given it
+    sizes = noise.sizes(chains.draws)
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(5,)))
+    return NoisyPosterior(
+        unknowns=model.unknowns, draws=marginal.draw(sizes, random), sigma=sizes.coordinate, seed=seed,
+        sampler=chains.sampler, ess_min=chains.ess_min, rhat_max=chains.rhat_max, steps=chains.steps,
+        autocorrelation_time=chains.autocorrelation_time, sizes=sizes,
+    )  # fmt: skip
+
+
+def start(marginal: Marginal) -> tuple[Floats, Floats]:
+    """Centre and factor from which to look: the residuals' scatter, the prior of all else."""
+    d = marginal.noise.dimension
+    dof = max(marginal.estimate.degrees_of_freedom, 1)
+    centre = np.zeros(d)
+    centre[0] = np.log(max(marginal.estimate.sigma, 2e-6)) - (0.5 if d > 1 else 0.0)
+    return centre, np.diag([1 / np.sqrt(2 * dof) + (0.7 if d > 1 else 0.0), *np.ones(d - 1)])

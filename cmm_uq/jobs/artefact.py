@@ -1,0 +1,85 @@
+"""``[artefact]``: what every kind of measurement says of its artefact."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import ClassVar, Self
+
+from pydantic import model_validator
+
+from cmm_uq.jobs.table import AnyFloat, Length, Table, Uncertainty
+
+
+class Traceability(Table):
+    """The artefact's own certificate."""
+
+    number: str = ""
+    laboratory: str = ""
+    date: dt.date | None = None
+    due: dt.date | None = None
+
+
+class ArtefactFacts(Table):
+    """``[artefact]``: what every kind of measurement has; a kind with more keys has a table of its own.
+
+    Without ``length_mm`` the artefact is uncalibrated, unless its certified figures stand in the recording.
+
+    Attributes
+    ----------
+    with_references : whether they do; its ``u_um`` may then stand without ``length_mm``.
+    with_recording : whether there is one; otherwise what ``[machine]`` names is measured.
+    with_earlier : whether two recordings of it at two dates can be compared.
+    form_key : key of the form deviation by its certificate, for a kind that has a form to be compared.
+    """
+
+    with_references: ClassVar[bool] = False
+    with_recording: ClassVar[bool] = True
+    with_earlier: ClassVar[bool] = False
+    form_key: ClassVar[str | None] = None
+
+    kind: str
+    name: str = ""
+    serial: str = ""
+    length_mm: Length | None = None
+    u_um: Uncertainty | None = None
+    cte_per_k: AnyFloat = 0.0
+    certificate: Traceability | None = None
+
+    @model_validator(mode="after")
+    def _uncertainty_of_something(self) -> Self:
+        if self.u_um is not None and self.length_mm is None and not self.with_references:
+            raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
+        if abs(self.cte_per_k) > 1e-3:
+            raise ValueError(
+                f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
+            )
+        return self
+
+    @property
+    def certified(self) -> bool:
+        """Whether lengths can be compared with it."""
+        return self.length_mm is not None
+
+
+class ReferencedFacts(ArtefactFacts):
+    """``[artefact]`` of a kind whose certified figures stand in the recording.
+
+    ``nominal`` says that those figures are nominal only: their common scale then stays free.
+    """
+
+    with_references: ClassVar[bool] = True
+
+    nominal: bool = False
+
+    @model_validator(mode="after")
+    def _nominal_or_certified(self) -> Self:
+        if self.nominal and (self.u_um is not None or self.length_mm is not None):
+            raise ValueError(
+                "nominal = true says that the recording's references are not certified: leave out length_mm and u_um"
+            )
+        return self
+
+    @property
+    def certified(self) -> bool:
+        """Whether lengths can be compared with it."""
+        return not self.nominal

@@ -1,0 +1,119 @@
+"""What every analysis of shifted artefacts found, along an axis or in a plane."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from cmm_uq.inference.draws import Draws, by_ensemble
+from cmm_uq.inference.ensembles import Chains
+from cmm_uq.jobs.job import Job
+from cmm_uq.points import Floats
+from cmm_uq.uncertainty.covariance import Covariance
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import MICROMETRE, unit
+
+Reported = Mapping[str, tuple[Floats, str]]
+"""Draws (N,) of something that is reported, and its unit, by its name."""
+
+
+_STILL = 1e-9
+"""Part of the largest spread in a list up to which an item does not move but for rounding."""
+
+
+class Estimated(Protocol):
+    """All that the readings say."""
+
+    @property
+    def chains(self) -> Chains:
+        """Of which the draws were kept."""
+        ...
+
+    @property
+    def sigma(self) -> Floats:
+        """(N,) draws of the standard uncertainty of one reading, mm."""
+        ...
+
+    @property
+    def residuals(self) -> tuple[Floats, Floats]:
+        """What does not fit, mm: with no error of the machine but its scale, and with what was estimated."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftFound(ABC):
+    """What was found.
+
+    Parameters
+    ----------
+    job : what was analysed.
+    estimate : of the machine and the artefact, with its posterior.
+    """
+
+    job: Job
+    estimate: Estimated
+
+    @cached_property
+    def disagreement_um(self) -> tuple[float, float]:
+        """Root mean square of what the placings disagree by, without and with the machine's errors, µm."""
+        without, with_errors = (_rms_um(values) for values in self.estimate.residuals)
+        return without, with_errors
+
+    @property
+    @abstractmethod
+    def reported(self) -> Reported:
+        """Draws of every estimate, by its name in results.json without ``estimates``."""
+
+    @property
+    @abstractmethod
+    def listed(self) -> Reported:
+        """Draws of what results.json has in lists, by its place there, such as ``curves.linearity_x.error_um[3]``."""
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Of every estimate."""
+        return Covariance.of_draws(self.reported)
+
+    @cached_property
+    def draws(self) -> Draws:
+        """The posterior of every estimate, of the noise where it is estimated, and of what is listed.
+
+        What is zero by definition, as a curve at its first position, is left out.
+        """
+        found = dict(self.reported)
+        if self.job.facts.recording.u_coordinate_um is None:
+            found["noise.coordinate_um"] = self.estimate.sigma / MICROMETRE, unit("µm")
+        found |= self.listed
+        chains = self.estimate.chains
+        values = np.column_stack([draws for draws, _ in found.values()])
+        return Draws(
+            {name: unit for name, (_, unit) in found.items()}, by_ensemble(values, chains.steps, len(chains.draws))
+        )
+
+    @property
+    def repeatability(self) -> Quantity:
+        """Standard uncertainty of one reading, µm."""
+        return Quantity.of_draws(self.estimate.sigma / MICROMETRE, unit("µm"))
+
+
+def _rms_um(values: Floats) -> float:
+    """Root mean square of mm, in µm."""
+    return float((values**2).mean() ** 0.5) / MICROMETRE
+
+
+def listed_draws(place: str, draws: Floats, unit: str) -> Reported:
+    """Draws (N, m) of the items of a list of results.json, but those that do not move: they are zero by definition.
+
+    Parameters
+    ----------
+    place : of the list.
+    draws, unit : in that unit.
+    """
+    spread = np.ptp(draws, axis=0)
+    moving = np.flatnonzero(spread > _STILL * spread.max(initial=0.0))
+    return {f"{place}[{i}]": (draws[:, i], unit) for i in moving.tolist()}

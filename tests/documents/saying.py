@@ -1,0 +1,71 @@
+"""Texts of a document that are no message, number, date, unit, nor the user's own words: what nobody could translate."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from cmm_uq.documents.document import Document, Plot
+from cmm_uq.messages import Day, Message, Number, Text, Verbatim
+from cmm_uq.units import Unit
+
+NO_TEXT = {"language", "svg", "tone", "outcome", "date", "lettering"}
+"""Fields of blocks that no reader sees as text."""
+
+_WORD = re.compile(r"[^\W\d_]{2,}")
+_NUMBER = re.compile(r"[<>\s±]*[+−-]?[\d.,\s]*(?:e[+−-]\d+|×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?[%\s]*|[–∞¼½¾]|nan|inf")
+_LETTERING = re.compile(r"<text[^>]*>(.*?)</text>", re.DOTALL)
+
+
+def strangers(document: Document, known: str) -> list[str]:
+    """Texts of a document with a word in them that cannot be translated and is not the user's.
+
+    Parameters
+    ----------
+    known : the user's own words, and names that are the same in every language.
+    """
+    return [str(text) for text in leaves(document) if not said(text, known)]
+
+
+def leaves(value: Any) -> Iterator[str]:
+    """Every text of a document, those lettered in its pictures too."""
+    if isinstance(value, str):
+        yield value
+    elif is_dataclass(value):
+        for field in fields(value):
+            if field.name not in NO_TEXT:
+                yield from leaves(getattr(value, field.name))
+        if isinstance(value, Plot):
+            yield from lettered(value)
+    elif isinstance(value, (list, tuple)):
+        for item in value:
+            yield from leaves(item)
+
+
+def lettered(plot: Plot) -> Iterator[str]:
+    """Texts in the picture: the message that each is, where it is one."""
+    sorts = {str.__str__(text): text for text in plot.lettering}
+    for found in _LETTERING.findall(plot.svg):
+        text = html.unescape(re.sub(r"<[^>]*>", "", found))
+        yield sorts.get(text, text)
+
+
+def said(text: object, known: str) -> bool:
+    """Whether a text, and all that it is made of, can be said in another language or need not be."""
+    if isinstance(text, Message):
+        return all(said(argument, known) for argument in text.arguments.values())
+    if isinstance(text, (Unit, Day, int, float)):
+        return True
+    if isinstance(text, Number):
+        return bool(_NUMBER.fullmatch(text))
+    if isinstance(text, Verbatim):
+        return all(line.strip() in known or not _prose(line, known) for line in text.splitlines())
+    return not _WORD.search(str(text)) if not isinstance(text, Text) else not text
+
+
+def _prose(line: str, known: str) -> bool:
+    """Whether a line has a word that is neither the user's nor an identifier."""
+    return any(_WORD.fullmatch(word) and word not in known for word in re.split(r"[\s()\[\]{}*/+,;]+", line))

@@ -1,0 +1,140 @@
+"""No document of any example has a word that cannot be translated: each is a message, or the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cmm_uq.commands.plan import plan_outcome
+from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.report import diagnosis_outcome, report_outcome
+from cmm_uq.conformity.plans import READY
+from cmm_uq.conformity.standards import BUILT_IN
+from cmm_uq.documents.budget_page import budget_document
+from cmm_uq.documents.document import Column, Document, Paragraph, Plot, Section, Table
+from cmm_uq.documents.origin import marked
+from cmm_uq.documents.program import NAME
+from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Message, Number, Verbatim, say
+from cmm_uq.physics.catalogue import every
+from cmm_uq.uncertainty.model_file import read_model_file
+from cmm_uq.units import Unit, unit
+from tests.conftest import ROOT
+from tests.documents.saying import leaves, strangers
+
+EXAMPLES = sorted(path.name for path in (ROOT / "examples").iterdir() if (path / "job.toml").exists())
+SAMPLER = "emcee affine-invariant ensemble sampler exact draws"
+
+
+def known_to(folder: Path) -> str:
+    """The user's own words, and names that are the same in every language: of effects, parameters, standards, the program."""
+    own = [path.name + "\n" + path.read_text(encoding="utf-8") for path in folder.iterdir() if path.is_file()]
+    effects = [
+        " ".join((name, *(p.name for p in effect.reported), *effect.columns)) for name, effect in every().items()
+    ]
+    characteristics = [each.name for standard in BUILT_IN.values() for each in standard.characteristics]
+    return "\n".join([*own, *effects, *READY, *characteristics, NAME, SAMPLER])
+
+
+def documents(folder: Path) -> list[Document]:
+    """All that the commands make of a job."""
+    found = []
+    for make, recorded in (
+        (report_outcome, True),
+        (diagnosis_outcome, True),
+        (lambda job: plan_outcome(job, power=False), False),
+    ):
+        try:
+            job = read_job(folder, recorded=recorded)
+            found.append(marked(make(job).document, job))
+        except CmmUqError:  # what this kind does not offer, or needs a recording
+            continue
+    return found
+
+
+def units(document: Document) -> Iterator[str]:
+    """What stands where tables have units: under a heading, and in the cells of a column of units."""
+    for table in (block for section in document.sections for block in section.blocks if isinstance(block, Table)):
+        for place, column in enumerate(table.columns):
+            yield column.unit
+            yield from (row[place] for row in table.rows if column.heading == "Unit")
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_text_of_every_document_is_a_message_or_the_user_s(name: str) -> None:
+    folder = ROOT / "examples" / name
+    made, known = documents(folder), known_to(folder)
+    assert made
+    assert {document.title: strangers(document, known) for document in made} == {
+        document.title: [] for document in made
+    }
+    assert [text for document in made for text in units(document) if not isinstance(text, Unit) and text] == []
+    assert all(sum(isinstance(text, Message) for text in leaves(document)) > 5 for document in made)
+
+
+def test_the_page_of_a_model_file_is_translatable_too(tmp_path: Path) -> None:
+    file = tmp_path / "model.toml"
+    file.write_text(MODEL, encoding="utf-8")
+    model = read_model_file(file)
+    document = budget_document(model, model.evaluate(), file.name)
+    assert strangers(document, MODEL + file.name + model.sha256 + NAME) == []
+
+
+MODEL = """
+[model]
+title = "Length of a bar"
+outputs = { y = "x1**2 + x2**2 * x3" }
+[inputs.x1]
+distribution = "normal"
+value = 0.05
+u = 0.005
+unit = "mm"
+source = "certificate 123"
+[inputs.x2]
+distribution = "rectangular"
+low = 0.0
+high = 0.1
+[inputs.x3]
+distribution = "t"
+samples = [1.0, 1.1, 0.9, 1.05]
+[correlation]
+"x1,x2" = 0.5
+"""
+
+PLAIN = Document(
+    title=say("Plan"), number=Verbatim("7"), subject=say("of {machine}", machine=Verbatim("Iota")), issuer=(), particulars=(),
+    warnings=(), sections=(), statements=(), signatures=(), attachments=(), produced_by=say("by nobody"),
+)  # fmt: skip
+WORD = "length"
+
+
+@pytest.mark.parametrize("block", [
+    Paragraph(f"one {WORD} more"),  # type: ignore[arg-type]
+    Paragraph(say("see {what}", what=f"one {WORD} more")),  # type: ignore[arg-type]
+    Paragraph(Verbatim(f"one {WORD} more")),
+    Paragraph(Number(f"one {WORD} more")),
+    Table(say("Lengths"), (Column(say("Name")),), ((f"one {WORD} more",),)),  # type: ignore[arg-type]
+    Table(say("Lengths"), (Column(f"one {WORD} more"),), ()),  # type: ignore[arg-type]
+    Plot(say("Lengths"), say("A line."), f"<svg><text x='1'>one {WORD} more</text></svg>"),
+])  # fmt: skip
+def test_an_f_string_anywhere_in_a_document_would_be_found(block: Paragraph | Table | Plot) -> None:
+    assert strangers(PLAIN, "Iota") == []
+    assert strangers(replace(PLAIN, sections=(Section(say("Results"), (block,)),)), "Iota") == (
+        ["see one length more"]
+        if isinstance(block, Paragraph) and block.text.startswith("see")
+        else ["one length more"]
+    )
+
+
+def test_what_the_user_wrote_stands_as_it_is() -> None:
+    page = replace(PLAIN, subject=Verbatim("one length more"))
+    assert strangers(page, "customer = 'one length more'") == []
+
+
+def test_the_words_in_a_picture_are_messages() -> None:
+    drawing = "<svg><text>Error / µm</text><text>−0.5</text></svg>"
+    plot = Plot(say("Curve"), say("A curve."), drawing, (say("Error / {unit}", unit=unit("µm")),))
+    assert strangers(replace(PLAIN, sections=(Section(say("Results"), (plot,)),)), "Iota") == []

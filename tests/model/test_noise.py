@@ -1,0 +1,73 @@
+"""The components that recordings could show, against the covariance of noise drawn at the points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.commands.diagnosing import screened_model
+from cmm_uq.commands.reading import read_job
+from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Sizes
+from cmm_uq.kinds import kind_of
+from cmm_uq.model import MeasurementModel, Noise
+from cmm_uq.model.noise import noise_of
+from cmm_uq.points import Floats
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def example(name: str, repeats: int = 1, *, timed: bool = False) -> MeasurementModel:
+    """The model of an example, each row read so many times, perhaps one a minute."""
+    job = read_job(EXAMPLES / name)
+    points = job.points
+    rows = np.tile(np.arange(len(points)), repeats)
+    columns = {key: values[rows] for key, values in points.columns.items()}
+    columns |= {"time_s": 60.0 * np.arange(len(rows))} if timed else {}
+    repeat = points.repeat[rows] + points.repeat.max() * np.repeat(np.arange(repeats), len(points))
+    read = replace(
+        points, xyz=points.xyz[rows], measurement=points.measurement[rows], point=points.point[rows], repeat=repeat,
+        columns=columns, lines=np.arange(len(rows)),
+    )  # fmt: skip
+    model, _ = screened_model(job)
+    observe = kind_of(job).observing("tested")
+    return MeasurementModel(observe(job.facts.artefact, read, where="recording"), model.effects)
+
+
+def seen(model: MeasurementModel, noise: Noise, draws: int) -> Floats:
+    """Observations (draws, m), mm, of noise drawn at the points."""
+    random = np.random.default_rng(8)
+    each = np.stack([noise.drawn(model.artefact.points, random) for _ in range(draws)], axis=2)
+    return model.artefact.project(model.placed(model.estimate().least_squares.value), each).T
+
+
+@pytest.mark.parametrize("name", ["iota-1102-20C", "step-gauge-simulated", "plate-simulated", "sphere-simulated"])
+def test_the_covariance_of_observations_is_that_of_noise_at_the_points(name: str) -> None:
+    """Readings by axis, twice each, and set-up offsets; over 4000 drawings, in units of each variance."""
+    model = example(name, 2)
+    drawn = seen(model, Noise((1e-3, 2e-3, 3e-3), placing=1.5e-3), 4000)
+    sizes = Sizes(np.array([[1e-3, 2e-3, 3e-3]]), np.array([1.5e-3]), np.zeros(1), np.zeros(1), np.ones(1))
+    repeated = noise_of(model).repeated(sizes, 4000, np.random.default_rng(9))[0]
+    chosen = np.linspace(0, drawn.shape[1] - 1, 60).astype(int)
+    wanted, found = (np.cov(values[:, chosen], rowvar=False) for values in (drawn, repeated))
+    scale = np.sqrt(np.diag(wanted))
+    assert np.abs((found - wanted) / np.outer(scale, scale)).max() < 0.16  # five standard errors of a difference of two
+
+
+def test_only_what_can_show_is_reckoned_with() -> None:
+    assert noise_of(example("iota-1102-20C")).possible == (AXES,)
+    assert noise_of(example("iota-1102-20C", 2)).possible == (AXES, PLACING)
+    assert noise_of(example("iota-1102-20C", 2, timed=True)).possible == (AXES, PLACING, SLOW)
+    assert GROWTH in noise_of(example("step-gauge-simulated")).possible
+
+
+def test_the_order_of_the_rows_says_nothing_without_a_time() -> None:
+    model = example("plate-simulated", 2)
+    assert noise_of(model).slow.shape[1] == 0
+
+
+def test_turning_keeps_every_length() -> None:
+    turn = noise_of(example("plate-simulated", 2)).turn.toarray()
+    assert np.allclose(turn @ turn.T, np.eye(len(turn)), atol=1e-12)
