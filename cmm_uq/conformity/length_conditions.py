@@ -14,7 +14,7 @@ from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Floats, Ints, Machine, Points
 
 SAME_LENGTH_MM = 1.0
-"""Lengths nearer to each other than this are one nominal length."""
+"""Lengths no farther from each other than this are one nominal length."""
 
 
 def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:

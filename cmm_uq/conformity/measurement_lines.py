@@ -15,6 +15,9 @@ CORNER_TO_CORNER = 0.75
 """Part of every axis' travel that a line, produced to the ends of travel, crosses on a space diagonal; this project's figure,
 which leaves room for the fixture."""
 
+_ROUNDING = 1e-6
+"""mm; a line as near as this to the end of an axis' travel lies in it."""
+
 PARALLELS = tuple(say("parallel to {axis}", axis=Verbatim(a.upper())) for a in AXES)
 SPACE_DIAGONALS = tuple(say("space diagonal {axes}", axes=Verbatim(f"{x}X {y}Y +Z")) for x in "+−" for y in "+−")
 FACE_DIAGONALS = tuple(
@@ -59,6 +62,8 @@ def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float
     u = direction / np.linalg.norm(direction)
     place = middle + machine.origin_mm
     moving = np.abs(u) > 1e-9
+    if np.any((np.abs(place - travel.mean(axis=1)) > 0.5 * np.ptp(travel, axis=1) + _ROUNDING)[~moving]):
+        return 0.0
     ends = (travel - place[:, None])[moving] / u[moving, None]
     return max(0.0, float(ends.max(axis=1).min() - ends.min(axis=1).max()))
 

@@ -21,7 +21,7 @@ from cmm_uq.planning.setting import Setting
 from cmm_uq.points import Floats, Points
 
 _HELD = 1e12
-"""Information of a size that its certificate gives without uncertainty."""
+"""Information of a size that its certificate gives without uncertainty, 0.1 nm; more would hide all other by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def certified(unknowns: Sequence[Unknown], more: int = 0) -> Floats:
     values = np.zeros(len(unknowns) + more)
     for i, unknown in enumerate(unknowns):
         if unknown.known:
-            values[i] = (unknown.scale / unknown.prior_sd) ** 2 if unknown.prior_sd > 0 else _HELD
+            values[i] = min((unknown.scale / unknown.prior_sd) ** 2, _HELD) if unknown.prior_sd > 0 else _HELD
     return np.diag(values)
 
 

@@ -67,7 +67,7 @@ def rounded(value: float, u: float, digits: int = 2) -> tuple[Number, Number]:
     if u == 0:
         return (_plain(exact.normalize()), Number("0"))
     if isinf(u):
-        return (_plain(_to_place(exact, exact.adjusted() - digits + 1) if value else exact), Number("∞"))
+        return _plain(_to_place(exact, exact.adjusted() - digits + 1)) if value else Number("0"), Number("∞")
     shown = _rounded_uncertainty(_decimal(u), digits)
     place = shown.adjusted() - digits + 1
     return _as_text(_to_place(exact, place), shown, place)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.conformity.accuracy import Repeated, figures, with_uncertainty
+from cmm_uq.points import Floats, Ints
 
 # Lengths printed in figures C 1/C 2 (uncompensated) and C 3/C 4 (compensated) of Harris 2004, mm.
 UNCOMPENSATED = [
@@ -54,6 +55,38 @@ def test_the_value_is_that_of_the_recording_and_lies_in_its_interval() -> None:
     for name, quantity in with_uncertainty(lengths, predicted, white(12e-3, 20), seed=0).items():
         assert quantity.value == figures(lengths)[name]
         assert quantity.interval95[0] < quantity.value < quantity.interval95[1]
+
+
+def test_the_uncertainty_is_the_scatter_of_repetitions_and_not_the_spread_of_the_models() -> None:
+    """Three hundred lengths leave numbers for ten repetitions of each of a thousand draws, whose models lie 0.1 mm apart."""
+    sigma, m = 5e-3, 300
+    models = 404 + 0.1 * np.arange(1000.0)[:, None] + np.zeros(m)
+    found = with_uncertainty(np.full(m, 404.0), models, white(sigma, m), seed=2)
+    assert found["mean_length_mm"].u == pytest.approx(sigma / np.sqrt(m), rel=0.02)
+
+
+def test_every_draw_has_its_part_in_the_uncertainty() -> None:
+    """Half of the draws with a noise of 1 µm, half with 7: √((1² + 7²)/2) = 5 µm, over √20."""
+    sigma = np.array([1e-3, 7e-3])
+
+    def noise(chosen: Ints, times: int, random: np.random.Generator) -> Floats:
+        return sigma[chosen][:, None, None] * random.standard_normal((len(chosen), times, 20))
+
+    found = with_uncertainty(np.full(20, 404.0), np.full((2, 20), 404.0), noise, seed=4)
+    assert found["mean_length_mm"].u == pytest.approx(5e-3 / np.sqrt(20), rel=0.15)
+    one = with_uncertainty(np.full(20, 404.0), np.full((1, 20), 404.0), white(7e-3, 20), seed=4)
+    assert one["mean_length_mm"].u == pytest.approx(7e-3 / np.sqrt(20), rel=0.3)
+
+
+def test_the_interval_leans_to_the_side_on_which_the_true_figure_lies() -> None:
+    """Of two lengths, s = σ·|z|: its error lies between (0.0313 − 0.7979)σ and (2.2414 − 0.7979)σ with 95 %, and the figure
+    that repetitions show on average is what was found less the error.
+    """
+    lengths = np.array([404.0, 404.0 + 1e-2])
+    found = with_uncertainty(lengths, np.full((1000, 2), 404.0), white(5e-3, 2), seed=6)["rms_accuracy_error_um"]
+    low, high = (end - found.value for end in found.interval95)
+    assert low == pytest.approx(-5.0 * (2.2414 - 0.7979), rel=0.03)
+    assert high == pytest.approx(5.0 * (0.7979 - 0.0313), rel=0.03)
 
 
 def test_intervals_cover_the_figure_that_repetitions_would_show() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.conformity.decision import decide
+from cmm_uq.conformity.decision import decide, rule_name
 from cmm_uq.jobs.conformity import FalseAccept, GuardBand, Rule
 
 RULES: list[Rule] = ["simple", "ISO 14253-1", GuardBand(guard_band=1.0), FalseAccept(max_false_accept=0.02)]
@@ -29,14 +29,24 @@ GUARDED: list[Rule] = [rule for rule in RULES if rule != "simple"]
         (10.01, "ISO 14253-1", "undecided"),
         (11.64, "ISO 14253-1", "undecided"),
         (11.65, "ISO 14253-1", "fail"),
-        (7.99, GuardBand(guard_band=1.0), "pass"),  # w = U = 2 u
-        (8.01, GuardBand(guard_band=1.0), "undecided"),
-        (11.99, GuardBand(guard_band=1.0), "undecided"),
-        (12.01, GuardBand(guard_band=1.0), "fail"),
+        (
+            8.0,
+            GuardBand(guard_band=1.0),
+            "pass",
+        ),  # w = U = 2 u, and the limit of acceptance belongs to what is accepted
+        (8.001, GuardBand(guard_band=1.0), "undecided"),
+        (11.999, GuardBand(guard_band=1.0), "undecided"),
+        (12.0, GuardBand(guard_band=1.0), "fail"),
         (7.94, FalseAccept(max_false_accept=0.02), "pass"),  # 2.054 u
         (7.95, FalseAccept(max_false_accept=0.02), "undecided"),
         (12.05, FalseAccept(max_false_accept=0.02), "undecided"),
         (12.06, FalseAccept(max_false_accept=0.02), "fail"),
+        (10.0, FalseAccept(max_false_accept=0.6), "pass"),
+        (
+            10.0,
+            FalseAccept(max_false_accept=0.5),
+            "pass",
+        ),  # at the limit one half is accepted wrongly, and that is allowed
         (10.01, FalseAccept(max_false_accept=0.6), "fail"),  # a risk above one half accepts nothing beyond the limit
         (10.0, GuardBand(guard_band=0.0), "pass"),
         (10.01, GuardBand(guard_band=0.0), "fail"),
@@ -77,16 +87,64 @@ def test_a_guard_band_of_both_sides_is_wider_where_the_limits_are_near() -> None
     assert found.guard_band is not None
     accepted = NormalDist(4.0 - found.guard_band, 2.0)
     assert accepted.cdf(-4.0) + 1 - accepted.cdf(4.0) == pytest.approx(0.05, abs=1e-9)
-    assert found.guard_band > 1.645 * 2.0
+    assert 1.645 * 2.0 < found.guard_band < 4.0
     assert decide(0.0, 2.0, 3.9, "ISO 14253-1", signed=True).guard_band is None
     assert decide(0.0, 2.0, 3.9, GuardBand(guard_band=1.0), signed=True).guard_band is None
     assert decide(0.0, 1.0, 10.0, "ISO 14253-1", signed=True).guard_band == pytest.approx(1.6448536, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rule", "band"),
+    [
+        ("simple", 0.0),
+        (GuardBand(guard_band=1.5), 6.0),  # 1.5 · 2 · 2
+        (FalseAccept(max_false_accept=0.02), 4.107498),  # 2.053749 u, the 98 % quantile of the normal distribution
+        (
+            FalseAccept(max_false_accept=0.6),
+            0.0,
+        ),  # nothing beyond the limit is accepted, so that no band lies outside it
+    ],
+)
+@pytest.mark.parametrize("signed", [True, False])
+def test_the_guard_band_of_two_micrometres_uncertainty(rule: Rule, band: float, signed: bool) -> None:
+    assert decide(0.0, 2.0, 40.0, rule, signed=signed).guard_band == pytest.approx(band, abs=1e-6)
+
+
+def test_a_guard_band_as_wide_as_the_limit_leaves_zero_to_accept() -> None:
+    found = decide(0.0, 2.0, 4.0, GuardBand(guard_band=1.0), signed=True)
+    assert (found.guard_band, found.outcome) == (4.0, "pass")
+    assert decide(0.0, 2.0, 3.999, GuardBand(guard_band=1.0), signed=True).outcome == "undecided"
+
+
+@pytest.mark.parametrize(
+    ("rule", "name", "words"),
+    [
+        ("simple", "simple", "simple acceptance (JCGM 106:2012, 8.2.1)"),
+        ("ISO 14253-1", "ISO 14253-1", "ISO 14253-1:2017, guard band 1.64 u (95 %)"),
+        (GuardBand(guard_band=1.5), "guard_band = 1.5", "guard band 1.5 U, k = 2 (ILAC-G8:09/2019)"),
+        (FalseAccept(max_false_accept=0.02), "max_false_accept = 0.02",
+         "probability of false acceptance at most 0.02 (JCGM 106:2012, 9.5)"),
+    ],
+)  # fmt: skip
+def test_a_rule_in_the_words_of_the_job_and_of_the_certificate(rule: Rule, name: str, words: str) -> None:
+    """Limit twenty times u: the band of 1.6449 u is a multiple of u, whatever u is."""
+    assert rule_name(rule) == name
+    assert decide(0.0, 2.0, 40.0, rule, signed=True).rule == words
+
+
+def test_the_words_name_no_guard_band_where_no_value_is_accepted() -> None:
+    assert decide(0.0, 2.0, 3.9, "ISO 14253-1", signed=True).rule == "ISO 14253-1:2017, (95 %)"
 
 
 def test_a_value_inside_its_limits_never_proves_nonconformity() -> None:
     """u a hundred times the limit: 0.8 % lie inside, whatever is measured; that says nothing of the machine."""
     for rule in GUARDED:
         assert decide(0.5, 100.0, 1.0, rule, signed=True).outcome == "undecided"
+
+
+def test_a_value_at_its_limit_does_not_prove_nonconformity_either() -> None:
+    """Limit 1, u = 2, value 1: beyond are Φ(0) + Φ(−1) = 65.9 %, more than may be, and within no more than may be."""
+    assert decide(1.0, 2.0, 1.0, FalseAccept(max_false_accept=0.6), signed=True).outcome == "undecided"
 
 
 def test_without_an_uncertainty_only_simple_acceptance_decides_and_has_no_probability() -> None:
@@ -100,8 +158,12 @@ def test_without_an_uncertainty_only_simple_acceptance_decides_and_has_no_probab
 
 def test_small_probabilities_keep_their_digits() -> None:
     """Φ(−12) = 1.7765e-33 (Abramowitz & Stegun have log10 Q(12) = −32.75044): 1 − P would be 0."""
-    assert decide(22.0, 1.0, 10.0, "simple", signed=True).probability_conforming == pytest.approx(1.7765e-33, rel=1e-4)
-    assert decide(-2.0, 1.0, 10.0, "simple", signed=False).probability_beyond == pytest.approx(1.7765e-33, rel=1e-4)
+    assert decide(22.0, 1.0, 10.0, "simple", signed=True).probability_conforming == pytest.approx(
+        1.7765e-33, rel=1e-4, abs=0
+    )
+    assert decide(-2.0, 1.0, 10.0, "simple", signed=False).probability_beyond == pytest.approx(
+        1.7765e-33, rel=1e-4, abs=0
+    )
 
 
 @given(st.floats(-30, 30), st.floats(0.001, 50), st.sampled_from(RULES), st.booleans())

@@ -75,6 +75,37 @@ def test_a_length_is_compared_with_the_travel_along_its_line() -> None:
     assert crossed_travel(MACHINE, np.array([5000.0, 0, 0]), diagonal) == 0.0
 
 
+@pytest.mark.parametrize(("degrees", "position"), [(9.99, "parallel to X"), (10.02, "face diagonal +X +Y")])
+def test_a_line_is_parallel_to_an_axis_up_to_ten_degrees_from_it(degrees: float, position: str) -> None:
+    t = np.radians(degrees)
+    assert position_of(np.array([np.cos(t), np.sin(t), 0.0])) == position
+
+
+@pytest.mark.parametrize(("moved", "position"), [(0.248, "space diagonal"), (0.251, "oblique")])
+def test_a_space_diagonal_crosses_three_quarters_of_every_axis(moved: float, position: str) -> None:
+    """Moved along X by a part of its travel, the diagonal crosses the rest."""
+    middle = TRAVEL.mean(axis=1) + np.array([900 * moved, 0, 0])
+    assert position_on(MACHINE, middle, np.array([900.0, 550, 500])) == f"{position} +X +Y +Z"
+
+
+@pytest.mark.parametrize("unknown", [0, 1, 2])
+def test_the_travel_of_two_axes_alone_is_no_travel(unknown: int) -> None:
+    travel = TRAVEL.copy()
+    travel[unknown] = np.nan
+    assert crossed_travel(Machine("m", "XYZ", travel), TRAVEL.mean(axis=1), np.array([1.0, 0, 0])) is None
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-6])
+def test_a_line_beside_the_travel_crosses_none_of_it(tilt: float) -> None:
+    """Along X, whether exactly or not; at the end of the travel of Y it lies within it."""
+    along = np.array([1.0, tilt, 0.0])
+    for y, crossed in ((-1.0, 0.0), (551.0, 0.0), (275.0, 900.0)):
+        assert crossed_travel(MACHINE, np.array([450.0, y, -250.0]), along) == pytest.approx(crossed)
+        assert crossed_travel(MACHINE, np.array([100.0, y, -250.0]), -along) == pytest.approx(crossed)
+    for y in (0.0, 550.0):
+        assert crossed_travel(MACHINE, np.array([450.0, y, -500.0]), np.array([1.0, 0.0, 0.0])) == pytest.approx(900.0)
+
+
 def test_the_travel_is_that_of_the_scales() -> None:
     """Recorded 1000 mm off the scales: the origin brings the line back."""
     moved = Machine("m", "XYZ", TRAVEL, np.array([1000.0, 0, 0]))

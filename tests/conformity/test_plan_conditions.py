@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cmm_uq.conformity.plan_conditions import conditions
-from cmm_uq.conformity.plans import READY
+from cmm_uq.conformity.plans import ISO_10360_5, READY
 from cmm_uq.kinds import artefact_of
 from cmm_uq.planning.placing import joined
 from cmm_uq.planning.ready import ready_plan
@@ -49,3 +49,9 @@ def test_blocks_on_one_line_count_together() -> None:
 def test_a_shortest_length_above_thirty_millimetres_is_said() -> None:
     said = unmet("step_gauge", length_mm=1000.0, lengths_mm=[100.0, 200.0, 400.0, 550.0, 1000.0])
     assert "shortest length at most 30 mm: 100 mm" in said
+
+
+def test_an_artefact_that_is_no_sphere_has_no_points_on_one() -> None:
+    facts, usual = EVERY_KIND["ballbar"]
+    artefact = artefact_of(facts, joined(ready_plan(setting(facts, **usual))[1]))
+    assert conditions(ISO_10360_5, artefact, recorded=True) == ()

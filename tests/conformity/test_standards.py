@@ -409,6 +409,59 @@ def test_simple_acceptance_does_without_an_uncertainty_and_says_so() -> None:
     )
 
 
+# --- what a statement remarks ----------------------------------------------------------------------------------------
+
+UNCERTAINTY_IGNORED = (
+    "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
+)
+
+
+def test_a_guarded_statement_on_lengths_remarks_their_uncertainty_and_the_worst() -> None:
+    """u at the worst length is 0.41236 · 612.3456/800 = 0.31563; 2.5 of 4.541 there, 0.1 of 2.567 at 20 mm."""
+    errors = {(1, 1, 20.0): 0.1, (1, 1, 612.3456): 2.5}
+    found = judged(gauge([np.eye(3)[0]], [[20.0, 612.3456]], errors=errors, repeats=1, u_um=0.41236))
+    assert found.remarks == (
+        "u is the test uncertainty (ISO/TS 23165), from the calibrated length: 0.316 µm.",
+        "2 lengths decided, each by its own u and limit; least favourable: measurement 1, repeat 1, 612.35 mm.",
+    )
+
+
+def test_one_length_alone_is_spoken_of_in_the_singular() -> None:
+    found = judged(gauge([np.eye(3)[0]], [[400.0]], repeats=1))
+    assert found.remarks[1].startswith("1 length decided, ")
+
+
+def test_simple_acceptance_of_a_length_remarks_what_it_ignores_once_there_is_an_uncertainty() -> None:
+    stated, unstated = (
+        judged(gauge([np.eye(3)[0]], [[400.0]], repeats=1, u_um=u), rule="simple").remarks for u in (0.4, None)
+    )
+    assert stated[2:] == (UNCERTAINTY_IGNORED,)
+    assert unstated[0] == "u_um is not stated: no uncertainty is considered, and no probability can be given."
+    assert len(unstated) == 2
+
+
+def test_a_statement_on_spheres_remarks_the_ball_and_of_several_the_largest() -> None:
+    """Form of the ball 0.2345 µm: half of it is 0.117. Of two spheres the second is a micrometre less true."""
+    one = judged(sphere(form_um=0.2345), ISO_5, limit_um=20.0)
+    ball = "u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, 0.12 µm."
+    assert one.remarks == (ball,)
+    assert (one.named.measurement, one.named.repeat, one.named.length_mm) == (1, 1, 25.0)
+    two = sphere(form_um=0.2345, spheres=2)
+    xyz = two.points.xyz.copy()
+    xyz[26] += 1e-3 * (xyz[26] - [30.0, 0.0, 0.0]) / 12.5
+    found = judged(Sphere(artefact_facts(kind="sphere", length_mm=25.0, form_um=0.2345), two.points.at(xyz)), ISO_5,
+                   limit_um=20.0)  # fmt: skip
+    assert found.remarks == (ball, "The largest of 2 spheres: measurement 2.")
+    assert found.named.measurement == 2
+    assert found.value_um > one.value_um + 0.5
+
+
+def test_a_maximum_permissible_error_grows_with_the_size_of_the_sphere() -> None:
+    """2.5 + 25/300."""
+    assert judged(sphere(), ISO_5).limit_um == pytest.approx(2.5 + 25 / 300)
+    assert judged(bars(), B89).limit_um == pytest.approx(2.5 + 300 / 300)
+
+
 # --- what is not decided ---------------------------------------------------------------------------------------------
 
 

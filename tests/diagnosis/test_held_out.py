@@ -5,16 +5,18 @@ from __future__ import annotations
 import arviz
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import linalg, stats
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.held_out import FOLDS, improvement
 from cmm_uq.inference.posterior import Density
+from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.points import Floats, Machine, Points
+from cmm_uq.points import Floats, Ints, Machine, Points
+from tests.conformity.recorded import gauge
 from tests.conftest import ROOT
 from tests.recordings import TRAVEL, bar_facts, bars
 
@@ -52,6 +54,76 @@ def test_the_gain_of_exact_refits_is_that_of_importance_sampling() -> None:
     gain = improvement(before, after)
     assert gain.elpd_gain > 0
     assert gain.elpd_gain == pytest.approx(second - first, abs=0.3)
+
+
+def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Floats, float]:
+    """Log predictive density of each fold and rms of its errors, µm.
+
+    All observations, in units of their noise, are normal with covariance A·P·Aᵀ + σ², a placing being known to 100 mm before;
+    those that the fit has seen are taken as given (Gelman et al., *Bayesian Data Analysis*, A.1). Where placings are left out
+    as a whole, only combinations that their own place does not change are predicted.
+    """
+    estimate = model.estimate()
+    linear, sigma = estimate.linear, estimate.least_squares.sigma_of_residuals
+    A = np.hstack([linear.design, linear.placing]) / linear.noise_scale[:, None]
+    variance = [*linear.prior_sd**2, *[1e4] * linear.placing.shape[1]]
+    y = (linear.observed - linear.design @ linear.prior_mean) / linear.noise_scale
+    joint = A @ np.diag(variance) @ A.T + sigma**2 * np.eye(len(y))
+    numbers, densities, errors = np.unique(groups), [], []
+    count = FOLDS if len(numbers) > 40 else len(numbers)
+    for k in range(count):
+        out = np.isin(groups, numbers[k::count])
+        gain = np.linalg.solve(joint[np.ix_(~out, ~out)], joint[np.ix_(~out, out)]).T
+        Q = linalg.null_space(linear.placing[out].T) if whole and linear.placing.size else np.eye(out.sum())
+        error = Q.T @ (y[out] - gain @ y[~out])
+        spread = Q.T @ (joint[np.ix_(out, out)] - gain @ joint[np.ix_(~out, out)]) @ Q
+        densities.append(stats.multivariate_normal.logpdf(error, cov=spread))
+        errors.append(error * linear.noise_scale[out][0])
+    return np.array(densities), float(1e3 * np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+
+
+def compared(before: MeasurementModel, after: MeasurementModel, groups: Ints, unseen: str) -> None:
+    """All figures of an improvement against the joint distribution; its standard error is over what was left out."""
+    whole = unseen == "placings"
+    (first, rms_first), (second, rms_second) = (predicted(model, groups, whole=whole) for model in (before, after))
+    found = improvement(before, after)
+    assert found.unseen == unseen
+    assert found.heldout_rms_before_um == pytest.approx(rms_first, rel=1e-5)
+    assert found.heldout_rms_after_um == pytest.approx(rms_second, rel=1e-5)
+    assert found.elpd_gain == pytest.approx((second - first).sum(), rel=1e-4)
+    assert found.elpd_gain_se == pytest.approx(np.sqrt(len(first)) * (second - first).std(ddof=1), rel=1e-4)
+    for model, rms in ((before, found.rms_before_um), (after, found.rms_after_um)):
+        assert rms == pytest.approx(1e3 * np.sqrt(np.mean(model.estimate().least_squares.residuals ** 2)))
+    same = improvement(after, after)
+    assert (same.elpd_gain, same.elpd_gain_se) == (0.0, 0.0)
+    assert same.heldout_rms_before_um == same.heldout_rms_after_um == found.heldout_rms_after_um
+
+
+@pytest.mark.parametrize("made", [12, 40, 41, 44])
+def test_predictions_of_bars_are_those_of_the_joint_normal_distribution(made: int) -> None:
+    """Up to forty bars one by one, of more a tenth at a time."""
+    points = bars(np.random.default_rng(6), made, 400.0, Machine("m", "XYZ", TRAVEL))
+    truth = MeasurementModel(Ballbar(bar_facts(), points), effects(("squareness_xy",)))
+    points = points.at(truth.simulate(np.array([12.0]), np.array([400.0]), Noise(5e-3), np.random.default_rng(7)))
+    before, after = (
+        MeasurementModel(Ballbar(bar_facts(), points), effects(names)) for names in (SCALES, (*SCALES, "squareness_xy"))
+    )
+    compared(before, after, after.artefact.measurement, "placings")
+
+
+@pytest.mark.parametrize(("lines", "unseen"), [(12, "placings"), (10, "placings"), (9, "points")])
+def test_predictions_along_lines_are_those_of_the_joint_normal_distribution(lines: int, unseen: str) -> None:
+    """Whole lines of a gauge, whose place is then open, or faces on few lines, whose place the other faces give."""
+    directions = np.random.default_rng(8).standard_normal((lines, 3))
+    ideal = gauge(list(directions), [[20.0, 100.0, 200.0, 300.0]] * lines, repeats=2)
+    truth = MeasurementModel(ideal, effects(("squareness_xy",)))
+    xyz = truth.simulate(np.array([12.0]), np.array([800.0]), Noise(2e-3), np.random.default_rng(9))
+    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4)
+    artefact = StepGauge(facts, ideal.points.at(xyz))
+    before, after = (MeasurementModel(artefact, effects(names)) for names in (SCALES, (*SCALES, "squareness_xy")))
+    key = np.column_stack([artefact.measurement, artefact.points.point])
+    groups = artefact.measurement if unseen == "placings" else np.unique(key, axis=0, return_inverse=True)[1].ravel()
+    compared(before, after, groups, unseen)
 
 
 def test_points_of_a_few_lines_are_predicted_as_the_press_residuals_of_all_columns_say() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -91,6 +93,102 @@ def test_too_few_observations_are_refused(rows: int, sigma: float | None, messag
     design = np.random.default_rng(6).standard_normal((rows, 3))
     with pytest.raises(CmmUqError, match=message):
         solve(model(design, np.zeros(rows), sigma=sigma))
+
+
+def weighted(sigma: float | None = None, rows: int = 7) -> LinearModel:
+    """Three columns, one of them the artefact's place, noise scales between 0.5 and 3."""
+    random = np.random.default_rng(8)
+    design, placing = random.standard_normal((rows, 2)), random.standard_normal((rows, 1))
+    scale = np.linspace(0.5, 3.0, rows)
+    return LinearModel(random.standard_normal(rows), design, (unknown(0), unknown(1)), placing, scale, sigma)
+
+
+def test_observations_count_by_their_noise_and_residuals_are_in_millimetres() -> None:
+    """Against weighted least squares with the place as a third parameter."""
+    given = weighted()
+    A, w = np.hstack([given.design, given.placing]), 1 / given.noise_scale
+    expected = np.linalg.lstsq(w[:, None] * A, w * given.observed, rcond=None)[0]
+    residuals = given.observed - A @ expected
+    found = solve(given)
+    np.testing.assert_allclose(found.value, expected[:2], rtol=1e-12)
+    np.testing.assert_allclose(found.residuals, residuals, rtol=1e-10)
+    assert found.degrees_of_freedom == 4
+    assert found.residual_sd == pytest.approx(np.sqrt(residuals @ residuals / 4))
+    assert found.sigma == found.sigma_of_residuals == pytest.approx(np.sqrt(np.sum((w * residuals) ** 2) / 4))
+    covariance = np.linalg.inv((w[:, None] * A).T @ (w[:, None] * A))[:2, :2]
+    np.testing.assert_allclose(found.covariance, found.sigma**2 * covariance, rtol=1e-10)
+
+
+def test_a_place_that_is_given_twice_is_taken_once() -> None:
+    given = weighted()
+    twice = replace(given, placing=np.hstack([given.placing, -3.0 * given.placing]))
+    assert solve(twice).degrees_of_freedom == solve(given).degrees_of_freedom == 4
+    np.testing.assert_allclose(solve(twice).value, solve(given).value, rtol=1e-9)
+
+
+def test_a_stated_noise_is_used_and_that_of_the_residuals_is_told() -> None:
+    stated, free = solve(weighted(0.125)), solve(weighted())
+    assert stated.sigma == 0.125
+    assert stated.sigma_of_residuals == free.sigma_of_residuals != 0.125
+    np.testing.assert_allclose(stated.covariance / 0.125**2, free.covariance / free.sigma**2, rtol=1e-12)
+
+
+def test_as_many_observations_as_parameters_leave_a_stated_noise_alone() -> None:
+    found = solve(weighted(0.125, rows=3))
+    assert found.degrees_of_freedom == 0
+    assert found.residual_sd is None
+    assert (found.sigma, found.sigma_of_residuals) == (0.125, 0.125)
+    with pytest.raises(CmmUqError, match="2 observations for 2 parameters leave nothing"):
+        solve(weighted(rows=3))
+    with pytest.raises(CmmUqError, match="1 observations cannot determine 2"):
+        solve(weighted(0.125, rows=2))
+
+
+def test_the_condition_is_that_of_the_design_in_the_parameters_units() -> None:
+    """Columns of length 8 and 2 in units of 0.5 and 1: lengths 4 and 2."""
+    design = np.zeros((6, 3))
+    design[0, 0], design[1, 1] = 8.0, 2.0
+    unknowns = (Unknown(("e", "a"), "", 0.0, 1.0, 0.5), unknown(1), unknown(2))
+    found = solve(LinearModel(np.zeros(6), design, unknowns, np.zeros((6, 0)), np.ones(6), 0.1))
+    assert (found.rank, found.condition) == (2, pytest.approx(2.0))
+    assert found.determined.tolist() == [True, True, False]
+    assert found.covariance[0, 0] == pytest.approx((0.1 / 8) ** 2)
+    assert found.covariance[1, 1] == pytest.approx((0.1 / 2) ** 2)
+    assert np.isinf(found.covariance[2, 2])
+
+
+def test_a_design_of_nothing_determines_nothing() -> None:
+    found = solve(model(np.zeros((4, 2)), np.ones(4), sigma=0.1, mean=3.0))
+    assert (found.rank, found.condition, found.degrees_of_freedom) == (0, float("inf"), 4)
+    assert found.value.tolist() == [3.0, 0.0]
+    np.testing.assert_allclose(found.null_space, np.eye(2), atol=1e-15)
+    assert not found.determined.any()
+
+
+def test_without_an_unknown_the_residuals_are_the_observations() -> None:
+    found = solve(model(np.ones((4, 1)), np.array([3.0, 4.0, 5.0, 4.0]), mean=4.0, sd=0.5, known=True))
+    assert found.residuals.tolist() == [-1.0, 0.0, 1.0, 0.0]
+    assert (found.rank, found.condition, found.degrees_of_freedom) == (0, float("inf"), 4)
+    assert found.covariance.tolist() == [[0.25]]
+    assert found.determined.tolist() == [True]
+
+
+@pytest.mark.parametrize(("part", "rank"), [(1.002e-7, 2), (0.998e-7, 1)])
+def test_a_ten_millionth_of_the_largest_singular_value_is_none(part: float, rank: int) -> None:
+    design = np.zeros((5, 2))
+    design[0, 0], design[1, 1] = 3.0, 3.0 * part
+    assert solve(model(design, np.zeros(5), sigma=1.0)).rank == rank
+
+
+def test_each_combination_of_a_null_space_begins_with_a_one_and_names_as_few_as_possible() -> None:
+    """Two pairs of parallel columns, in units of 1 and 2 to 1 and −4."""
+    random = np.random.default_rng(9)
+    a, b, c = random.standard_normal((3, 10))
+    found = solve(model(np.column_stack([a, c, 2 * a, b, -4 * b]), np.zeros(10), sigma=1.0))
+    columns = {tuple(np.round(column, 9) + 0.0) for column in found.null_space.T}
+    assert columns == {(1.0, 0.0, -0.5, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0, 0.25)}
+    assert found.determined.tolist() == [False, True, False, False, False]
+    assert found.condition < 1e3
 
 
 LONGLEY = """

@@ -37,6 +37,74 @@ def test_the_scale_of_one_bar_measured_n_times_by_hand() -> None:
     assert parameter.status == "determined"
 
 
+EXACT = BALLBAR.model_copy(update={"u_um": 1e-6})
+"""A bar whose length is as good as known."""
+
+
+@pytest.mark.parametrize(
+    ("left", "status"), [(0.1002, "weak"), (0.0998, "determined"), (0.9, "weak"), (0.001, "determined")]
+)
+def test_a_parameter_is_weakly_determined_while_a_tenth_of_its_prior_variance_is_left(left: float, status: str) -> None:
+    """One bar of 400 mm: u = √2·σ/0.4 ppm, and with a prior variance of s² of it s²u²/(s² + u²)."""
+    (unknown, _) = setting(EXACT, named=("scale_x",)).model(joined(bars(setting(EXACT), (1, 0, 0)))).unknowns
+    prior = unknown.prior_sd
+    u = prior * np.sqrt(left / (1 - left))
+    chosen = setting(EXACT, named=("scale_x",), sigma=0.4e-3 * u / np.sqrt(2), repeats=1)
+    plan = found(chosen, bars(chosen, (1, 0, 0)))
+    (parameter,) = plan.parameters
+    assert parameter.u == pytest.approx(u, rel=1e-4)
+    assert parameter.u_with_prior == pytest.approx(prior * np.sqrt(left), rel=1e-4)
+    assert parameter.status == status
+    assert plan.singular_values == pytest.approx([prior / u], rel=1e-4)
+    assert plan.complete
+    assert plan.free == ()
+
+
+@pytest.mark.parametrize(("cosine", "alike"), [(0.981, True), (0.979, False)])
+@pytest.mark.parametrize("rivals", [(), ("scale_x", "scale_y")])
+def test_two_scales_are_alike_where_all_bars_lie_near_the_diagonal(
+    cosine: float, alike: bool, rivals: tuple[str, ...]
+) -> None:
+    """Bars at 45° ± δ show c² and s² of the scales and the other way round: cosine 2c²s²/(c⁴ + s⁴)."""
+    product = cosine / (2 * (1 + cosine))
+    c, s = np.sqrt(0.5 + np.sqrt(0.25 - product)), np.sqrt(0.5 - np.sqrt(0.25 - product))
+    chosen = setting(EXACT, named=("scale_z",) if rivals else ("scale_x", "scale_y"))
+    plan = found(chosen, bars(chosen, (c, s, 0), (s, c, 0), *[(0.0, 0.0, 1.0)] * bool(rivals)), *rivals)
+    if not alike:
+        assert plan.alike == ()
+    else:
+        assert [pair[:2] for pair in plan.alike] == [("scale_x", "scale_y")]
+        assert plan.alike[0][2] == pytest.approx(cosine, abs=1e-4)
+
+
+def test_of_a_free_length_no_more_is_known_than_the_prior_of_the_scale_leaves() -> None:
+    """Along X only scale and length together show: u² of the length is 2σ² + (L·s)², s the prior of the scale."""
+    chosen = setting(UNCALIBRATED, named=("scale_x",), length_mm=400.0, repeats=1, sigma=1e-2)
+    plan = found(chosen, bars(chosen, (1, 0, 0)))
+    scale, length = plan.parameters
+    assert (scale.status, length.status, scale.u, length.u) == ("free", "free", None, None)
+    assert plan.alike == ()  # an artefact's length is no effect to be told apart
+    prior = 0.4e-3 * scale.unknown.prior_sd
+    assert length.u_with_prior == pytest.approx(np.sqrt(2e-4 + prior**2), rel=1e-4)
+    assert scale.u_with_prior == pytest.approx(scale.unknown.prior_sd, rel=1e-4)
+
+
+def test_of_a_calibrated_bar_without_effects_there_is_nothing_to_determine() -> None:
+    chosen = setting(EXACT, named=())
+    plan = found(chosen, bars(chosen, (1, 0, 0)))
+    assert (plan.parameters, plan.free, plan.alike, plan.complete) == ((), (), (), True)
+    assert plan.singular_values.tolist() == []
+
+
+def test_a_length_that_is_measured_is_determined_however_roughly() -> None:
+    """√2·0.2 mm, beyond the tenth of a millimetre that is its unit: it has no prior to fall back on."""
+    chosen = setting(UNCALIBRATED, named=("scale_y",), length_mm=400.0, repeats=1, sigma=0.2)
+    scale, length = found(chosen, bars(chosen, (1, 0, 0))).parameters
+    assert (scale.status, length.status) == ("free", "determined")
+    assert length.u == pytest.approx(np.sqrt(2) * 0.2, rel=1e-4)
+    assert length.u_with_prior == pytest.approx(np.sqrt(2) * 0.2, rel=1e-4)
+
+
 def test_an_uncalibrated_bar_leaves_the_three_scales_free_together_with_its_length() -> None:
     chosen = setting(UNCALIBRATED, length_mm=400.0)
     plan = found(chosen, ready_plan(chosen)[1])
@@ -55,6 +123,7 @@ def test_bars_along_one_axis_determine_its_scale_and_nothing_else() -> None:
     plan = found(chosen, bars(chosen, (1, 0, 0), (1, 0, 0)))
     assert [p.unknown.key[0] for p in plan.parameters if p.status == "determined"] == ["scale_x"]
     assert len(plan.free) == 5
+    assert plan.alike == ()  # what does not show looks like nothing
 
 
 def test_sag_is_one_with_the_scales_of_the_table_axes() -> None:

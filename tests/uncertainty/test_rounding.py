@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.uncertainty.rounding import rounded, significant
+from cmm_uq.uncertainty.rounding import figure, rounded, significant
 
 
 @pytest.mark.parametrize(
@@ -49,15 +49,65 @@ def test_an_exact_value_stays_as_it_is() -> None:
 
 def test_of_a_value_with_infinite_uncertainty_little_is_shown() -> None:
     assert rounded(404.238, float("inf")) == ("400", "∞")
+    assert rounded(447.0, float("inf")) == ("450", "∞")
+    assert rounded(0.0, float("inf")) == ("0", "∞")
 
 
 def test_unusual_magnitudes_share_a_power_of_ten() -> None:
     assert rounded(4.5e-17, 1.23e-18) == ("4.50×10⁻¹⁷", "0.12×10⁻¹⁷")
     assert rounded(-1.0, 2.5e20) == ("0.0×10²⁰", "2.5×10²⁰")
+    assert rounded(0.0, 2.5e20) == ("0.0×10²⁰", "2.5×10²⁰")
+
+
+def test_twelve_decimals_and_fifteen_digits_are_written_out() -> None:
+    """One more of either, and the power of ten is split off."""
+    assert rounded(1.5e-9, 1.2e-11) == ("0.000000001500", "0.000000000012")
+    assert rounded(1.5e-9, 1.2e-12) == ("1.5000×10⁻⁹", "0.0012×10⁻⁹")
+    assert rounded(123456789012345.0, 12.0) == ("123456789012300", "12")
+    assert rounded(1.2e15, 1.3e14) == ("1.20×10¹⁵", "0.13×10¹⁵")
+
+
+def test_a_loss_of_five_percent_is_still_rounded_down() -> None:
+    """EA-4/02 M:2022 6.3: more than 5 % is too much; from 2.1053 to 2 it is 5.0 %, from 2.11 on 5.2 %."""
+    assert significant(2.0 / 0.95 - 1e-4, 1) == "2"
+    assert significant(2.0 / 0.95 + 1e-4, 1) == "3"
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        (1.23449, "1.234"),
+        (-0.5, "−0.5"),
+        (2.0, "2"),
+        (0.0, "0"),
+        (0.001, "0.001"),
+        (0.0012346, "0.001235"),
+        (0.00099999, "0.001"),  # rounds to 0.001, and that is written out
+        (0.00099994, "9.999×10⁻⁴"),
+        (123456.0, "123500"),
+        (999960.0, "1×10⁶"),
+        (1234567.0, "1.235×10⁶"),
+    ],
+)
+def test_a_number_without_uncertainty_has_four_digits(number: float, text: str) -> None:
+    assert figure(number) == text
+
+
+def test_as_many_digits_as_asked_for() -> None:
+    assert (figure(1.23456, 2), figure(1234567.0, 2), rounded(1.23456, 0.0104, 1)) == (
+        "1.2",
+        "1.2×10⁶",
+        ("1.23", "0.01"),
+    )
+    with pytest.raises(CmmUqError, match="0 significant digits"):
+        rounded(1.0, 0.1, 0)
+    with pytest.raises(CmmUqError, match="cannot be stated"):
+        figure(float("nan"))
 
 
 def test_binary_noise_does_not_decide_a_tie() -> None:
     assert significant(0.1 + 0.2, 1) == "0.3"
+    assert significant(1.23e-18) == "1.2×10⁻¹⁸"
     assert significant(1.25 - 1e-15) == "1.3"
 
 

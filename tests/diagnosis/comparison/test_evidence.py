@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import special, stats
@@ -63,6 +65,72 @@ def test_the_evidence_is_that_of_a_multivariate_normal() -> None:
     assert float(nothing[0]) == pytest.approx(direct(c, None), abs=2e-4)
     for i, explanation in enumerate(c.explanations):
         assert something[i, 0] == pytest.approx(direct(c, explanation.members), abs=2e-4)
+
+
+def singles(c: Comparison, member: Member) -> dict[float, float]:
+    """Log evidence of one version at each size that is tried, by its size, the choice between them included."""
+    Q, found = rest(c), {}
+    y, n = Q.T @ c.observed, Q.shape[1]
+    for (signal, _), amplitude in zip(_signals(c, (member,)), _amplitudes(c, member), strict=True):
+        total = []
+        for kind in c.kinds:
+            white = Q.T @ covariance(kind) @ Q + signal
+            log = -0.5 * (y @ np.linalg.solve(white, y) / c.sigma**2 + np.linalg.slogdet(white)[1]) - n * np.log(
+                c.sigma
+            )
+            total.append(log + c.log_sigma + np.log(kind.probability))
+        found[amplitude] = float(special.logsumexp(total))
+    return found
+
+
+def _amplitudes(c: Comparison, member: Member) -> list[float]:
+    F = rest(c).T @ (member.columns / c.noise_scale[:, None])
+    largest = 1 / c.least_noise
+    return list(np.geomspace(largest, min(0.4 / np.sqrt(np.sum(F**2) / len(F)), largest), 7))
+
+
+def test_the_best_version_of_each_explanation_is_the_one_of_most_evidence() -> None:
+    """Of explanations with one column and several versions, at seven sizes each, one by one."""
+    c = comparison(5)
+    random = np.random.default_rng(6)
+    several = [
+        Explanation(f"{count} versions", EFFECT, tuple(Member(random.standard_normal((14, 1))) for _ in range(count)))
+        for count in (3, 1, 2)
+    ]
+    c = replace(c, explanations=several)
+    _, something = c.log_evidence()
+    for i, (log, version) in c.beside().items():
+        assert log == pytest.approx(float(something[i, 0]), abs=1e-9)
+        tried = {
+            (j, amplitude): value
+            for j, member in enumerate(several[i].members) for amplitude, value in singles(c, member).items()
+        }  # fmt: skip
+        j, amplitude = max(tried, key=lambda key: tried[key])
+        assert (version.explanation, version.member) == (i, j)
+        assert version.amplitude == pytest.approx(amplitude)
+
+
+def test_kind_and_size_of_the_noise_are_as_probable_as_the_observations_make_them() -> None:
+    c, found = comparison(2), []
+    Q = rest(c)
+    for kind in c.kinds:
+        white = Q.T @ covariance(kind) @ Q
+        log = [stats.multivariate_normal(np.zeros(len(white)), s**2 * white).logpdf(Q.T @ c.observed) for s in c.sigma]
+        found.append(np.array(log) + c.log_sigma + np.log(kind.probability))
+    expected = np.exp(np.array(found) - special.logsumexp(found))
+    np.testing.assert_allclose(c.noise_posterior(), expected, rtol=1e-6, atol=1e-12)
+
+
+def test_a_baseline_takes_as_many_observations_as_its_columns_differ() -> None:
+    """Columns of any length, one of nothing, and one that is the sum of two others."""
+    c = comparison(3)
+    columns = np.random.default_rng(4).standard_normal((14, 3)) * [1e-6, 1.0, 1e6]
+    whole = np.column_stack([columns, columns @ [1e6, 1.0, 0.0], np.zeros(14)])
+    c = replace(c, baseline=whole)
+    assert c.degrees_of_freedom == 11
+    Q = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0]
+    np.testing.assert_allclose(c.left, c.observed - Q @ (Q.T @ c.observed), atol=1e-12)
+    assert replace(c, baseline=np.zeros((14, 0))).degrees_of_freedom == 14
 
 
 def test_what_the_baseline_absorbs_has_no_evidence() -> None:
