@@ -28,7 +28,7 @@ package; true errors, sizes and noise are drawn anew for each, and the job names
 | axis × 2, × 3 | one axis, drawn anew, reads that many times worse |
 | growing | from one to three times: with the distance along a gauge, else of each coordinate over its travel |
 | correlated | an Ornstein–Uhlenbeck process alone, 0.85 from one observation to the next; of a bar, in its length |
-| walk | white beside a random walk whose standard deviation ends at four times the reading noise; of a bar, in its length |
+| walk | white beside a random walk whose standard deviation ends at eight times the reading noise; of a bar, in its length |
 | t3 | Student's t with three degrees of freedom |
 | resolution | white, displayed in steps of 5 µm |
 
