@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.conformity.accuracy import with_uncertainty
-from cmm_uq.documents.result import LACK_OF_FIT, Influence, Noise
+from cmm_uq.documents.result import LACK_OF_FIT, Noise
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import OBSERVATIONS
 from cmm_uq.inference.draws import Draws, by_chain
@@ -19,6 +20,7 @@ from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.screening.copies import counted_with
 from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -40,10 +42,20 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
-    return MeasurementModel(
-        artefact, effects(job.facts.model.effects, where="job.toml [model] effects"),
-        None if stated is None else stated * MICROMETRE, ~np.isin(artefact.measurement, aside),
-    )  # fmt: skip
+    used = ~(np.isin(artefact.measurement, aside) | _copies(artefact, aside))
+    if not used.any():
+        raise CmmUqError(
+            "no observation is left to estimate from", where="job.toml [recording] set_aside" if aside else job.recording_path,
+            fix="Set fewer measurements aside, or record what the machine reads",
+        )  # fmt: skip
+    named = effects(job.facts.model.effects, where="job.toml [model] effects")
+    return MeasurementModel(artefact, named, None if stated is None else stated * MICROMETRE, used)
+
+
+def _copies(artefact: Artefact, aside: Sequence[int]) -> NDArray[np.bool_]:
+    """(m,) which observations are copies of others."""
+    group, rows = artefact.points.group, artefact.rows[:, 0]
+    return np.asarray(group[counted_with(artefact.points, aside)[rows]] != group[rows])
 
 
 def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Finding]]:
@@ -73,29 +85,6 @@ def with_noise(model: MeasurementModel) -> tuple[MeasurementModel, Estimate, flo
         model = replace(model, sigma=None)
         estimate = model.estimate()
     return model, estimate, p_value
-
-
-def influences(model: MeasurementModel, estimate: Estimate, findings: tuple[Finding, ...]) -> tuple[Influence, ...]:
-    """What leaving out the later measurement of each pair of copies would change."""
-    found = []
-    result = estimate.least_squares
-    u = np.sqrt(np.diag(result.covariance))
-    for finding in findings:
-        if finding.kind != "duplicate" or finding.set_aside:
-            continue
-        measurement = finding.measurements[-1]
-        kept = model.used & (model.artefact.measurement != measurement)
-        without = replace(model, used=kept).estimate().least_squares
-        known = result.determined & without.determined & (u > 0)
-        if not known.any():
-            continue
-        change = np.where(known, np.abs(without.value - result.value) / np.where(known, u, 1.0), 0.0)
-        worst = int(np.argmax(change))
-        sd = without.residual_sd
-        found.append(Influence(
-            measurement, None if sd is None else sd / MICROMETRE, float(change[worst]), result.unknowns[worst].key
-        ))  # fmt: skip
-    return tuple(found)
 
 
 def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
@@ -142,4 +131,5 @@ def accuracy(model: MeasurementModel, estimate: Estimate, posterior: Posterior, 
         return {}
     linear = replace(model, used=np.ones_like(model.used)).linearised(estimate.least_squares.value)
     predicted = lengths - linear.observed + posterior.draws @ linear.design.T
-    return with_uncertainty(lengths, predicted, posterior.sigma[:, None] * artefact.noise_scale, seed)
+    noise = posterior.sigma[:, None] * artefact.noise_scale
+    return with_uncertainty(lengths, predicted, noise, seed, counted_with(artefact.points)[artefact.rows[:, 0]])

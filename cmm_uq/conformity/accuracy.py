@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
@@ -47,7 +47,9 @@ def figures(lengths: Floats) -> dict[str, Floats]:
     }
 
 
-def with_uncertainty(lengths: Floats, predicted: Floats, noise: Floats, seed: int) -> dict[str, Quantity]:
+def with_uncertainty(
+    lengths: Floats, predicted: Floats, noise: Floats, seed: int, drawn_with: Ints | None = None
+) -> dict[str, Quantity]:  # fmt: skip
     """Figures of recorded lengths, with uncertainty.
 
     Parameters
@@ -56,15 +58,20 @@ def with_uncertainty(lengths: Floats, predicted: Floats, noise: Floats, seed: in
     predicted : (N, m) lengths that draws from the posterior predict, mm, without noise.
     noise : (N, m) standard uncertainty of each length in each draw, mm.
     seed : of the repetitions.
+    drawn_with : (m,) equal where lengths share their noise: a copy has that of its original. Each its own by default.
     """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
+    shared = np.arange(len(lengths))
+    if drawn_with is not None:
+        _, first, which = np.unique(drawn_with, return_index=True, return_inverse=True)
+        shared = first[which.ravel()]
     chosen = np.linspace(0, len(predicted) - 1, min(_DRAWS, len(predicted))).astype(int)
     repetitions = int(np.clip(_NUMBERS // (len(chosen) * len(lengths)), 10, 100))
     unbiased = np.sqrt(repetitions / (repetitions - 1))
     errors: dict[str, list[Floats]] = {name: [] for name in TITLES}
     for block in np.array_split(chosen, 10):
         scatter = random.standard_normal((len(block), repetitions, len(lengths)))
-        repeated = figures(predicted[block, None, :] + noise[block, None, :] * scatter)
+        repeated = figures(predicted[block, None, :] + noise[block, None, :] * scatter[..., shared])
         for name, values in repeated.items():
             errors[name].append((unbiased * (values - values.mean(axis=1, keepdims=True))).ravel())
     return {

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.conformity.copies import run_of
 from cmm_uq.conformity.measurement_lines import position_of
 from cmm_uq.conformity.plans import BarPlan, Condition
 from cmm_uq.model.artefact import Artefact
@@ -53,7 +52,7 @@ def _same_places(
     """Measurements that are no further position: what each is instead, and of which other."""
     found: dict[int, tuple[str, int]] = {}
     for later, original in copies.items():
-        (one, _), (two, _) = run_of(points, original), run_of(points, later)
+        (one, _), (two, _) = points.run_of(original), points.run_of(later)
         if one != two:
             found[two] = "a copy", one
     kept: list[int] = []

@@ -14,6 +14,7 @@ from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.inference.posterior import Density
 from cmm_uq.jobs.job import Job
 from cmm_uq.model.kind import Observed
+from cmm_uq.screening.copies import counted_with
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
 
@@ -70,8 +71,9 @@ def consequences(
         whole = model.linearised(value)
         predicted = lengths - whole.observed + draws @ whole.design.T
         noise = np.broadcast_to(sigma * artefact.noise_scale, predicted.shape)
-        before = with_uncertainty(lengths, predicted, noise, seed)
-        after = with_uncertainty(late, predicted - draws[:, ours] @ whole.design[:, ours].T, noise, seed)
+        same = counted_with(artefact.points)[artefact.rows[:, 0]]
+        before = with_uncertainty(lengths, predicted, noise, seed, same)
+        after = with_uncertainty(late, predicted - draws[:, ours] @ whole.design[:, ours].T, noise, seed, same)
     return Consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(

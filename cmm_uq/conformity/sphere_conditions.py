@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cmm_uq.conformity.copies import run_of
 from cmm_uq.conformity.plans import Condition, SpherePlan
 from cmm_uq.points import Floats, Points
 
@@ -31,7 +30,7 @@ def sphere_points(
             continue
         rows = np.flatnonzero(points.group == group)
         count = len(np.unique(points.xyz[rows] + 0.0, axis=0))
-        name = f"measurement {run_of(points, group)[0]}"
+        name = f"measurement {points.run_of(group)[0]}"
         if not count == plan.points == len(rows):
             lacking.append(f"{plan.points} points on the sphere of {name} ({len(rows)} recorded, {count} different)")
         elif (gap := _farthest(directions[rows])) > plan.reach_deg:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.conformity.copies import copied, copies_in_words
+from cmm_uq.conformity.copies import copies_in_words
 from cmm_uq.conformity.decision import decide, needs_uncertainty
 from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import PLANS
@@ -82,7 +82,7 @@ def _errors_of_indication(facts: ConformityFacts, artefact: Artefact, key: str, 
     points, first = artefact.points, found.rows[:, 0]
     errors, u, limits = found.errors / MICROMETRE, found.u / MICROMETRE, _limits_um(facts, found.lengths)
     _refuse_without_uncertainty(facts, float(u.min()), "u_um", key)
-    copies = list(copied(recorded.points))
+    copies = list(recorded.points.copies)
     items = tuple(
         Decided(
             float(errors[i]), float(u[i]), float(limits[i]),

@@ -50,24 +50,6 @@ class Noise:
         return self.p_value is not None and self.p_value < LACK_OF_FIT
 
 
-@dataclass(frozen=True)
-class Influence:
-    """What the estimates would be without a measurement that the screening found odd but the estimates use.
-
-    Parameters
-    ----------
-    measurement : that would be left out.
-    residual_sd_um : residual standard deviation without it; ``None`` without degrees of freedom.
-    largest_change : of an estimate, in units of its standard uncertainty.
-    parameter : key of that estimate.
-    """
-
-    measurement: int
-    residual_sd_um: float | None
-    largest_change: float
-    parameter: tuple[str, str]
-
-
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
     """A job with its diagnosis.
@@ -104,7 +86,6 @@ class Result:
     ----------
     job, model : what was analysed.
     findings : of the screening.
-    influences : of findings whose measurements are used all the same.
     estimate : least squares.
     posterior : draws of the model's own parameters.
     draws : of all that is reported, by name and chain.
@@ -119,7 +100,6 @@ class Result:
     job: Job
     model: MeasurementModel
     findings: tuple[Finding, ...]
-    influences: tuple[Influence, ...]
     estimate: Estimate
     posterior: Posterior
     draws: Draws

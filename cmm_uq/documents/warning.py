@@ -82,22 +82,11 @@ def _undetermined(result: Result) -> list[str]:
 
 
 def _screening(result: Result) -> list[str]:
-    texts = [
+    return [
         f"{finding.why[0].upper()}{finding.why[1:]}. "
         + ("It is set aside: not used for the error factors." if finding.set_aside else "It is used as it stands.")
         for finding in result.findings
     ]
-    for influence in result.influences:
-        sd = (
-            ""
-            if influence.residual_sd_um is None
-            else f"residual standard deviation {influence.residual_sd_um:.1f} µm, "
-        )
-        texts.append(
-            f"Without measurement {influence.measurement}: {sd}largest change of an estimate "
-            f"{influence.largest_change:.2g} of its standard uncertainty ({title_of(influence.parameter, result)})."
-        )
-    return texts
 
 
 def _missing(result: Result) -> list[str]:

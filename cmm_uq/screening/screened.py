@@ -22,6 +22,7 @@ from cmm_uq.model.kind import Observe
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.screening.columns import SENSORS, about_whole_column, column_findings
 from cmm_uq.screening.coordinates import coordinate_findings
+from cmm_uq.screening.copies import copied_measurements
 from cmm_uq.screening.finding import Finding, finding, span
 from cmm_uq.screening.search import outside_travel
 from cmm_uq.screening.shape import Screening
@@ -109,7 +110,7 @@ def screen(
         if found.kind in _REFUSED_WHOLE and about_whole_column(found, points):
             raise CmmUqError(found.why, where=_place(where, found), fix="Mend the column, or remove it")
     odd = (*impossible, *repeated_figures(points))
-    return tuple(replace(f, set_aside=f.measurements[-1] in set_aside) for f in odd)
+    return tuple(replace(f, set_aside=_aside(f, set_aside)) for f in odd)
 
 
 def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
@@ -133,12 +134,7 @@ def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
 
 def repeated_figures(points: Points) -> list[Finding]:
     """Measurements whose coordinates repeat, digit for digit, those of another measurement; runs of them as one block."""
-    copies = [
-        (groups[0], later)
-        for groups in points.twins
-        for later in groups[1:]
-        if _measurement(points, groups[0]) != _measurement(points, later)
-    ]
+    copies = sorted((original, later) for later, original in copied_measurements(points).items())
     copies.sort(key=lambda pair: pair[1])
     return [_copied(points, run) for run in _runs(copies)]
 
@@ -179,8 +175,11 @@ def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
     both = np.isin(points.group, (*originals, *later))
     if len(run) == 1:
         a, b = _measurement(points, originals[0]), _measurement(points, later[0])
-        why = f"measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement"
-        return finding("duplicate", points, both, why)
+        why = (
+            f"measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement, and "
+            "counts once"
+        )
+        return replace(finding("duplicate", points, both, why), measurements=(a, b))
     ends = [_measurement(points, group) for group in (later[0], later[-1], originals[0], originals[-1])]
     why = (
         "measurements {} to {} repeat the coordinates of measurements {} to {} to the last digit: a block ".format(
@@ -204,7 +203,13 @@ def _runs(copies: Sequence[tuple[int, int]]) -> list[list[tuple[int, int]]]:
 
 
 def _measurement(points: Points, group: int) -> int:
-    return int(points.measurement[np.argmax(points.group == group)])
+    return points.run_of(group)[0]
+
+
+def _aside(found: Finding, set_aside: Collection[int]) -> bool:
+    """Whether the estimates leave out what was found: a copy, or a measurement that the job leaves out."""
+    *others, last = found.measurements
+    return last in set_aside or (found.kind == "duplicate" and not any(other in set_aside for other in others))
 
 
 def _reversal(found: Finding, points: Points, needed: Collection[str]) -> Finding:
