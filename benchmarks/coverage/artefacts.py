@@ -79,7 +79,14 @@ def ballbar(random: np.random.Generator) -> Placed:
 def _gauge_lines(
     kind: str, lines: list[tuple[np.ndarray, np.ndarray]], scale: float, random: np.random.Generator, **more: object
 ) -> Placed:
-    """Lines, each a direction and the certified distances of its faces, three times; ``scale`` is true over certified."""
+    """Lines, each a direction and the certified distances of its faces, three times; ``scale`` is true over certified.
+
+    Every second time the whole line is measured three times over, else each face three times before the next: what drifts
+    then looks like a scale.
+    """
+    order = np.arange(3 * len(lines[0][1]))
+    if random.random() < 0.5:
+        order = order.reshape(3, -1).T.ravel()
     parts: dict[str, list[np.ndarray]] = {"true": [], "measurement": [], "point": [], "repeat": [], "reference": []}
     sense = []
     for number, (direction, faces) in enumerate(lines, 1):
@@ -87,12 +94,12 @@ def _gauge_lines(
         free = np.maximum(np.ptp(TRAVEL, axis=1) - extent, 0) * random.uniform(0.2, 0.8, 3)
         start = np.where(direction < 0, TRAVEL[:, 1] - free, TRAVEL[:, 0] + free)
         count = len(faces)
-        parts["true"].append(np.tile(start + scale * faces[:, None] * direction, (3, 1)))
+        parts["true"].append(np.tile(start + scale * faces[:, None] * direction, (3, 1))[order])
         parts["measurement"].append(np.full(3 * count, number))
-        parts["point"].append(np.tile(np.arange(1, count + 1), 3))
-        parts["repeat"].append(np.repeat([1, 2, 3], count))
-        parts["reference"].append(np.tile(faces, 3))
-        sense.append(np.tile(np.where(np.arange(count)[:, None] == 0, -direction, direction), (3, 1)))
+        parts["point"].append(np.tile(np.arange(1, count + 1), 3)[order])
+        parts["repeat"].append(np.repeat([1, 2, 3], count)[order])
+        parts["reference"].append(np.tile(faces, 3)[order])
+        sense.append(np.tile(np.where(np.arange(count)[:, None] == 0, -direction, direction), (3, 1))[order])
     joined = {name: np.concatenate(values) for name, values in parts.items()}
     reference, outward = joined.pop("reference"), np.concatenate(sense)
     columns = {"reference_mm": reference}

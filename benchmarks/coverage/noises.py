@@ -17,7 +17,7 @@ RESOLUTION = 5e-3
 """mm of the display."""
 CORRELATION = 0.85
 """Of the slow noise, from one observation to the next."""
-WALK = 8.0
+WALK = 4.0
 """Standard deviation of the random walk at the end of the recording, over that of the reading noise beside it."""
 
 

@@ -20,6 +20,7 @@ EXPLAINED = """\
 Written by `python -m benchmarks.coverage.study FOLDER --page`. Recordings come from equations that share no code with the
 package; true errors, sizes and noise are drawn anew for each, and the job names all physics that acts. The reading noise is
 0.7 to 2 µm and not stated, unless a row says so. Every second recording has the time in it; those of slow noise all have it.
+Of a gauge either the whole line is measured three times over, or each face three times before the next.
 
 | noise | what |
 | --- | --- |
@@ -28,7 +29,7 @@ package; true errors, sizes and noise are drawn anew for each, and the job names
 | axis × 2, × 3 | one axis, drawn anew, reads that many times worse |
 | growing | from one to three times: with the distance along a gauge, else of each coordinate over its travel |
 | correlated | an Ornstein–Uhlenbeck process alone, 0.85 from one observation to the next; of a bar, in its length |
-| walk | white beside a random walk whose standard deviation ends at eight times the reading noise; of a bar, in its length |
+| walk | white beside a random walk whose standard deviation ends at four times the reading noise; of a bar, in its length |
 | t3 | Student's t with three degrees of freedom |
 | resolution | white, displayed in steps of 5 µm |
 

@@ -113,10 +113,10 @@ def test_repeats_share_the_offset_of_their_placing() -> None:
     assert abs(np.mean(drawn[:, :-1, 0] * drawn[:, 1:, 0])) / read.sigma**2 < 0.05
 
 
-def test_a_walk_starts_at_nothing_and_ends_at_eight_times_the_reading_noise() -> None:
+def test_a_walk_starts_at_nothing_and_ends_at_four_times_the_reading_noise() -> None:
     sd = spread("walk").mean(axis=1)
     assert sd[0] == pytest.approx(1, rel=0.1)
-    assert sd[-1] == pytest.approx(65**0.5, rel=0.1)
+    assert sd[-1] == pytest.approx(17**0.5, rel=0.1)
 
 
 def test_slow_noise_of_a_bar_changes_its_length_alone() -> None:
