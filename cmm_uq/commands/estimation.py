@@ -42,7 +42,7 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
-    used = ~(np.isin(artefact.measurement, aside) | _copies(artefact, aside))
+    used = ~(np.isin(artefact.measurement, aside) | _copies(artefact, aside) | artefact.unread())
     if not used.any():
         raise CmmUqError(
             "no observation is left to estimate from", where="job.toml [recording] set_aside" if aside else job.recording_path,

@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.points import Floats, Ints, Points
 
@@ -113,6 +114,10 @@ class Artefact(ABC):
     @abstractmethod
     def size_change(self) -> Floats:
         """Change of the observations, (m, s), for one mm of each size."""
+
+    def unread(self) -> NDArray[np.bool_]:
+        """Observations (m,) along a coordinate that stood still to the last digit: nobody read it, and it has no noise."""
+        return np.zeros(len(self.noise_scale), dtype=bool)
 
     def lengths(self) -> Floats | None:
         """Lengths (m,), mm at 20 °C, whose scatter is a figure of performance; ``None`` when it has no meaning here."""

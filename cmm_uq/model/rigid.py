@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.model.artefact import Artefact
@@ -73,6 +74,10 @@ class Rigid(Artefact):
         U, _, Vt = np.linalg.svd(moment)
         U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
         return np.asarray((U @ Vt)[self.placings.index], dtype=np.float64)
+
+    def unread(self) -> NDArray[np.bool_]:
+        """See :meth:`Artefact.unread`: the artefact's axis along which the machine's coordinate stood still."""
+        return self.placings.unread(self.points.xyz, self.attitudes(self.points.xyz)).ravel()
 
     def deviations(self) -> Floats:
         """Found minus certified position of each point after placing the artefact, (n, 3) mm, in the machine's axes."""
