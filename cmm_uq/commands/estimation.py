@@ -21,6 +21,7 @@ from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.screening.copies import counted_with
+from cmm_uq.screening.finding import finding
 from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -65,11 +66,8 @@ def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Fi
     for index, times in gross_outliers(model.estimate().linear, artefact.measurement[chosen]):
         i = int(chosen[index])
         used[i] = False
-        measurement, repeat = int(artefact.measurement[i]), int(artefact.repeat[i])
-        rows = (artefact.points.measurement == measurement) & (artefact.points.repeat == repeat)
-        why = f"measurement {measurement}, repeat {repeat} is {times:.1f} of its standard deviations off what the others say"
-        lines = tuple(artefact.points.lines[rows].tolist()) if len(artefact.points.lines) else ()
-        found.append(Finding("outlier", (measurement,), lines, why, set_aside=True))
+        why = f"{artefact.words_of(i)} is {times:.1f} of its standard deviations off what the others say"
+        found.append(replace(finding("outlier", artefact.points, artefact.rows[i], why), set_aside=True))
     return replace(model, used=used), found
 
 

@@ -178,9 +178,12 @@ class Result:
 
     @cached_property
     def flagged(self) -> NDArray[np.bool_]:
-        """Observations (m,) of measurements that the screening found odd."""
-        odd = {m for finding in self.findings for m in finding.measurements}
-        return np.isin(self.artefact.measurement, list(odd))
+        """Observations (m,) of measurements that the screening found odd; of one with outliers, those that are not used."""
+        found = np.zeros(len(self.artefact.measurement), dtype=bool)
+        for finding in self.findings:
+            own = np.isin(self.artefact.measurement, finding.measurements)
+            found |= own & ~self.model.used if finding.kind == "outlier" else own
+        return found
 
     def prior_share(self, key: tuple[str, str]) -> float:
         """How much of a parameter's variance is left of the prior's: 0 all from the recording, 1 all assumed."""

@@ -115,6 +115,13 @@ class Artefact(ABC):
     def size_change(self) -> Floats:
         """Change of the observations, (m, s), for one mm of each size."""
 
+    def words_of(self, observation: int) -> str:
+        """What an observation is of: a whole (measurement, repeat), or a point of one."""
+        points, rows = self.points, self.rows[observation]
+        run = f"measurement {self.measurement[observation]}, repeat {self.repeat[observation]}"
+        whole = np.all(np.isin(np.flatnonzero(points.group == points.group[rows[0]]), rows))
+        return run if whole else f"point {points.point[rows[0]]} of {run}"
+
     def unread(self) -> NDArray[np.bool_]:
         """Observations (m,) along a coordinate that stood still to the last digit: nobody read it, and it has no noise."""
         return np.zeros(len(self.noise_scale), dtype=bool)

@@ -16,7 +16,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import place
-from cmm_uq.points import Floats, Points
+from cmm_uq.points import AXES, Floats, Points
 
 _ANOTHER_SHAPE = 0.05
 """rms misfit over the extent from which on a recording cannot be of this artefact."""
@@ -74,6 +74,11 @@ class Rigid(Artefact):
         U, _, Vt = np.linalg.svd(moment)
         U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
         return np.asarray((U @ Vt)[self.placings.index], dtype=np.float64)
+
+    def words_of(self, observation: int) -> str:
+        """See :meth:`Artefact.words_of`: one coordinate of a point."""
+        along = AXES[observation % 3]
+        return f"the coordinate along the {self.title.lower()}'s {along} of {super().words_of(observation)}"
 
     def unread(self) -> NDArray[np.bool_]:
         """See :meth:`Artefact.unread`: the artefact's axis along which the machine's coordinate stood still."""

@@ -131,6 +131,7 @@ def test_a_gross_outlier_is_set_aside_from_the_fit_but_counts_in_the_figures(job
     found = analyse(job)
     (outlier,) = [finding for finding in found.findings if finding.kind == "outlier"]
     assert outlier.measurements == (5,)
+    assert outlier.why.startswith("measurement 5, repeat 1 is ")
     assert outlier.set_aside
     assert found.accuracy["b89_range_um"].value > 1000
     for name in ("squareness_xy", "squareness_zx"):
