@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.uncertainty.heavy_tails import NO_VARIANCE
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.uncertainty.monte_carlo import Simulated, numerical_tolerance
 from cmm_uq.uncertainty.propagation import Propagated, first_order, second_order
@@ -90,11 +91,21 @@ def is_flat(model: MeasurementModel, found: Propagated, row: int) -> bool:
     return uncertain and bool(found.u[row] <= _ROUNDING * abs(found.value[row]))
 
 
-def stability(ways: Ways, digits: int) -> str:
-    """A sentence where Monte Carlo gave up before its figures were stable, else nothing."""
-    if ways.simulated is None or ways.simulated.stable:
+def stability(ways: Ways, row: int, digits: int) -> str:
+    """Sentences where Monte Carlo gave up before its figures were stable, and why it had to, else nothing."""
+    found = ways.simulated
+    if found is None or found.stable:
         return ""
-    return f" Monte Carlo is not stable to {digits} digits after {ways.simulated.trials} trials."
+    told = f" Monte Carlo is not stable to {digits} digits after {found.trials} trials."
+    name, shape, unseen = found.outputs[row], float(found.shape[row]), float(found.unseen[row])
+    if shape >= NO_VARIANCE:
+        told += (
+            f" The tail of {name} is so heavy (Pareto shape {shape:.2f}; from 0.5 on there is no standard deviation) that u "
+            "is of these trials alone and grows with their number; the coverage interval stands."
+        )
+    elif unseen > numerical_tolerance(found.u, digits)[row]:
+        told += f" The tail of {name} is so heavy (Pareto shape {shape:.2f}) that rare draws rule u."
+    return told
 
 
 def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[Method, str]:
@@ -102,7 +113,7 @@ def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[
     if ways.simulated is None:
         return _without_monte_carlo(ways, row, digits)
     findings: list[str] = []
-    told = stability(ways, digits)
+    told = stability(ways, row, digits)
     for method in PROPAGATION:
         confirmed, finding = _finding(model, ways, ways.simulated, method, row, digits)
         findings.append(f"{NAMES[method]} {finding}")
