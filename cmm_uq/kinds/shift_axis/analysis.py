@@ -17,6 +17,7 @@ from cmm_uq.kinds.shift_axis.shift_integration import Method
 from cmm_uq.kinds.shift_axis.undetermined import Undetermined, undetermined
 from cmm_uq.kinds.shifting.correction_table import correction_table
 from cmm_uq.kinds.shifting.facts import KnownLength, ShiftFacts, shift_facts
+from cmm_uq.kinds.shifting.peak_to_valley import peak_to_valley
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats, Ints, Points
@@ -70,13 +71,17 @@ class ShiftResult:
     @cached_property
     def linearity(self) -> Quantity:
         """Linearity error: peak to valley of the curve about the line through its ends at the first series, µm."""
-        about = self._about_the_ends
-        return Quantity.of_draws(np.ptp(about, axis=1) / MICROMETRE, "µm", _ptp(about.mean(axis=0)))
+        return peak_to_valley(self.estimate.about_the_ends)
 
     @cached_property
     def covariance(self) -> Covariance:
         """Of linearity error and, where it is determined, mean sensitivity error."""
-        draws = {f"linearity_{self.axis}.peak_to_valley_um": (np.ptp(self._about_the_ends, axis=1) / MICROMETRE, "µm")}
+        draws = {
+            f"linearity_{self.axis}.peak_to_valley_um": (
+                np.ptp(self.estimate.about_the_ends, axis=1) / MICROMETRE,
+                "µm",
+            )
+        }
         if self.estimate.scale_known:
             draws[f"{SCALE[self.axis].name}.ppm"] = self.estimate.scale / PPM, "ppm"
         return Covariance.of_draws(draws)
@@ -99,15 +104,6 @@ class ShiftResult:
         return None if first is None else self.estimate.at(first.position)
 
     @cached_property
-    def _about_the_ends(self) -> Floats:
-        """(N, m) draws of the curve about the line through its ends at the first series, mm."""
-        curve, ends = self.estimate.curve, self.estimate.series.reading[self.estimate.series.series == 0][[0, -1]]
-        draws = curve.draws.copy()
-        if self.estimate.scale_known:
-            draws -= self.estimate.scale[:, None] * (curve.position - ends[0])
-        return np.asarray(draws, dtype=np.float64)
-
-    @cached_property
     def disagreement_um(self) -> tuple[float, float]:
         """Root mean square of what the placings disagree by, without and with the curve, µm."""
         without, with_curve = (rms_um(values) for values in self.estimate.residuals)
@@ -122,10 +118,6 @@ class ShiftResult:
 def rms_um(values: Floats) -> float:
     """Root mean square of mm, in µm."""
     return float((values**2).mean() ** 0.5) / MICROMETRE
-
-
-def _ptp(values: Floats) -> float:
-    return float(np.ptp(values)) / MICROMETRE
 
 
 def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult:
