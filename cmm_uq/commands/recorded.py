@@ -11,6 +11,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.placings import LAST_DIGIT
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import AXES
 from cmm_uq.screening.finding import finding
@@ -38,15 +39,16 @@ def recorded_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
 
 
 def _unread(artefact: Artefact) -> list[Finding]:
-    """Coordinates that stood still where the artefact observes them."""
-    points, rows = artefact.points, artefact.rows[artefact.unread(), 0]
+    """Coordinates that stood still where the artefact observes them, here or in the recording that it is compared with."""
+    points, rows = artefact.points, np.unique(artefact.rows[artefact.unread(), 0])
     found = []
     for number in np.unique(points.measurement[rows]).tolist():
-        own = points.measurement == number
-        for i in np.flatnonzero(np.ptp(points.xyz[own], axis=0) == 0):
-            column = f"{AXES[i]}_mm"
-            why = f"{column} is {points.xyz[own][0, i]:g} in all of measurement {number}: nobody read it, and it says nothing"
-            found.append(replace(finding("stuck", points, own, why, column), set_aside=True))
+        own = rows[points.measurement[rows] == number]
+        still = np.flatnonzero(np.ptp(points.xyz[own], axis=0) <= LAST_DIGIT)
+        column = f"{AXES[still[0]]}_mm" if len(still) else None
+        what = f"{column} is {points.xyz[own[0], still[0]]:g}" if len(still) else "a coordinate stood still earlier"
+        why = f"in all of measurement {number} {what}: nobody read it, and it says nothing"
+        found.append(replace(finding("stuck", points, own, why, column), set_aside=True))
     return found
 
 

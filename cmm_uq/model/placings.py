@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.points import Floats, Ints
 
-_LAST_DIGIT = 1e-9
+LAST_DIGIT = 1e-9
 """mm, of means over repeats, which rounding keeps from being the same."""
 
 _ALONG = 0.99
@@ -58,7 +58,7 @@ class Placings:
     def still(self, xyz: Floats) -> NDArray[np.bool_]:
         """(n, 3) which coordinates of ``xyz`` (n, 3) are the same to the last digit in all of a point's placing."""
         order, starts = self._order
-        moved = np.abs(xyz - xyz[order[starts]][self.index]) > _LAST_DIGIT
+        moved = np.abs(xyz - xyz[order[starts]][self.index]) > LAST_DIGIT
         return np.asarray((self.sums(moved.astype(np.float64)) == 0)[self.index])
 
     def unread(self, xyz: Floats, axes: Floats) -> NDArray[np.bool_]:

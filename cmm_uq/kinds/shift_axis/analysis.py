@@ -76,12 +76,8 @@ class ShiftResult:
     @cached_property
     def covariance(self) -> Covariance:
         """Of linearity error and, where it is determined, mean sensitivity error."""
-        draws = {
-            f"linearity_{self.axis}.peak_to_valley_um": (
-                np.ptp(self.estimate.about_the_ends, axis=1) / MICROMETRE,
-                "µm",
-            )
-        }
+        sizes = np.ptp(self.estimate.about_the_ends, axis=1) / MICROMETRE
+        draws = {f"linearity_{self.axis}.peak_to_valley_um": (sizes, "µm")}
         if self.estimate.scale_known:
             draws[f"{SCALE[self.axis].name}.ppm"] = self.estimate.scale / PPM, "ppm"
         return Covariance.of_draws(draws)

@@ -93,7 +93,8 @@ def test_what_was_not_read_on_one_of_two_dates_is_no_difference(
     """Where z was read earlier alone, its noise is the shape of the plate, and two tilts of each placing move it a little."""
     later, earlier = flat(1, still=now), flat(2, still=then)
     job = plate_job(later, earlier="earlier.csv", earlier_date=dt.date(2025, 1, 1), frame=earlier)
-    model, _ = model_of(job)
+    model, findings = model_of(job)
+    assert [(f.measurements, f.column) for f in findings] == [((m,), "z_mm" if now else None) for m in (1, 2)]
     found = model.estimate().least_squares
     a, b = (frame[["x_mm", "y_mm"]].to_numpy() for frame in (later, earlier))
     _, u, sd, dof = in_the_plane(a - b, a, later.measurement.to_numpy())
@@ -126,7 +127,7 @@ def test_the_coordinate_is_named_with_its_measurement() -> None:
     assert [(f.kind, f.column, f.measurements, f.set_aside) for f in findings] == [
         ("stuck", "z_mm", (1,), True), ("stuck", "z_mm", (2,), True)
     ]  # fmt: skip
-    assert findings[0].why == "z_mm is 0 in all of measurement 1: nobody read it, and it says nothing"
+    assert findings[0].why == "in all of measurement 1 z_mm is 0: nobody read it, and it says nothing"
 
 
 def plane_job(*heights: Floats | float) -> Job:
