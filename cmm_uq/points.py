@@ -130,13 +130,25 @@ class Points:
         return rank[inverse.ravel()]
 
     @cached_property
-    def twins(self) -> tuple[tuple[int, ...], ...]:
-        """Groups (see :attr:`group`) that have the same coordinates to the last digit, in whatever order of their points."""
+    def copies(self) -> Mapping[int, int]:
+        """Groups (see :attr:`group`) that repeat another to the last digit, with that other: the first by measurement, repeat.
+
+        The order of their points is no matter.
+        """
         same: dict[bytes, list[int]] = {}
         for group in range(int(self.group.max()) + 1 if len(self) else 0):
             figures = self.xyz[self.group == group] + 0.0  # −0 is 0
             same.setdefault(figures[np.lexsort(figures.T)].tobytes(), []).append(group)
-        return tuple(tuple(groups) for groups in same.values() if len(groups) > 1)
+        found: dict[int, int] = {}
+        for groups in same.values():
+            original, *later = sorted(groups, key=self.run_of)
+            found |= dict.fromkeys(later, original)
+        return found
+
+    def run_of(self, group: int) -> tuple[int, int]:
+        """Measurement and repeat of a group."""
+        row = int(np.argmax(self.group == group))
+        return int(self.measurement[row]), int(self.repeat[row])
 
     def column(self, name: str) -> Floats:
         """A recorded column, (n,).

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from physics import TRAVEL
+
+from benchmarks.concealed.physics import TRAVEL
 
 
 @dataclass

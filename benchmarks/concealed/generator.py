@@ -13,8 +13,9 @@ import json
 from pathlib import Path
 
 import numpy as np
-from designs import Design, ballbar, plate, sphere, step_gauge
-from physics import (
+
+from benchmarks.concealed.designs import Design, ballbar, plate, sphere, step_gauge
+from benchmarks.concealed.physics import (
     AROUND,
     BAR,
     DRIVE,
@@ -123,20 +124,34 @@ def _attempt(random: np.random.Generator, what: str, kind: str, folder: Path) ->
     certified = design.size is not None and bool(random.random() < 0.7)
     shape = {"period": float(np.exp(random.uniform(np.log(30), np.log(300)))), "phase": float(random.uniform(-3, 3))}
     oracle = Oracle(design, named, certified, sigma, shape)
-    chosen = _hide(random, kind, design, oracle, named)
+    chosen = hide(random, kind, design, oracle, named)
     if chosen is None:
         return None
     hidden, rivals = chosen
     weak = what == "ballbar 20"
     wanted = {name: float(random.uniform(4.5, 7) if weak else random.uniform(6, 15)) for name in hidden}
     signals = {name: oracle.seen(error) for name, error in hidden.items()}
-    sizes = _sizes(random, oracle, hidden, wanted, signals)
+    sizes = sizes_for(random, oracle, hidden, wanted, signals)
     if sizes is None:
         return None
     if kind in ("one", "two", "three", "roughly"):
         rivals = _inseparable(oracle, design, named, hidden, sizes, signals)
     stands_in = _stands_in(oracle, design, named, sizes, signals) if kind == "outside" else None
     base = {name: random.normal(0, LARGEST[kind_of(name)] / 6) for name in named}
+
+    p = indicated(oracle, base, hidden, sizes) + _noise(random, kind, sigma, design)
+    stated = sigma * 1e3 * (random.choice([0.5, 2.0]) if kind == "noise stated wrongly" else 1.0)
+    says = kind == "noise stated wrongly" or random.random() < 0.7
+    write(folder, p, design, named, design.length if certified else None, stated if says else None)
+    return {
+        "named": named, "hidden": sizes, "root_lambda": wanted, "sigma_um": sigma * 1e3, "stated": says,
+        "certified": certified, "rivals": rivals, "stands_in": stands_in,
+        **shape, "observations": len(oracle.column(KNOWN["scale_x"])),
+    }  # fmt: skip
+
+
+def indicated(oracle: Oracle, base: dict[str, float], hidden: dict[str, Error], sizes: dict[str, float]) -> np.ndarray:
+    """Readings without noise: p + e(p) = t."""
 
     def e(p: np.ndarray) -> np.ndarray:
         total = np.zeros_like(p)
@@ -146,21 +161,13 @@ def _attempt(random: np.random.Generator, what: str, kind: str, folder: Path) ->
             total += size * hidden[name](p, oracle.context)
         return total
 
-    p = design.true.copy()
+    p = oracle.design.true.copy()
     for _ in range(30):
-        p = design.true - e(p)
-    p += _noise(random, kind, sigma, design)
-    stated = sigma * 1e3 * (random.choice([0.5, 2.0]) if kind == "noise stated wrongly" else 1.0)
-    says = kind == "noise stated wrongly" or random.random() < 0.7
-    _write(folder, p, design, named, design.length if certified else None, stated if says else None)
-    return {
-        "named": named, "hidden": sizes, "root_lambda": wanted, "sigma_um": sigma * 1e3, "stated": says,
-        "certified": certified, "rivals": rivals, "stands_in": stands_in,
-        **shape, "observations": len(oracle.column(KNOWN["scale_x"])),
-    }  # fmt: skip
+        p = oracle.design.true - e(p)
+    return p
 
 
-def _sizes(
+def sizes_for(
     random: np.random.Generator, oracle: Oracle, hidden: dict[str, Error], wanted: dict[str, float], signals: dict
 ) -> dict[str, float] | None:
     """Sizes that give the wanted noncentralities, or nothing when they would be absurd."""
@@ -175,7 +182,7 @@ def _sizes(
     return sizes
 
 
-def _hide(random: np.random.Generator, kind: str, design: Design, oracle: Oracle, named: list[str]) -> Choice | None:
+def hide(random: np.random.Generator, kind: str, design: Design, oracle: Oracle, named: list[str]) -> Choice | None:
     if kind in NOTHING:
         return {}, {}
     if kind == "outside":
@@ -255,7 +262,7 @@ def _noise(random: np.random.Generator, kind: str, sigma: float, design: Design)
     return e
 
 
-def _write(
+def write(
     folder: Path, p: np.ndarray, design: Design, named: list[str], length: float | None, stated_um: float | None
 ) -> None:
     folder.mkdir(parents=True, exist_ok=True)

@@ -8,8 +8,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from generator import DESIGNS, NOTHING, SIGNALS
 from scipy.stats import norm
+
+from benchmarks.concealed.generator import DESIGNS, NOTHING, SIGNALS
 
 Pairs = list[tuple[dict, dict]]
 

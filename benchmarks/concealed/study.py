@@ -13,11 +13,11 @@ import time
 from pathlib import Path
 
 import numpy as np
-from generator import DESIGNS, NOTHING, SIGNALS, case, seal
-from greedy import searched
-from physics import UNIT, kind_of
 from rich.progress import track
 
+from benchmarks.concealed.generator import DESIGNS, NOTHING, SIGNALS, case, seal
+from benchmarks.concealed.greedy import searched
+from benchmarks.concealed.physics import UNIT, kind_of
 from cmm_uq.commands.diagnosing import diagnose_job
 
 
@@ -121,7 +121,7 @@ def _written(folder: Path, file: str) -> list[dict]:
 
 
 def summary(folder: Path, truths: list[dict], docs: Path | None) -> None:
-    from report import write
+    from benchmarks.concealed.report import write
 
     by_name = {t["name"]: t for t in truths}
     pairs, peers = ([(by_name[f["name"]], f) for f in _written(folder, file)] for file in ("found", "peer"))

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.cli.options import Force, Json, Quiet
+from cmm_uq.cli import NOT_CONFORMING
+from cmm_uq.cli.options import Force, Json, Quiet, Settled
 from cmm_uq.cli.printing import put, say
 
 
@@ -16,6 +17,7 @@ def command(
     out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<name of the file>]")] = None,
     seed: Annotated[int | None, typer.Option(help="Instead of the file's seed.", min=0)] = None,
     force: Force = False,
+    strict: Settled = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -31,3 +33,5 @@ def command(
             say("  ".join(row))
         for path in written.files.values():
             say(str(path))
+    if strict and not written.evaluation.stable:
+        raise typer.Exit(NOT_CONFORMING)

@@ -12,6 +12,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print results.json instead o
 Force = Annotated[
     bool, typer.Option("--force", help="Keep what stands in the way as NAME.previous instead of refusing.")
 ]
+Settled = Annotated[
+    bool, typer.Option("--strict", help="Exit code 4 unless Monte Carlo is stable to the digits asked for.")
+]
 Strict = Annotated[
     bool, typer.Option("--strict", help="Exit code 4 unless everything conforms and agrees with the model.")
 ]

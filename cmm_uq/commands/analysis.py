@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cmm_uq.commands.diagnosing import diagnosed, screened_model
-from cmm_uq.commands.estimation import accuracy, influences, named_draws, noise, parameters, sizes, with_noise
+from cmm_uq.commands.estimation import accuracy, named_draws, noise, parameters, sizes, with_noise
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.refusals import OVERFLOW_FIX
@@ -72,8 +72,7 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
     result = Result(
-        job, model, findings, influences(model, estimate, findings), estimate, posterior,
-        named_draws(model, components, posterior),
+        job, model, findings, estimate, posterior, named_draws(model, components, posterior),
         parameters(model, posterior), sizes(model, posterior),
         noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
         diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None),

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.conformity.accuracy import with_uncertainty
-from cmm_uq.documents.result import LACK_OF_FIT, Component, Influence, Noise
+from cmm_uq.documents.result import LACK_OF_FIT, Component, Noise
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import OBSERVATIONS
 from cmm_uq.inference.draws import Draws, by_chain
@@ -24,6 +25,8 @@ from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.model.noise import noise_of
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats
+from cmm_uq.screening.copies import counted_with
+from cmm_uq.screening.finding import finding
 from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, unit
@@ -48,13 +51,23 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
-    model = MeasurementModel(
-        artefact, effects(job.facts.model.effects, where="job.toml [model] effects"),
-        None if stated is None else stated * MICROMETRE, ~np.isin(artefact.measurement, aside),
-    )  # fmt: skip
+    used = ~(np.isin(artefact.measurement, aside) | _copies(artefact, aside) | artefact.unread())
+    if not used.any():
+        raise CmmUqError(
+            "no observation is left to estimate from", where="job.toml [recording] set_aside" if aside else job.recording_path,
+            fix="Set fewer measurements aside, or record what the machine reads",
+        )  # fmt: skip
+    named = effects(job.facts.model.effects, where="job.toml [model] effects")
+    model = MeasurementModel(artefact, named, None if stated is None else stated * MICROMETRE, used)
     _refuse_open_sizes(model, job.recording_path)
     _refuse_hidden_noise(model, job.recording_path)
     return model
+
+
+def _copies(artefact: Artefact, aside: Sequence[int]) -> NDArray[np.bool_]:
+    """(m,) which observations are copies of others."""
+    group, rows = artefact.points.group, artefact.rows[:, 0]
+    return np.asarray(group[counted_with(artefact.points, aside)[rows]] != group[rows])
 
 
 def _refuse_open_sizes(model: MeasurementModel, where: str) -> None:
@@ -107,17 +120,11 @@ def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Fi
     for index, times in gross_outliers(model.estimate().linear, artefact.measurement[chosen]):
         i = int(chosen[index])
         used[i] = False
-        measurement, repeat = int(artefact.measurement[i]), int(artefact.repeat[i])
-        rows = (artefact.points.measurement == measurement) & (artefact.points.repeat == repeat)
         why = say(
-            "measurement {measurement}, repeat {repeat} is {times:.1f} of its standard deviations off "
-            "what the others say",
-            measurement=measurement,
-            repeat=repeat,
-            times=times,
-        )
-        lines = tuple(artefact.points.lines[rows].tolist()) if len(artefact.points.lines) else ()
-        found.append(Finding("outlier", (measurement,), lines, why, set_aside=True))
+            "{what} is {times:.1f} of its standard deviations off what the others say",
+            what=artefact.words_of(i), times=times,
+        )  # fmt: skip
+        found.append(replace(finding("outlier", artefact.points, artefact.rows[i], why), set_aside=True))
     return replace(model, used=used), found
 
 
@@ -133,29 +140,6 @@ def with_noise(model: MeasurementModel) -> tuple[MeasurementModel, Estimate, flo
         model = replace(model, sigma=None)
         estimate = model.estimate()
     return model, estimate, p_value
-
-
-def influences(model: MeasurementModel, estimate: Estimate, findings: tuple[Finding, ...]) -> tuple[Influence, ...]:
-    """What leaving out the later measurement of each pair of copies would change."""
-    found = []
-    result = estimate.least_squares
-    u = np.sqrt(np.diag(result.covariance))
-    for finding in findings:
-        if finding.kind != "duplicate" or finding.set_aside:
-            continue
-        measurement = finding.measurements[-1]
-        kept = model.used & (model.artefact.measurement != measurement)
-        without = replace(model, used=kept).estimate().least_squares
-        known = result.determined & without.determined & (u > 0)
-        if not known.any():
-            continue
-        change = np.where(known, np.abs(without.value - result.value) / np.where(known, u, 1.0), 0.0)
-        worst = int(np.argmax(change))
-        sd = without.residual_sd
-        found.append(Influence(
-            measurement, None if sd is None else sd / MICROMETRE, float(change[worst]), result.unknowns[worst].key
-        ))  # fmt: skip
-    return tuple(found)
 
 
 def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
@@ -236,5 +220,6 @@ def accuracy(
     linear, components, sizes = every.linearised(estimate.least_squares.value), noise_of(every), posterior.sizes
     predicted = lengths - linear.observed + posterior.draws @ linear.design.T
     return with_uncertainty(
-        lengths, predicted, lambda some, times, random: components.repeated(sizes.at(some), times, random), seed
-    )
+        lengths, predicted, lambda some, times, random: components.repeated(sizes.at(some), times, random), seed,
+        counted_with(artefact.points)[artefact.rows[:, 0]],
+    )  # fmt: skip

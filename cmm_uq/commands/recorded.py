@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from cmm_uq.commands.estimation import model_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
+from cmm_uq.messages import Verbatim, say
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.placings import LAST_DIGIT
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.points import AXES
+from cmm_uq.screening.finding import finding
 from cmm_uq.screening.screened import Finding, screened
 from cmm_uq.screening.shape import Screening
 
@@ -26,7 +35,26 @@ def recorded_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
         needed={column for effect in acting for column in effect.columns},
         set_aside=job.facts.recording.set_aside, where=where,
     )  # fmt: skip
-    return model_of(job, observe(job.facts.artefact, recording.points, where=where)), recording.findings
+    artefact = observe(job.facts.artefact, recording.points, where=where)
+    return model_of(job, artefact), (*recording.findings, *_unread(artefact))
+
+
+def _unread(artefact: Artefact) -> list[Finding]:
+    """Coordinates that stood still where the artefact observes them, here or in the recording that it is compared with."""
+    points, rows = artefact.points, np.unique(artefact.rows[artefact.unread(), 0])
+    found = []
+    for number in np.unique(points.measurement[rows]).tolist():
+        own = rows[points.measurement[rows] == number]
+        still = np.flatnonzero(np.ptp(points.xyz[own], axis=0) <= LAST_DIGIT)
+        column = f"{AXES[still[0]]}_mm" if len(still) else None
+        what = say("a coordinate stood still earlier")
+        if column is not None:
+            what = say("{column} is {value:g}", column=Verbatim(column), value=points.xyz[own[0], still[0]])
+        why = say(
+            "in all of measurement {number} {what}: nobody read it, and it says nothing", number=number, what=what
+        )
+        found.append(replace(finding("stuck", points, own, why, column), set_aside=True))
+    return found
 
 
 def refuse_unfit(job: Job) -> None:

@@ -50,7 +50,9 @@ Repeated = Callable[[Ints, int, np.random.Generator], Floats]
 """Noise (w, repetitions, m), mm, of the recording made anew, for w of the draws."""
 
 
-def with_uncertainty(lengths: Floats, predicted: Floats, noise: Repeated, seed: int) -> dict[str, Quantity]:
+def with_uncertainty(
+    lengths: Floats, predicted: Floats, noise: Repeated, seed: int, drawn_with: Ints | None = None
+) -> dict[str, Quantity]:  # fmt: skip
     """Figures of recorded lengths, with uncertainty.
 
     Parameters
@@ -59,14 +61,19 @@ def with_uncertainty(lengths: Floats, predicted: Floats, noise: Repeated, seed: 
     predicted : (N, m) lengths that draws from the posterior predict, mm, without noise.
     noise : draws that of each repetition.
     seed : of the repetitions.
+    drawn_with : (m,) equal where lengths share their noise: a copy has that of its original. Each its own by default.
     """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
+    shared = np.arange(len(lengths))
+    if drawn_with is not None:
+        _, first, which = np.unique(drawn_with, return_index=True, return_inverse=True)
+        shared = first[which.ravel()]
     chosen = np.linspace(0, len(predicted) - 1, min(_DRAWS, len(predicted))).astype(int)
     repetitions = int(np.clip(_NUMBERS // (len(chosen) * len(lengths)), 10, 100))
     unbiased = np.sqrt(repetitions / (repetitions - 1))
     errors: dict[str, list[Floats]] = {name: [] for name in TITLES}
     for block in np.array_split(chosen, 10):
-        repeated = figures(predicted[block, None, :] + noise(block, repetitions, random))
+        repeated = figures(predicted[block, None, :] + noise(block, repetitions, random)[..., shared])
         for name, values in repeated.items():
             errors[name].append((unbiased * (values - values.mean(axis=1, keepdims=True))).ravel())
     return {

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.conformity.copies import run_of
 from cmm_uq.conformity.measurement_lines import position_of
 from cmm_uq.conformity.plans import BarPlan, Condition
 from cmm_uq.messages import Text, commas, number, plural, say
@@ -67,7 +66,7 @@ def _same_places(
     """Measurements that are no further position: within how many mm of which other, or a copy of it."""
     found: dict[int, tuple[float | None, int]] = {}
     for later, original in copies.items():
-        (one, _), (two, _) = run_of(points, original), run_of(points, later)
+        (one, _), (two, _) = points.run_of(original), points.run_of(later)
         if one != two:
             found[two] = None, one
     kept: list[int] = []

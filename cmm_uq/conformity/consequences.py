@@ -15,6 +15,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.model.kind import Observed
 from cmm_uq.model.noise import noise_of
 from cmm_uq.points import Floats, Ints
+from cmm_uq.screening.copies import counted_with
 from cmm_uq.uncertainty.quantity import Quantity
 
 _DRAWS = 1000
@@ -71,8 +72,9 @@ def consequences(
         def noise(chosen: Ints, times: int, random: np.random.Generator) -> Floats:
             return components.repeated(sizes.at(chosen), times, random)
 
-        before = with_uncertainty(lengths, predicted, noise, seed)
-        after = with_uncertainty(late, predicted - draws[:, ours] @ whole.design[:, ours].T, noise, seed)
+        same = counted_with(artefact.points)[artefact.rows[:, 0]]
+        before = with_uncertainty(lengths, predicted, noise, seed, same)
+        after = with_uncertainty(late, predicted - draws[:, ours] @ whole.design[:, ours].T, noise, seed, same)
     return Consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(

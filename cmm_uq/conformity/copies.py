@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cmm_uq.messages import NOTHING, Text, say, semicolons
 from cmm_uq.points import Points
 
@@ -11,20 +9,11 @@ _NAMED = 5
 """Copies that are named one by one."""
 
 
-def copied(points: Points) -> dict[int, int]:
-    """Groups that repeat another to the last digit, with that other: the one of the lowest measurement and repeat."""
-    found: dict[int, int] = {}
-    for groups in points.twins:
-        original, *later = sorted(groups, key=lambda group: run_of(points, group))
-        found |= dict.fromkeys(later, original)
-    return found
-
-
 def copies_in_words(points: Points) -> Text:
     """Which measurements are copies of which; empty when none is."""
     told = []
-    for later, original in copied(points).items():
-        (one, first), (two, repeat) = run_of(points, original), run_of(points, later)
+    for later, original in points.copies.items():
+        (one, first), (two, repeat) = points.run_of(original), points.run_of(later)
         told.append((one, first, two, repeat))
     said = [
         say(
@@ -44,9 +33,3 @@ def copies_in_words(points: Points) -> Text:
         "Copies to the last digit, which do not count: {copies} and {count} more.",
         copies=semicolons(said[:_NAMED]), count=len(said) - _NAMED,
     )  # fmt: skip
-
-
-def run_of(points: Points, group: int) -> tuple[int, int]:
-    """Measurement and repeat of a group."""
-    row = int(np.argmax(points.group == group))
-    return int(points.measurement[row]), int(points.repeat[row])

@@ -7,7 +7,6 @@ digit does not count: that is a copy, where in a plan it is a wish.
 from __future__ import annotations
 
 from cmm_uq.conformity.bar_conditions import bar_positions
-from cmm_uq.conformity.copies import copied
 from cmm_uq.conformity.length_conditions import lengths_measured
 from cmm_uq.conformity.plans import BarPlan, Condition, LengthPlan, Plan
 from cmm_uq.conformity.sphere_conditions import sphere_points
@@ -23,7 +22,7 @@ def conditions(plan: Plan, artefact: Artefact, *, recorded: bool) -> tuple[Condi
     artefact : with the points that were planned or recorded.
     recorded : whether they were; then copies do not count.
     """
-    copies = copied(artefact.points) if recorded else {}
+    copies = artefact.points.copies if recorded else {}
     if isinstance(plan, LengthPlan):
         return lengths_measured(plan, artefact, copies)
     if isinstance(plan, BarPlan):

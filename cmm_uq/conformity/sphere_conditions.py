@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cmm_uq.conformity.copies import run_of
 from cmm_uq.conformity.plans import Condition, SpherePlan
 from cmm_uq.messages import say
 from cmm_uq.points import Floats, Points
@@ -32,7 +31,7 @@ def sphere_points(
             continue
         rows = np.flatnonzero(points.group == group)
         count = len(np.unique(points.xyz[rows] + 0.0, axis=0))
-        name = say("measurement {run_of}", run_of=run_of(points, group)[0])
+        name = say("measurement {number}", number=points.run_of(group)[0])
         if not count == plan.points == len(rows):
             lacking.append(
                 say(

@@ -11,7 +11,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.conformity.copies import copied
 from cmm_uq.conformity.decision import decide
 from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import B89, ISO_10360_2, ISO_10360_5
@@ -86,7 +85,7 @@ def _errors_of_indication(test: Test) -> Statement:
     points, first = artefact.points, found.rows[:, 0]
     errors, u, limits = found.errors / MICROMETRE, found.u / MICROMETRE, test.limits_um(found.lengths)
     test.refuse_without_uncertainty(float(u.min()), "u_um")
-    copies = list(copied(recorded.points))
+    copies = list(recorded.points.copies)
     items = tuple(
         Decided(
             float(errors[i]), float(u[i]), float(limits[i]),

@@ -65,24 +65,6 @@ class Noise:
         return self.p_value is not None and self.p_value < LACK_OF_FIT
 
 
-@dataclass(frozen=True)
-class Influence:
-    """What the estimates would be without a measurement that the screening found odd but the estimates use.
-
-    Parameters
-    ----------
-    measurement : that would be left out.
-    residual_sd_um : residual standard deviation without it; ``None`` without degrees of freedom.
-    largest_change : of an estimate, in units of its standard uncertainty.
-    parameter : key of that estimate.
-    """
-
-    measurement: int
-    residual_sd_um: float | None
-    largest_change: float
-    parameter: tuple[str, str]
-
-
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
     """A job with its diagnosis.
@@ -119,7 +101,6 @@ class Result:
     ----------
     job, model : what was analysed.
     findings : of the screening.
-    influences : of findings whose measurements are used all the same.
     estimate : least squares.
     posterior : draws of the model's own parameters.
     draws : of all that is reported, by name and chain.
@@ -134,7 +115,6 @@ class Result:
     job: Job
     model: MeasurementModel
     findings: tuple[Finding, ...]
-    influences: tuple[Influence, ...]
     estimate: Estimate
     posterior: Posterior
     draws: Draws
@@ -213,9 +193,12 @@ class Result:
 
     @cached_property
     def flagged(self) -> NDArray[np.bool_]:
-        """Observations (m,) of measurements that the screening found odd."""
-        odd = {m for finding in self.findings for m in finding.measurements}
-        return np.isin(self.artefact.measurement, list(odd))
+        """Observations (m,) of measurements that the screening found odd; of one with outliers, those that are not used."""
+        found = np.zeros(len(self.artefact.measurement), dtype=bool)
+        for finding in self.findings:
+            own = np.isin(self.artefact.measurement, finding.measurements)
+            found |= own & ~self.model.used if finding.kind == "outlier" else own
+        return found
 
     def prior_share(self, key: tuple[str, str]) -> float:
         """How much of a parameter's variance is left of the prior's: 0 all from the recording, 1 all assumed."""

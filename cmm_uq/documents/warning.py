@@ -6,7 +6,7 @@ from cmm_uq.documents.diagnosis_words import VERDICTS
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import title_of
 from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.messages import NOTHING, Text, commas, listed, say, sentences
+from cmm_uq.messages import Text, commas, listed, say, sentences
 from cmm_uq.uncertainty.rounding import significant
 
 ASSUMED = 0.25
@@ -130,29 +130,12 @@ def _undetermined(result: Result) -> list[Text]:
 
 
 def _screening(result: Result) -> list[Text]:
-    texts: list[Text] = [
+    return [
         say("{why:capital}. It is set aside: not used for the error factors.", why=finding.why)
         if finding.set_aside
         else say("{why:capital}. It is used as it stands.", why=finding.why)
         for finding in result.findings
     ]
-    for influence in result.influences:
-        sd = (
-            NOTHING
-            if influence.residual_sd_um is None
-            else say("residual standard deviation {residual_sd_um:.1f} µm, ", residual_sd_um=influence.residual_sd_um)
-        )
-        texts.append(
-            say(
-                "Without measurement {measurement}: {sd}largest change of an estimate {largest_change:.2g} "
-                "of its standard uncertainty ({parameter}).",
-                measurement=influence.measurement,
-                sd=sd,
-                largest_change=influence.largest_change,
-                parameter=title_of(influence.parameter, result),
-            )
-        )
-    return texts
 
 
 def _missing(result: Result) -> list[Text]:

@@ -117,7 +117,8 @@ def _check_header(header: Sequence[str], name: str) -> None:
                              fix=f"Convert it and name it {known}")  # fmt: skip
     for column in REQUIRED:
         if column not in header:
-            raise CmmUqError(f"no column {column!r}", where=where, fix=suggestion(column, header))
+            unread = " (of an axis that nobody reads, give one number in all rows)" * column.endswith("_mm")
+            raise CmmUqError(f"no column {column!r}", where=where, fix=f"{suggestion(column, header)}{unread}")
 
 
 def largest(column: str) -> float:

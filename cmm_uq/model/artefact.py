@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cmm_uq.messages import NOTHING, Text, foreign
+from cmm_uq.messages import NOTHING, Text, foreign, say
 from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.units import Unit, unit
 
@@ -128,6 +129,20 @@ class Artefact(ABC):
     @abstractmethod
     def size_change(self) -> Floats:
         """Change of the observations, (m, s), for one mm of each size."""
+
+    def words_of(self, observation: int) -> Text:
+        """What an observation is of: a whole (measurement, repeat), or a point of one."""
+        points, rows = self.points, self.rows[observation]
+        run = say(
+            "measurement {measurement}, repeat {repeat}",
+            measurement=int(self.measurement[observation]), repeat=int(self.repeat[observation]),
+        )  # fmt: skip
+        whole = np.all(np.isin(np.flatnonzero(points.group == points.group[rows[0]]), rows))
+        return run if whole else say("point {point} of {run}", point=int(points.point[rows[0]]), run=run)
+
+    def unread(self) -> NDArray[np.bool_]:
+        """Observations (m,) along a coordinate that stood still to the last digit: nobody read it, and it has no noise."""
+        return np.zeros(len(self.noise_scale), dtype=bool)
 
     def lengths(self) -> Floats | None:
         """Lengths (m,), mm at 20 °C, whose scatter is a figure of performance; ``None`` when it has no meaning here."""

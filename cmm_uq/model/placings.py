@@ -6,8 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.points import Floats, Ints
+
+LAST_DIGIT = 1e-9
+"""mm, of means over repeats, which rounding keeps from being the same."""
+
+_ALONG = 0.99
+"""Cosine from which on an axis of an artefact is one of the machine's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +54,19 @@ class Placings:
         """Means of ``values`` (n, …) over the points of each placing, given back to every point."""
         counts = self.sizes.reshape((-1,) + (1,) * (values.ndim - 1))
         return np.asarray((self.sums(values) / counts)[self.index], dtype=np.float64)
+
+    def still(self, xyz: Floats) -> NDArray[np.bool_]:
+        """(n, 3) which coordinates of ``xyz`` (n, 3) are the same to the last digit in all of a point's placing."""
+        order, starts = self._order
+        moved = np.abs(xyz - xyz[order[starts]][self.index]) > LAST_DIGIT
+        return np.asarray((self.sums(moved.astype(np.float64)) == 0)[self.index])
+
+    def unread(self, xyz: Floats, axes: Floats) -> NDArray[np.bool_]:
+        """(n, j) which of an artefact's axes, the columns of ``axes`` (n, 3, j), lie along a coordinate that stood still.
+
+        A coordinate that nobody read has no noise: it is no observation, and one too many makes the noise look smaller.
+        """
+        return np.asarray(np.any(self.still(xyz)[:, :, None] & (np.abs(axes) > _ALONG), axis=1))
 
     def columns(self, freedoms: Floats) -> Floats:
         """Design of freedoms that each placing has for itself: (n, …, j) → (n, …, q·j), zero outside its placing."""

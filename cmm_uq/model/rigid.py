@@ -10,12 +10,14 @@ from __future__ import annotations
 from abc import abstractmethod
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import place
-from cmm_uq.points import Floats, Points
+from cmm_uq.points import AXES, Floats, Points
 
 _ANOTHER_SHAPE = 0.05
 """rms misfit over the extent from which on a recording cannot be of this artefact."""
@@ -73,6 +75,17 @@ class Rigid(Artefact):
         U, _, Vt = np.linalg.svd(moment)
         U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
         return np.asarray((U @ Vt)[self.placings.index], dtype=np.float64)
+
+    def words_of(self, observation: int) -> Text:
+        """See :meth:`Artefact.words_of`: one coordinate of a point."""
+        return say(
+            "the coordinate along the {title:small}'s {axis} of {what}",
+            title=self.title, axis=Verbatim(AXES[observation % 3]), what=super().words_of(observation),
+        )  # fmt: skip
+
+    def unread(self) -> NDArray[np.bool_]:
+        """See :meth:`Artefact.unread`: the artefact's axis along which the machine's coordinate stood still."""
+        return self.placings.unread(self.points.xyz, self.attitudes(self.points.xyz)).ravel()
 
     def deviations(self) -> Floats:
         """Found minus certified position of each point after placing the artefact, (n, 3) mm, in the machine's axes."""

@@ -23,6 +23,7 @@ from cmm_uq.model.kind import Observe
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.screening.columns import SENSORS, about_whole_column, column_findings
 from cmm_uq.screening.coordinates import coordinate_findings
+from cmm_uq.screening.copies import copied_measurements
 from cmm_uq.screening.finding import Finding, finding, span
 from cmm_uq.screening.search import outside_travel
 from cmm_uq.screening.shape import Screening
@@ -110,7 +111,7 @@ def screen(
         if found.kind in _REFUSED_WHOLE and about_whole_column(found, points):
             raise CmmUqError(found.why, where=_place(where, found), fix="Mend the column, or remove it")
     odd = (*impossible, *repeated_figures(points))
-    return tuple(replace(f, set_aside=f.measurements[-1] in set_aside) for f in odd)
+    return tuple(replace(f, set_aside=_aside(f, set_aside)) for f in odd)
 
 
 def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
@@ -140,12 +141,7 @@ def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
 
 def repeated_figures(points: Points) -> list[Finding]:
     """Measurements whose coordinates repeat, digit for digit, those of another measurement; runs of them as one block."""
-    copies = [
-        (groups[0], later)
-        for groups in points.twins
-        for later in groups[1:]
-        if _measurement(points, groups[0]) != _measurement(points, later)
-    ]
+    copies = sorted((original, later) for later, original in copied_measurements(points).items())
     copies.sort(key=lambda pair: pair[1])
     return [_copied(points, run) for run in _runs(copies)]
 
@@ -187,11 +183,12 @@ def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
     if len(run) == 1:
         a, b = _measurement(points, originals[0]), _measurement(points, later[0])
         why = say(
-            "measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement",
+            "measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement, and "
+            "counts once",
             b=b,
             a=a,
         )
-        return finding("duplicate", points, both, why)
+        return replace(finding("duplicate", points, both, why), measurements=(a, b))
     ends = [_measurement(points, group) for group in (later[0], later[-1], originals[0], originals[-1])]
     first, last, original, final = ends
     block = say(
@@ -218,7 +215,13 @@ def _runs(copies: Sequence[tuple[int, int]]) -> list[list[tuple[int, int]]]:
 
 
 def _measurement(points: Points, group: int) -> int:
-    return int(points.measurement[np.argmax(points.group == group)])
+    return points.run_of(group)[0]
+
+
+def _aside(found: Finding, set_aside: Collection[int]) -> bool:
+    """Whether the estimates leave out what was found: a copy, or a measurement that the job leaves out."""
+    *others, last = found.measurements
+    return last in set_aside or (found.kind == "duplicate" and not any(other in set_aside for other in others))
 
 
 def _reversal(found: Finding, points: Points, needed: Collection[str]) -> Finding:

@@ -112,6 +112,7 @@ def _simulated(found: Simulated | None, row: int) -> dict[str, Any] | None:
         "symmetric_interval": found.symmetric_interval[row].tolist(),
         "trials": found.trials,
         "stable": found.stable,
+        "tail_shape": _finite(float(found.shape[row])),
     }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import NOTHING, Text, after, foreign, say, semicolons
+from cmm_uq.uncertainty.heavy_tails import NO_VARIANCE
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.uncertainty.monte_carlo import Simulated, numerical_tolerance
 from cmm_uq.uncertainty.propagation import Propagated, first_order, second_order
@@ -95,15 +96,29 @@ def is_flat(model: MeasurementModel, found: Propagated, row: int) -> bool:
     return uncertain and bool(found.u[row] <= _ROUNDING * abs(found.value[row]))
 
 
-def stability(ways: Ways, digits: int) -> Text:
-    """A sentence where Monte Carlo gave up before its figures were stable, else nothing."""
-    if ways.simulated is None or ways.simulated.stable:
+def stability(ways: Ways, row: int, digits: int) -> Text:
+    """Sentences where Monte Carlo gave up before its figures were stable, and why it had to, else nothing."""
+    found = ways.simulated
+    if found is None or found.stable:
         return NOTHING
-    return say(
-        "Monte Carlo is not stable to {digits} digits after {trials} trials.",
-        digits=digits,
-        trials=ways.simulated.trials,
+    told = say(
+        "Monte Carlo is not stable to {digits} digits after {trials} trials.", digits=digits, trials=found.trials
     )
+    name, shape, unseen = foreign(found.outputs[row]), float(found.shape[row]), float(found.unseen[row])
+    if shape >= NO_VARIANCE:
+        heavy = say(
+            "The tail of {name} is so heavy (Pareto shape {shape:.2f}; from 0.5 on there is no standard deviation) that u "
+            "is of these trials alone and grows with their number; the coverage interval stands.",
+            name=name,
+            shape=shape,
+        )
+        return after(told, heavy)
+    if unseen > numerical_tolerance(found.u, digits)[row]:
+        heavy = say(
+            "The tail of {name} is so heavy (Pareto shape {shape:.2f}) that rare draws rule u.", name=name, shape=shape
+        )
+        return after(told, heavy)
+    return told
 
 
 def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[Method, Text]:
@@ -111,7 +126,7 @@ def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[
     if ways.simulated is None:
         return _without_monte_carlo(ways, row, digits)
     findings: list[Text] = []
-    told = stability(ways, digits)
+    told = stability(ways, row, digits)
     for method in PROPAGATION:
         confirmed, finding = _finding(model, ways, ways.simulated, method, row, digits)
         findings.append(say("{names} {finding}", names=NAMES[method], finding=finding))

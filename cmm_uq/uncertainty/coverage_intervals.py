@@ -116,6 +116,11 @@ class Tails:
         else:
             self._below, self._above = np.finfo(float).max, -np.finfo(float).max
 
+    def extremes(self, count: int) -> tuple[Floats, Floats]:
+        """The lowest and the highest ``count`` draws so far, ascending; fewer where fewer are kept."""
+        low, high = np.sort(np.concatenate(self._low)), np.sort(np.concatenate(self._high))
+        return low[:count], high[-count:]
+
     def intervals(self) -> Floats:
         """Ends (4,) of the shortest (settled) and the symmetric interval of all draws so far."""
         outer = max(1, self.trials - inner_draws(self.trials, self.coverage))

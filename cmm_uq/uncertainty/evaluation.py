@@ -102,6 +102,11 @@ class Evaluation:
     correlation: Floats
     ways: Ways
 
+    @property
+    def stable(self) -> bool:
+        """Whether Monte Carlo, where it was run, is stable to the digits asked for."""
+        return self.ways.simulated is None or bool(self.ways.simulated.stable)
+
     def __repr__(self) -> str:
         said = [(name, *rounded(found.value, found.u), found.budget.unit) for name, found in self.stated.items()]
         told = (
@@ -185,7 +190,7 @@ def _chosen(model: MeasurementModel, ways: Ways, row: int, asked: Request) -> tu
     if asked.method == "auto":
         return choose(model, ways, row, asked.digits)
     if asked.method == "monte_carlo":
-        return ("monte_carlo", after(say("Asked for."), stability(ways, asked.digits)))
+        return ("monte_carlo", after(say("Asked for."), stability(ways, row, asked.digits)))
     method: Method = "first" if asked.method == "first" else "second"
     return method, after(say("Asked for; not confirmed by Monte Carlo."), beside(ways, method, row, asked.digits))
 

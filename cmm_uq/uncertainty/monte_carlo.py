@@ -16,6 +16,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.coverage_intervals import Tails, both_intervals
 from cmm_uq.uncertainty.degrees_of_freedom import check_coverage
+from cmm_uq.uncertainty.heavy_tails import draws_in_tail, tail_of
 from cmm_uq.uncertainty.joint_draws import Draw, joint_draws
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
 
@@ -45,7 +46,10 @@ class Simulated:
     symmetric_interval : (p, 2) probabilistically symmetric coverage intervals.
     standard_error : (p, 6) standard deviations of value, u, and the ends of both intervals, from the scatter of blocks;
         ``nan`` for fewer than two blocks.
-    stable : whether every figure is known to its numerical tolerance; None when no digits were asked for.
+    stable : whether every figure is known to its numerical tolerance, rare draws that did not come included; None when no
+        digits were asked for.
+    shape : (p,) of the heavier tail of each output (:mod:`cmm_uq.uncertainty.heavy_tails`).
+    unseen : (p,) by how much u would be larger with draws that are too rare to have come; infinite where it does not exist.
     edges, density : (p, b + 1) and (p, b) histogram of the output, for pictures.
     """
 
@@ -59,6 +63,8 @@ class Simulated:
     symmetric_interval: Floats
     standard_error: Floats
     stable: bool | None
+    shape: Floats
+    unseen: Floats
     edges: Floats
     density: Floats
 
@@ -128,6 +134,13 @@ def simulate_adaptively(
             figures, errors = run.figures(), run.standard_errors()
             tolerance = numerical_tolerance(figures[:, 1], digits)
             stable = bool(np.all(2 * errors[:, :4] <= tolerance[:, None])) and settled(figures, errors)
+            if stable:
+                shape, unseen = run.tails()
+                stable = bool(np.all(unseen <= tolerance))
+                with np.errstate(over="ignore"):  # what is missing falls as n^(2k − 1), if at all
+                    at_last = unseen * (run.blocks / most) ** np.clip(1 - 2 * shape, 0.0, None)
+                if np.any(at_last > tolerance):
+                    break
     return run.result(stable)
 
 
@@ -245,6 +258,18 @@ class _Run:
             return np.full((len(self._mean), 6), np.nan)
         return np.asarray(np.sqrt(self._block_squares / ((self.blocks - 1) * self.blocks)))
 
+    def tails(self) -> tuple[Floats, Floats]:
+        """(p,) shape of the heavier tail of each output, and how much larger its u would be with draws that did not come."""
+        count, found = draws_in_tail(self.trials) + 1, []
+        for mean, square, tails in zip(self._mean, np.diagonal(self._comoment), self._tails, strict=True):
+            lowest, highest = tails.extremes(count)
+            both = tail_of(highest, mean, self.trials), tail_of(-lowest[::-1], -mean, self.trials)
+            variance = square / (self.trials - 1)
+            more = np.sqrt(variance + sum(tail.unseen for tail in both)) - np.sqrt(variance)
+            found.append((max(tail.shape for tail in both), more))
+        shape, unseen = np.array(found).T
+        return shape, unseen
+
     def result(self, stable: bool | None) -> Simulated:
         """What the trials say."""
         ends = np.array([tails.intervals() for tails in self._tails])
@@ -268,6 +293,7 @@ class _Run:
             ends[:, 2:],
             self.standard_errors(),
             stable,
+            *self.tails(),
             start[:, None] + width[:, None] * np.arange(_BINS + 1),
             self._counts / (self.trials * width[:, None]),
         )

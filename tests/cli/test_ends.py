@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -30,6 +31,22 @@ def test_a_strict_run_ends_with_4_where_the_machine_does_not_conform(iota: Path,
     done = run("report", iota, "--out", tmp_path / "out", "--strict", "--quiet")
     assert done.returncode == 4
     assert (tmp_path / "out" / "certificate.pdf").is_file()
+
+
+@pytest.mark.parametrize(("dof", "code"), [(2.2, 4), (30.0, 0)])
+def test_a_strict_budget_ends_with_4_where_monte_carlo_is_not_stable(
+    budget: Path, tmp_path: Path, dof: float, code: int
+) -> None:
+    """A t of 2.2 degrees of freedom has so heavy a tail that u is not found; it is written all the same, and says so."""
+    budget.write_text(
+        '[model]\noutputs = { y = "x" }\nmethod = "monte_carlo"\ndigits = 1\n'
+        f'[inputs.x]\ndistribution = "t"\nvalue = 0.0\nu = 1.0\ndof = {dof}\n'
+    )
+    done = run("budget", budget, "--out", tmp_path / "out", "--strict", "--json")
+    assert done.returncode == code
+    (told,) = json.loads(done.stdout)["outputs"].values()
+    assert told["monte_carlo"]["stable"] is (code == 0)
+    assert ("not stable" in told["reason"]) is (code == 4)
 
 
 def test_a_strict_diagnosis_ends_with_4_where_something_was_left_out_and_with_0_where_not(

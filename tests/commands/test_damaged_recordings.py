@@ -71,15 +71,15 @@ def test_three_rows_are_too_few_for_any_artefact(example: str, tmp_path: Path) -
     assert error.value.fix
 
 
-@pytest.mark.parametrize("example", [name for name in KINDS if not name.startswith(("iota", "bryan"))])
+@pytest.mark.parametrize("example", [name for name in KINDS if not name.startswith(("iota", "bryan", "digitizer"))])
 def test_a_single_placing_is_diagnosed_by_its_points(example: str, tmp_path: Path) -> None:
     """No placing can be held out, so its points are, each with its repeats."""
     improvement = diagnose_job(job_with(example, one_place, tmp_path)).diagnosis.improvement
     assert np.isfinite([improvement.heldout_rms_before_um, improvement.heldout_rms_after_um]).all()
 
 
-@pytest.mark.parametrize("example", ["iota-1102-20C", "bryan-simulated"])
-def test_one_distance_determines_nothing(example: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("example", ["iota-1102-20C", "bryan-simulated", "digitizer-simulated"])
+def test_one_distance_or_attitude_determines_nothing(example: str, tmp_path: Path) -> None:
     job = job_with(example, one_place, tmp_path)
     with pytest.raises(CmmUqError):
         diagnose_job(job)

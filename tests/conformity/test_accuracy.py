@@ -39,6 +39,18 @@ def test_the_printed_figures_of_the_thesis(
     assert found["b89_max_deviation_um"] == pytest.approx(largest, abs=0.06)
 
 
+def test_a_copied_length_has_the_noise_of_its_original() -> None:
+    """Of twenty lengths, eighteen and one twice: u(mean) = σ·√(18 + 2²)/20, and a copy alone has no scatter."""
+    sigma, n = 5e-3, 20
+    drawn = np.full((500, n), 404.0)
+    shared = np.where(np.arange(n) == 17, 13, np.arange(n))
+    found = with_uncertainty(np.full(n, 404.0), drawn, white(sigma, n), 3, shared)
+    assert found["mean_length_mm"].u == pytest.approx(sigma * 22**0.5 / n, rel=0.02)
+    two = with_uncertainty(np.full(2, 404.0), drawn[:, :2], white(sigma, 2), 3, np.zeros(2, dtype=np.int64))
+    assert two["b89_range_um"].u == 0
+    assert two["mean_length_mm"].u == pytest.approx(sigma, rel=0.02)
+
+
 def test_the_uncertainty_of_mean_and_scatter_is_the_textbook_one() -> None:
     """Pure noise: u(mean) = σ/√n, u(s) = σ·√(1 − c4²) with c4 of twenty lengths 0.98693 (ISO 7870-2)."""
     sigma, n = 5e-3, 20

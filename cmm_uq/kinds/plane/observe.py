@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.plane.facts import PlaneFacts
@@ -104,6 +105,11 @@ class PlaneSurface(Artefact):
         about = touched - self.placings.means(touched)
         across = np.einsum("ni,nij->nj", about, self._axes(touched)[:, :, 1:])
         return self.placings.columns(np.column_stack([np.ones(len(touched)), across]))
+
+    def unread(self) -> NDArray[np.bool_]:
+        """See :meth:`Artefact.unread`: along the normal."""
+        touched = self.points.xyz[self.rows[:, 0]]
+        return self.placings.unread(touched, self._axes(touched)[:, :, :1])[:, 0]
 
     def probed(self, u_point: float) -> tuple[ProbedPlane, ...]:
         """Flatness of each plane, and the surface where the probe's offset is known.

@@ -8,6 +8,7 @@ positions leave that scale free.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.earlier import NOISE_RATIO
@@ -28,7 +29,8 @@ class Plate(Rigid):
 
     Parameters
     ----------
-    facts : what the job says of the plate; ``u_um`` belongs to ``length_mm``, or to the farthest ball from the first.
+    facts : what the job says of the plate; ``u_um`` belongs to ``length_mm``, or to the farthest ball from the first by its
+        number.
     points : the recording, with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm``.
         An earlier recording in place of references (:mod:`cmm_uq.jobs.earlier`) adds its own noise.
 
@@ -46,7 +48,8 @@ class Plate(Rigid):
             self.noise_scale = points.columns[NOISE_RATIO][self.rows[:, 0]]
         self.reference = columns_needed(points, REFERENCES, self.kind, where)
         self.expansion = expansion(facts, points)
-        longest = float(np.linalg.norm(self.reference - self.reference[0], axis=1).max())
+        first = self.reference[np.argmin(points.point)]
+        longest = float(np.linalg.norm(self.reference - first, axis=1).max())
         body = self.reference * self.expansion[:, None]
         self.body = body - self.placings.means(body)
         self.sizes = (
@@ -68,6 +71,13 @@ class Plate(Rigid):
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`: away from the middle of each placing, in proportion."""
         return self.body.reshape(-1, 1) / self.sizes[0].nominal
+
+    def unread(self) -> NDArray[np.bool_]:
+        """See :meth:`Artefact.unread`; of two dates, what stood still on the earlier one is no difference either."""
+        found = super().unread()
+        if NOISE_RATIO in self.points.columns:
+            found |= self.placings.still(self.reference).ravel()
+        return found
 
     def indications(self) -> Indications | None:
         """Distances between every two balls of a (measurement, repeat), against the certified ones."""

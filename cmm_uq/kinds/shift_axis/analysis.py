@@ -18,6 +18,7 @@ from cmm_uq.kinds.shift_axis.undetermined import Undetermined, undetermined
 from cmm_uq.kinds.shifting.correction_table import correction_table
 from cmm_uq.kinds.shifting.facts import KnownLength, ShiftFacts, shift_facts
 from cmm_uq.kinds.shifting.found import Reported, ShiftFound, listed_draws
+from cmm_uq.kinds.shifting.peak_to_valley import peak_to_valley
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats, Ints, Points
@@ -67,13 +68,13 @@ class ShiftResult(ShiftFound):
     @cached_property
     def linearity(self) -> Quantity:
         """Linearity error: peak to valley of the curve about the line through its ends at the first series, µm."""
-        about = self._about_the_ends
-        return Quantity.of_draws(np.ptp(about, axis=1) / MICROMETRE, unit("µm"), _ptp(about.mean(axis=0)))
+        return peak_to_valley(self.estimate.about_the_ends)
 
     @cached_property
     def reported(self) -> Reported:
         """See :attr:`ShiftFound.reported`: linearity error and, where it is determined, mean sensitivity error."""
-        found = {f"linearity_{self.axis}.peak_to_valley_um": (np.ptp(self._about_the_ends, axis=1) / MICROMETRE, "µm")}
+        sizes = np.ptp(self.estimate.about_the_ends, axis=1) / MICROMETRE
+        found = {f"linearity_{self.axis}.peak_to_valley_um": (sizes, "µm")}
         if self.estimate.scale_known:
             found[f"{SCALE[self.axis].name}.ppm"] = self.estimate.scale / PPM, "ppm"
         return found
@@ -105,19 +106,6 @@ class ShiftResult(ShiftFound):
         """The curve at the positions of the integrations; ``None`` where there are none."""
         first = next(iter(self.integrated.values()), None)
         return None if first is None else self.estimate.at(first.position)
-
-    @cached_property
-    def _about_the_ends(self) -> Floats:
-        """(N, m) draws of the curve about the line through its ends at the first series, mm."""
-        curve, ends = self.estimate.curve, self.estimate.series.reading[self.estimate.series.series == 0][[0, -1]]
-        draws = curve.draws.copy()
-        if self.estimate.scale_known:
-            draws -= self.estimate.scale[:, None] * (curve.position - ends[0])
-        return np.asarray(draws, dtype=np.float64)
-
-
-def _ptp(values: Floats) -> float:
-    return float(np.ptp(values)) / MICROMETRE
 
 
 def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult:

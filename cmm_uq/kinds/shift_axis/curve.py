@@ -126,6 +126,12 @@ class CurveEstimate:
         return np.asarray((ends[:, 1] - ends[:, 0]) / (self._ends[1] - self._ends[0]))
 
     @cached_property
+    def about_the_ends(self) -> Floats:
+        """(N, m) draws of the curve about the line through its ends at the first series, mm."""
+        draws = self.curve.draws
+        return draws - self.scale[:, None] * (self.curve.position - self._ends[0]) if self.scale_known else draws
+
+    @cached_property
     def shifts(self) -> Floats:
         """(N, s) draws of the shift of each series against the first, mm; the nominal ones where they are known exactly."""
         nominal = np.tile(self.series.shifts, (len(self.sigma), 1))

@@ -17,11 +17,14 @@ from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
 from cmm_uq.kinds.shifting.correction_table import plane_correction_table
 from cmm_uq.kinds.shifting.facts import KnownLength, shift_facts
 from cmm_uq.kinds.shifting.found import Reported, ShiftFound, listed_draws
+from cmm_uq.kinds.shifting.peak_to_valley import peak_to_valley
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.points import AXES, Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
+
+PEAK_TO_VALLEY = "peak_to_valley_um"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +55,19 @@ class PlaneShiftResult(ShiftFound):
     def scalars(self) -> dict[str, dict[str, Quantity]]:
         """Squareness, scales and sizes of the curves, by name and parameter; what is not determined is left out."""
         found: dict[str, dict[str, Quantity]] = {}
-        for (name, parameter), (draws, own, value) in self._draws.items():
-            found.setdefault(name, {})[parameter] = Quantity.of_draws(draws, own, value)
+        for (name, parameter), (draws, own) in self._draws.items():
+            found.setdefault(name, {})[parameter] = Quantity.of_draws(draws, own)
+        for name, sized in self._sized.items():
+            found.setdefault(name, {})[PEAK_TO_VALLEY] = peak_to_valley(sized)
         return found
 
     @cached_property
     def reported(self) -> Reported:
         """See :attr:`ShiftFound.reported`."""
-        return {".".join(key): (draws, unit) for key, (draws, unit, _) in self._draws.items()}
+        sizes = {
+            (name, PEAK_TO_VALLEY): (np.ptp(d, axis=1) / MICROMETRE, unit("µm")) for name, d in self._sized.items()
+        }
+        return {".".join(key): drawn for key, drawn in (self._draws | sizes).items()}
 
     @cached_property
     def listed(self) -> Reported:
@@ -74,28 +82,32 @@ class PlaneShiftResult(ShiftFound):
         return found
 
     @cached_property
-    def _draws(self) -> dict[tuple[str, str], tuple[Floats, Unit, float | None]]:
-        """Draws (N,), unit, and estimate where that is not their mean."""
+    def _sized(self) -> dict[str, Floats]:
+        """Draws (N, m), mm, of the curves whose peak to valley is stated."""
+        found = {}
+        for name, curve in self.curves.items():
+            if name not in self.estimate.free.names:
+                part = 0.0
+                if name.startswith("linearity"):  # its own end line is the scale, stated by itself
+                    part = curve.draws[:, -1:] * (curve.position - curve.position[0]) / np.ptp(curve.position)
+                found[name] = curve.draws - part
+        return found
+
+    @cached_property
+    def _draws(self) -> dict[tuple[str, str], tuple[Floats, Unit]]:
+        """Draws (N,), and unit."""
         free = self.estimate.free.names
-        found: dict[tuple[str, str], tuple[Floats, Unit, float | None]] = {}
+        found: dict[tuple[str, str], tuple[Floats, Unit]] = {}
         square = SQUARENESS[self.plane].name
         if square not in free:
-            found[square, "angle_arcsec"] = (self.estimate.squareness / ARCSECOND, unit("″"), None)
+            found[square, "angle_arcsec"] = self.estimate.squareness / ARCSECOND, unit("″")
         axes = [AXES[axis] for axis in self.estimate.plate.axes]
         for axis, draws in zip(axes, self.estimate.scales, strict=True):
             if SCALE[axis].name not in free:
-                found[SCALE[axis].name, "ppm"] = (draws / PPM, unit("ppm"), None)
+                found[SCALE[axis].name, "ppm"] = draws / PPM, unit("ppm")
         if (SCALE[axes[0]].name, SCALE[axes[1]].name) in self.estimate.free.combinations:
             difference = self.estimate.scales[1] - self.estimate.scales[0]
-            found[f"{SCALE[axes[1]].name}_minus_{axes[0]}", "ppm"] = (difference / PPM, unit("ppm"), None)
-        for name, curve in self.curves.items():
-            if name not in free:
-                draws = curve.draws
-                if name.startswith("linearity"):  # its own end line is the scale, stated by itself
-                    part = (curve.position - curve.position[0]) / np.ptp(curve.position)
-                    draws = draws - draws[:, -1:] * part
-                value = float(np.ptp(draws.mean(axis=0))) / MICROMETRE
-                found[name, "peak_to_valley_um"] = (np.ptp(draws, axis=1) / MICROMETRE, unit("µm"), value)
+            found[f"{SCALE[axes[1]].name}_minus_{axes[0]}", "ppm"] = difference / PPM, unit("ppm")
         return found
 
     @cached_property
