@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmm_uq.conformity.copies import copied, copies_in_words, run_of
+from cmm_uq.conformity.copies import copies_in_words
 from cmm_uq.points import Points
 
 
@@ -18,7 +18,7 @@ def runs(*of: tuple[int, int, float]) -> Points:
 
 
 def by_run(points: Points) -> dict[tuple[int, int], tuple[int, int]]:
-    return {run_of(points, later): run_of(points, original) for later, original in copied(points).items()}
+    return {points.run_of(later): points.run_of(original) for later, original in points.copies.items()}
 
 
 def test_the_original_is_the_one_of_the_lowest_number_wherever_it_was_recorded() -> None:
@@ -28,7 +28,7 @@ def test_the_original_is_the_one_of_the_lowest_number_wherever_it_was_recorded()
 
 
 def test_where_nothing_is_repeated_nothing_is_said() -> None:
-    assert copied(runs((1, 1, 5.0), (1, 2, 6.0))) == {}
+    assert runs((1, 1, 5.0), (1, 2, 6.0)).copies == {}
     assert copies_in_words(runs((1, 1, 5.0), (1, 2, 6.0))) == ""
 
 
