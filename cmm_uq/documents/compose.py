@@ -8,6 +8,7 @@ from cmm_uq.documents import tolerance_section
 from cmm_uq.documents.corner import corner_plot
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
 from cmm_uq.documents.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
+from cmm_uq.documents.noise_words import noise_found
 from cmm_uq.documents.origin import CERTIFICATE, came_about
 from cmm_uq.documents.outcome import Outcome, Page
 from cmm_uq.documents.posterior_file import posterior_file, posterior_name
@@ -353,6 +354,7 @@ def _method(result: Result) -> Section:
             NOTHING if ls.residual_sd is None else say("{sd:.1f} µm", sd=ls.residual_sd * 1e3),
         ),
         (say("Standard uncertainty of a coordinate"), spread),
+        (say("Noise"), noise_found(noise)),
         (say("Sampler"), sampler),
         (say("Convergence"), _convergence(posterior)),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.documents.result import Noise
-from cmm_uq.messages import Text, after, listed, say
+from cmm_uq.messages import Text, listed, say
 
 _SHOWN = 0.8
 """Probability from which a component is said to be there; beforehand it is at most one half."""
@@ -29,7 +29,9 @@ def noise_found(noise: Noise) -> Text:
         hidden.append(say("set-up offsets (no repeats)"))
     if "slow" not in noise.components:
         hidden.append(say("slow noise (no time_s)"))
-    return after(found, say("Not to be seen in this recording: {what}", what=listed(hidden))) if hidden else found
+    return (
+        say("{found}; not to be seen in this recording: {what}", found=found, what=listed(hidden)) if hidden else found
+    )
 
 
 def _found(noise: Noise) -> list[Text]:

@@ -31,6 +31,8 @@ _T_DOF = 6.0
 _WIDER = 2.0
 """Times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail."""
 _LOOKS = 3
+_ENOUGH, _MOST_LOOKS, _NEVER = 0.2, 25, -1e30
+"""Part of the draws that must count, rounds at most, and the least gain that is reckoned with, when a density is let in by degrees."""
 
 Progress = Callable[[float], None]
 LogDensity = Callable[[Floats], Floats]
@@ -184,9 +186,6 @@ def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> 
         if not left:
             break
     return centre, factor
-
-
-_ENOUGH, _MOST_LOOKS, _NEVER = 0.2, 25, -1e30
 
 
 def _highest_power(gain: Floats, known: Floats, least: float, enough: float) -> float:

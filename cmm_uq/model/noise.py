@@ -13,6 +13,9 @@ from cmm_uq.points import Floats, Ints
 _LEAST_SHARE = 0.15
 """Part of the observations' variance that each of two axes must have for their noises to be told apart."""
 
+_LEAST_TIMES = 8
+"""Different times from which on slow noise is reckoned with."""
+
 _LEAST_SPREAD = 1.5
 """Longest over median length from which on noise may be seen to grow with it."""
 
@@ -188,6 +191,3 @@ def _turning(seen: Floats, measurement: Ints) -> bool:
     """Whether observations (m, 3) of one placing look along different directions."""
     _, first, index = np.unique(measurement, return_index=True, return_inverse=True)
     return bool(np.abs(seen - seen[first][index.ravel()]).max() > 1e-3)
-
-
-_LEAST_TIMES = 8
