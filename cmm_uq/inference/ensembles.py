@@ -32,7 +32,7 @@ _WIDER = 2.0
 """Times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail."""
 _LOOKS = 3
 _ENOUGH, _MOST_LOOKS, _NEVER = 0.2, 25, -1e30
-"""Part of the draws that must count, rounds at most, and the least gain that is reckoned with, when a density is let in by degrees."""
+"""Letting in by degrees: part of the draws that must count, rounds at most, least gain that is reckoned with."""
 
 Progress = Callable[[float], None]
 LogDensity = Callable[[Floats], Floats]

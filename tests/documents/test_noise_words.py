@@ -17,22 +17,15 @@ def noise(components: dict[str, Component], *, apart: float = 0.2, wider: float 
 
 
 def test_white_noise_is_said_to_be_nothing_else_and_what_could_not_show_is_named() -> None:
-    assert (
-        noise_found(noise({}))
-        == (
-            "independent readings, nothing else Not to be seen in this recording: set-up offsets (no repeats) and slow noise (no time_s)"
-        ).replace("else Not", "else. Not")
-        + "."
+    assert noise_found(noise({})) == (
+        "independent readings, nothing else; not to be seen in this recording: "
+        "set-up offsets (no repeats) and slow noise (no time_s)"
     )
 
 
 def test_what_is_probably_there_is_named_with_its_size_and_what_it_does_to_the_uncertainties() -> None:
-    found = noise(
-        {"placing": size(2.3, 0.97), "slow": size(0.4, 0.3), "x": size(1), "y": size(1), "z": size(3)},
-        apart=0.99,
-        wider=1.84,
-    )
-    said = noise_found(found)
+    components = {"placing": size(2.3, 0.97), "slow": size(0.4, 0.3), "x": size(1), "y": size(1), "z": size(3)}
+    said = noise_found(noise(components, apart=0.99, wider=1.84))
     assert "differs by axis (X 1, Y 1, Z 3 µm)" in said
     assert "an offset of 2.3 µm of each set-up, shared by its repeats (probability 0.97)" in said
     assert "slow noise" not in said
