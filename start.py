@@ -3,6 +3,7 @@
 
     python3 start.py report examples/iota-1102-20C     any cmm-uq command
     python3 start.py test                              lint, types and tests
+    python3 start.py test --numprocesses=auto --cov    the same, with the lines that the tests run (twice as long)
 
 Makes a virtual environment in .venv (or in the folder that CMM_UQ_ENV names) on the first call and reuses it until
 pyproject.toml changes; the system's Python is left alone.
@@ -60,7 +61,7 @@ def test(arguments: list[str]) -> int:
         run("ruff", "check"),
         run("ruff", "format", "--check"),
         run("mypy"),
-        run("pytest", *(arguments or ["--numprocesses=auto", "--cov", "--cov-report=term:skip-covered"])),
+        run("pytest", *(arguments or ["--numprocesses=auto"])),
     ]
     return max(results)
 
