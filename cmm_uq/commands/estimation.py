@@ -158,7 +158,7 @@ def named_draws(model: MeasurementModel, components: Components, posterior: Nois
         units[f"noise.{name}_um"] = unit("µm")
         columns.append(values / MICROMETRE)
     values = np.column_stack(columns) if columns else np.zeros((len(posterior.draws), 0))
-    return Draws(units, by_chain(values, posterior.steps))
+    return Draws(units, by_chain(values, posterior.steps // posterior.every), posterior.every)
 
 
 def sizes(model: MeasurementModel, posterior: Posterior) -> dict[str, Quantity]:

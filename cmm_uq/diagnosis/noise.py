@@ -106,13 +106,14 @@ def drawn_shapes(components: Components) -> Floats:
             root = (1 + root) ** (1 / d)
         steps = root ** -np.arange(1.0, d)
         found[:, 1:] = special.ndtri(np.clip((0.5 + np.outer(np.arange(SHAPES), steps)) % 1, 1e-6, 1 - 1e-6))
+    found[:, 0] = components.log_scatter(found)
     return found
 
 
 def _probability(marginal: Marginal, shapes: Floats) -> Floats:
     """Of each shape (n,), the reading noise integrated out: the sum of squares has a gamma distribution given the shape."""
     at = shapes.copy()
-    at[:, 0] = np.log(marginal.estimate.sigma_of_residuals or 1.0)
+    at[:, 0] += np.log(marginal.estimate.sigma_of_residuals or 1.0)
     log, squares = marginal.log_likelihood(marginal.noise.sizes(at))
     count = max(marginal.estimate.degrees_of_freedom, 1)
     value = log - 0.5 * count * np.log(np.maximum(squares, 1e-12))

@@ -63,6 +63,15 @@ class Chains:
         """See :func:`converged`."""
         return converged(self.ess_min, self.rhat_max, self.steps, self.autocorrelation_time)
 
+    def thinning(self, most: int) -> int:
+        """Of how many steps one is to be kept for at most ``most`` draws (or for those of two steps of each chain)."""
+        return max(1, min(-(-len(self.draws) // most), self.steps // 2))
+
+    def thinned(self, every: int) -> Floats:
+        """Draws of every such step."""
+        by_step = self.draws.reshape(ENSEMBLES, self.steps, -1, self.draws.shape[1])
+        return np.asarray(by_step[:, every - 1 :: every].reshape(-1, self.draws.shape[1]))
+
 
 def converged(ess_min: float, rhat_max: float, steps: int, autocorrelation_time: float) -> bool:
     """At least 1000 effective samples, R-hat below 1.01, and chains longer than 50 autocorrelation times."""

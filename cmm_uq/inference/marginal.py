@@ -25,6 +25,9 @@ _JITTER = 1e-11
 _NUMBERS = 4_000_000
 """In one batch of matrices."""
 
+_NUMBERS_DRAWN = 100_000_000
+"""In the matrices that all draws of the parameters take."""
+
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
@@ -133,6 +136,11 @@ class Marginal:
             logs[part] = log - np.log(diagonal[:, :-1]).sum(axis=1)
             squares[part] = diagonal[:, -1] ** 2
         return logs, squares
+
+    @property
+    def affordable_draws(self) -> int:
+        """How many draws of the parameters take a second or so; never fewer than ten thousand."""
+        return max(10_000, _NUMBERS_DRAWN // len(self._length) ** 2)
 
     def draw(self, sizes: Sizes, random: np.random.Generator) -> Floats:
         """One exact draw (w, k) of the parameters for each of w sizes."""

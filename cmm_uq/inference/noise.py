@@ -103,6 +103,7 @@ class Components:
     frequency : of each of those columns, in half turns over the recording; 0 is a constant.
     possible : which components could show here.
     stated : standard uncertainty of a coordinate, mm, as the job states it.
+    gap : typical time between neighbouring readings, over the duration of the recording.
     """
 
     turn: sparse.csr_array
@@ -111,6 +112,7 @@ class Components:
     frequency: Floats
     possible: tuple[str, ...]
     stated: float | None = None
+    gap: float = 0.0
     names: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -124,9 +126,13 @@ class Components:
         return len(self.names)
 
     def sizes(self, latent: Floats) -> Sizes:
-        """Sizes in each of w rows of ``latent`` (w, d): ln σ of a reading in mm, then standard normal numbers."""
+        """Sizes in each of w rows of ``latent`` (w, d).
+
+        First ln of how far neighbouring readings scatter about each other, mm, then standard normal numbers. Slow noise that
+        changes from reading to reading is then told from reading noise by what the recording knows of it, not by σ.
+        """
         column = {name: latent[:, i] for i, name in enumerate(self.names)}
-        sigma, nothing = np.exp(column["log_sigma"]), np.zeros(len(latent))
+        sigma, nothing = np.exp(column["log_sigma"] - self.log_scatter(latent)), np.zeros(len(latent))
         reading = np.repeat(sigma[:, None], 3, axis=1)
         if AXES in self.possible:
             spread = _half_normal(column["spread"], ABSENT[AXES], AXES_SPREAD)
@@ -137,8 +143,16 @@ class Components:
             name: sigma * _half_cauchy(column[name], ABSENT[name], RATIO[name]) if name in self.possible else nothing
             for name in (PLACING, GROWTH, SLOW)
         }
-        rate = np.exp(special.ndtr(column["rate"]) * np.log(FASTEST)) if SLOW in self.possible else 1 + nothing
+        rate = _rate(column["rate"]) if SLOW in self.possible else 1 + nothing
         return Sizes(reading, ratios[PLACING], ratios[GROWTH], ratios[SLOW], rate)
+
+    def log_scatter(self, latent: Floats) -> Floats:
+        """Logarithm (w,) of the standard deviation of neighbouring readings about each other, over √2 of that of a reading."""
+        if SLOW not in self.possible:
+            return np.zeros(len(latent))
+        ratio = _half_cauchy(latent[:, self.names.index(SLOW)], ABSENT[SLOW], RATIO[SLOW])
+        changed = -np.expm1(-self.gap * _rate(latent[:, self.names.index("rate")]))
+        return np.asarray(0.5 * np.log1p(ratio**2 * changed))
 
     def variances(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Six variances (w, 6), mm², that ``shares`` refers to, and those of the slow columns (w, c)."""
@@ -224,6 +238,11 @@ def slow_variances(sd: Floats, rate: Floats, frequency: Floats) -> tuple[Floats,
     each = np.where(frequency == 0, mean, cosine)
     shown = each[:, np.unique(frequency, return_index=True)[1]].sum(axis=1)
     return sd[:, None] ** 2 * each, sd**2 * np.maximum(1 - shown, 0.0)
+
+
+def _rate(latent: Floats) -> Floats:
+    """Standard normal numbers as rates whose logarithm is uniform, in units of one over the duration."""
+    return np.asarray(np.exp(special.ndtr(latent) * np.log(FASTEST)))
 
 
 def _present(latent: Floats, absent: float) -> Floats:

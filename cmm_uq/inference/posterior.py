@@ -35,6 +35,7 @@ class Posterior:
     sampler : program and version.
     ess_min, rhat_max : worst over all parameters and the noise.
     steps, autocorrelation_time : length of each chain, and the longest time.
+    every : of how many steps one was kept as a draw.
     shapes : (N, q) of what shapes columns, if anything does.
     """
 
@@ -48,6 +49,7 @@ class Posterior:
     steps: int
     autocorrelation_time: float
     shapes: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    every: int = 1
 
     @property
     def converged(self) -> bool:

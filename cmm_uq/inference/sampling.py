@@ -38,12 +38,13 @@ def sample_with_noise(
         steps_at_once=100,
         least_walkers=16,
     )  # everything but the noise is drawn independently, given it
-    sizes = noise.sizes(chains.draws)
+    every = chains.thinning(marginal.affordable_draws)
+    sizes = noise.sizes(chains.thinned(every))
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(5,)))
     return NoisyPosterior(
         unknowns=model.unknowns, draws=marginal.draw(sizes, random), sigma=sizes.coordinate, seed=seed,
         sampler=chains.sampler, ess_min=chains.ess_min, rhat_max=chains.rhat_max, steps=chains.steps,
-        autocorrelation_time=chains.autocorrelation_time, sizes=sizes,
+        autocorrelation_time=chains.autocorrelation_time, every=every, sizes=sizes,
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws, by_chain, by_ensemble, evenly
-from cmm_uq.inference.ensembles import ENSEMBLES, run_ensembles
+from cmm_uq.inference.ensembles import ENSEMBLES, Chains, run_ensembles
 
 
 def some(chains: int = 6, draws: int = 40) -> Draws:
@@ -48,6 +48,19 @@ def test_kept_draws_of_an_ensemble_are_its_walkers_paths_one_behind_the_other() 
 
 def test_no_more_draws_are_kept_than_there_are() -> None:
     assert evenly(8, 2000).tolist() == list(range(8))
+
+
+@pytest.mark.parametrize(("most", "every"), [(1000, 1), (180, 1), (60, 3), (59, 4), (1, 7)])
+def test_thinned_draws_are_whole_steps_of_every_walker(most: int, every: int) -> None:
+    """180 draws of 15 steps, numbered as above."""
+    steps, walkers = 15, 3
+    e, s, w = np.meshgrid(np.arange(ENSEMBLES), np.arange(steps), np.arange(walkers), indexing="ij")
+    chains = Chains((100 * e + s + 0.1 * w).reshape(-1, 1), "", 0.0, 1.0, steps, 1.0)
+    assert chains.thinning(most) == every
+    kept = by_chain(chains.thinned(every)[:, 0], steps // every)
+    for number, chain in enumerate(kept):
+        first = 100 * (number // walkers) + 0.1 * (number % walkers)
+        assert np.allclose(chain, first + np.arange(every - 1, steps, every)[: steps // every])
 
 
 def test_the_sampler_gives_its_draws_in_the_order_that_chains_are_made_of() -> None:

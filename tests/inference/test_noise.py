@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -60,7 +62,7 @@ def test_a_component_is_absent_as_often_as_its_prior_says(name: str) -> None:
     noise = components((name,))
     latent = np.random.default_rng(3).standard_normal((100_000, noise.dimension))
     sizes = noise.sizes(latent)
-    ratio = getattr(sizes, name) / np.exp(latent[:, 0])
+    ratio = getattr(sizes, name) / sizes.coordinate
     assert np.mean(ratio == 0) == pytest.approx(ABSENT[name], abs=0.006)  # four standard errors
     present = ratio[ratio > 0]
     assert np.median(present) == pytest.approx(1.0, abs=0.05)  # of a half-Cauchy distribution of scale one
@@ -73,6 +75,16 @@ def test_axes_are_equal_as_often_as_the_prior_says_and_keep_their_geometric_mean
     reading = noise.sizes(latent).reading
     assert np.mean(np.ptp(np.log(reading), axis=1) < 1e-12) == pytest.approx(ABSENT[AXES], abs=0.006)
     assert np.allclose(np.log(reading).mean(axis=1), latent[:, 0])
+
+
+def test_the_first_number_says_how_far_neighbouring_readings_scatter_about_each_other() -> None:
+    """Half the variance of their difference: σ² + s²·(1 − exp(−rate·gap)), of an Ornstein–Uhlenbeck process beside σ."""
+    noise = replace(components((PLACING, SLOW)), gap=0.05)
+    latent = np.random.default_rng(5).standard_normal((1000, noise.dimension))
+    sizes = noise.sizes(latent)
+    half = sizes.reading[:, 0] ** 2 + sizes.slow**2 * (1 - np.exp(-0.05 * sizes.rate))
+    assert np.any(sizes.slow > sizes.reading[:, 0])
+    assert np.allclose(half, np.exp(2 * latent[:, 0]))
 
 
 @pytest.mark.parametrize("rate", [1.0, 5.0, 20.0])
