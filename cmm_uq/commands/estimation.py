@@ -179,6 +179,8 @@ def sizes_of_noise(components: Components, posterior: NoisyPosterior) -> dict[st
     found = {"coordinate": sizes.coordinate}
     if AXES in components.possible:
         found |= dict(zip("xyz", sizes.reading.T, strict=True))
+    if components.display:
+        found["display"] = np.full_like(sizes.coordinate, components.display / np.sqrt(12))
     each = {PLACING: sizes.placing, GROWTH: sizes.growth, SLOW: sizes.slow}
     return found | {name: values for name, values in each.items() if name in components.possible}
 

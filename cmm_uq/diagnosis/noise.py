@@ -83,6 +83,7 @@ def kinds(
     rivals : (m, r) columns, mm, of what could be missing, for coefficients of standard deviation one.
     residuals : (m,) of the estimate, mm.
     """
+    components = _for_a_unit(components, estimate.sigma_of_residuals)
     shapes = drawn_shapes(components)
     wide = Marginal(_with_rivals(linear, rivals), components, _without_rivals(estimate, rivals.shape[1]))
     share = np.mean([_probability(Marginal(linear, components, estimate), shapes), _probability(wide, shapes)], axis=0)
@@ -93,6 +94,15 @@ def kinds(
         for i, w in zip(kept, weight, strict=True)
     ]
     return [*found, tails(residuals / scale)]
+
+
+def _for_a_unit(components: Components, scatter: float) -> Components:
+    """The components with the display's step over the reading noise that the residuals leave it."""
+    step = components.display
+    if not step:
+        return components
+    reading = max(np.sqrt(max(scatter**2 - step**2 / 12, 0.0)), components.least)
+    return replace(components, display=step / reading)
 
 
 def drawn_shapes(components: Components) -> Floats:
@@ -112,8 +122,9 @@ def drawn_shapes(components: Components) -> Floats:
 
 def _probability(marginal: Marginal, shapes: Floats) -> Floats:
     """Of each shape (n,), the reading noise integrated out: the sum of squares has a gamma distribution given the shape."""
-    at = shapes.copy()
-    at[:, 0] += np.log(marginal.estimate.sigma_of_residuals or 1.0)
+    at, sigma = shapes.copy(), marginal.estimate.sigma_of_residuals or 1.0
+    at[:, 0] += np.log(sigma)
+    marginal = replace(marginal, noise=replace(marginal.noise, display=sigma * marginal.noise.display))
     log, squares = marginal.log_likelihood(marginal.noise.sizes(at))
     count = max(marginal.estimate.degrees_of_freedom, 1)
     value = log - 0.5 * count * np.log(np.maximum(squares, 1e-12))

@@ -6,6 +6,7 @@ class of observations with equal variance, so that the density at new sizes cost
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,7 +15,7 @@ import numpy as np
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel, reached
 from cmm_uq.inference.noise import Components, Sizes
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 
 SIGMA_BOUNDS = (1e-6, 10.0)
 """mm: from a nanometre to a centimetre; between them an unknown noise is uniform in its logarithm."""
@@ -91,20 +92,34 @@ class Marginal:
         return found.reshape(len(shares), -1), (prior.T @ prior).ravel()
 
     @cached_property
+    def _without_slow(self) -> tuple[Floats, Floats]:
+        """The products without the columns of slow noise, whose coefficients are zero where it is absent."""
+        P, q, c = len(self._length), self._placing.shape[1], self.noise.slow.shape[1]
+        kept = np.delete(np.arange(P), np.arange(q, q + c))
+        found, prior = (each.reshape(-1, P, P)[:, kept[:, None], kept] for each in self._products)
+        return found.reshape(len(found), -1), prior.ravel()
+
+    @cached_property
     def _counts(self) -> Floats:
         return np.bincount(self.noise.classes[0], minlength=len(self.noise.classes[1])).astype(np.float64)
 
     def _factors(self, sizes: Sizes) -> tuple[Floats, Floats]:
-        """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them."""
+        """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them.
+
+        Without rows and columns of slow noise, where it is absent in all of the sizes.
+        """
         variances, slow = self.noise.variances(sizes)
         v = variances @ self.noise.classes[1].T
-        products, prior = self._products
-        P = len(self._length)
+        absent = not np.any(sizes.slow)
+        products, prior = self._without_slow if absent else self._products
+        q, c = self._placing.shape[1], slow.shape[1]
+        P = len(self._length) - absent * c
         whole = ((1 / v) @ products + prior).reshape(-1, P, P)
         log = -0.5 * np.log(v) @ self._counts
-        q, c = self._placing.shape[1], slow.shape[1]
-        if c:
-            at = np.arange(q, q + c)
+        at = np.arange(q, q + c)
+        if absent:  # what is left of slow noise whose variance goes to zero
+            log += np.log(self._length[at]).sum()
+        else:
             least = np.maximum(slow, (1e-6 * self._scale) ** 2)
             whole[:, at, at] += 1 / (least * self._length[at] ** 2)
             log -= 0.5 * np.log(least).sum(axis=1)
@@ -112,13 +127,16 @@ class Marginal:
         whole[:, diagonal, diagonal] *= 1 + _JITTER
         return _cholesky(whole), log
 
-    def _batches(self, count: int) -> list[slice]:
-        size = max(1, _NUMBERS // len(self._length) ** 2)
-        return [slice(i, i + size) for i in range(0, count, size)]
+    def _batches(self, sizes: Sizes) -> Iterator[Ints]:
+        """Which sizes to reckon with at once: those without slow noise, which need smaller matrices, apart."""
+        c = self.noise.slow.shape[1]
+        for chosen, P in ((sizes.slow == 0, len(self._length) - c), (sizes.slow > 0, len(self._length))):
+            at, size = np.flatnonzero(chosen), max(1, _NUMBERS // P**2)
+            yield from (at[i : i + size] for i in range(0, len(at), size))
 
     def log_density(self, latent: Floats) -> Floats:
         """(w,) up to a constant, of the numbers (w, d) that say the sizes; minus infinity out of bounds."""
-        low, high = np.log(SIGMA_BOUNDS)
+        low, high = np.log(max(SIGMA_BOUNDS[0], self.noise.least)), np.log(SIGMA_BOUNDS[1])
         inside = (latent[:, 0] > low) & (latent[:, 0] < high)
         held = np.where(np.isfinite(latent), latent, 0.0)
         held[:, 0] = np.clip(held[:, 0], low, high)
@@ -130,7 +148,7 @@ class Marginal:
     def log_likelihood(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Log likelihood (w,) of w sizes but for the sum of squares, and that sum (w,), of which half is to be subtracted."""
         logs, squares = np.empty(len(sizes.placing)), np.empty(len(sizes.placing))
-        for part in self._batches(len(logs)):
+        for part in self._batches(sizes):
             factors, log = self._factors(sizes.at(part))
             diagonal = np.einsum("wii->wi", factors)
             logs[part] = log - np.log(diagonal[:, :-1]).sum(axis=1)
@@ -148,7 +166,7 @@ class Marginal:
         if not k:
             return np.zeros((count, 0))
         found = np.empty((count, k))
-        for part in self._batches(count):
+        for part in self._batches(sizes):
             factors, _ = self._factors(sizes.at(part))
             # the parameters stand last before the observations: the lower right of the factor is all that they need
             own, mean = factors[:, -1 - k : -1, -1 - k : -1], factors[:, -1, -1 - k : -1]

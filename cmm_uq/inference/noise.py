@@ -40,7 +40,7 @@ RATIO = {PLACING: 1.0, GROWTH: 1.0, SLOW: 1.0}
 
 LARGEST_RATIO = 300.0
 
-FREQUENCIES = 72
+FREQUENCIES = 48
 """Cosines of slow noise, of all axes together; what is faster counts as independent."""
 
 FASTEST = 200.0
@@ -52,7 +52,7 @@ _FARTHEST = 5.0
 
 _MOST_CLASSES, _STEPS = 48, 20
 _VARIANCES = 6
-"""Columns of ``shares``: reading noise along x, y, z; set-up offset; growing noise; the fast part of slow noise."""
+"""Columns of ``shares``: reading noise along x, y, z; what repeats share; growing noise; what each observation has alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +104,7 @@ class Components:
     possible : which components could show here.
     stated : standard uncertainty of a coordinate, mm, as the job states it.
     gap : typical time between neighbouring readings, over the duration of the recording.
+    display : step in which coordinates are displayed, mm; 0 where it is too fine to matter.
     """
 
     turn: sparse.csr_array
@@ -113,12 +114,18 @@ class Components:
     possible: tuple[str, ...]
     stated: float | None = None
     gap: float = 0.0
+    display: float = 0.0
     names: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         latent = {AXES: ("spread", "first", "second"), PLACING: (PLACING,), GROWTH: (GROWTH,), SLOW: (SLOW, "rate")}
         names = ["log_sigma", *(name for component in self.possible for name in latent[component])]
         object.__setattr__(self, "names", tuple(names))
+
+    @property
+    def least(self) -> float:
+        """Reading noise, mm, below which a smaller one would show no other readings."""
+        return self.display / 20
 
     @property
     def dimension(self) -> int:
@@ -139,8 +146,9 @@ class Components:
             apart = spread[:, None] * (np.column_stack([column["first"], column["second"]]) @ _CONTRASTS.T)
             most = np.abs(apart).max(axis=1, keepdims=True)
             reading = reading * np.exp(apart * np.minimum(1.0, _FARTHEST / np.maximum(most, 1e-9)))
+        apparent = np.hypot(sigma, self.display / np.sqrt(12))
         ratios = {
-            name: sigma * _half_cauchy(column[name], ABSENT[name], RATIO[name]) if name in self.possible else nothing
+            name: apparent * _half_cauchy(column[name], ABSENT[name], RATIO[name]) if name in self.possible else nothing
             for name in (PLACING, GROWTH, SLOW)
         }
         rate = _rate(column["rate"]) if SLOW in self.possible else 1 + nothing
@@ -148,16 +156,26 @@ class Components:
 
     def log_scatter(self, latent: Floats) -> Floats:
         """Logarithm (w,) of the standard deviation of neighbouring readings about each other, over √2 of that of a reading."""
-        if SLOW not in self.possible:
-            return np.zeros(len(latent))
-        ratio = _half_cauchy(latent[:, self.names.index(SLOW)], ABSENT[SLOW], RATIO[SLOW])
-        changed = -np.expm1(-self.gap * _rate(latent[:, self.names.index("rate")]))
-        return np.asarray(0.5 * np.log1p(ratio**2 * changed))
+        column = {name: latent[:, i] for i, name in enumerate(self.names)}
+        square = np.ones(len(latent))
+        if SLOW in self.possible:
+            changed = -np.expm1(-self.gap * _rate(column["rate"]))
+            square += changed * _half_cauchy(column[SLOW], ABSENT[SLOW], RATIO[SLOW]) ** 2
+        if GROWTH in self.possible:
+            square += self._growth * _half_cauchy(column[GROWTH], ABSENT[GROWTH], RATIO[GROWTH]) ** 2
+        return np.asarray(0.5 * np.log(square))
+
+    @cached_property
+    def _growth(self) -> float:
+        """Typical variance of the growing part over that at the longest length."""
+        return float(np.mean(self.shares[:, 4] / self.shares[:, :3].sum(axis=1)))
 
     def variances(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Six variances (w, 6), mm², that ``shares`` refers to, and those of the slow columns (w, c)."""
         slow, fast = slow_variances(sizes.slow, sizes.rate, self.frequency)
-        each = [*(sizes.reading.T**2), sizes.placing**2, sizes.growth**2, fast]
+        shared = display_shared(sizes.coordinate, self.display)
+        alone = self.display**2 / 12 - shared
+        each = [*(sizes.reading.T**2), sizes.placing**2 + shared, sizes.growth**2, fast + alone]
         return np.column_stack(each), slow
 
     def log_prior(self, latent: Floats, sizes: Sizes) -> Floats:
@@ -238,6 +256,20 @@ def slow_variances(sd: Floats, rate: Floats, frequency: Floats) -> tuple[Floats,
     each = np.where(frequency == 0, mean, cosine)
     shown = each[:, np.unique(frequency, return_index=True)[1]].sum(axis=1)
     return sd[:, None] ** 2 * each, sd**2 * np.maximum(1 - shown, 0.0)
+
+
+def display_shared(sigma: Floats, step: float) -> Floats:
+    """Variance (w,), mm², of the rounding to a display's steps that repeats of one quantity share.
+
+    Rounding errs by Σ (−1)ᵏ·step/(π·k)·sin(2π·k·y/step) of the reading y, a Fourier series. Where y lies on the grid is not
+    known, and σ is the scatter of y about what repeats have in common: of each wave's variance the share exp(−(2π·k·σ/step)²)
+    is common. Together with what is not, all are step²/12 (Widrow, Kollár 2008, Quantization Noise).
+    """
+    if not step:
+        return np.zeros_like(sigma)
+    k = np.arange(1.0, 200.0)
+    waves = np.exp(-((2 * np.pi * k * sigma[:, None] / step) ** 2)) / (2 * (np.pi * k) ** 2)
+    return np.asarray(step**2 * waves.sum(axis=1))
 
 
 def _rate(latent: Floats) -> Floats:

@@ -11,6 +11,7 @@ from scipy import linalg, optimize
 from cmm_uq.inference.ensembles import Progress, converged, run_ensembles
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.inference.noise import Sizes
+from cmm_uq.inference.proposals import Proposal
 from cmm_uq.points import Floats
 
 __all__ = ["SIGMA_BOUNDS", "Density", "Posterior", "Progress", "sample"]
@@ -183,7 +184,7 @@ def sample(model: LinearModel, seed: int, progress: Progress | None = None) -> P
     """
     density = Density(model)
     centre, factor = density.laplace()
-    chains = run_ensembles(density, centre, factor, seed, progress)
+    chains = run_ensembles(density, Proposal.single(centre, factor), seed, progress)
     k = len(model.unknowns)
     sigma = np.full(len(chains.draws), model.sigma) if model.sigma is not None else np.exp(chains.draws[:, k])
     return Posterior(

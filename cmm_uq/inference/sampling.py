@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Progress, run_ensembles, tempered
+from cmm_uq.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Progress, run_ensembles
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.marginal import Marginal
 from cmm_uq.inference.noise import Components
 from cmm_uq.inference.posterior import NoisyPosterior
+from cmm_uq.inference.proposals import tempered
 from cmm_uq.points import Floats
 
 
@@ -27,16 +28,14 @@ def sample_with_noise(
     progress : told the part done, from 0 to 1.
     """
     marginal = Marginal(model, noise, estimate)
-    centre, factor = tempered(marginal.log_density, *start(marginal), seed)
     chains = run_ensembles(
         marginal.log_density,
-        centre,
-        factor,
+        tempered(marginal.log_density, *start(marginal), seed),
         seed,
         progress,
         effective_samples=LEAST_EFFECTIVE_SAMPLES,
         steps_at_once=100,
-        least_walkers=16,
+        walkers=max(16, 4 * noise.dimension),
     )  # everything but the noise is drawn independently, given it
     every = chains.thinning(marginal.affordable_draws)
     sizes = noise.sizes(chains.thinned(every))

@@ -17,6 +17,7 @@ from scipy import linalg, special
 from cmm_uq.inference.ensembles import Progress, run_ensembles
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.posterior import SIGMA_BOUNDS, Posterior
+from cmm_uq.inference.proposals import Proposal
 from cmm_uq.points import Floats
 
 _ANYWHERE = 0.02
@@ -56,7 +57,7 @@ def sample_shaped(
     """
     density = _Density(model, shaped)
     centre, factor = density.start
-    chains = run_ensembles(density, centre, factor, seed, progress)
+    chains = run_ensembles(density, Proposal.single(centre, factor), seed, progress)
     shapes, sigma = density.unpacked(chains.draws)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(5,)))
     parts = [slice(i, i + _BATCH) for i in range(0, len(sigma), _BATCH)]

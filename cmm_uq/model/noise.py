@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from cmm_uq.inference.noise import AXES, FREQUENCIES, GROWTH, PLACING, SLOW, Components
+from cmm_uq.model.display import display_step
 from cmm_uq.model.drawn_noise import distances_in_placing
 from cmm_uq.model.measurement import MeasurementModel
 from cmm_uq.points import Floats, Ints
@@ -30,7 +31,8 @@ def noise_of(model: MeasurementModel, used: np.ndarray | None = None) -> Compone
     """
     artefact = model.artefact
     chosen = model.used if used is None else used
-    xyz = model.placed(model.estimate().least_squares.value)
+    estimate = model.estimate().least_squares
+    xyz = model.placed(estimate.value)
     sensitivity = sensitivities(model, xyz)[chosen]
     rows = artefact.rows[chosen]
     turn, along = _machine_axes(rows, sensitivity)
@@ -45,13 +47,14 @@ def noise_of(model: MeasurementModel, used: np.ndarray | None = None) -> Compone
     )
     shares = np.column_stack([axes, reading * count, growth, reading])
     slow, frequency, gap = _slow(model, chosen, sensitivity)
+    step = display_step(artefact.points.xyz, estimate.sigma_of_residuals)
     possible = {
         AXES: _axes_differ(axes), PLACING: bool(np.any(np.bincount(block) > 1)),
         GROWTH: bool(length.max() > _LEAST_SPREAD * np.median(length[length > 0])) if np.any(length > 0) else False,
         SLOW: slow.shape[1] > 0,
     }  # fmt: skip
     return Components(
-        turn, shares, slow, frequency, tuple(name for name, can in possible.items() if can), model.sigma, gap
+        turn, shares, slow, frequency, tuple(name for name, can in possible.items() if can), model.sigma, gap, step
     )
 
 

@@ -13,6 +13,7 @@ import pytest
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws, by_chain, by_ensemble, evenly
 from cmm_uq.inference.ensembles import ENSEMBLES, Chains, run_ensembles
+from cmm_uq.inference.proposals import Proposal
 
 
 def some(chains: int = 6, draws: int = 40) -> Draws:
@@ -65,7 +66,9 @@ def test_thinned_draws_are_whole_steps_of_every_walker(most: int, every: int) ->
 
 def test_the_sampler_gives_its_draws_in_the_order_that_chains_are_made_of() -> None:
     """A walker that rejects a step repeats its state: within chains that happens often, between walkers never."""
-    found = run_ensembles(lambda z: -0.5 * (z**2).sum(axis=1), np.zeros(2), np.eye(2), 1, effective_samples=1)
+    found = run_ensembles(
+        lambda z: -0.5 * (z**2).sum(axis=1), Proposal.single(np.zeros(2), np.eye(2)), 1, effective_samples=1
+    )
     chains = by_chain(found.draws, found.steps)
     assert np.mean(np.diff(chains[:, :, 0], axis=1) == 0) > 0.05
     assert not np.any(np.diff(chains[:, :, 0], axis=0) == 0)

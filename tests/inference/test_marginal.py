@@ -11,6 +11,7 @@ from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.inference.marginal import Marginal
 from cmm_uq.inference.noise import PLACING, Components
+from cmm_uq.inference.proposals import Proposal
 from cmm_uq.inference.sampling import sample_with_noise, start
 from tests.inference.test_noise import M, components, covariance
 
@@ -90,10 +91,8 @@ def test_a_direct_run_of_emcee_over_all_parameters_agrees() -> None:
 
     centre, factor = start(Marginal(linear, noise, solve(linear)))
     spread = sampled.draws.std(axis=0)
-    direct = run_ensembles(
-        density, np.append(sampled.draws.mean(axis=0), centre), np.diag([*spread, *np.diag(factor)]), 3,
-        effective_samples=1000, least_walkers=16,
-    )  # fmt: skip
+    proposal = Proposal.single(np.append(sampled.draws.mean(axis=0), centre), np.diag([*spread, *np.diag(factor)]))
+    direct = run_ensembles(density, proposal, 3, effective_samples=1000, walkers=16)
     for i in range(2):
         error = spread[i] * np.sqrt(2 / direct.ess_min)
         assert abs(direct.draws[:, i].mean() - sampled.draws[:, i].mean()) < 4.5 * error

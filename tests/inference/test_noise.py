@@ -78,11 +78,12 @@ def test_axes_are_equal_as_often_as_the_prior_says_and_keep_their_geometric_mean
 
 
 def test_the_first_number_says_how_far_neighbouring_readings_scatter_about_each_other() -> None:
-    """Half the variance of their difference: σ² + s²·(1 − exp(−rate·gap)), of an Ornstein–Uhlenbeck process beside σ."""
-    noise = replace(components((PLACING, SLOW)), gap=0.05)
+    """Half the variance of their difference: σ² + mean growth + s²·(1 − exp(−rate·gap)), Ornstein–Uhlenbeck's process."""
+    noise = replace(components((PLACING, GROWTH, SLOW)), gap=0.05)
     latent = np.random.default_rng(5).standard_normal((1000, noise.dimension))
     sizes = noise.sizes(latent)
-    half = sizes.reading[:, 0] ** 2 + sizes.slow**2 * (1 - np.exp(-0.05 * sizes.rate))
+    growth = np.mean(np.linspace(0.0, 1.0, 6) ** 2)
+    half = sizes.reading[:, 0] ** 2 + growth * sizes.growth**2 + sizes.slow**2 * (1 - np.exp(-0.05 * sizes.rate))
     assert np.any(sizes.slow > sizes.reading[:, 0])
     assert np.allclose(half, np.exp(2 * latent[:, 0]))
 

@@ -17,8 +17,9 @@ import numpy as np
 from scipy import linalg
 
 from cmm_uq.inference.draws import evenly
-from cmm_uq.inference.ensembles import Chains, Progress, refined, run_ensembles
+from cmm_uq.inference.ensembles import Chains, Progress, run_ensembles
 from cmm_uq.inference.posterior import SIGMA_BOUNDS
+from cmm_uq.inference.proposals import refined
 from cmm_uq.kinds.shifting.smooth_function import LONGEST, SmoothFunction
 from cmm_uq.kinds.shifting.smooth_marginal import BATCH, Marginal, marginal
 from cmm_uq.points import Floats
@@ -258,9 +259,9 @@ class Coefficients:
 
 def sampled(model: SmoothModel, seed: int, progress: Progress | None) -> tuple[Coefficients, Chains]:
     """Draws of everything linear, evenly along chains of θ, and the chains."""
-    centre, factor = refined(model.log_density, *model.laplace(), seed)
+    proposal = refined(model.log_density, *model.laplace(), seed)
     chains = run_ensembles(
-        model.log_density, centre, factor, seed, progress, effective_samples=EFFECTIVE_SAMPLES, steps_at_once=200
+        model.log_density, proposal, seed, progress, effective_samples=EFFECTIVE_SAMPLES, steps_at_once=200
     )
     chosen = chains.draws[evenly(len(chains.draws), DRAWS)]
     return model.draw(chosen, np.random.default_rng(np.random.SeedSequence([seed, 1]))), chains

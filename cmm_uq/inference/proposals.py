@@ -1,0 +1,237 @@
+"""What a sampler proposes: Student's t distributions that together are nearly the density, found by importance sampling.
+
+One of them does where the density has one rounded mode. Where components of noise may be present or absent, it has several of
+different widths, and a mixture is fitted to weighted draws (Cappé et al. 2008, Statistics and Computing 18(4)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.points import Floats
+
+LogDensity = Callable[[Floats], Floats]
+"""Of (w, d) parameters, up to a constant: (w,)."""
+
+_DOF = 6.0
+_WIDER = 2.0
+"""Times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail."""
+
+_LOOKS = 3
+_ENOUGH, _MOST_LOOKS, _NEVER = 0.2, 25, -1e30
+"""Letting in by degrees: part of the draws that must count, rounds at most, least gain that is reckoned with."""
+
+_STUCK = 1.01
+"""Times the power from round to round below which one distribution does not do."""
+
+_PARTS, _WIDE, _NARROWER = 8, 0.1, 0.3
+"""Distributions of a mixture; weight of one more as wide as all; their variance over that of all to begin with."""
+_REFITS, _RECALLED, _LEAST_ENOUGH = 5, 3, 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Student's t distributions with six degrees of freedom in whitened coordinates z; x = centre + factor @ z.
+
+    Parameters
+    ----------
+    centre, factor : (d,) and (d, d).
+    weights, centres, factors : (K,), (K, d) and (K, d, d) in z.
+    """
+
+    centre: Floats
+    factor: Floats
+    weights: Floats
+    centres: Floats
+    factors: Floats
+
+    @classmethod
+    def single(cls, centre: Floats, factor: Floats) -> Proposal:
+        """One distribution, about ``centre``."""
+        d = len(centre)
+        return cls(centre, factor, np.ones(1), np.zeros((1, d)), np.eye(d)[None])
+
+    def parameters(self, z: Floats) -> Floats:
+        """(w, d) for whitened coordinates z."""
+        return np.asarray(self.centre + z @ self.factor.T)
+
+    def draws(self, count: int, random: Any) -> Floats:
+        """Whitened coordinates (count, d)."""
+        d = len(self.centre)
+        normal = random.standard_normal((count, d))
+        t = np.asarray(normal / np.sqrt(random.chisquare(_DOF, size=(count, 1)) / _DOF))
+        if len(self.weights) == 1:
+            return t
+        part = random.choice(len(self.weights), size=count, p=self.weights)
+        return np.asarray(self.centres[part] + np.einsum("wij,wj->wi", self.factors[part], t))
+
+    def log_density(self, z: Floats) -> Floats:
+        """(w,) up to a constant."""
+        return np.asarray(special.logsumexp(self.log_each(z)[0], axis=1))
+
+    def log_each(self, z: Floats) -> tuple[Floats, Floats]:
+        """Weighted log density of each distribution, and squared distance from its centre, (w, K)."""
+        if len(self.weights) == 1:
+            squares = np.einsum("wi,wi->w", z, z)[:, None]
+        else:
+            squares = np.sum(np.einsum("kij,wkj->wki", self._inverse, z[:, None] - self.centres) ** 2, axis=2)
+        log = -0.5 * (_DOF + z.shape[1]) * np.log1p(squares / _DOF)
+        return log + self._log_weight, squares
+
+    @cached_property
+    def _inverse(self) -> Floats:
+        return np.asarray(np.linalg.inv(self.factors))
+
+    @cached_property
+    def _log_weight(self) -> Floats:
+        return np.asarray(np.log(self.weights) - np.linalg.slogdet(self.factors)[1])
+
+
+def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> Proposal:
+    """A better approximation of a skewed density: its moments by importance sampling from a t distribution, thrice."""
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
+    width, looks = _WIDER, 0
+    while looks < _LOOKS:
+        proposal = Proposal.single(centre, width * factor)
+        z = proposal.draws(500 * len(centre), random)
+        theta = proposal.parameters(z)
+        weight = _weights(density(theta) - proposal.log_density(z))
+        # too few draws that count would make it degenerate: the approximation is then better than its correction
+        if 1 / np.sum(weight**2) < 5 * len(centre):
+            if width == 1.0:
+                break
+            width = max(1.0, width / 2**0.25)  # in many dimensions most of what is so much wider lies where nothing is
+            continue
+        looks += 1
+        mean, covariance = _moments(theta, weight)
+        centre, factor, width = mean, _root(covariance), 1.0
+    return Proposal.single(centre, factor)
+
+
+def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> Proposal:
+    """An approximation of a density that may lie far from where it was looked for: importance sampling, let in by degrees.
+
+    What is looked for goes from where the search begins to the density, in each round as far as enough draws count.
+
+    Parameters
+    ----------
+    density : to be approximated.
+    centre, factor : where to begin, (d,) and (d, d), wide enough for the density to be somewhere within.
+    seed : of the draws.
+    """
+    random, d = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))), len(centre)
+    begin, back = centre, np.linalg.inv(factor)
+    first = factor
+    count, power, left = 100 * (d + 1), 0.0, _LOOKS
+    for _ in range(_MOST_LOOKS):
+        proposal = Proposal.single(centre, factor)
+        z = proposal.draws(count, random)
+        theta = proposal.parameters(z)
+        from_begin = -0.5 * np.sum(((theta - begin) @ back.T) ** 2, axis=1)
+        gain = np.maximum(density(theta) - from_begin, _NEVER)
+        known = from_begin - proposal.log_density(z)
+        before, power = power, _highest_power(gain, known, power, _ENOUGH * count)
+        if power < min(1.0, _STUCK * before):
+            return _mixture(density, begin, first, random)
+        mean, covariance = _moments(theta, _weights(power * gain + known))
+        centre, factor = mean, np.linalg.cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(d))
+        left -= power == 1.0
+        if not left:
+            break
+    return Proposal.single(centre, factor)
+
+
+def _mixture(density: LogDensity, centre: Floats, factor: Floats, random: Any) -> Proposal:
+    """Several distributions, let in by degrees.
+
+    The draws of some rounds count together, as if each came from the mean of what drew them.
+    """
+    d = len(centre)
+    proposals = [Proposal.single(centre, factor)]
+    draws: list[Floats] = []
+    gains: list[Floats] = []
+    count, power, enough, left = 100 * (d + 1), 0.0, _ENOUGH, _LOOKS
+    for _ in range(_MOST_LOOKS):
+        z = proposals[-1].draws(count, random)
+        draws = [*draws, z][-_RECALLED:]
+        gain = np.maximum(density(proposals[-1].parameters(z)) + 0.5 * np.sum(z**2, axis=1), _NEVER)
+        gains = [*gains, gain][-_RECALLED:]
+        every, gain = np.vstack(draws), np.concatenate(gains)
+        from_any = np.stack([proposal.log_density(every) for proposal in proposals[-_RECALLED:]])
+        known = -0.5 * np.sum(every**2, axis=1) - special.logsumexp(from_any, axis=0)
+        before, power = power, _highest_power(gain, known, power, enough * len(every))
+        enough = max(0.5 * enough, _LEAST_ENOUGH) if power < min(1.0, _STUCK * before) else enough
+        proposals.append(_fitted(proposals[-1], every, _weights(power * gain + known), random))
+        left -= power == 1.0
+        if not left:
+            break
+    return proposals[-1]
+
+
+def _fitted(proposal: Proposal, z: Floats, weight: Floats, random: Any) -> Proposal:
+    """A mixture for weighted draws z, by expectation and maximisation from centres drawn among them."""
+    d = z.shape[1]
+    mean, covariance = _moments(z, weight)
+    covariance = covariance + 1e-9 * np.trace(covariance) * np.eye(d)
+    worth = 1 / np.sum(weight**2)
+    narrow = np.linalg.cholesky(_NARROWER * covariance)
+    found = Proposal(
+        proposal.centre, proposal.factor, np.full(_PARTS, 1 / _PARTS), z[random.choice(len(z), _PARTS, p=weight)],
+        np.repeat(narrow[None], _PARTS, axis=0),
+    )  # fmt: skip
+    for _ in range(_REFITS):
+        log, squares = found.log_each(z)
+        share = weight[:, None] * np.exp(log - special.logsumexp(log, axis=1, keepdims=True))
+        part = share.sum(axis=0)
+        pull = share * (_DOF + d) / (_DOF + squares)
+        kept = part * worth > min(
+            d / 2, 0.5 * part.max() * worth
+        )  # fewer draws say nothing about a distribution of its own
+        share, pull, part = share[:, kept], pull[:, kept], part[kept]
+        centres = (pull.T @ z) / pull.sum(axis=0)[:, None]
+        about = z[:, None] - centres
+        own = np.einsum("wk,wki,wkj->kij", pull, about, about) / part[:, None, None]
+        prior = (2 * d / (2 * d + part * worth))[:, None, None]
+        factors = np.linalg.cholesky((1 - prior) * own + prior * _NARROWER * covariance)
+        found = Proposal(proposal.centre, proposal.factor, part / part.sum(), centres, factors)
+    return Proposal(
+        proposal.centre, proposal.factor, np.append((1 - _WIDE) * found.weights, _WIDE),
+        np.vstack([found.centres, mean]), np.concatenate([found.factors, np.linalg.cholesky(covariance)[None]]),
+    )  # fmt: skip
+
+
+def _root(covariance: Floats) -> Floats:
+    return np.asarray(np.linalg.cholesky(covariance))
+
+
+def _moments(values: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Mean and covariance of weighted draws (w, d)."""
+    mean = weight @ values
+    about = values - mean
+    return mean, (about * weight[:, None]).T @ about
+
+
+def _highest_power(gain: Floats, known: Floats, least: float, enough: float) -> float:
+    """Largest power of a gain in density, not below ``least``, at which the draws are worth enough, by bisection."""
+    low, high = least, 1.0
+    if _worth(gain + known) >= enough:
+        return 1.0
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _worth(middle * gain + known) >= enough else (low, middle)
+    return low
+
+
+def _weights(log: Floats) -> Floats:
+    weight = np.exp(log - log.max())
+    return np.asarray(weight / weight.sum())
+
+
+def _worth(log: Floats) -> float:
+    return float(1 / np.sum(_weights(log) ** 2))
