@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from cmm_uq.conformity.accuracy import with_uncertainty
+from cmm_uq.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.documents.result import LACK_OF_FIT, Component, Noise
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import OBSERVATIONS
@@ -218,7 +218,8 @@ def accuracy(
         return {}
     every = replace(model, used=np.ones_like(model.used))
     linear, components, sizes = every.linearised(estimate.least_squares.value), noise_of(every), posterior.sizes
-    predicted = lengths - linear.observed + posterior.draws @ linear.design.T
+    chosen = repeated_draws(len(posterior.draws), len(lengths))
+    predicted, sizes = lengths - linear.observed + posterior.draws[chosen] @ linear.design.T, sizes.at(chosen)
     return with_uncertainty(
         lengths, predicted, lambda some, times, random: components.repeated(sizes.at(some), times, random), seed,
         counted_with(artefact.points)[artefact.rows[:, 0]],

@@ -184,11 +184,21 @@ class MeasurementModel:
         """What used observations show, (m, k) in mm, of an error e of the points (n, 3, k) that ``values`` do not contain."""
         return -self.artefact.project(self.placed(values), displacement)[self.used]
 
+    @cached_property
+    def _placed(self) -> dict[bytes, Floats]:
+        """What :meth:`placed` found last: it is asked for again by every candidate of a diagnosis."""
+        return {}
+
     def placed(self, values: Floats) -> Floats:
         """Points (n, 3), mm, of the artefact where parameters (k,) say that the recording found it."""
-        coefficients, sizes = self._split(values)
-        xyz = self.artefact.points.xyz
-        return self.artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
+        key = values.tobytes()
+        if key not in self._placed:
+            coefficients, sizes = self._split(values)
+            xyz = self.artefact.points.xyz
+            self._placed.clear()
+            self._placed[key] = self.artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
+            self._placed[key].flags.writeable = False
+        return self._placed[key]
 
     def residuals(self, values: Floats) -> Floats:
         """Unexplained part of every observation, used or not, (m,) mm."""
