@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +25,12 @@ NOISE_UM = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What stands in a job: lines of ``[artefact]``, nominal points, and the errors that act, all of them named."""
+    """What stands in a job: lines of ``[artefact]``, nominal points, and the errors that act, all but some of them named."""
 
     artefact: dict[str, object]
     points: Points
     truth: dict[str, float]
+    left_out: tuple[str, ...] = ()
 
 
 def bars(count: int, repeats: int = 1, *, timed: bool = False) -> Recorded:
@@ -89,13 +90,19 @@ CASES: dict[str, Callable[[], Recorded]] = {
     "5 000 bars": lambda: bars(5000),
     "5 000 bars with their times": lambda: bars(5000, timed=True),
     "50 000 bars, 100 000 rows": lambda: bars(50_000),
+    "5 000 bars, a squareness left out": lambda: replace(bars(5000), left_out=("squareness_xy",)),
     "1 000 bars, 5 times": lambda: bars(1000, 5),
+    "2 bars, 10 000 times": lambda: bars(2, 10_000),
     "sphere, 3 × 4 000 points": lambda: spheres(3, 4000),
     "sphere, 4 × 25 000 points": lambda: spheres(4, 25_000),
+    "sphere, 4 × 25 000 points, a straightness left out": lambda: replace(
+        spheres(4, 25_000), truth=PROBE | {"straightness_x_y": 3.0}, left_out=("straightness_x_y",)
+    ),
     "sphere, 500 × 25 points": lambda: spheres(500, 25),
     "plate, 4 × 400 balls": lambda: plates(4, 20),
     "plate, 2 × 16 641 balls": lambda: plates(2, 129),
     "plate, 100 × 25 balls": lambda: plates(100, 5),
+    "plate, 4 000 × 25 balls": lambda: plates(4000, 5),
 }
 """By name."""
 
@@ -135,7 +142,7 @@ def _csv(points: Points, xyz: Floats) -> str:
 
 def _toml(recorded: Recorded, name: str) -> str:
     table = "\n".join(f"{key} = {_value(value)}" for key, value in recorded.artefact.items())
-    named = ", ".join(f'"{effect}"' for effect in recorded.truth)
+    named = ", ".join(f'"{effect}"' for effect in recorded.truth if effect not in recorded.left_out)
     return f"""[job]
 id = "{name}"
 date = 2026-01-01

@@ -45,6 +45,12 @@ class Placings:
         """(q,) points in each placing."""
         return np.bincount(self.index, minlength=len(self.numbers)).astype(np.int64)
 
+    @cached_property
+    def rows(self) -> tuple[Ints, ...]:
+        """Points of each placing (k,), ascending."""
+        order, starts = self._order
+        return tuple(np.split(order, starts[1:])) if len(order) else ()
+
     def sums(self, values: Floats) -> Floats:
         """Sums of ``values`` (n, …) over the points of each placing, (q, …)."""
         order, starts = self._order
