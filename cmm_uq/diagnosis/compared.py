@@ -1,7 +1,7 @@
 """Which observations of a large recording the candidates are compared on.
 
 Thousands of columns stand for what could be missing; with all observations of a large recording they would fill the memory,
-and tell no more that matters: of 2000 observations, what is a tenth of their noise is found. What is found is then estimated
+and tell no more that matters: of 1000 observations, what is a fifth of their noise is found. What is found is then estimated
 from all.
 """
 
@@ -16,10 +16,10 @@ from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Observed
 from cmm_uq.points import Ints
 
-MOST = 2000
+MOST = 1000
 """Observations that candidates are compared on."""
 
-LEAST_OF_PLACING = 60
+LEAST_OF_PLACING = 30
 """Observations that a placing keeps where it has as many: its freedoms cost six of them at most."""
 
 
@@ -54,7 +54,7 @@ def compared_on(model: MeasurementModel, observe: Observed, seed: int, most: int
 def _first_of_each(
     owner: Ints, part: Ints, most: int, random: np.random.Generator
 ) -> NDArray[np.bool_]:  # fmt: skip
-    """(m,) the first ``most`` of every owner's observations, or as many as its first part has: in random order of the parts."""
+    """(m,) which of every owner's observations: its parts in random order and each of them whole, until ``most`` are reached."""
     _, part = np.unique(np.column_stack([owner, part]), axis=0, return_inverse=True)
     part = part.ravel()
     order = np.lexsort((random.permutation(part.max() + 1)[part], owner))

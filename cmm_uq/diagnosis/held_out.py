@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.posterior import Density
 from cmm_uq.messages import Text, say
 from cmm_uq.model import MeasurementModel
@@ -68,21 +69,14 @@ def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float
     errors, counts, densities = [], [], []
     scale = linear.noise_scale[:, None]
     every = np.hstack([linear.observed[:, None], linear.design]) / scale
-    placing = linear.placing / scale
+    placing = linear.freedoms.over(linear.noise_scale)
     for out in _folds(groups):
-        train = replace(
-            linear, observed=linear.observed[~out], design=linear.design[~out], placing=linear.placing[~out],
-            noise_scale=linear.noise_scale[~out], sigma=sigma,
-        )  # fmt: skip
-        mean, covariance, _ = Density(train).conditional(float(np.log(sigma)))
-        reached, known, free = _told(placing[~out])
-        open_ = _reached(placing[out] @ free)
-        known = _without(open_, placing[out] @ known)
-        left = _without(open_, every[out]) - known @ (reached.T @ every[~out])
+        mean, covariance, _ = Density(replace(linear.at(~out), sigma=sigma)).conditional(float(np.log(sigma)))
+        left, known, open_ = _predicted(placing, every, out)
         error = left[:, 0] - left[:, 1:] @ mean
         told = [known, left[:, 1:] @ (_root(covariance) / sigma)]
         errors.append(float(error @ error) * linear.noise_scale[out].mean() ** 2)
-        counts.append(len(error) - open_.shape[1])
+        counts.append(len(error) - open_)
         densities.append(_log_density(error / sigma, np.hstack(told)) - counts[-1] * np.log(sigma * np.sqrt(2 * np.pi)))
     return float(np.sqrt(sum(errors) / sum(counts)) / MICROMETRE), np.array(densities)
 
@@ -120,6 +114,30 @@ def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
     count = FOLDS if len(groups) > 40 else len(groups)
     for k in range(count):
         yield np.isin(group, groups[k::count])
+
+
+def _predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:
+    """What is held out of columns (m, b), less what the placings' other observations tell of it.
+
+    Returns
+    -------
+    (o, b) without what no observation tells of the placings; (o, r) whose products are the covariance of what was told, in
+    units of the noise; and how many of the o dimensions are lost with what is left open.
+    """
+    left, known, open_ = every.copy(), np.zeros((len(every), 0)), 0
+    for rows in placing.rows:
+        own = out[rows]
+        inside, rest = rows[own], rows[~own]
+        if not len(inside):
+            continue
+        reached, told, free = _told(placing.columns[rest])
+        basis = _reached(placing.columns[inside] @ free)
+        each = _without(basis, placing.columns[inside] @ told)
+        left[inside] = _without(basis, every[inside]) - each @ (reached.T @ every[rest])
+        widened = np.zeros((len(every), each.shape[1]))
+        widened[inside] = each
+        known, open_ = np.hstack([known, widened]), open_ + basis.shape[1]
+    return left[out], known[out], open_
 
 
 def _told(columns: Floats) -> tuple[Floats, Floats, Floats]:

@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import LeastSquares
-from cmm_uq.inference.linear_model import LinearModel, reached
+from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.points import Floats
 
@@ -47,17 +48,21 @@ class Marginal:
         return float(max(self.estimate.sigma_of_residuals, SIGMA_BOUNDS[0]))
 
     @cached_property
-    def _placing(self) -> Floats:
-        """(m, q) orthonormal basis of what the placing reaches."""
-        return reached(self.model.placing)
+    def _freedoms(self) -> Freedoms:
+        """Orthonormal columns of what each placing reaches, turned as the observations are, in units of the noise."""
+        basis = self.model.freedoms.reached
+        turn = self.noise.turn.tocoo()
+        if np.any(basis.index[turn.row] != basis.index[turn.col]):
+            basis = Freedoms.of(basis.dense())
+        return Freedoms(np.asarray(self.noise.turn @ basis.columns) * self._scale, basis.index, basis.blocks)
 
     @cached_property
     def _length(self) -> Floats:
-        """(c,) by which columns [placing, slow, parameters, observations] are divided."""
+        """(P,) by which columns [slow, parameters, observations] are divided."""
         design = self.model.design
         priors = np.array([0.0 if np.isinf(u.prior_sd) else 1 / self._sd(i) for i, u in enumerate(self.model.unknowns)])
         parameters = np.sqrt(np.sum(design**2, axis=0) / self._scale**2 + priors**2)
-        others = np.full(self._placing.shape[1] + self.noise.slow.shape[1], 1 / self._scale)
+        others = np.full(self.noise.slow.shape[1], 1 / self._scale)
         return np.concatenate([others, np.where(parameters > 0, parameters, 1.0), [1.0]])
 
     def _sd(self, i: int) -> float:
@@ -66,18 +71,22 @@ class Marginal:
         return float(max(unknown.prior_sd, 1e-6 * unknown.scale))
 
     @cached_property
+    def _turned(self) -> Floats:
+        """(m, P) columns [slow, parameters, observations], turned."""
+        model = self.model
+        left = model.observed - model.design @ self.estimate.value
+        return np.asarray(self.noise.turn @ np.hstack([self.noise.slow, model.design, left[:, None]])) / self._length
+
+    @cached_property
     def _products(self) -> tuple[Floats, Floats]:
         """Inner products (c, P²) of the columns, by class of the observations, and of the prior (P²,), which is data too."""
         model, value = self.model, self.estimate.value
-        left = model.observed - model.design @ value
-        columns = np.hstack([self._placing, self.noise.slow, model.design, left[:, None]])
-        turned = np.asarray(self.noise.turn @ columns) / self._length
         index, shares = self.noise.classes
-        size = turned.shape[1]
+        size = len(self._length)
         found = np.zeros((len(shares), size, size))
         order = np.argsort(index, kind="stable")
         for i, rows in enumerate(np.split(order, np.cumsum(np.bincount(index, minlength=len(shares)))[:-1])):
-            found[i] = turned[rows].T @ turned[rows]
+            found[i] = self._turned[rows].T @ self._turned[rows]
         first = size - 1 - len(value)
         prior = np.zeros((len(value), size))
         for i, unknown in enumerate(model.unknowns):
@@ -88,29 +97,66 @@ class Marginal:
         return found.reshape(len(shares), -1), (prior.T @ prior).ravel()
 
     @cached_property
+    def _blocks(self) -> Floats:
+        """Inner products (c, blocks·j·(j + P)) of each placing's columns with themselves and with all others, by class."""
+        freedoms, (index, shares) = self._freedoms, self.noise.classes
+        j, classes = freedoms.columns.shape[1], len(shares)
+        whole = np.hstack([freedoms.columns, self._turned])
+        among = Freedoms(whole, index * freedoms.blocks + freedoms.index, classes * freedoms.blocks)
+        each = [among.sums(freedoms.columns[:, [i]] * whole) for i in range(j)]
+        return np.stack(each, axis=1).reshape(classes, -1)
+
+    @cached_property
+    def _absent(self) -> Floats:
+        """(blocks, j) one for columns that a placing lacks."""
+        lengths = self._freedoms.sums(self._freedoms.columns**2) / self._scale**2
+        return np.where(lengths > 0.5, 0.0, 1.0)
+
+    @cached_property
     def _counts(self) -> Floats:
         return np.bincount(self.noise.classes[0], minlength=len(self.noise.classes[1])).astype(np.float64)
 
     def _factors(self, sizes: Sizes) -> tuple[Floats, Floats]:
-        """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them."""
+        """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them.
+
+        What each placing leaves free is eliminated first, by itself.
+        """
         variances, slow = self.noise.variances(sizes)
         v = variances @ self.noise.classes[1].T
         products, prior = self._products
         P = len(self._length)
         whole = ((1 / v) @ products + prior).reshape(-1, P, P)
         log = -0.5 * np.log(v) @ self._counts
-        q, c = self._placing.shape[1], slow.shape[1]
+        c = slow.shape[1]
         if c:
-            at = np.arange(q, q + c)
+            at = np.arange(c)
             least = np.maximum(slow, (1e-6 * self._scale) ** 2)
             whole[:, at, at] += 1 / (least * self._length[at] ** 2)
             log -= 0.5 * np.log(least).sum(axis=1)
         diagonal = np.arange(P)
         whole[:, diagonal, diagonal] *= 1 + _JITTER
+        if self._freedoms.count:
+            lost, own = self._eliminated(v)
+            whole -= lost
+            log -= own
         return _cholesky(whole), log
 
+    def _eliminated(self, v: Floats) -> tuple[Floats, Floats]:
+        """What the placings take from the precision (w, P, P), and half the logarithm of their own determinant (w,)."""
+        w, (blocks, j) = len(v), self._absent.shape
+        each = ((1 / v) @ self._blocks).reshape(w * blocks, j, -1)
+        diagonal = np.arange(j)
+        own = each[:, :, :j]
+        own[:, diagonal, diagonal] *= 1 + _JITTER
+        own[:, diagonal, diagonal] += np.tile(self._absent, (w, 1))
+        factor = _cholesky(own)
+        rows = np.linalg.solve(factor, each[:, :, j:]).reshape(w, blocks * j, -1)
+        logs = np.log(factor[:, diagonal, diagonal]).reshape(w, -1).sum(axis=1)
+        return rows.transpose(0, 2, 1) @ rows, logs
+
     def _batches(self, count: int) -> list[slice]:
-        size = max(1, _NUMBERS // len(self._length) ** 2)
+        P, j = len(self._length), self._freedoms.columns.shape[1]
+        size = max(1, _NUMBERS // (P**2 + self._freedoms.count * (j + P)))
         return [slice(i, i + size) for i in range(0, count, size)]
 
     def log_density(self, latent: Floats) -> Floats:

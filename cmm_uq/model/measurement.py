@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import LeastSquares, solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.model.artefact import Artefact
@@ -177,7 +178,7 @@ class MeasurementModel:
         design = np.hstack([-artefact.project(true, self._basis(true)), artefact.size_change()])
         return LinearModel(
             (unexplained + design @ values)[used], design[used], self.unknowns,
-            artefact.placing(true)[used], artefact.noise_scale[used], self.sigma,
+            Freedoms.of(artefact.placing(true)).at(used), artefact.noise_scale[used], self.sigma,
         )  # fmt: skip
 
     def seen(self, displacement: Floats, values: Floats) -> Floats:
