@@ -54,7 +54,7 @@ def compared_on(model: MeasurementModel, observe: Observed, seed: int, most: int
 def _first_of_each(
     owner: Ints, part: Ints, most: int, random: np.random.Generator
 ) -> NDArray[np.bool_]:  # fmt: skip
-    """(m,) which of every owner's observations: its parts in random order and each of them whole, until ``most`` are reached."""
+    """(m,) which of every owner's observations: its parts in random order, each of them whole, until ``most`` are reached."""
     _, part = np.unique(np.column_stack([owner, part]), axis=0, return_inverse=True)
     part = part.ravel()
     order = np.lexsort((random.permutation(part.max() + 1)[part], owner))

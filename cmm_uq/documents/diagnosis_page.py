@@ -263,8 +263,8 @@ def _rivals(found: Diagnosed) -> Table:
     some, every = found.diagnosis.compared, int(found.diagnosis.before.used.sum())
     if some < every:
         notes.append(say(
-            "Explanations were compared on {some} of {every} observations, drawn at random; what is asserted was then estimated "
-            "from all. An error much smaller than the noise, which only all of them together would show, can go unnoticed.",
+            "Explanations were compared on {some} of {every} observations, drawn at random; what is asserted was then "
+            "estimated from all. An error much smaller than the noise, which only all together would show, can go unnoticed.",
             some=some, every=every,
         ))  # fmt: skip
     return Table(say("Model comparison: one explanation alone"), heads, rows, tuple(notes))
