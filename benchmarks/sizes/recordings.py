@@ -70,9 +70,9 @@ def plates(placings: int, side: int, repeats: int = 1) -> Recorded:
     steps = np.linspace(-200, 200, side)
     body = np.array([[x, y, 0.0] for y in steps for x in steps])
     random = np.random.default_rng(placings)
-    attitudes = [Rotation.identity(), Rotation.from_euler("xz", (90, 0.4), degrees=True)]
+    attitudes = [Rotation.from_euler("xz", angles, degrees=True) for angles in ((0, 0), (90, 0.4), (90, 90.4))]
     centres = random.uniform(-60, 60, (placings, 3)) + MIDDLE
-    each = [np.tile(centre + attitudes[i % 2].apply(body), (repeats, 1)) for i, centre in enumerate(centres)]
+    each = [np.tile(centre + attitudes[i % 3].apply(body), (repeats, 1)) for i, centre in enumerate(centres)]
     n = len(body) * repeats
     reference = np.tile(body, (placings * repeats, 1))
     return Recorded(
@@ -99,9 +99,9 @@ CASES: dict[str, Callable[[], Recorded]] = {
         spheres(4, 25_000), truth=PROBE | {"straightness_x_y": 3.0}, left_out=("straightness_x_y",)
     ),
     "sphere, 500 × 25 points": lambda: spheres(500, 25),
-    "plate, 4 × 400 balls": lambda: plates(4, 20),
-    "plate, 2 × 16 641 balls": lambda: plates(2, 129),
-    "plate, 100 × 25 balls": lambda: plates(100, 5),
+    "plate, 6 × 400 balls": lambda: plates(6, 20),
+    "plate, 3 × 11 025 balls": lambda: plates(3, 105),
+    "plate, 99 × 25 balls": lambda: plates(99, 5),
     "plate, 4 000 × 25 balls": lambda: plates(4000, 5),
 }
 """By name."""

@@ -156,7 +156,7 @@ class Marginal:
 
     def _batches(self, count: int) -> list[slice]:
         P, j = len(self._length), self._freedoms.columns.shape[1]
-        size = max(1, _NUMBERS // (P**2 + self._freedoms.count * (j + P)))
+        size = max(1, _NUMBERS // (P**2 + self._freedoms.count * (j + P) + 3 * len(self._counts)))
         return [slice(i, i + size) for i in range(0, count, size)]
 
     def log_density(self, latent: Floats) -> Floats:
