@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Observed
 from cmm_uq.points import Ints
@@ -46,8 +47,16 @@ def compared_on(model: MeasurementModel, observe: Observed, seed: int, most: int
     each = max(most // len(np.unique(placing)), LEAST_OF_PLACING) if artefact.rows.shape[1] == 1 else len(used)
     within = _first_of_each(placing, points.point[first], each, random)
     whole = _first_of_each(np.zeros_like(placing[within]), placing[within], most, random)
-    rows = np.unique(artefact.rows[used[within][whole]])
-    found = observe(points.select(rows))
+    chosen = used[within][whole]
+    rows = np.zeros(len(points), dtype=bool)
+    rows[artefact.rows[chosen]] = True
+    # points that are no observations, such as one ahead of a surface, stay with their placing
+    bare = ~np.isin(np.arange(len(points)), artefact.rows)
+    rows |= bare & np.isin(points.measurement, artefact.measurement[chosen])
+    try:
+        found = observe(points.select(rows))
+    except CmmUqError:  # a kind whose points cannot do without each other: slower, the others stay and are not used
+        return replace(model, used=np.isin(np.arange(len(model.used)), chosen))
     return replace(model, artefact=found, used=~found.unread())
 
 

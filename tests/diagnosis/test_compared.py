@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import tracemalloc
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
+from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.compared import LEAST_OF_PLACING, MOST, compared_on
 from cmm_uq.diagnosis.held_out import improvement
-from cmm_uq.kinds import artefact_facts
+from cmm_uq.errors import CmmUqError
+from cmm_uq.kinds import artefact_facts, kind_of
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.sphere.observe import Sphere
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Machine, Points
+from tests.conftest import ROOT
 from tests.recordings import TRAVEL, bar_facts, bars
 
 MACHINE = Machine("m", "XYZ", TRAVEL)
@@ -62,6 +66,25 @@ def test_of_many_bars_some_are_drawn_and_all_repeats_of_each() -> None:
     assert np.ptp(found.artefact.measurement) > 850  # from the whole recording
     other = compared_on(model, observed, 1)
     assert set(other.artefact.measurement.tolist()) != set(found.artefact.measurement.tolist())
+
+
+def test_where_some_points_cannot_be_observed_alone_the_others_are_not_used() -> None:
+    model = many_bars(1500)
+
+    def never(points: Points) -> Ballbar:
+        raise CmmUqError("a point is missing")
+
+    found, some = compared_on(model, never, 0), compared_on(model, observed, 0)
+    assert found.artefact is model.artefact
+    assert np.array_equal(found.artefact.measurement[found.used], some.artefact.measurement)
+
+
+def test_a_point_ahead_of_a_surface_stays_with_its_placing() -> None:
+    job = read_job(ROOT / "examples" / "plane-simulated")
+    observe = partial(kind_of(job).observing("diagnosed"), job.facts.artefact)
+    found = compared_on(MeasurementModel(observe(job.points), ()), observe, 0, most=40).artefact
+    assert sorted(found.points.measurement[found.points.point == 0].tolist()) == [1, 2]
+    assert len(found.measurement) == 2 * LEAST_OF_PLACING
 
 
 def test_what_is_not_used_is_not_drawn() -> None:
