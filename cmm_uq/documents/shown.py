@@ -40,5 +40,7 @@ def told(caption: Text, drawn: int, count: int) -> Text:
     """A caption that says how many of all are drawn, where it is not all."""
     if drawn == count:
         return caption
-    return say("{caption} Drawn are {drawn} of {count}: the largest, and of the others as many as can be told apart.",
-               caption=caption, drawn=drawn, count=count)  # fmt: skip
+    return say(
+        "{caption} Drawn are {drawn} of {count}: the largest, and some of the others from all over the recording.",
+        caption=caption, drawn=drawn, count=count,
+    )  # fmt: skip
