@@ -130,14 +130,20 @@ class Points:
         return rank[inverse.ravel()]
 
     @cached_property
+    def rows_of_groups(self) -> list[Ints]:
+        """Rows of each group (see :attr:`group`), ascending."""
+        order = np.argsort(self.group, kind="stable")
+        return np.split(order, np.cumsum(np.bincount(self.group))[:-1]) if len(self) else []
+
+    @cached_property
     def copies(self) -> Mapping[int, int]:
         """Groups (see :attr:`group`) that repeat another to the last digit, with that other: the first by measurement, repeat.
 
         The order of their points is no matter.
         """
         same: dict[bytes, list[int]] = {}
-        for group in range(int(self.group.max()) + 1 if len(self) else 0):
-            figures = self.xyz[self.group == group] + 0.0  # −0 is 0
+        for group, rows in enumerate(self.rows_of_groups):
+            figures = self.xyz[rows] + 0.0  # −0 is 0
             same.setdefault(figures[np.lexsort(figures.T)].tobytes(), []).append(group)
         found: dict[int, int] = {}
         for groups in same.values():
@@ -147,7 +153,7 @@ class Points:
 
     def run_of(self, group: int) -> tuple[int, int]:
         """Measurement and repeat of a group."""
-        row = int(np.argmax(self.group == group))
+        row = self.rows_of_groups[group][0]
         return int(self.measurement[row]), int(self.repeat[row])
 
     def column(self, name: str) -> Floats:

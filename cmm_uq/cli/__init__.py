@@ -10,6 +10,7 @@ import contextlib
 import os
 import sys
 import warnings
+from types import ModuleType
 
 BAD_INPUT = 2
 """Exit code of everything that the user can mend."""
@@ -33,6 +34,7 @@ def main() -> None:
         os.environ.setdefault(variable, "1")
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # what matters is an error or a warning of the report, not a line of a library
+    _without_kde()
     code = _ended()
     try:
         if sys.stdout is not None:
@@ -45,6 +47,13 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter would complain once more at its end
     done()
     sys.exit(code)
+
+
+def _without_kde() -> None:
+    """Put a stand-in where emcee has its KDE move, which needs all of scipy.stats, a fifth of a report, and is not used."""
+    module = ModuleType("emcee.moves.kde")
+    module.__dict__["KDEMove"] = None
+    sys.modules.setdefault(module.__name__, module)
 
 
 def _ended() -> int:

@@ -95,10 +95,13 @@ def diagnosed(
 ) -> Diagnosed:
     """Diagnose the screened model of a job; ``known`` is its posterior where it was sampled already."""
     stated = job.facts.recording.u_coordinate_um
-    diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known)
     kind, facts = kind_of(job), job.facts.artefact
     observe = kind.observing("diagnosed")
-    changes = consequences(job, diagnosis, partial(observe, facts, where=job.recording_path), kind.tested, seed)
+    made = partial(observe, facts, where=job.recording_path)
+    diagnosis = diagnose(
+        model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known, observe=made
+    )  # fmt: skip
+    changes = consequences(job, diagnosis, made, kind.tested, seed)
     next_ones = suggestions(diagnosis, facts, observe, kind.offers("plan", Planning), job.facts.plan)
     return Diagnosed(job, findings, diagnosis, next_ones, changes)
 

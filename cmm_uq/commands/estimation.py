@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from cmm_uq.conformity.accuracy import with_uncertainty
+from cmm_uq.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.documents.result import LACK_OF_FIT, Component, Noise
 from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import OBSERVATIONS
+from cmm_uq.files.limits import FREEDOMS, OBSERVATIONS
 from cmm_uq.inference.draws import Draws, by_chain
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import RANK_TOLERANCE
 from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.inference.posterior import NoisyPosterior, Posterior
@@ -40,12 +41,17 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
 
     Raises
     ------
-    CmmUqError : an unknown effect, too many observations, or a measurement to set aside that is not there.
+    CmmUqError : an unknown effect, too many observations or placings, or a measurement to set aside that is not there.
     """
     if len(artefact.noise_scale) > OBSERVATIONS.most:
         raise CmmUqError(
             f"{len(artefact.noise_scale)} observations are more than are estimated from at once",
             where=job.recording_path, fix=f"{OBSERVATIONS.most} are the most: thin out the recording",
+        )  # fmt: skip
+    if (count := Freedoms.of(artefact.placing(artefact.points.xyz)).count) > FREEDOMS.most:
+        raise CmmUqError(
+            f"the placings have {count} freedoms together, more than are estimated beside the machine's errors at once",
+            where=job.recording_path, fix=f"{FREEDOMS.most} are the most: split the recording",
         )  # fmt: skip
     stated, aside = job.facts.recording.u_coordinate_um, job.facts.recording.set_aside
     if unknown := set(aside) - set(job.points.measurement.tolist()):
@@ -220,7 +226,8 @@ def accuracy(
         return {}
     every = replace(model, used=np.ones_like(model.used))
     linear, components, sizes = every.linearised(estimate.least_squares.value), noise_of(every), posterior.sizes
-    predicted = lengths - linear.observed + posterior.draws @ linear.design.T
+    chosen = repeated_draws(len(posterior.draws), len(lengths))
+    predicted, sizes = lengths - linear.observed + posterior.draws[chosen] @ linear.design.T, sizes.at(chosen)
     return with_uncertainty(
         lengths, predicted, lambda some, times, random: components.repeated(sizes.at(some), times, random), seed,
         counted_with(artefact.points)[artefact.rows[:, 0]],

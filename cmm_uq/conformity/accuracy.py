@@ -29,6 +29,12 @@ _DRAWS = 1000
 _NUMBERS = 3_000_000
 """Random numbers to spend on repetitions."""
 
+_LEAST, _LEAST_DRAWS, _MOST_NUMBERS = 10, 200, 10_000_000
+"""Repetitions of each draw at least; where so many take more random numbers, fewer of the draws are repeated."""
+
+_AT_ONCE = 1_000_000
+"""Random numbers that are held at once."""
+
 
 def figures(lengths: Floats) -> dict[str, Floats]:
     """Figures of lengths (..., m) in mm: mean, rms accuracy error (n − 1), range, largest deviation from the mean.
@@ -50,6 +56,12 @@ Repeated = Callable[[Ints, int, np.random.Generator], Floats]
 """Noise (w, repetitions, m), mm, of the recording made anew, for w of the draws."""
 
 
+def repeated_draws(draws: int, lengths: int) -> Ints:
+    """Which of a posterior's draws are repeated for the figures of so many lengths."""
+    most = int(np.clip(_MOST_NUMBERS // (_LEAST * lengths), _LEAST_DRAWS, _DRAWS))
+    return np.linspace(0, draws - 1, min(most, draws)).astype(np.int64)
+
+
 def with_uncertainty(
     lengths: Floats, predicted: Floats, noise: Repeated, seed: int, drawn_with: Ints | None = None
 ) -> dict[str, Quantity]:  # fmt: skip
@@ -58,7 +70,7 @@ def with_uncertainty(
     Parameters
     ----------
     lengths : (m,) as recorded, mm.
-    predicted : (N, m) lengths that draws from the posterior predict, mm, without noise.
+    predicted : (N, m) lengths that draws from the posterior predict, mm, without noise; see :func:`repeated_draws`.
     noise : draws that of each repetition.
     seed : of the repetitions.
     drawn_with : (m,) equal where lengths share their noise: a copy has that of its original. Each its own by default.
@@ -68,11 +80,12 @@ def with_uncertainty(
     if drawn_with is not None:
         _, first, which = np.unique(drawn_with, return_index=True, return_inverse=True)
         shared = first[which.ravel()]
-    chosen = np.linspace(0, len(predicted) - 1, min(_DRAWS, len(predicted))).astype(int)
-    repetitions = int(np.clip(_NUMBERS // (len(chosen) * len(lengths)), 10, 100))
+    chosen = repeated_draws(*predicted.shape)
+    repetitions = int(np.clip(_NUMBERS // (len(chosen) * len(lengths)), _LEAST, 100))
     unbiased = np.sqrt(repetitions / (repetitions - 1))
     errors: dict[str, list[Floats]] = {name: [] for name in TITLES}
-    for block in np.array_split(chosen, 10):
+    parts = min(len(chosen), max(10, repetitions * len(chosen) * len(lengths) // _AT_ONCE))
+    for block in np.array_split(chosen, parts):
         repeated = figures(predicted[block, None, :] + noise(block, repetitions, random)[..., shared])
         for name, values in repeated.items():
             errors[name].append((unbiased * (values - values.mean(axis=1, keepdims=True))).ravel())

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.conformity.accuracy import with_uncertainty
+from cmm_uq.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
@@ -17,8 +17,6 @@ from cmm_uq.model.noise import noise_of
 from cmm_uq.points import Floats, Ints
 from cmm_uq.screening.copies import counted_with
 from cmm_uq.uncertainty.quantity import Quantity
-
-_DRAWS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +62,7 @@ def consequences(
     after: dict[str, Quantity] = {}
     late = corrected.lengths()
     if lengths is not None and late is not None:
-        some = np.linspace(0, len(diagnosis.posterior.draws) - 1, _DRAWS).astype(np.int64)
+        some = repeated_draws(len(diagnosis.posterior.draws), len(lengths))
         draws, sizes, components = diagnosis.posterior.draws[some], diagnosis.posterior.sizes.at(some), noise_of(model)
         whole = model.linearised(value)
         predicted = lengths - whole.observed + draws @ whole.design.T

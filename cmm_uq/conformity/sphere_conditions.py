@@ -26,10 +26,9 @@ def sphere_points(
     copies : groups that do not count.
     """
     lacking, bare = [], []
-    for group in range(int(points.group.max()) + 1):
+    for group, rows in enumerate(points.rows_of_groups):
         if group in copies:
             continue
-        rows = np.flatnonzero(points.group == group)
         count = len(np.unique(points.xyz[rows] + 0.0, axis=0))
         name = say("measurement {number}", number=points.run_of(group)[0])
         if not count == plan.points == len(rows):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
+from cmm_uq.diagnosis.compared import compared_on
 from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, Found, ModelComparison, search, with_rivals
 from cmm_uq.diagnosis.held_out import Improvement, improvement
 from cmm_uq.diagnosis.joint import Joint, joint_posterior
@@ -19,6 +20,7 @@ from cmm_uq.inference.noise import Components
 from cmm_uq.inference.posterior import NoisyPosterior, Progress
 from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.kind import Observed
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, unit
@@ -82,6 +84,7 @@ class Diagnosis:
     before, after : the job's model, and with what was left out.
     components : of the noise, for the model after.
     posterior : joint, of the model after.
+    compared : observations that the candidates were compared on; what was found is estimated from all.
     """
 
     verdict: str
@@ -97,6 +100,7 @@ class Diagnosis:
     after: MeasurementModel
     components: Components
     posterior: NoisyPosterior
+    compared: int
 
 
 def diagnose(
@@ -107,6 +111,7 @@ def diagnose(
     seed: int,
     progress: Progress | None = None,
     known: NoisyPosterior | None = None,
+    observe: Observed | None = None,
 ) -> Diagnosis:
     """Diagnose a recording.
 
@@ -117,9 +122,13 @@ def diagnose(
     alpha : false-alarm rate.
     seed : of everything random.
     known : posterior of the model, where it was sampled already.
+    observe : makes the artefact of points; without it a large recording is searched with all its observations.
     """
     stated = None if stated_um is None else stated_um * MICROMETRE
-    found = search(model, stated, alpha=alpha, seed=seed)
+    some = model if observe is None else compared_on(model, observe, seed)
+    found = search(some, stated, alpha=alpha, seed=seed)
+    if some is not model:
+        found = replace(found, model=replace(found.model, artefact=model.artefact, used=model.used))
     gain = improvement(model, found.model)
     if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
         found = replace(found, last=found.first.comparison, model=model, chosen=frozenset(), unexplained=1.0)
@@ -128,9 +137,9 @@ def diagnose(
     noise = _noise(found, joint, stated)
     after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     return Diagnosis(
-        _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha), _left_out(found, joint),
-        _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
-        joint.components, joint.posterior,
+        _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha),
+        _left_out(found, joint, model), _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
+        joint.components, joint.posterior, int(some.used.sum()),
     )  # fmt: skip
 
 
@@ -142,11 +151,11 @@ def _verdict(found: Found, alpha: float) -> str:
     return "partial" if found.rough or found.unexplained > _UNKNOWN else "explained"
 
 
-def _left_out(found: Found, joint: Joint) -> tuple[LeftOut, ...]:
+def _left_out(found: Found, joint: Joint, before: MeasurementModel) -> tuple[LeftOut, ...]:
     index = {str.__str__(found.first.explanations[i].name): i for i in found.chosen}
     posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
-    linear, first = found.model.estimate().linear, _squares(found.first.model.estimate().linear, ())
+    linear, first = found.model.estimate().linear, _squares(before.estimate().linear, ())
     total = first - _squares(linear, ())
     listed = []
     for effect in (e for e in found.model.effects if e.name in found.effects):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.posterior import Density
 from cmm_uq.messages import Text, say
 from cmm_uq.model import MeasurementModel
@@ -65,27 +66,34 @@ def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float
     estimate = model.estimate()
     linear = estimate.linear
     sigma = max(estimate.least_squares.sigma_of_residuals, 1e-7)
-    errors, densities = [], []
+    errors, counts, densities = [], [], []
     scale = linear.noise_scale[:, None]
     every = np.hstack([linear.observed[:, None], linear.design]) / scale
-    placing = linear.placing / scale
+    placing = linear.freedoms.over(linear.noise_scale)
     for out in _folds(groups):
-        train = replace(
-            linear, observed=linear.observed[~out], design=linear.design[~out], placing=linear.placing[~out],
-            noise_scale=linear.noise_scale[~out], sigma=sigma,
-        )  # fmt: skip
-        mean, covariance, _ = Density(train).conditional(float(np.log(sigma)))
-        known = placing[out] @ np.linalg.pinv(placing[~out], rcond=_SINGULAR)
-        Q = _complement(placing[out] @ _free(placing[~out]))
-        left = Q.T @ (every[out] - known @ every[~out])
-        error, A = left[:, 0] - left[:, 1:] @ mean, left[:, 1:]
-        told = Q.T @ known
-        spread = sigma**2 * (np.eye(Q.shape[1]) + told @ told.T) + A @ covariance @ A.T
-        errors.append(error * linear.noise_scale[out].mean())
-        factor = np.linalg.cholesky(spread)
-        white = np.linalg.solve(factor, error)
-        densities.append(-0.5 * white @ white - np.log(np.diag(factor)).sum() - 0.5 * len(error) * np.log(2 * np.pi))
-    return _rms(np.concatenate(errors)), np.array(densities)
+        mean, covariance, _ = Density(replace(linear.at(~out), sigma=sigma)).conditional(float(np.log(sigma)))
+        left, known, open_ = _predicted(placing, every, out)
+        error = left[:, 0] - left[:, 1:] @ mean
+        told = [known, left[:, 1:] @ (_root(covariance) / sigma)]
+        errors.append(float(error @ error) * linear.noise_scale[out].mean() ** 2)
+        counts.append(len(error) - open_)
+        densities.append(_log_density(error / sigma, np.hstack(told)) - counts[-1] * np.log(sigma * np.sqrt(2 * np.pi)))
+    return float(np.sqrt(sum(errors) / sum(counts)) / MICROMETRE), np.array(densities)
+
+
+def _log_density(error: Floats, spread: Floats) -> float:
+    """Of errors (m,) with the covariance 1 + L·Lᵀ for L = ``spread`` (m, r), but for the constant."""
+    U, s, _ = np.linalg.svd(spread, full_matrices=False)
+    seen = U.T @ error
+    rest = error - U @ seen
+    return float(-0.5 * (rest @ rest + np.sum(seen**2 / (1 + s**2)) + np.sum(np.log1p(s**2))))
+
+
+def _root(covariance: Floats) -> Floats:
+    """A matrix whose product with its own transpose is a covariance (k, k)."""
+    scale = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], Text]:
@@ -108,20 +116,60 @@ def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
         yield np.isin(group, groups[k::count])
 
 
-def _free(columns: Floats) -> Floats:
-    """Orthonormal basis (q, r) of what columns (m, q) leave open of their coefficients."""
+def _predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:
+    """What is held out of columns (m, b), less what the placings' other observations tell of it.
+
+    Returns
+    -------
+    (o, b) without what no observation tells of the placings; (o, r) whose products are the covariance of what was told, in
+    units of the noise; and how many of the o dimensions are lost with what is left open.
+    """
+    left, known, open_ = every.copy(), np.zeros((len(every), 0)), 0
+    for rows in placing.rows:
+        own = out[rows]
+        inside, rest = rows[own], rows[~own]
+        if not len(inside):
+            continue
+        reached, told, free = _told(placing.columns[rest])
+        basis = _reached(placing.columns[inside] @ free)
+        each = _without(basis, placing.columns[inside] @ told)
+        left[inside] = _without(basis, every[inside]) - each @ (reached.T @ every[rest])
+        widened = np.zeros((len(every), each.shape[1]))
+        widened[inside] = each
+        known, open_ = np.hstack([known, widened]), open_ + basis.shape[1]
+    return left[out], known[out], open_
+
+
+def _told(columns: Floats) -> tuple[Floats, Floats, Floats]:
+    """What columns (m, q) tell of their coefficients.
+
+    Returns
+    -------
+    orthonormal basis (m, r) of what they reach, what (q, r) turns observations along it into coefficients, and an orthonormal
+    basis (q, q − r) of the coefficients that they leave open.
+    """
     if not columns.size:
-        return np.eye(columns.shape[1])
-    _, s, V = np.linalg.svd(columns)
-    return V[int(np.sum(s > _SINGULAR * max(float(s[0]), 1e-300))) :].T
+        return np.zeros((len(columns), 0)), np.zeros((columns.shape[1], 0)), np.eye(columns.shape[1])
+    U, s, V = np.linalg.svd(columns, full_matrices=len(columns) < columns.shape[1])
+    rank = _rank(s)
+    return U[:, :rank], V[:rank].T / s[:rank], V[rank:].T
 
 
-def _complement(columns: Floats) -> Floats:
-    """Orthonormal basis of what columns (m, q) do not reach, (m, m − rank)."""
+def _reached(columns: Floats) -> Floats:
+    """Orthonormal basis (m, rank) of what columns (m, q) reach."""
     if not columns.shape[1]:
-        return np.eye(len(columns))
-    U, s, _ = np.linalg.svd(columns, full_matrices=True)
-    return U[:, int(np.sum(s > _SINGULAR * max(float(s[0]), 1e-300))) :]
+        return np.zeros((len(columns), 0))
+    U, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return U[:, : _rank(s)]
+
+
+def _without(basis: Floats, columns: Floats) -> Floats:
+    """Columns (m, b) without their part in an orthonormal basis (m, r)."""
+    return columns - basis @ (basis.T @ columns)
+
+
+def _rank(s: Floats) -> int:
+    return int(np.sum(s > _SINGULAR * max(float(s[0]), 1e-300)))
 
 
 def _rms(values: Floats) -> float:

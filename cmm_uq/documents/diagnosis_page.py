@@ -17,7 +17,7 @@ from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.results_file import diagnosis_data, head
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.messages import NOTHING, Verbatim, commas, day, names, number, say, together
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, number, say, together
 from cmm_uq.units import MICROMETRE, unit
 
 
@@ -259,7 +259,15 @@ def _where(found: Diagnosed) -> tuple[Block, ...]:
 def _rivals(found: Diagnosed) -> Table:
     rows = tuple((name, probability(p)) for name, p in found.diagnosis.rivals)
     heads = (Column(say("Explanation"), numeric=False), Column(say("Probability")))
-    return Table(say("Model comparison: one explanation alone"), heads, rows, (say("Nothing missing has the rest."),))
+    notes: list[Text] = [say("Nothing missing has the rest.")]
+    some, every = found.diagnosis.compared, int(found.diagnosis.before.used.sum())
+    if some < every:
+        notes.append(say(
+            "Explanations were compared on {some} of {every} observations, drawn at random; what is asserted was then "
+            "estimated from all. An error much smaller than the noise, which only all together would show, can go unnoticed.",
+            some=some, every=every,
+        ))  # fmt: skip
+    return Table(say("Model comparison: one explanation alone"), heads, rows, tuple(notes))
 
 
 def diagnosed_outcome(found: Diagnosed) -> Outcome:

@@ -29,6 +29,7 @@ from cmm_uq.documents.plot_style import (
     house_style,
     new_figure,
 )
+from cmm_uq.documents.shown import shown, told
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, Verbatim, say, semicolons, signed
 from cmm_uq.points import Floats
@@ -72,6 +73,8 @@ def length_plot(
         (after_label, finite("after_um", after_um, (count,)), expanded_after_um, ACCENT),
     ]
     marked = np.zeros(count, dtype=bool) if flagged is None else np.asarray(flagged, dtype=bool)
+    rows = shown([values for _, values, _, _ in series], marked)
+    caption, x, marked = told(caption, len(rows), count), x[rows], marked[rows]
     size = float(np.clip(60.0 / count**0.75, 1.3, 4.2))
     with house_style():
         figure = new_figure(96)
@@ -80,7 +83,8 @@ def length_plot(
         for ax, (label, values, expanded, colour) in zip(axes, series, strict=True):
             half = finite(
                 "expanded uncertainty", np.broadcast_to(np.asarray(expanded, dtype=float), (count,)), (count,)
-            )
+            )[rows]
+            values = values[rows]
             ax.axhspan(-reference_expanded_um, reference_expanded_um, color=BAND, lw=0, zorder=0)
             ax.axhline(0, color=INK, lw=0.7, zorder=1)
             bars(ax, x, values - half, values + half, max(0.28 * size, 0.6), colour)
@@ -156,6 +160,9 @@ def volume_plot(
     start = finite("start_mm", start_mm, (None, 3))
     end = start if end_mm is None else finite("end_mm", end_mm, (len(start), 3))
     residual = finite("residual_um", residual_um, (len(start),))
+    rows = shown([residual])
+    caption = told(caption, len(rows), len(residual))
+    start, end, residual = start[rows], end[rows], residual[rows]
     box = None if travel_mm is None else finite("travel_mm", travel_mm, (3, 2))
     limit = float(np.abs(residual).max(initial=0.0)) or 1.0
     edges = limit * np.linspace(-1, 1, len(DIVERGING) + 1)

@@ -116,6 +116,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         "screening": [finding_data(f, found.job.facts.recording.file) for f in found.findings],
         "improvement": improvement_data(d.improvement),
         "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
+        **({"compared_on": d.compared} if d.compared < int(d.before.used.sum()) else {}),
         "corrected": None if changes is None else {
             "accuracy": {
                 name: {"before": quantity_data(a), "after": quantity_data(b)} for name, (a, b) in changes.figures.items()

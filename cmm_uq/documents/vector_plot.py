@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.documents.document import Plot
 from cmm_uq.documents.plot_style import ACCENT, MUTED, RULE, TINY, dots, drawn, finite, house_style, new_figure
+from cmm_uq.documents.shown import shown, told
 from cmm_uq.messages import Text, say
 
 _ROUND = (1.0, 2.0, 5.0)
@@ -32,6 +33,9 @@ def vector_plot(
     """
     place = finite("position_mm", position_mm, (None, 2))
     vectors = [(title, finite("vectors", values, place.shape)) for title, values in series]
+    rows = shown([np.linalg.norm(values, axis=1) for _, values in vectors])
+    caption = told(caption, len(rows), len(place))
+    place, vectors = place[rows], [(title, values[rows]) for title, values in vectors]
     longest = max(float(np.linalg.norm(values, axis=1).max(initial=0.0)) for _, values in vectors) or 1.0
     low, high = place.min(axis=0), place.max(axis=0)
     span = np.maximum(high - low, 1e-3 * float(np.ptp(place)) + 1.0)

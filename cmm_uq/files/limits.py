@@ -35,7 +35,10 @@ ROWS = Limit(200_000, "rows", "CSV file", "a scanned surface; larger ones are po
 MAP_ROWS = Limit(30_000, "rows", "error map", "10 m of each axis by the millimetre")
 COLUMNS = Limit(200, "columns", "CSV file", "every column is searched by a diagnosis")
 CELLS = Limit(5_000_000, "cells", "CSV file", "100 000 rows of 30 columns are 3 000 000")
-OBSERVATIONS = Limit(20_000, "observations", "estimate", "its decomposition holds their square in memory, 3.2 GB")
+OBSERVATIONS = Limit(300_000, "observations", "estimate", "100 000 points of three coordinates each")
+FREEDOMS = Limit(
+    6_000, "freedoms", "placings of an artefact together", "each is eliminated anew for every size of noise"
+)
 CELL = Limit(500, "characters", "cell of a CSV file", "a number needs 25, a remark a sentence")
 LINE = Limit(100_000, "characters", "line of a CSV file", "200 columns of 500 characters")
 LINES = Limit(500_000, "lines", "CSV file", "rows, comments and empty lines")
@@ -60,7 +63,7 @@ DRAWS = Limit(250_000, "entries", "samples of an input", "draws of an earlier Mo
 INPUTS = Limit(500, "entries", "inputs, outputs or correlations of a budget", "its matrix of correlations is square")
 
 LIMITS = (
-    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, MAP_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS, CELL, LINE, LINES,
+    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, MAP_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS, FREEDOMS, CELL, LINE, LINES,
     COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY, LISTED, DRAWS, INPUTS,
 )  # fmt: skip
 """All of them, in the order of docs/limits.md."""

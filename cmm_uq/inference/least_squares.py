@@ -67,7 +67,7 @@ def solve(model: LinearModel) -> LeastSquares:
     value = model.prior_mean.copy()
     scale = np.array([unknowns[i].scale for i in free])
     target = reduced.observed - reduced.design @ value
-    U, s, Vt = linalg.svd(reduced.design[:, free] * scale, full_matrices=True)
+    U, s, Vt = linalg.svd(reduced.design[:, free] * scale, full_matrices=False)
     rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s.size and s[0] > 0 else 0
     forward = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T * scale[:, None]
     value[free] += forward @ target

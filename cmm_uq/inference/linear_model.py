@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
+from numpy.typing import NDArray
 
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.points import Floats
 from cmm_uq.units import Unit
 
@@ -51,7 +52,7 @@ class LinearModel:
     observed : (m,) mm.
     design : (m, k) mm per unit of each parameter.
     unknowns : k of them.
-    placing : (m, q) columns to be projected out.
+    placing : (m, q) columns to be projected out, or those of each placing by itself.
     noise_scale : (m,) positive.
     sigma : standard uncertainty of one coordinate, mm; ``None`` when it is to be estimated.
     """
@@ -59,7 +60,7 @@ class LinearModel:
     observed: Floats
     design: Floats
     unknowns: tuple[Unknown, ...]
-    placing: Floats
+    placing: Floats | Freedoms
     noise_scale: Floats
     sigma: float | None
 
@@ -67,17 +68,28 @@ class LinearModel:
     def reduced(self) -> Reduced:
         """Whitened by the noise scale, the placing projected out by QR: (observed, design, degrees of freedom)."""
         y = self.reduce(self.observed[:, None])[:, 0]
-        return Reduced(y, self.reduce(self.design), len(y) - self._reached.shape[1])
+        return Reduced(y, self.reduce(self.design), len(y) - self._whitened.rank)
 
     def reduce(self, columns: Floats) -> Floats:
         """Columns (m, r), mm, in units of the noise scale, the placing projected out."""
-        white, Q = columns / self.noise_scale[:, None], self._reached
-        return white - Q @ (Q.T @ white) if Q.shape[1] else white
+        return self._whitened.without(columns / self.noise_scale[:, None])
 
     @cached_property
-    def _reached(self) -> Floats:
-        """Orthonormal basis of what the placing reaches, in units of the noise scale."""
-        return reached(self.placing / self.noise_scale[:, None])
+    def freedoms(self) -> Freedoms:
+        """The columns of the placing, by placing where that is known."""
+        return Freedoms.of(self.placing)
+
+    @cached_property
+    def _whitened(self) -> Freedoms:
+        """The same in units of the noise scale."""
+        return self.freedoms.over(self.noise_scale)
+
+    def at(self, rows: NDArray[np.bool_]) -> LinearModel:
+        """The model of some of its observations."""
+        return replace(
+            self, observed=self.observed[rows], design=self.design[rows], placing=self.freedoms.at(rows),
+            noise_scale=self.noise_scale[rows],
+        )  # fmt: skip
 
     def only(self, parameters: Sequence[int]) -> LinearModel:
         """The model with some of its parameters, the others zero."""
@@ -93,7 +105,7 @@ class LinearModel:
         """
         observed = whiten(self.observed[:, None])[:, 0]
         return replace(
-            self, observed=observed, design=whiten(self.design), placing=whiten(self.placing),
+            self, observed=observed, design=whiten(self.design), placing=whiten(self.freedoms.dense()),
             noise_scale=np.ones(len(observed)),
         )  # fmt: skip
 
@@ -115,12 +127,3 @@ class Reduced:
     observed: Floats
     design: Floats
     count: int
-
-
-def reached(columns: Floats) -> Floats:
-    """Orthonormal basis (m, r) of what columns (m, q) reach, by QR with pivoting."""
-    if not columns.shape[1]:
-        return np.zeros((len(columns), 0))
-    Q, R, _ = linalg.qr(columns, mode="economic", pivoting=True)
-    diagonal = np.abs(np.diag(R))
-    return np.asarray(Q[:, diagonal > 1e-10 * diagonal[0]], dtype=np.float64)

@@ -12,8 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import LeastSquares
-from cmm_uq.inference.linear_model import LinearModel, reached
+from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.points import Floats, Ints
 
@@ -51,17 +52,21 @@ class Marginal:
         return float(max(self.estimate.sigma_of_residuals, SIGMA_BOUNDS[0]))
 
     @cached_property
-    def _placing(self) -> Floats:
-        """(m, q) orthonormal basis of what the placing reaches."""
-        return reached(self.model.placing)
+    def _freedoms(self) -> Freedoms:
+        """Orthonormal columns of what each placing reaches, turned as the observations are, in units of the noise."""
+        basis = self.model.freedoms.reached
+        turn = self.noise.turn.tocoo()
+        if np.any(basis.index[turn.row] != basis.index[turn.col]):
+            basis = Freedoms.of(basis.dense())
+        return Freedoms(np.asarray(self.noise.turn @ basis.columns) * self._scale, basis.index, basis.blocks)
 
     @cached_property
     def _length(self) -> Floats:
-        """(c,) by which columns [placing, slow, parameters, observations] are divided."""
+        """(P,) by which columns [slow, parameters, observations] are divided."""
         design = self.model.design
         priors = np.array([0.0 if np.isinf(u.prior_sd) else 1 / self._sd(i) for i, u in enumerate(self.model.unknowns)])
         parameters = np.sqrt(np.sum(design**2, axis=0) / self._scale**2 + priors**2)
-        others = np.full(self._placing.shape[1] + self.noise.slow.shape[1], 1 / self._scale)
+        others = np.full(self.noise.slow.shape[1], 1 / self._scale)
         return np.concatenate([others, np.where(parameters > 0, parameters, 1.0), [1.0]])
 
     def _sd(self, i: int) -> float:
@@ -70,18 +75,22 @@ class Marginal:
         return float(max(unknown.prior_sd, 1e-6 * unknown.scale))
 
     @cached_property
+    def _turned(self) -> Floats:
+        """(m, P) columns [slow, parameters, observations], turned."""
+        model = self.model
+        left = model.observed - model.design @ self.estimate.value
+        return np.asarray(self.noise.turn @ np.hstack([self.noise.slow, model.design, left[:, None]])) / self._length
+
+    @cached_property
     def _products(self) -> tuple[Floats, Floats]:
         """Inner products (c, P²) of the columns, by class of the observations, and of the prior (P²,), which is data too."""
         model, value = self.model, self.estimate.value
-        left = model.observed - model.design @ value
-        columns = np.hstack([self._placing, self.noise.slow, model.design, left[:, None]])
-        turned = np.asarray(self.noise.turn @ columns) / self._length
         index, shares = self.noise.classes
-        size = turned.shape[1]
+        size = len(self._length)
         found = np.zeros((len(shares), size, size))
         order = np.argsort(index, kind="stable")
         for i, rows in enumerate(np.split(order, np.cumsum(np.bincount(index, minlength=len(shares)))[:-1])):
-            found[i] = turned[rows].T @ turned[rows]
+            found[i] = self._turned[rows].T @ self._turned[rows]
         first = size - 1 - len(value)
         prior = np.zeros((len(value), size))
         for i, unknown in enumerate(model.unknowns):
@@ -92,12 +101,29 @@ class Marginal:
         return found.reshape(len(shares), -1), (prior.T @ prior).ravel()
 
     @cached_property
-    def _without_slow(self) -> tuple[Floats, Floats]:
-        """The products without the columns of slow noise, whose coefficients are zero where it is absent."""
-        P, q, c = len(self._length), self._placing.shape[1], self.noise.slow.shape[1]
-        kept = np.delete(np.arange(P), np.arange(q, q + c))
-        found, prior = (each.reshape(-1, P, P)[:, kept[:, None], kept] for each in self._products)
-        return found.reshape(len(found), -1), prior.ravel()
+    def _blocks(self) -> Floats:
+        """Inner products (c, blocks·j·(j + P)) of each placing's columns with themselves and with all others, by class."""
+        freedoms, (index, shares) = self._freedoms, self.noise.classes
+        j, classes = freedoms.columns.shape[1], len(shares)
+        whole = np.hstack([freedoms.columns, self._turned])
+        among = Freedoms(whole, index * freedoms.blocks + freedoms.index, classes * freedoms.blocks)
+        each = [among.sums(freedoms.columns[:, [i]] * whole) for i in range(j)]
+        return np.stack(each, axis=1).reshape(classes, -1)
+
+    @cached_property
+    def _absent(self) -> Floats:
+        """(blocks, j) one for columns that a placing lacks."""
+        lengths = self._freedoms.sums(self._freedoms.columns**2) / self._scale**2
+        return np.where(lengths > 0.5, 0.0, 1.0)
+
+    @cached_property
+    def _without_slow(self) -> tuple[Floats, Floats, Floats]:
+        """Products and blocks without the columns of slow noise, whose coefficients are zero where it is absent."""
+        P, c, j = len(self._length), self.noise.slow.shape[1], self._freedoms.columns.shape[1]
+        found, prior = (each.reshape(-1, P, P)[:, c:, c:] for each in self._products)
+        blocks = self._blocks.reshape(len(found), -1, j + P)
+        kept = np.delete(np.arange(j + P), np.arange(j, j + c))
+        return found.reshape(len(found), -1), prior.ravel(), blocks[:, :, kept].reshape(len(found), -1)
 
     @cached_property
     def _counts(self) -> Floats:
@@ -106,32 +132,51 @@ class Marginal:
     def _factors(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them.
 
-        Without rows and columns of slow noise, where it is absent in all of the sizes.
+        What each placing leaves free is eliminated first, by itself; slow noise has no rows and columns where it is absent in
+        all of the sizes.
         """
         variances, slow = self.noise.variances(sizes)
         v = variances @ self.noise.classes[1].T
         absent = not np.any(sizes.slow)
-        products, prior = self._without_slow if absent else self._products
-        q, c = self._placing.shape[1], slow.shape[1]
-        P = len(self._length) - absent * c
+        products, prior, blocks = self._without_slow if absent else (*self._products, self._blocks)
+        P = len(self._length) - absent * slow.shape[1]
         whole = ((1 / v) @ products + prior).reshape(-1, P, P)
         log = -0.5 * np.log(v) @ self._counts
-        at = np.arange(q, q + c)
+        c = slow.shape[1]
         if absent:  # what is left of slow noise whose variance goes to zero
-            log += np.log(self._length[at]).sum()
+            log += np.log(self._length[:c]).sum()
         else:
+            at = np.arange(c)
             least = np.maximum(slow, (1e-6 * self._scale) ** 2)
             whole[:, at, at] += 1 / (least * self._length[at] ** 2)
             log -= 0.5 * np.log(least).sum(axis=1)
         diagonal = np.arange(P)
         whole[:, diagonal, diagonal] *= 1 + _JITTER
+        if self._freedoms.count:
+            lost, own = self._eliminated(v, blocks)
+            whole -= lost
+            log -= own
         return _cholesky(whole), log
+
+    def _eliminated(self, v: Floats, products: Floats) -> tuple[Floats, Floats]:
+        """What the placings take from the precision (w, P, P), and half the logarithm of their own determinant (w,)."""
+        w, (blocks, j) = len(v), self._absent.shape
+        each = ((1 / v) @ products).reshape(w * blocks, j, -1)
+        diagonal = np.arange(j)
+        own = each[:, :, :j]
+        own[:, diagonal, diagonal] *= 1 + _JITTER
+        own[:, diagonal, diagonal] += np.tile(self._absent, (w, 1))
+        factor = _cholesky(own)
+        rows = np.linalg.solve(factor, each[:, :, j:]).reshape(w, blocks * j, -1)
+        logs = np.log(factor[:, diagonal, diagonal]).reshape(w, -1).sum(axis=1)
+        return rows.transpose(0, 2, 1) @ rows, logs
 
     def _batches(self, sizes: Sizes) -> Iterator[Ints]:
         """Which sizes to reckon with at once: those without slow noise, which need smaller matrices, apart."""
-        c = self.noise.slow.shape[1]
+        j, c = self._freedoms.columns.shape[1], self.noise.slow.shape[1]
         for chosen, P in ((sizes.slow == 0, len(self._length) - c), (sizes.slow > 0, len(self._length))):
-            at, size = np.flatnonzero(chosen), max(1, _NUMBERS // P**2)
+            size = max(1, _NUMBERS // (P**2 + self._freedoms.count * (j + P) + 3 * len(self._counts)))
+            at = np.flatnonzero(chosen)
             yield from (at[i : i + size] for i in range(0, len(at), size))
 
     def log_density(self, latent: Floats) -> Floats:

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.messages import NOTHING, Text, foreign, say
 from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.units import Unit, unit
@@ -161,6 +162,9 @@ class Artefact(ABC):
         """Form errors of a test sphere; ``None`` when they have no meaning here."""
         return None
 
-    def placing(self, xyz: Floats) -> Floats:
-        """Change of the observations, (m, q), for each freedom of the artefact's placing that they do not cancel."""
+    def placing(self, xyz: Floats) -> Floats | Freedoms:
+        """Change of the observations, (m, q), for each freedom of the artefact's placing that they do not cancel.
+
+        As :class:`Freedoms` where every placing has its own, which keeps many placings small.
+        """
         return np.zeros((len(self.noise_scale), 0))

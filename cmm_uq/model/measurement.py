@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import LeastSquares, solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.model.artefact import Artefact
@@ -177,18 +178,28 @@ class MeasurementModel:
         design = np.hstack([-artefact.project(true, self._basis(true)), artefact.size_change()])
         return LinearModel(
             (unexplained + design @ values)[used], design[used], self.unknowns,
-            artefact.placing(true)[used], artefact.noise_scale[used], self.sigma,
+            Freedoms.of(artefact.placing(true)).at(used), artefact.noise_scale[used], self.sigma,
         )  # fmt: skip
 
     def seen(self, displacement: Floats, values: Floats) -> Floats:
         """What used observations show, (m, k) in mm, of an error e of the points (n, 3, k) that ``values`` do not contain."""
         return -self.artefact.project(self.placed(values), displacement)[self.used]
 
+    @cached_property
+    def _placed(self) -> dict[bytes, Floats]:
+        """What :meth:`placed` found last: it is asked for again by every candidate of a diagnosis."""
+        return {}
+
     def placed(self, values: Floats) -> Floats:
         """Points (n, 3), mm, of the artefact where parameters (k,) say that the recording found it."""
-        coefficients, sizes = self._split(values)
-        xyz = self.artefact.points.xyz
-        return self.artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
+        key = values.tobytes()
+        if key not in self._placed:
+            coefficients, sizes = self._split(values)
+            xyz = self.artefact.points.xyz
+            self._placed.clear()
+            self._placed[key] = self.artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
+            self._placed[key].flags.writeable = False
+        return self._placed[key]
 
     def residuals(self, values: Floats) -> Floats:
         """Unexplained part of every observation, used or not, (m,) mm."""

@@ -17,6 +17,9 @@ _LEAST_SHARE = 0.15
 _LEAST_TIMES = 8
 """Different times from which on slow noise is reckoned with."""
 
+_WHOLE = 100
+"""Repeats whose mean and contrasts are one matrix without zeros; of more the matrix would fill the memory."""
+
 _LEAST_SPREAD = 1.5
 """Longest over median length from which on noise may be seen to grow with it."""
 
@@ -129,13 +132,31 @@ def _helmert(block: Ints) -> tuple[sparse.csr_array, Floats]:
     at, across, values, count = [], [], [], np.zeros(m)
     for n in np.unique(sizes):
         groups = order[starts[sizes == n][:, None] + np.arange(n)]
-        basis = np.vstack([np.full(n, 1 / np.sqrt(n)), _contrasts(n)])
-        at.append(np.repeat(groups, n, axis=1).ravel())
-        across.append(np.tile(groups, (1, n)).ravel())
-        values.append(np.tile(basis.ravel(), len(groups)))
+        basis = mean_and_contrasts(n).tocoo()
+        at.append(groups[:, basis.row].ravel())
+        across.append(groups[:, basis.col].ravel())
+        values.append(np.tile(basis.data, len(groups)))
         count[groups[:, 0]] = n
     where = np.concatenate(at), np.concatenate(across)
     return sparse.csr_array((np.concatenate(values), where), shape=(m, m)), count
+
+
+def mean_and_contrasts(n: int) -> sparse.csr_array:
+    """An orthonormal matrix (n, n) whose first row is constant.
+
+    Many repeats are taken in parts, and the means of the parts together, so that most of its values are zero.
+    """
+    if n <= _WHOLE:
+        return sparse.csr_array(np.vstack([np.full(n, 1 / np.sqrt(n)), _contrasts(n)]))
+    sizes = np.array([len(part) for part in np.array_split(np.arange(n), int(np.sqrt(n)))])
+    within = sparse.block_diag([np.vstack([np.full(k, 1 / np.sqrt(k)), _contrasts(k)]) for k in sizes], format="csr")
+    # a reflection that turns the first axis into the direction of what all means have in common
+    whole = np.sqrt(sizes / n)
+    away = np.where(np.arange(len(sizes)) == 0, 1.0, 0.0) - whole
+    among = np.eye(len(sizes)) - 2 * np.outer(away, away) / (away @ away)
+    first = np.cumsum(sizes) - sizes
+    others = np.setdiff1d(np.arange(n), first)
+    return sparse.csr_array(sparse.vstack([sparse.csr_array(among) @ within[first], within[others]]))
 
 
 def _contrasts(n: int) -> Floats:

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.points import Floats, Ints
 
 LAST_DIGIT = 1e-9
@@ -45,6 +46,12 @@ class Placings:
         """(q,) points in each placing."""
         return np.bincount(self.index, minlength=len(self.numbers)).astype(np.int64)
 
+    @cached_property
+    def rows(self) -> tuple[Ints, ...]:
+        """Points of each placing (k,), ascending."""
+        order, starts = self._order
+        return tuple(np.split(order, starts[1:])) if len(order) else ()
+
     def sums(self, values: Floats) -> Floats:
         """Sums of ``values`` (n, …) over the points of each placing, (q, …)."""
         order, starts = self._order
@@ -68,8 +75,9 @@ class Placings:
         """
         return np.asarray(np.any(self.still(xyz)[:, :, None] & (np.abs(axes) > _ALONG), axis=1))
 
-    def columns(self, freedoms: Floats) -> Floats:
-        """Design of freedoms that each placing has for itself: (n, …, j) → (n, …, q·j), zero outside its placing."""
-        block = np.zeros((*freedoms.shape[:-1], len(self.numbers), freedoms.shape[-1]))
-        block[np.arange(len(self.index)), ..., self.index, :] = freedoms
-        return block.reshape((*freedoms.shape[:-1], -1))
+    def columns(self, freedoms: Floats) -> Freedoms:
+        """Freedoms that each placing has for itself, by what they do to its points' observations, (n, j) or (n, …, j)."""
+        each = int(np.prod(freedoms.shape[1:-1]))
+        return Freedoms(
+            freedoms.reshape(-1, freedoms.shape[-1]), np.repeat(self.index, each), len(self.numbers)
+        )  # fmt: skip

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.messages import Text
 from cmm_uq.model.artefact import Artefact, Size
@@ -85,7 +86,7 @@ class Radial(Artefact):
         """See :meth:`Artefact.size_change`."""
         return np.asarray(self.per_size * self.expansion[:, None], dtype=np.float64)
 
-    def placing(self, xyz: Floats) -> Floats:
+    def placing(self, xyz: Floats) -> Freedoms:
         """See :meth:`Artefact.placing`: three freedoms of each centre."""
         return self.centred.columns(self.directions(xyz))
 

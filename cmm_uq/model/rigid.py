@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.placings import Placings
@@ -56,11 +57,11 @@ class Rigid(Artefact):
         own = np.einsum("nij,nik->njk", self.attitudes(xyz), displacement)
         return np.asarray(own.reshape(3 * len(xyz), displacement.shape[2]), dtype=np.float64)
 
-    def placing(self, xyz: Floats) -> Floats:
+    def placing(self, xyz: Floats) -> Freedoms:
         """See :meth:`Artefact.placing`: three translations and three rotations of each placing."""
         turns = np.cross(np.eye(3)[None, :, :], self.body[:, None, :])
         freedoms = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=1).transpose(0, 2, 1)
-        return self.placings.columns(freedoms).reshape(3 * len(xyz), -1)
+        return self.placings.columns(freedoms)
 
     def attitudes(self, xyz: Floats, shape: Floats | None = None) -> Floats:
         """Rotation (n, 3, 3) from the artefact's axes to the machine's, by least squares in each placing (Kabsch 1976).

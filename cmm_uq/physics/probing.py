@@ -70,8 +70,7 @@ class ArtefactSag(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         basis = np.zeros((len(points), 3, 1))
-        for group in range(int(points.group.max()) + 1):
-            rows = np.flatnonzero(points.group == group)
+        for rows in points.rows_of_groups:
             order = points.point[rows]
             bar = points.xyz[rows[np.argmax(order)]] - points.xyz[rows[np.argmin(order)]]
             length = float(np.linalg.norm(bar))

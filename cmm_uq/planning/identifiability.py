@@ -104,13 +104,13 @@ def _enough(linear: LinearModel) -> LinearModel:
 
     Columns of which the placing leaves nothing but rounding become zero, lest they determine each other.
     """
-    k = len(linear.unknowns)
+    k, free = len(linear.unknowns), linear.freedoms.dense()
     whole = np.linalg.norm(linear.design / linear.noise_scale[:, None], axis=0)
     there = np.linalg.norm(linear.reduced.design, axis=0) > _ROUNDING * whole
     return replace(
         linear, observed=np.concatenate([linear.observed, np.zeros(k + 1)]),
         design=np.vstack([linear.design * there, np.zeros((k + 1, k))]),
-        placing=np.vstack([linear.placing, np.zeros((k + 1, linear.placing.shape[1]))]),
+        placing=np.vstack([free, np.zeros((k + 1, free.shape[1]))]),
         noise_scale=np.concatenate([linear.noise_scale, np.ones(k + 1)]),
     )  # fmt: skip
 

@@ -104,12 +104,12 @@ def shared(model: MeasurementModel) -> Told:
     """Information of each measurement of a recording whose placing's freedoms are common to all of them: a swept bar."""
     values = np.array([u.prior_mean for u in model.unknowns])
     linear = model.linearised(values)
-    rows = np.hstack([linear.design * scales(linear.unknowns), linear.placing])
+    rows = np.hstack([linear.design * scales(linear.unknowns), linear.freedoms.dense()])
     rows = rows / (linear.noise_scale[:, None] * _sigma(linear))
     numbers, index = np.unique(model.artefact.measurement, return_inverse=True)
     each = np.zeros((len(numbers), rows.shape[1], rows.shape[1]))
     np.add.at(each, index.ravel(), rows[:, :, None] * rows[:, None, :])
-    return Told(linear.unknowns, each, certified(linear.unknowns, linear.placing.shape[1]))
+    return Told(linear.unknowns, each, certified(linear.unknowns, linear.freedoms.count))
 
 
 def _sigma(linear: LinearModel) -> float:

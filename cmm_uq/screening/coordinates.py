@@ -13,6 +13,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import say
 from cmm_uq.model.kind import Observed
+from cmm_uq.model.placings import Placings
 from cmm_uq.points import AXES, Points
 from cmm_uq.screening.changes import Change, changes, changes_of_blocks
 from cmm_uq.screening.finding import Finding, at_lines, finding
@@ -129,8 +130,8 @@ def _reversed_bars(points: Points, shape: Shape) -> list[Finding]:
     ends = np.array([rows[np.argsort(points.point[rows])] for rows in shape.rows])
     bars = points.xyz[ends[:, 1]] - points.xyz[ends[:, 0]]
     found = []
-    for number in np.unique(points.measurement):
-        own = np.flatnonzero(points.measurement[ends[:, 0]] == number)
+    placings = Placings.of(points.measurement[ends[:, 0]])
+    for number, own in zip(placings.numbers, placings.rows, strict=True):
         if len(own) < 2:
             continue
         against = bars[own] @ bars[own[0]] < 0

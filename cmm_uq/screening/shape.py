@@ -189,8 +189,7 @@ def flat_misfit(xyz: Floats, _: Floats, __: float) -> Floats:
 
 def rows_by(numbers: Ints) -> tuple[Ints, ...]:
     """Rows of the recording (k,) for each different number of ``numbers`` (n,)."""
-    index = Placings.of(numbers).index
-    return tuple(np.flatnonzero(index == i) for i in range(int(index.max()) + 1))
+    return Placings.of(numbers).rows
 
 
 def samples_of(count: int, size: int) -> Ints:

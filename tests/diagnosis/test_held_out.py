@@ -65,8 +65,8 @@ def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Fl
     """
     estimate = model.estimate()
     linear, sigma = estimate.linear, estimate.least_squares.sigma_of_residuals
-    A = np.hstack([linear.design, linear.placing]) / linear.noise_scale[:, None]
-    variance = [*linear.prior_sd**2, *[1e4] * linear.placing.shape[1]]
+    A = np.hstack([linear.design, linear.freedoms.dense()]) / linear.noise_scale[:, None]
+    variance = [*linear.prior_sd**2, *[1e4] * linear.freedoms.dense().shape[1]]
     y = (linear.observed - linear.design @ linear.prior_mean) / linear.noise_scale
     joint = A @ np.diag(variance) @ A.T + sigma**2 * np.eye(len(y))
     numbers, densities, errors = np.unique(groups), [], []
@@ -74,7 +74,11 @@ def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Fl
     for k in range(count):
         out = np.isin(groups, numbers[k::count])
         gain = np.linalg.solve(joint[np.ix_(~out, ~out)], joint[np.ix_(~out, out)]).T
-        Q = linalg.null_space(linear.placing[out].T) if whole and linear.placing.size else np.eye(out.sum())
+        Q = (
+            linalg.null_space(linear.freedoms.dense()[out].T)
+            if whole and linear.freedoms.dense().size
+            else np.eye(out.sum())
+        )
         error = Q.T @ (y[out] - gain @ y[~out])
         spread = Q.T @ (joint[np.ix_(out, out)] - gain @ joint[np.ix_(~out, out)]) @ Q
         densities.append(stats.multivariate_normal.logpdf(error, cov=spread))
@@ -133,7 +137,7 @@ def test_points_of_a_few_lines_are_predicted_as_the_press_residuals_of_all_colum
     model = MeasurementModel(StepGauge(facts, job.points), effects(("scale_x", "scale_y", "scale_z", "squareness_xy")))
     linear = model.estimate().linear
     y = linear.observed - linear.design[:, 4:] @ linear.prior_mean[4:]
-    columns = np.hstack([linear.design[:, :4], linear.placing])
+    columns = np.hstack([linear.design[:, :4], linear.freedoms.dense()])
     Q = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0]
     residual, hat = y - Q @ (Q.T @ y), Q @ Q.T
     artefact = model.artefact

@@ -121,7 +121,7 @@ def test_observations_count_by_their_noise_and_residuals_are_in_millimetres() ->
 
 def test_a_place_that_is_given_twice_is_taken_once() -> None:
     given = weighted()
-    twice = replace(given, placing=np.hstack([given.placing, -3.0 * given.placing]))
+    twice = replace(given, placing=np.hstack([given.freedoms.dense(), -3.0 * given.freedoms.dense()]))
     assert solve(twice).degrees_of_freedom == solve(given).degrees_of_freedom == 4
     np.testing.assert_allclose(solve(twice).value, solve(given).value, rtol=1e-9)
 

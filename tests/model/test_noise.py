@@ -13,7 +13,7 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Sizes
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel, Noise
-from cmm_uq.model.noise import noise_of
+from cmm_uq.model.noise import mean_and_contrasts, noise_of
 from cmm_uq.points import Floats
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -73,3 +73,14 @@ def test_the_order_of_the_rows_says_nothing_without_a_time() -> None:
 def test_turning_keeps_every_length() -> None:
     turn = noise_of(example("plate-simulated", 2)).turn.toarray()
     assert np.allclose(turn @ turn.T, np.eye(len(turn)), atol=1e-12)
+
+
+@pytest.mark.parametrize("repeats", [1, 2, 7, 100, 101, 137, 1000])
+def test_repeats_are_turned_to_their_mean_and_what_is_orthogonal_to_it(repeats: int) -> None:
+    turn = mean_and_contrasts(repeats)
+    np.testing.assert_allclose((turn @ turn.T).toarray(), np.eye(repeats), atol=1e-12)
+    np.testing.assert_allclose(turn[[0]].toarray()[0], 1 / np.sqrt(repeats), atol=1e-14)
+
+
+def test_ten_thousand_repeats_take_no_square_matrix() -> None:
+    assert mean_and_contrasts(10_000).nnz < 3 * 100 * 10_000

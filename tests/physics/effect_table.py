@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.commands.reading import read_job
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.kinds import artefact_of
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
@@ -78,7 +79,7 @@ def seen_by(effect: Effect, artefact: Artefact) -> bool:
     shape = list(effect.trials())[-4 if effect.shape else 0]
     basis = effect.basis(points, shape) * [c.prior_sd for c in effect.coefficients]
     shown = model.seen(basis, values)
-    free = artefact.placing(model.placed(values))
+    free = Freedoms.of(artefact.placing(model.placed(values))).dense()
     left = shown - free @ np.linalg.lstsq(free, shown, rcond=None)[0] if free.shape[1] else shown
     return bool(np.sqrt(np.mean(left**2, axis=0)).max() > 1e-3 * SEEN_UM)
 

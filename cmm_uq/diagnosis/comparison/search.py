@@ -214,7 +214,7 @@ def comparison_of(model: MeasurementModel, stated: float | None, candidates: Seq
     held = _held(model)
     rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
     return Comparison(
-        rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.placing]) / linear.noise_scale[:, None],
+        rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.freedoms.dense()]) / linear.noise_scale[:, None],
         noise_kinds(model, candidates), sigma, log_sigma, candidates, linear.noise_scale,
         stated or sigma_left / _MISFIT, _certified(model, sigma_left),
     )  # fmt: skip

@@ -105,8 +105,7 @@ class Ballbar(Artefact):
 def _ends(points: Points, where: str | None) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
     """Rows of points 1 and 2 of every bar, (m, 2)."""
     ends = []
-    for group in range(int(points.group.max()) + 1):
-        rows = np.flatnonzero(points.group == group)
+    for rows in points.rows_of_groups:
         numbers = points.point[rows]
         if sorted(numbers.tolist()) != [1, 2]:
             measurement, repeat = points.measurement[rows[0]], points.repeat[rows[0]]

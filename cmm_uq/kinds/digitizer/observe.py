@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.kinds.digitizer.attitudes import alignments, check_angles, refuse_undetermined, scan_of
 from cmm_uq.kinds.digitizer.facts import AlignmentFacts
 from cmm_uq.kinds.digitizer.target import Centre, ScannedSphere, Target
@@ -92,7 +93,7 @@ class Digitizer(Artefact):
         """See :meth:`Artefact.project`: away from the sphere's centre, or every coordinate."""
         return self.target.project(self._seen_at, displacement)
 
-    def placing(self, xyz: Floats) -> Floats:
+    def placing(self, xyz: Floats) -> Floats | Freedoms:
         """See :meth:`Artefact.placing`: the place of the sphere."""
         return self.target.placing(self._seen_at)
 
@@ -124,7 +125,11 @@ class Digitizer(Artefact):
             freedoms.append(np.broadcast_to(MICROMETRE * np.eye(3), (len(self._tip), 3, 3)))
         if not freedoms:
             return np.zeros((len(self._tip), 3, 0))
-        return self.poses.columns(np.concatenate(freedoms, axis=1).transpose(0, 2, 1))
+        return (
+            self.poses.columns(np.concatenate(freedoms, axis=1).transpose(0, 2, 1))
+            .dense()
+            .reshape(len(self._tip), 3, -1)
+        )
 
     def _offset_sizes(self) -> tuple[Size, ...]:
         return tuple(

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Size
@@ -34,7 +35,7 @@ class Target(Protocol):
     def size_change(self) -> Floats:
         """Change of the observations for one mm of each size."""
 
-    def placing(self, xyz: Floats) -> Floats:
+    def placing(self, xyz: Floats) -> Floats | Freedoms:
         """Change of the observations for the three freedoms of its place."""
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.jobs.artefact import ReferencedFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact, Indications, Size
@@ -98,7 +99,7 @@ class StepGauge(Artefact):
         """See :meth:`Artefact.size_change`: in proportion to the distance."""
         return np.asarray((self.reference * self.expansion / self.sizes[0].nominal)[:, None], dtype=np.float64)
 
-    def placing(self, xyz: Floats) -> Floats:
+    def placing(self, xyz: Floats) -> Freedoms:
         """See :meth:`Artefact.placing`: the position along each line."""
         return self._lines.columns(np.ones((len(xyz), 1)))
 

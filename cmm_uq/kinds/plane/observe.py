@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.kinds.plane.facts import PlaneFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact, Size
@@ -99,7 +100,7 @@ class PlaneSurface(Artefact):
         """See :meth:`Artefact.size_change`: a plane has no size."""
         return np.zeros((len(self.rows), 0))
 
-    def placing(self, xyz: Floats) -> Floats:
+    def placing(self, xyz: Floats) -> Freedoms:
         """See :meth:`Artefact.placing`: height and two tilts of each plane."""
         touched = xyz[self.rows[:, 0]]
         about = touched - self.placings.means(touched)

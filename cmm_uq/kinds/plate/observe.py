@@ -86,8 +86,7 @@ class Plate(Rigid):
             return None
         runs = Placings.of(self.points.group)
         found, certified, ends = [], [], []
-        for run in range(len(runs.numbers)):
-            rows = np.flatnonzero(runs.index == run)
+        for rows in runs.rows:
             a, b = rows[np.array(np.triu_indices(len(rows), 1))]
             ends.append(np.column_stack([a, b]))
             ratio = 0.5 * (self.expansion[a] + self.expansion[b])

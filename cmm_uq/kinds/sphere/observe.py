@@ -78,8 +78,7 @@ class Sphere(Radial):
         runs = Placings.of(self.points.group)
         size = self.sizes[0]
         first, form, diameter = [], [], []
-        for run in range(len(runs.numbers)):
-            rows = np.flatnonzero(runs.index == run)
+        for rows in runs.rows:
             ball = fit_sphere(self.points.xyz[rows], u_point=1.0)
             first.append(rows[0])
             form.append(ball.form_deviation)

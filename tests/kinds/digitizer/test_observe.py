@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.posterior import sample
 from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.digitizer.observe import Digitizer
@@ -138,7 +139,7 @@ def test_the_jacobian_of_every_size_is_that_of_differences(form: str) -> None:
     nominal = np.array([size.nominal for size in digitizer.sizes])
     at = digitizer.fit(digitizer.points.xyz, nominal)
     # what is left of a change after the sphere has moved along with it
-    placing = digitizer.placing(at)
+    placing = Freedoms.of(digitizer.placing(at)).dense()
     left = np.eye(len(placing)) - placing @ np.linalg.pinv(placing)
     for i, size in enumerate(digitizer.sizes):
         step = {"mm": 1e-3, "″": 1.0, "µm": 1.0}[size.unit]
