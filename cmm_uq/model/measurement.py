@@ -24,6 +24,7 @@ from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.physics.effect import Effect
+from cmm_uq.physics.superposition import Superposition
 from cmm_uq.points import Floats
 from cmm_uq.units import Unit
 
@@ -119,7 +120,7 @@ class MeasurementModel:
 
     def errors(self, xyz: Floats, coefficients: Floats) -> Floats:
         """Errors e (n, 3), mm, of points indicated at ``xyz``."""
-        return np.asarray(self._basis(xyz) @ coefficients, dtype=np.float64)
+        return self._acting.errors(self.artefact.points.at(xyz), coefficients)
 
     def indicated(self, true_xyz: Floats, coefficients: Floats) -> Floats:
         """What the machine indicates at true points (n, 3): solves indicated + e(indicated) = true to below 0.01 nm.
@@ -174,7 +175,8 @@ class MeasurementModel:
         coefficients, _ = self._split(values)
         xyz, true = artefact.points.xyz, self.placed(values)
         unexplained = artefact.project(true, (xyz - self.indicated(true, coefficients))[:, :, None])[:, 0]
-        design = np.hstack([-artefact.project(true, self._basis(true)), artefact.size_change()])
+        change = self._acting.derivatives(artefact.points.at(true), coefficients)
+        design = np.hstack([-artefact.project(true, change), artefact.size_change()])
         return LinearModel(
             (unexplained + design @ values)[used], design[used], self.unknowns,
             artefact.placing(true)[used], artefact.noise_scale[used], self.sigma,
@@ -209,10 +211,9 @@ class MeasurementModel:
         exact = self.predicted(np.concatenate([coefficients, sizes]))
         return noise.displayed(exact + noise.drawn(self.artefact.points, random))
 
-    def _basis(self, xyz: Floats) -> Floats:
-        points = self.artefact.points.at(xyz)
-        bases = [effect.basis(points, self.shapes.get(effect.name, ())) for effect in self.effects]
-        return np.concatenate(bases, axis=2) if bases else np.zeros((len(points), 3, 0))
+    @property
+    def _acting(self) -> Superposition:
+        return Superposition(self.effects, self.shapes)
 
     def _split(self, values: Floats) -> tuple[Floats, Floats]:
         k = len(values) - len(self.artefact.sizes)
