@@ -294,13 +294,17 @@ def on_leaning_axes(
         return e
     chain = Chain.of(chain)
     lean = axis_directions(squareness) - np.eye(3)
-    own = readings + position_errors(errors)
-    for j in range(3):
-        moved = own[:, j, None] * lean[..., j, :]
+    # written by components: clouds of points spend their time here
+    for j in (1, 2):  # x does not lean
+        own = readings[:, j] + errors[:, j, j]
+        moved = [own * lean[..., j, k] for k in range(3)]
         turning = [i for i in range(3) if j in _carried(i, chain)]
-        if turning and j:  # x does not lean
-            moved += np.cross(errors[:, turning, 3:].sum(axis=1), moved)
-        e += moved
+        for k in range(3):
+            e[:, k] += moved[k]
+        for i in turning:
+            for k in range(3):
+                e[:, k] += errors[:, i, 3 + (k + 1) % 3] * moved[(k + 2) % 3]
+                e[:, k] -= errors[:, i, 3 + (k + 2) % 3] * moved[(k + 1) % 3]
     return e
 
 
