@@ -129,6 +129,11 @@ class Chain:
         axes = [AXES[i].upper() for i in self.order]
         return "".join([*axes[: self.workpiece], "F" if self.workpiece else "", *axes[self.workpiece :]])
 
+    def rides(self, carriage: str, on: str) -> bool:
+        """Whether a carriage rides on another: what turns the guide of that one turns this one too."""
+        place, below = (self.order.index(AXES.index(axis)) for axis in (carriage, on))
+        return self.workpiece <= below < place or place < below < self.workpiece
+
 
 @lru_cache(maxsize=64)
 def _chain(text: str) -> Chain:
