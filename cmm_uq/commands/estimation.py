@@ -217,7 +217,7 @@ def accuracy(
     if lengths is None:
         return {}
     every = replace(model, used=np.ones_like(model.used))
-    linear, components, sizes = every.linearised(estimate.least_squares.value), noise_of(every), posterior.sizes
+    linear, components, sizes = every.linearised(estimate.about), noise_of(every), posterior.sizes
     predicted = lengths - linear.observed + posterior.draws @ linear.design.T
     return with_uncertainty(
         lengths, predicted, lambda some, times, random: components.repeated(sizes.at(some), times, random), seed,

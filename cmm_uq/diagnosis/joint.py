@@ -14,6 +14,7 @@ from cmm_uq.inference.posterior import NoisyPosterior, Progress
 from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.inference.shaped import Shaped, sample_shaped
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.bending import with_curvature
 from cmm_uq.model.noise import noise_of
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
@@ -53,7 +54,7 @@ def joint_posterior(
     new = [e for e in model.effects if e.shape and e.name in found.effects]
     posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, None if new else progress)
     if not new:
-        return Joint(posterior, components, {})
+        return Joint(with_curvature(model, components, posterior), components, {})
     # what shapes columns is sampled under the noise that is typical with the shapes held
     white = components.white(posterior.sizes.typical)
     linear, values = estimate.linear.uncorrelated(white), estimate.least_squares.value

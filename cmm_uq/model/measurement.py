@@ -19,20 +19,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.inference.least_squares import LeastSquares, solve
+from cmm_uq.inference.least_squares import LeastSquares, likeliest, solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.physics.effect import Effect
 from cmm_uq.physics.superposition import Superposition
 from cmm_uq.points import Floats
-from cmm_uq.units import Unit
+from cmm_uq.units import ARCSECOND, Unit
 
 ARTEFACT = "artefact"
 """First part of the key of a size of the artefact."""
 
 _NO_MACHINE = 1000.0
 """mm."""
+
+_SMALLEST_NOISE = 1e-6
+"""mm."""
+
+SMALL_LEAN = 100 * ARCSECOND
+"""rad: squares and products of angles up to this are 0.25 ppm."""
+
+_MOVED = 10 * ARCSECOND
+"""rad: about an angle this far away a model is as linear."""
+
+_ROUNDS = 20
 
 _SIZE_SCALE = 0.1
 """mm, a typical deviation of an artefact from its nominal size; only scales columns."""
@@ -45,11 +56,13 @@ class Estimate:
     Attributes
     ----------
     least_squares : the estimate.
-    linear : the model, linear about the estimate, whose posterior may be sampled.
+    linear : the model, linear about ``about``, whose posterior may be sampled.
+    about : (k,) the estimate; or, where the recording leaves an angle to its prior, the likeliest parameters.
     """
 
     least_squares: LeastSquares
     linear: LinearModel
+    about: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,20 +180,43 @@ class MeasurementModel:
             values = result.value
             if change.max(initial=0.0) < 1e-9:
                 break
-        return Estimate(result, linear)
+        about = self._likeliest(linear, values, result)
+        return Estimate(result, linear if about is values else self.linearised(about), about)
+
+    def _likeliest(self, linear: LinearModel, values: Floats, found: LeastSquares) -> Floats:
+        """Where the posterior is to be linear: the estimate, unless priors know angles much better than the recording does."""
+        sigma, still = max(found.sigma_of_residuals, _SMALLEST_NOISE), np.zeros_like(values)
+        if not self.leans_beyond(values, still, SMALL_LEAN):
+            return values
+        for _ in range(_ROUNDS):
+            nearer = likeliest(linear, sigma)
+            if not self.leans_beyond(nearer - values, still, _MOVED):
+                break
+            values, linear = nearer, self.linearised(nearer)
+        return values
 
     def linearised(self, values: Floats) -> LinearModel:
         """The model about parameters (k,): ``observed`` is what they leave unexplained plus what they explain."""
         artefact, used = self.artefact, self.used
         coefficients, _ = self._split(values)
-        xyz, true = artefact.points.xyz, self.placed(values)
-        unexplained = artefact.project(true, (xyz - self.indicated(true, coefficients))[:, :, None])[:, 0]
+        true, unexplained = self._unexplained(values)
         change = self._acting.derivatives(artefact.points.at(true), coefficients)
         design = np.hstack([-artefact.project(true, change), artefact.size_change()])
         return LinearModel(
             (unexplained + design @ values)[used], design[used], self.unknowns,
             artefact.placing(true)[used], artefact.noise_scale[used], self.sigma,
         )  # fmt: skip
+
+    def remainder(self, about: Estimate, values: Floats) -> Floats:
+        """What parameters (k,) explain of the used observations, (m,) mm, beyond the linear model of an estimate."""
+        linear = about.linear
+        return linear.observed - linear.design @ values - self._unexplained(values)[1][self.used]
+
+    def _unexplained(self, values: Floats) -> tuple[Floats, Floats]:
+        """Where the artefact's points are, (n, 3), and what parameters (k,) leave unexplained, (m,), mm."""
+        true = self.placed(values)
+        missing = self.artefact.points.xyz - self.indicated(true, self._split(values)[0])
+        return true, self.artefact.project(true, missing[:, :, None])[:, 0]
 
     def seen(self, displacement: Floats, values: Floats) -> Floats:
         """What used observations show, (m, k) in mm, of an error e of the points (n, 3, k) that ``values`` do not contain."""
@@ -210,6 +246,10 @@ class MeasurementModel:
         """
         exact = self.predicted(np.concatenate([coefficients, sizes]))
         return noise.displayed(exact + noise.drawn(self.artefact.points, random))
+
+    def leans_beyond(self, values: Floats, sd: Floats, limit: float) -> bool:
+        """Whether an angle between two axes may differ from 90° by more than ``limit``, rad, within four ``sd`` (k,)."""
+        return self._acting.largest_lean(self.artefact.points, self._split(np.abs(values) + 4 * sd)[0]) > limit
 
     @property
     def _acting(self) -> Superposition:

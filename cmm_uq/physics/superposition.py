@@ -73,6 +73,13 @@ class Superposition:
             basis[:, :, column] = (turned.T * effect.lean(indicated)).T
         return basis
 
+    def largest_lean(self, points: Points, sizes: Floats) -> float:
+        """Largest sum of leans in one plane, rad, where each effect may be as large as its coefficient of ``sizes`` (k,)."""
+        total = dict.fromkeys(SQUARENESSES, 0.0)
+        for column, effect in self._leaning:
+            total[str(effect.plane)] += float(sizes[column] * np.abs(effect.lean(points)).max(initial=0.0))
+        return max(total.values())
+
     def _squareness(self, points: Points, coefficients: Floats) -> Floats | None:
         """Squarenesses (3,) or (n, 3), rad, of all effects that are some; ``None`` where there are none."""
         acting = [(effect, coefficients[column]) for column, effect in self._leaning if coefficients[column]]
