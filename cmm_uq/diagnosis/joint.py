@@ -57,7 +57,7 @@ def joint_posterior(
         return Joint(with_curvature(model, components, posterior), components, {})
     # what shapes columns is sampled under the noise that is typical with the shapes held
     white = components.white(posterior.sizes.typical)
-    linear, values = estimate.linear.uncorrelated(white), estimate.least_squares.value
+    linear, values = estimate.linear.uncorrelated(white), estimate.about
     shaped = [_shaped(found, model, effect, values) for effect in new]
     shaped = [replace(some, table=np.stack([white(columns) for columns in some.table])) for some in shaped]
     drawn = sample_shaped(replace(linear, sigma=None), shaped, seed, progress)
@@ -70,9 +70,8 @@ def joint_posterior(
 
 def _shaped(found: Found, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:
     """An effect's columns on a fine grid of its shape, wherever the search found some probability."""
-    points = model.artefact.points.at(model.placed(values))
     nodes = _nodes(found, effect)
-    table = np.stack([model.seen(effect.basis(points, (float(shape),)), values) for shape in nodes])
+    table = np.stack([model.seen(model.columns(effect, (float(shape),), values), values) for shape in nodes])
     keys = [unknown.key for unknown in model.unknowns]
     return Shaped([keys.index((effect.name, c.name)) for c in effect.coefficients], nodes, table)
 

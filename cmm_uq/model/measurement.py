@@ -76,6 +76,8 @@ class MeasurementModel:
     sigma : standard uncertainty of one recorded coordinate, mm; ``None`` when it is to be estimated.
     used : (m,) which observations to use; all by default.
     shapes : nonlinear parameters, held, of the effects that have some, by the effect's name.
+    within : a model of the same recording with effects more, where these turn out to be so large that they bend it: the linear
+        model is then taken about the estimate of that one.
 
     Raises
     ------
@@ -87,6 +89,7 @@ class MeasurementModel:
     sigma: float | None = None
     used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    within: MeasurementModel | None = None
 
     def __post_init__(self) -> None:
         if not len(self.used):
@@ -171,6 +174,11 @@ class MeasurementModel:
 
     @cached_property
     def _estimate(self) -> Estimate:
+        if self.within is not None:
+            whole, keys = self.within.estimate(), [unknown.key for unknown in self.within.unknowns]
+            own = [keys.index(unknown.key) for unknown in self.unknowns]
+            linear = whole.linear.only(own)
+            return Estimate(solve(linear), linear, whole.about[own])
         values = np.array([u.prior_mean for u in self.unknowns])
         for _ in range(10):
             linear = self.linearised(values)
@@ -220,7 +228,17 @@ class MeasurementModel:
 
     def seen(self, displacement: Floats, values: Floats) -> Floats:
         """What used observations show, (m, k) in mm, of an error e of the points (n, 3, k) that ``values`` do not contain."""
-        return -self.artefact.project(self.placed(values), displacement)[self.used]
+        return -self.artefact.project(self.where(values), displacement)[self.used]
+
+    def where(self, values: Floats) -> Floats:
+        """Points (n, 3), mm, about which the model is linear at ``values``."""
+        return self.placed(values) if self.within is None else self.within.placed(self.within.estimate().about)
+
+    def columns(self, effect: Effect, shape: Sequence[float], values: Floats) -> Floats:
+        """Errors e of the points, (n, 3, j) in mm, for one unit of each coefficient of one effect beside the model's own."""
+        model, about = (self, values) if self.within is None else (self.within, self.within.estimate().about)
+        points = self.artefact.points.at(self.where(values))
+        return model._acting.beside(effect, shape, points, model._split(about)[0])
 
     def placed(self, values: Floats) -> Floats:
         """Points (n, 3), mm, of the artefact where parameters (k,) say that the recording found it."""

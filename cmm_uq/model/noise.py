@@ -30,7 +30,7 @@ def noise_of(model: MeasurementModel, used: np.ndarray | None = None) -> Compone
     """
     artefact = model.artefact
     chosen = model.used if used is None else used
-    xyz = model.placed(model.estimate().least_squares.value)
+    xyz = model.placed(model.estimate().about)
     sensitivity = sensitivities(model, xyz)[chosen]
     rows = artefact.rows[chosen]
     turn, along = _machine_axes(rows, sensitivity)

@@ -73,6 +73,14 @@ class Superposition:
             basis[:, :, column] = (turned.T * effect.lean(indicated)).T
         return basis
 
+    def beside(self, effect: Effect, shape: Sequence[float], true: Points, coefficients: Floats) -> Floats:
+        """Change of e, (n, 3, j) in mm, for one unit of each coefficient of one effect more; as :meth:`derivatives`."""
+        if not any(coefficients[column] for column, _ in self._leaning):
+            return effect.basis(true, shape)
+        whole = Superposition((*self.effects, effect), {**self.shapes, effect.name: shape})
+        own = len(effect.coefficients)
+        return whole.derivatives(true, np.append(coefficients, np.zeros(own)))[:, :, -own:]
+
     def largest_lean(self, points: Points, sizes: Floats) -> float:
         """Largest sum of leans in one plane, rad, where each effect may be as large as its coefficient of ``sizes`` (k,)."""
         total = dict.fromkeys(SQUARENESSES, 0.0)
