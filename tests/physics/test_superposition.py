@@ -129,6 +129,33 @@ def test_columns_are_derivatives_of_the_errors_and_scales_add_up_to_the_place() 
         np.testing.assert_allclose(columns[:, :, i], (ahead - behind) / 2e-2, rtol=1e-7, atol=1e-11)
 
 
+def test_an_effect_beside_others_acts_as_if_it_were_one_of_them() -> None:
+    true, values = somewhere(), np.array([0, 0, 0, 1500.0, -900.0, 700.0])
+    six, more = effects(SIX), effects(("rotation_y_x", "scale_curvature_z"))
+    together = Superposition((*six, *more)).derivatives(true, np.append(values, [0.0, 0.0]))
+    for i, effect in enumerate(more):
+        beside = Superposition(six).beside(effect, (), true, values)
+        np.testing.assert_array_equal(beside, together[:, :, 6 + i : 7 + i])
+        assert np.abs(beside - effect.basis(true)).max() > 1e-3 * np.abs(beside).max()
+    np.testing.assert_array_equal(Superposition(six).beside(more[0], (), true, 0 * values), more[0].basis(true))
+
+
+def test_the_largest_lean_of_a_plane_sums_what_acts_in_it() -> None:
+    points = somewhere(temp_x_c=np.full(7, 25.0), temp_y_c=np.full(7, 25.0), temp_z_c=np.full(7, 14.0))
+    acting = Superposition(effects(("scale_x", "squareness_xy", "thermal_squareness_xy", "squareness_zx")))
+    found = acting.largest_lean(points, np.array([1e6, 50.0, 10.0, 60.0]))
+    assert found == pytest.approx(ARCSEC * (50 + 10 * 4 / 3))
+    assert Superposition(effects(("scale_x",))).largest_lean(points, np.array([1e6])) == 0
+
+
+def test_chosen_points_keep_their_directions() -> None:
+    each = np.arange(63.0).reshape(7, 3, 3)
+    points = replace(somewhere(), directions=each)
+    np.testing.assert_array_equal(points.select(np.array([4, 1])).directions, each[[4, 1]])
+    one = replace(somewhere(), directions=each[0])
+    np.testing.assert_array_equal(one.select(np.array([4, 1])).directions, each[0])
+
+
 def test_without_squareness_everything_adds_up() -> None:
     points = somewhere()
     acting = Superposition(effects((*SIX, "straightness_x_y", "rotation_x_z")))
