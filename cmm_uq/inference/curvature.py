@@ -150,7 +150,14 @@ def bent(posterior: NoisyPosterior, found: Bend) -> NoisyPosterior:
     kept = _metropolis(weight, posterior.steps, posterior.seed)
     draws = (found.centre + z @ found.axes.T)[kept]
     given = {field.name: getattr(posterior, field.name) for field in fields(posterior)}
-    return NoisyPosterior(**given | {"draws": draws, "sigma": posterior.sigma[kept], "sizes": posterior.sizes.at(kept)})
+    held = {"draws": draws, "sigma": posterior.sigma[kept], "sizes": posterior.sizes.at(kept)}
+    return NoisyPosterior(**given | held | {"ess_min": posterior.ess_min * _evenness(weight)})
+
+
+def _evenness(log_weight: Floats) -> float:
+    """Part of draws that are worth as much as equally weighted ones (Kish): 1 where all weigh the same."""
+    weight = np.exp(log_weight - log_weight.max())
+    return float(weight.sum() ** 2 / (len(weight) * np.sum(weight**2)))
 
 
 def _metropolis(log_weight: Floats, steps: int, seed: int) -> Ints:
@@ -161,6 +168,8 @@ def _metropolis(log_weight: Floats, steps: int, seed: int) -> Ints:
     held = walks.copy()
     for step in range(1, steps):
         before, now = held[:, step - 1], walks[:, step]
-        stays = chance[:, step] >= log_weight[now] - log_weight[before]
-        held[:, step] = np.where(stays, before, now)
+        better = np.where(np.isfinite(log_weight[now]), log_weight[now], -np.inf) - np.maximum(
+            log_weight[before], -1e300
+        )
+        held[:, step] = np.where(chance[:, step] < better, now, before)
     return np.asarray(held.ravel(), dtype=np.int64)
