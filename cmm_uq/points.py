@@ -90,6 +90,8 @@ class Points:
     machine : the machine that read them.
     columns : further recorded columns by their name in the recording, each (n,).
     lines : (n,) line of each point in its file, for messages; 0 where there is no file.
+    directions : (3, 3) or (n, 3, 3) unit vectors of the motions of carriages x, y, z, a row each; ``None`` where they are
+        taken as the axes of the coordinates.
     """
 
     xyz: Floats
@@ -99,6 +101,7 @@ class Points:
     machine: Machine = field(default_factory=Machine)
     columns: Mapping[str, Floats] = field(default_factory=dict)
     lines: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    directions: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -185,6 +188,7 @@ class Points:
             self.machine,
             {name: values[rows] for name, values in self.columns.items()},
             self.lines[rows] if len(self.lines) else self.lines,
+            self.directions if self.directions is None or self.directions.ndim == 2 else self.directions[rows],
         )
 
     def group_means(self, values: Floats) -> Floats:

@@ -40,14 +40,18 @@ def cloud(n: int, seed: int = 1) -> np.ndarray:
 
 
 def chain_35(rows: np.ndarray, errors: np.ndarray, squareness: np.ndarray) -> np.ndarray:
-    """Equations 11–13 and 29–35 as they stand, on whole arrays; errors (n, 3, 6)."""
+    """Equations 11–13 and 29–35 on whole arrays, the axes at their exact angles; errors (n, 3, 6)."""
     D = rows[:, 2:]
     d, r = errors[:, :, :3].sum(axis=1), errors[:, :, 3:]
-    (sxy, syz, szx), (_, y, z) = squareness, D.T
+    y, z = D[:, 1], D[:, 2]
+    xy, yz, zx = -np.sin(squareness)
+    lean = np.linalg.cholesky(np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]])) - np.eye(3)
+    along_y, along_z = np.outer(y + errors[:, 1, 1], lean[1]), np.outer(z + errors[:, 2, 2], lean[2])
+    squareness_part = along_y + np.cross(r[:, 0], along_y) + along_z + np.cross(r[:, 0] + r[:, 1], along_z)
     e = np.column_stack(
         [
-            d[:, 0] - y * r[:, 0, 2] + z * (r[:, 0, 1] + r[:, 1, 1]) - y * sxy - z * szx,
-            d[:, 1] - z * (r[:, 0, 0] + r[:, 1, 0]) - z * syz,
+            d[:, 0] - y * r[:, 0, 2] + z * (r[:, 0, 1] + r[:, 1, 1]),
+            d[:, 1] - z * (r[:, 0, 0] + r[:, 1, 0]),
             d[:, 2] + y * r[:, 0, 0],
         ]
     )
@@ -58,7 +62,7 @@ def chain_35(rows: np.ndarray, errors: np.ndarray, squareness: np.ndarray) -> np
     X /= np.linalg.norm(X, axis=1)[:, None]
     A = np.stack([X, np.cross(Z, X), Z], axis=2)
     q = (np.column_stack([rows[:, :2], np.zeros(len(rows))]) - OFFSET) @ ATTITUDE.T
-    return np.einsum("nij,nj->ni", A, q) + D + e
+    return np.einsum("nij,nj->ni", A, q) + D + e + squareness_part
 
 
 def numpy_chain(rows: np.ndarray, error_map: ErrorMap) -> np.ndarray:

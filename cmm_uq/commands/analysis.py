@@ -20,6 +20,7 @@ from cmm_uq.inference.posterior import Progress
 from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
+from cmm_uq.model.bending import with_curvature
 from cmm_uq.model.kind import Kind
 from cmm_uq.model.noise import noise_of
 from cmm_uq.overflow import must_be_finite, refusing_overflow
@@ -65,7 +66,8 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     screened, findings = screened_model(job)
     model, estimate, p_value = with_noise(screened)
     components = noise_of(model)
-    posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, progress)
+    drawn = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, progress)
+    posterior = with_curvature(model, components, drawn)
     figures = accuracy(model, estimate, posterior, seed)
     statements = [
         statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested)

@@ -225,7 +225,7 @@ def accuracy(
     if lengths is None:
         return {}
     every = replace(model, used=np.ones_like(model.used))
-    linear, components, sizes = every.linearised(estimate.least_squares.value), noise_of(every), posterior.sizes
+    linear, components, sizes = every.linearised(estimate.about), noise_of(every), posterior.sizes
     chosen = repeated_draws(len(posterior.draws), len(lengths))
     predicted, sizes = lengths - linear.observed + posterior.draws[chosen] @ linear.design.T, sizes.at(chosen)
     return with_uncertainty(

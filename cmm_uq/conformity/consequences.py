@@ -53,7 +53,7 @@ def consequences(
     if not found or (lengths is None and not job.facts.conformity):
         return None
     estimate = diagnosis.after.estimate()
-    linear, value = estimate.linear, estimate.least_squares.value
+    linear, value = estimate.linear, estimate.about
     ours = np.array([unknown.key[0] in found for unknown in linear.unknowns])
     coefficients = np.where(ours, value, 0.0)[: len(value) - len(artefact.sizes)]
     points = artefact.points.at(artefact.points.xyz + model.errors(artefact.points.xyz, coefficients))
@@ -72,7 +72,9 @@ def consequences(
 
         same = counted_with(artefact.points)[artefact.rows[:, 0]]
         before = with_uncertainty(lengths, predicted, noise, seed, same)
-        after = with_uncertainty(late, predicted - draws[:, ours] @ whole.design[:, ours].T, noise, seed, same)
+        # corrected by the estimate, as the points were; a draw corrects by something else
+        remaining = predicted + (late - lengths) - (draws - value)[:, ours] @ whole.design[:, ours].T
+        after = with_uncertainty(late, remaining, noise, seed, same)
     return Consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(

@@ -14,6 +14,7 @@ from cmm_uq.inference.posterior import NoisyPosterior, Progress
 from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.inference.shaped import Shaped, sample_shaped
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.bending import with_curvature
 from cmm_uq.model.noise import noise_of
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
@@ -53,10 +54,10 @@ def joint_posterior(
     new = [e for e in model.effects if e.shape and e.name in found.effects]
     posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, None if new else progress)
     if not new:
-        return Joint(posterior, components, {})
+        return Joint(with_curvature(model, components, posterior), components, {})
     # what shapes columns is sampled under the noise that is typical with the shapes held
     white = components.white(posterior.sizes.typical)
-    linear, values = estimate.linear.uncorrelated(white), estimate.least_squares.value
+    linear, values = estimate.linear.uncorrelated(white), estimate.about
     shaped = [_shaped(found, model, effect, values) for effect in new]
     shaped = [replace(some, table=np.stack([white(columns) for columns in some.table])) for some in shaped]
     drawn = sample_shaped(replace(linear, sigma=None), shaped, seed, progress)
@@ -69,9 +70,8 @@ def joint_posterior(
 
 def _shaped(found: Found, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:
     """An effect's columns on a fine grid of its shape, wherever the search found some probability."""
-    points = model.artefact.points.at(model.placed(values))
     nodes = _nodes(found, effect)
-    table = np.stack([model.seen(effect.basis(points, (float(shape),)), values) for shape in nodes])
+    table = np.stack([model.seen(model.columns(effect, (float(shape),), values), values) for shape in nodes])
     keys = [unknown.key for unknown in model.unknowns]
     return Shaped([keys.index((effect.name, c.name)) for c in effect.coefficients], nodes, table)
 

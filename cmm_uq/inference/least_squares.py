@@ -90,6 +90,14 @@ def solve(model: LinearModel) -> LeastSquares:
     )  # fmt: skip
 
 
+def likeliest(model: LinearModel, sigma: float) -> Floats:
+    """The parameters (k,) that observations with noise ``sigma``, mm, and all priors together make likeliest."""
+    rows, given = model.priors
+    scale = np.array([u.scale for u in model.unknowns])
+    whole = np.vstack([model.reduced.design / sigma, rows]) * scale
+    return np.asarray(scale * np.linalg.lstsq(whole, np.append(model.reduced.observed / sigma, given), rcond=None)[0])
+
+
 def _enough(observations: int, parameters: int, *, stated: bool) -> None:
     if observations < parameters:
         raise CmmUqError(

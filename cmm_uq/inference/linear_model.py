@@ -110,6 +110,17 @@ class LinearModel:
         )  # fmt: skip
 
     @property
+    def priors(self) -> tuple[Floats, Floats]:
+        """What is known beforehand as p observations of unit variance: rows (p, k), and what they give, (p,).
+
+        A certificate without uncertainty is taken as good to a millionth of a typical size.
+        """
+        known = np.isfinite(self.prior_sd)
+        scale = np.array([u.scale for u in self.unknowns])
+        sd = np.maximum(self.prior_sd, 1e-6 * scale)[known]
+        return np.eye(len(known))[known] / sd[:, None], self.prior_mean[known] / sd
+
+    @property
     def prior_mean(self) -> Floats:
         """(k,)."""
         return np.array([u.prior_mean for u in self.unknowns])

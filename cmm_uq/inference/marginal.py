@@ -108,7 +108,7 @@ class Marginal:
         whole = np.hstack([freedoms.columns, self._turned])
         among = Freedoms(whole, index * freedoms.blocks + freedoms.index, classes * freedoms.blocks)
         each = [among.sums(freedoms.columns[:, [i]] * whole) for i in range(j)]
-        return np.stack(each, axis=1).reshape(classes, -1)
+        return np.stack(each, axis=1).reshape(classes, -1) if each else np.zeros((classes, 0))
 
     @cached_property
     def _absent(self) -> Floats:

@@ -20,19 +20,31 @@ from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.freedoms import Freedoms
-from cmm_uq.inference.least_squares import LeastSquares, solve
+from cmm_uq.inference.least_squares import LeastSquares, likeliest, solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.physics.effect import Effect
+from cmm_uq.physics.superposition import Superposition
 from cmm_uq.points import Floats
-from cmm_uq.units import Unit
+from cmm_uq.units import ARCSECOND, Unit
 
 ARTEFACT = "artefact"
 """First part of the key of a size of the artefact."""
 
 _NO_MACHINE = 1000.0
 """mm."""
+
+_SMALLEST_NOISE = 1e-6
+"""mm."""
+
+SMALL_LEAN = 100 * ARCSECOND
+"""rad: squares and products of angles up to this are 0.25 ppm."""
+
+_MOVED = 10 * ARCSECOND
+"""rad: about an angle this far away a model is as linear."""
+
+_ROUNDS = 20
 
 _SIZE_SCALE = 0.1
 """mm, a typical deviation of an artefact from its nominal size; only scales columns."""
@@ -45,11 +57,13 @@ class Estimate:
     Attributes
     ----------
     least_squares : the estimate.
-    linear : the model, linear about the estimate, whose posterior may be sampled.
+    linear : the model, linear about ``about``, whose posterior may be sampled.
+    about : (k,) the estimate; or, where the recording leaves an angle to its prior, the likeliest parameters.
     """
 
     least_squares: LeastSquares
     linear: LinearModel
+    about: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +77,8 @@ class MeasurementModel:
     sigma : standard uncertainty of one recorded coordinate, mm; ``None`` when it is to be estimated.
     used : (m,) which observations to use; all by default.
     shapes : nonlinear parameters, held, of the effects that have some, by the effect's name.
+    within : a model of the same recording with effects more, where these turn out to be so large that they bend it: the linear
+        model is then taken about the estimate of that one.
 
     Raises
     ------
@@ -74,6 +90,7 @@ class MeasurementModel:
     sigma: float | None = None
     used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    within: MeasurementModel | None = None
 
     def __post_init__(self) -> None:
         if not len(self.used):
@@ -120,7 +137,7 @@ class MeasurementModel:
 
     def errors(self, xyz: Floats, coefficients: Floats) -> Floats:
         """Errors e (n, 3), mm, of points indicated at ``xyz``."""
-        return np.asarray(self._basis(xyz) @ coefficients, dtype=np.float64)
+        return self._acting.errors(self.artefact.points.at(xyz), coefficients)
 
     def indicated(self, true_xyz: Floats, coefficients: Floats) -> Floats:
         """What the machine indicates at true points (n, 3): solves indicated + e(indicated) = true to below 0.01 nm.
@@ -158,6 +175,11 @@ class MeasurementModel:
 
     @cached_property
     def _estimate(self) -> Estimate:
+        if self.within is not None:
+            whole, keys = self.within.estimate(), [unknown.key for unknown in self.within.unknowns]
+            own = [keys.index(unknown.key) for unknown in self.unknowns]
+            linear = whole.linear.only(own)
+            return Estimate(solve(linear), linear, whole.about[own])
         values = np.array([u.prior_mean for u in self.unknowns])
         for _ in range(10):
             linear = self.linearised(values)
@@ -167,23 +189,57 @@ class MeasurementModel:
             values = result.value
             if change.max(initial=0.0) < 1e-9:
                 break
-        return Estimate(result, linear)
+        about = self._likeliest(linear, values, result)
+        return Estimate(result, linear if about is values else self.linearised(about), about)
+
+    def _likeliest(self, linear: LinearModel, values: Floats, found: LeastSquares) -> Floats:
+        """Where the posterior is to be linear: the estimate, unless priors know angles much better than the recording does."""
+        sigma, still = max(found.sigma_of_residuals, _SMALLEST_NOISE), np.zeros_like(values)
+        if not self.leans_beyond(values, still, SMALL_LEAN):
+            return values
+        for _ in range(_ROUNDS):
+            nearer = likeliest(linear, sigma)
+            if not self.leans_beyond(nearer - values, still, _MOVED):
+                break
+            values, linear = nearer, self.linearised(nearer)
+        return values
 
     def linearised(self, values: Floats) -> LinearModel:
         """The model about parameters (k,): ``observed`` is what they leave unexplained plus what they explain."""
         artefact, used = self.artefact, self.used
         coefficients, _ = self._split(values)
-        xyz, true = artefact.points.xyz, self.placed(values)
-        unexplained = artefact.project(true, (xyz - self.indicated(true, coefficients))[:, :, None])[:, 0]
-        design = np.hstack([-artefact.project(true, self._basis(true)), artefact.size_change()])
+        true, unexplained = self._unexplained(values)
+        change = self._acting.derivatives(artefact.points.at(true), coefficients)
+        design = np.hstack([-artefact.project(true, change), artefact.size_change()])
         return LinearModel(
             (unexplained + design @ values)[used], design[used], self.unknowns,
             Freedoms.of(artefact.placing(true)).at(used), artefact.noise_scale[used], self.sigma,
         )  # fmt: skip
 
+    def remainder(self, about: Estimate, values: Floats) -> Floats:
+        """What parameters (k,) explain of the used observations, (m,) mm, beyond the linear model of an estimate."""
+        linear = about.linear
+        return linear.observed - linear.design @ values - self._unexplained(values)[1][self.used]
+
+    def _unexplained(self, values: Floats) -> tuple[Floats, Floats]:
+        """Where the artefact's points are, (n, 3), and what parameters (k,) leave unexplained, (m,), mm."""
+        true = self.placed(values)
+        missing = self.artefact.points.xyz - self.indicated(true, self._split(values)[0])
+        return true, self.artefact.project(true, missing[:, :, None])[:, 0]
+
     def seen(self, displacement: Floats, values: Floats) -> Floats:
         """What used observations show, (m, k) in mm, of an error e of the points (n, 3, k) that ``values`` do not contain."""
-        return -self.artefact.project(self.placed(values), displacement)[self.used]
+        return -self.artefact.project(self.where(values), displacement)[self.used]
+
+    def where(self, values: Floats) -> Floats:
+        """Points (n, 3), mm, about which the model is linear at ``values``."""
+        return self.placed(values) if self.within is None else self.within.placed(self.within.estimate().about)
+
+    def columns(self, effect: Effect, shape: Sequence[float], values: Floats) -> Floats:
+        """Errors e of the points, (n, 3, j) in mm, for one unit of each coefficient of one effect beside the model's own."""
+        model, about = (self, values) if self.within is None else (self.within, self.within.estimate().about)
+        points = self.artefact.points.at(self.where(values))
+        return model._acting.beside(effect, shape, points, model._split(about)[0])
 
     @cached_property
     def _placed(self) -> dict[bytes, Floats]:
@@ -220,10 +276,13 @@ class MeasurementModel:
         exact = self.predicted(np.concatenate([coefficients, sizes]))
         return noise.displayed(exact + noise.drawn(self.artefact.points, random))
 
-    def _basis(self, xyz: Floats) -> Floats:
-        points = self.artefact.points.at(xyz)
-        bases = [effect.basis(points, self.shapes.get(effect.name, ())) for effect in self.effects]
-        return np.concatenate(bases, axis=2) if bases else np.zeros((len(points), 3, 0))
+    def leans_beyond(self, values: Floats, sd: Floats, limit: float) -> bool:
+        """Whether an angle between two axes may differ from 90° by more than ``limit``, rad, within four ``sd`` (k,)."""
+        return self._acting.largest_lean(self.artefact.points, self._split(np.abs(values) + 4 * sd)[0]) > limit
+
+    @property
+    def _acting(self) -> Superposition:
+        return Superposition(self.effects, self.shapes)
 
     def _split(self, values: Floats) -> tuple[Floats, Floats]:
         k = len(values) - len(self.artefact.sizes)

@@ -34,8 +34,8 @@ def noise_of(model: MeasurementModel, used: np.ndarray | None = None) -> Compone
     """
     artefact = model.artefact
     chosen = model.used if used is None else used
-    estimate = model.estimate().least_squares
-    xyz = model.placed(estimate.value)
+    estimate = model.estimate()
+    xyz = model.placed(estimate.about)
     sensitivity = sensitivities(model, xyz)[chosen]
     rows = artefact.rows[chosen]
     turn, along = _machine_axes(rows, sensitivity)
@@ -50,7 +50,7 @@ def noise_of(model: MeasurementModel, used: np.ndarray | None = None) -> Compone
     )
     shares = np.column_stack([axes, reading * count, growth, reading])
     slow, frequency, gap = _slow(model, chosen, sensitivity)
-    step = display_step(artefact.points.xyz, estimate.sigma_of_residuals)
+    step = display_step(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
     possible = {
         AXES: _axes_differ(axes), PLACING: bool(np.any(np.bincount(block) > 1)),
         GROWTH: bool(length.max() > _LEAST_SPREAD * np.median(length[length > 0])) if np.any(length > 0) else False,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.physics.kinematics import Chain, exact, first_order
+from cmm_uq.physics.kinematics import Chain, exact, on_leaning_axes
 from cmm_uq.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.points import AXES, Floats, Ints, Points
 
@@ -59,7 +59,8 @@ class Compensation:
     maps : its error maps.
     chain : its carriages; see :meth:`cmm_uq.physics.kinematics.Chain.of`.
     origin : (3,) scale reading = coordinate + origin, mm.
-    rigid : True for exact rigid transformations, False for the first order of Harris 2004 eq. 10–13.
+    rigid : True for exact rigid transformations; False to first order in displacements and rotations (Harris 2004
+        eq. 10–13), on axes that lean exactly.
     beyond : what to do beyond the mapped positions and temperatures.
     """
 
@@ -82,7 +83,7 @@ class Compensation:
         CmmUqError : a point lies beyond the maps and ``beyond`` is "refuse".
         """
         readings = indicated + np.asarray(self.origin)
-        form = exact if self.rigid else first_order
+        form = exact if self.rigid else on_leaning_axes
         e, extrapolated = np.empty(readings.shape), np.empty(len(readings), dtype=bool)
         for start in range(0, len(readings), BLOCK):
             rows = slice(start, start + BLOCK)
@@ -135,7 +136,7 @@ class Compensation:
             ],
             "chain": Chain.of(self.chain).letters,
             "origin_mm": [float(o) for o in self.origin],
-            "form": "rigid transformations" if self.rigid else "first order",
+            "form": "rigid transformations" if self.rigid else "first order on exact axes",
             "sign": "true = indicated + e",
             "beyond_the_maps": "refused" if self.beyond == "refuse" else "extrapolated",
         }

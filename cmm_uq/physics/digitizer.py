@@ -20,7 +20,7 @@ from cmm_uq.geometry import fit_plane
 from cmm_uq.geometry.frame import frame_about
 from cmm_uq.geometry.orthogonal_distance import minimise
 from cmm_uq.physics.compensation import BLOCK, Circumstances, Compensation
-from cmm_uq.physics.kinematics import first_order
+from cmm_uq.physics.kinematics import on_leaning_axes
 from cmm_uq.physics.map_interpolation import LookedUp
 from cmm_uq.points import Floats
 
@@ -225,7 +225,7 @@ class Digitizer:
         D = np.ascontiguousarray((readings + np.asarray(self.compensation.origin)).T)
         u, v = np.ascontiguousarray(scan.T)
         looked_up = self.compensation.maps.at(D.T, temperatures, beyond=self.compensation.beyond, first=first)
-        e = first_order(D.T, looked_up.errors, looked_up.squareness, chain=self.compensation.chain).T
+        e = on_leaning_axes(D.T, looked_up.errors, looked_up.squareness, chain=self.compensation.chain).T
         X, Y, Z = mount_axes(looked_up.errors[:, :, 3:].sum(axis=1).T)
         E, mount = self.attitude, -self.attitude @ self.offset
         qx, qy, qz = (mount[i] + E[i, 0] * u + E[i, 1] * v for i in range(3))

@@ -23,7 +23,7 @@ class PeriodicScale(Harmonic):
     coefficients = (Parameter("cosine_um", unit("µm"), 10.0), Parameter("sine_um", unit("µm"), 10.0))
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"periodic_scale_{axis}"
         self.title = say("Periodic scale error of {axis}", axis=Verbatim(axis.upper()))
         self.shape = (Shape("period_mm", unit("mm"), 0.5, 1000.0, period_along=axis),)
@@ -48,7 +48,7 @@ class Hysteresis(Effect):
     coefficients = (Parameter("gap_um", unit("µm"), 30.0),)
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"hysteresis_{axis}"
         self.title = say("Hysteresis of {axis}", axis=Verbatim(axis.upper()))
         self.columns = (f"approach_{axis}",)
@@ -72,7 +72,7 @@ class Drift(Effect):
     idealised_over = "time_s"
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"drift_{axis}"
         self.title = say("Drift of {axis} with time", axis=Verbatim(axis.upper()))
 

@@ -97,6 +97,8 @@ class Effect(ABC):
     tier : ``contract`` or ``further``: how readily it is to be thought of.
     idealised_over : axis, or column, over which its form is the simplest of many that its mechanism can have, if it is that.
     imitated_by : nonparametric terms that could pass for it.
+    along_motion : carriage along whose motion e goes, however that leans; ``None`` where e keeps to the coordinates.
+    plane : pair of axes whose squareness it is (``xy``, ``yz``, ``zx``), if it is one; it then gives its :meth:`lean`.
     """
 
     name: str
@@ -110,6 +112,8 @@ class Effect(ABC):
     tier: str = CONTRACT
     idealised_over: str | None = None
     imitated_by: tuple[Nonparametric, ...] = ()
+    along_motion: str | None = None
+    plane: str | None = None
 
     @property
     def prior_weight(self) -> float:
@@ -124,6 +128,15 @@ class Effect(ABC):
         ------
         CmmUqError : a column or a machine's figure is missing.
         """
+
+    def lean(self, points: Points) -> Floats:
+        """Angle between the axes of ``plane`` less 90°, rad, for one unit of the coefficient: () or (n,).
+
+        Raises
+        ------
+        CmmUqError : a column is missing, or it is no squareness.
+        """
+        raise CmmUqError(f"{self.name} is no squareness")
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """Values of the shape worth trying, evenly spread in their logarithm; one empty tuple without a shape."""

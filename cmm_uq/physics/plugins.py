@@ -48,6 +48,7 @@ class _Outside(Effect):
         self.mechanism, self.points_to = effect.mechanism, foreign(effect.points_to)
         self.coefficients, self.shape, self.columns = effect.coefficients, effect.shape, effect.columns
         self.tier, self.idealised_over, self.imitated_by = effect.tier, effect.idealised_over, effect.imitated_by
+        self.along_motion, self.plane = effect.along_motion, effect.plane
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -56,6 +57,10 @@ class _Outside(Effect):
         if found.shape != wanted or found.dtype != np.float64 or not np.isfinite(found).all():
             raise self._plugin.broken(f"gives a basis {found.shape} {found.dtype}, not one {wanted} of finite float64")
         return found
+
+    def lean(self, points: Points) -> Floats:
+        """See :meth:`Effect.lean`."""
+        return np.asarray(self._plugin.attempt(lambda: self._effect.lean(points)), dtype=np.float64)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """See :meth:`Effect.trials`."""

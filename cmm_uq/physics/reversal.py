@@ -90,7 +90,7 @@ class WindUp(Effect):
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"windup_{axis}"
         self.title = say("Wind-up of the drive of {axis}", axis=Verbatim(axis.upper()))
         self.points_to = say(
@@ -120,7 +120,7 @@ class SpeedLag(Effect):
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"speed_lag_{axis}"
         self.title = say("Lag of {axis} in proportion to speed", axis=Verbatim(axis.upper()))
         self.points_to = say(

@@ -16,6 +16,9 @@ from cmm_uq.physics.kinematics import Chain, carried_offset
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
 
+LEANING = MappingProxyType({"xy": ("x", "y"), "yz": ("y", "z"), "zx": ("x", "z")})
+"""Of each plane the axis along which a point moves, and the one that leans, by whose reading it moves."""
+
 
 class Scale(Effect):
     """Linear scale error."""
@@ -27,7 +30,7 @@ class Scale(Effect):
     coefficients = (Parameter("ppm", unit("ppm"), 300.0),)
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"scale_{axis}"
         self.title = say("Scale error of {axis}", axis=Verbatim(axis.upper()))
         self.imitated_by = (Nonparametric(f"{axis}_mm", axis), Nonparametric("time_s", axis, scale=True))
@@ -37,24 +40,37 @@ class Scale(Effect):
         return along(self.axis, PPM * points.readings[self.axis])
 
 
-class Squareness(Effect):
+class Lean(Effect):
+    """The angle between two axes less 90°, or what changes it: to first order, one axis leans by it across its reading."""
+
+    mechanism = "frame"
+
+    def __init__(self, plane: str) -> None:
+        self.plane = plane
+        self.moved, self.lever = LEANING[plane]
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`: for small angles; see :mod:`cmm_uq.physics.superposition` for what they do together."""
+        return along(self.moved, -self.lean(points) * points.readings[self.lever])
+
+
+class Squareness(Lean):
     """Squareness of two axes: their angle less 90°."""
 
     formula = "xy: e_x = −S·y; yz: e_y = −S·z; zx: e_x = −S·z"
-    mechanism = "frame"
     points_to = say("the axes are not square: adjust the guideways or the squareness in the compensation")
 
     coefficients = (Parameter("angle_arcsec", unit("″"), 500.0),)
 
-    def __init__(self, plane: str, moved: str, lever: str) -> None:
-        self.moved, self.lever = moved, lever
+    def __init__(self, plane: str) -> None:
+        super().__init__(plane)
         self.name = f"squareness_{plane}"
         self.title = say("Squareness {plane}", plane=Verbatim("–".join(plane.upper())))
-        self.imitated_by = (Nonparametric(f"{lever}_mm", moved),)
+        self.imitated_by = (Nonparametric(f"{self.lever}_mm", self.moved),)
 
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
-        return along(self.moved, -ARCSECOND * points.readings[self.lever])
+    def lean(self, points: Points) -> Floats:
+        """See :meth:`Effect.lean`."""
+        return np.array(ARCSECOND)
 
 
 class Straightness(Effect):
@@ -115,7 +131,7 @@ def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
     chain = Chain.of(points.machine.chain)
     tip = np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
     acts_on_tip = points.machine.tip_on_every_carriage or axis == AXES[chain.order[-1]]
-    carried = carried_offset(axis, points.carriages, tip if acts_on_tip else None, chain)
+    carried = carried_offset(axis, points.carriages, tip if acts_on_tip else None, chain, points.directions)
     rotation = np.zeros((len(points), 3))
     rotation[:, AXES.index(about)] = angle
     return np.cross(rotation, carried)[:, :, None]
@@ -124,9 +140,7 @@ def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
 SCALE = MappingProxyType({a: Scale(a) for a in AXES})
 """By axis."""
 
-SQUARENESS = MappingProxyType(
-    {"xy": Squareness("xy", "x", "y"), "yz": Squareness("yz", "y", "z"), "zx": Squareness("zx", "x", "z")}
-)
+SQUARENESS = MappingProxyType({plane: Squareness(plane) for plane in LEANING})
 """By plane."""
 
 STRAIGHTNESS = MappingProxyType({(a, b): Straightness(a, b) for a in AXES for b in AXES if a != b})

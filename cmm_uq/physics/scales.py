@@ -35,7 +35,7 @@ class ScaleCurvature(Effect):
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"scale_curvature_{axis}"
         self.title = say("Curvature of the scale of {axis}", axis=Verbatim(axis.upper()))
         self.points_to = say(
@@ -64,7 +64,7 @@ class AirScale(Effect):
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"air_scale_{axis}"
         self.title = say("Refractive index of air on the laser scale of {axis}", axis=Verbatim(axis.upper()))
         self.points_to = say(
@@ -91,7 +91,7 @@ class DeadPath(Effect):
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"dead_path_{axis}"
         self.title = say("Dead path of the laser scale of {axis}", axis=Verbatim(axis.upper()))
         self.points_to = say(

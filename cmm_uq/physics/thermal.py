@@ -29,7 +29,7 @@ class ThermalScale(Effect):
     coefficients = (EXPANSION,)
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"thermal_scale_{axis}"
         self.title = say("Thermal expansion of scale {axis}", axis=Verbatim(axis.upper()))
         self.columns = (f"temp_{axis}_c",)

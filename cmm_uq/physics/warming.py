@@ -12,7 +12,7 @@ import numpy as np
 
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.physics.effect import FURTHER, Effect, Parameter, Shape, along
-from cmm_uq.physics.rigid_body import turned
+from cmm_uq.physics.rigid_body import Lean, turned
 from cmm_uq.physics.thermal import EXPANSION
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import ARCSECOND, HOUR, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
@@ -35,7 +35,7 @@ class ScaleDrift(Effect):
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"scale_drift_{axis}"
         self.title = say("Scale of {axis} growing with time", axis=Verbatim(axis.upper()))
         self.points_to = say(
@@ -62,7 +62,7 @@ class Settling(Effect):
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"settling_{axis}"
         self.title = say("Settling of {axis}", axis=Verbatim(axis.upper()))
         self.points_to = say(
@@ -88,7 +88,7 @@ class ScaleSettling(Effect):
     tier = FURTHER
 
     def __init__(self, axis: str) -> None:
-        self.axis = axis
+        self.axis = self.along_motion = axis
         self.name = f"scale_settling_{axis}"
         self.title = say("Scale of {axis} settling", axis=Verbatim(axis.upper()))
         self.points_to = say(
@@ -102,7 +102,7 @@ class ScaleSettling(Effect):
         return along(self.axis, PPM * _settled(points, shape) * points.readings[self.axis])
 
 
-class ThermalSquareness(Effect):
+class ThermalSquareness(Lean):
     """Squareness that changes with temperature.
 
     A frame of two materials. Harris 2004 table 7 looked for it, and found XY free of it and YZ, ZX by up to 4″/K.
@@ -114,8 +114,8 @@ class ThermalSquareness(Effect):
     columns = tuple(f"temp_{a}_c" for a in AXES)
     tier = FURTHER
 
-    def __init__(self, plane: str, moved: str, lever: str) -> None:
-        self.moved, self.lever = moved, lever
+    def __init__(self, plane: str) -> None:
+        super().__init__(plane)
         self.name = f"thermal_squareness_{plane}"
         self.title = say(
             "Squareness {one}–{other} with temperature",
@@ -129,10 +129,10 @@ class ThermalSquareness(Effect):
             other=Verbatim(plane[1].upper()),
         )
 
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
+    def lean(self, points: Points) -> Floats:
+        """See :meth:`Effect.lean`."""
         excess = np.mean([points.column(name) for name in self.columns], axis=0) - REFERENCE_TEMPERATURE
-        return along(self.moved, -ARCSECOND * excess * points.readings[self.lever])
+        return np.asarray(ARCSECOND * excess)
 
 
 class CarriageGradient(Effect):
@@ -213,9 +213,9 @@ EFFECTS: tuple[Effect, ...] = (
     *(ScaleDrift(a) for a in AXES),
     *(Settling(a) for a in AXES),
     *(ScaleSettling(a) for a in AXES),
-    ThermalSquareness("xy", "x", "y"),
-    ThermalSquareness("yz", "y", "z"),
-    ThermalSquareness("zx", "x", "z"),
+    ThermalSquareness("xy"),
+    ThermalSquareness("yz"),
+    ThermalSquareness("zx"),
     CarriageGradient(
         "bridge",
         say("bridge"),

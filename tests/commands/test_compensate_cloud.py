@@ -27,13 +27,12 @@ from cmm_uq.points import Floats
 from cmm_uq.writing import read_manifest, sha256_of
 from tests.cli.process import run
 from tests.commands.test_compensate import straight
-from tests.commands.test_map_squareness import HARRIS, TABLE_7, stated
+from tests.commands.test_map_squareness import HARRIS, TABLE_7, stated, unit_vectors
 from tests.conftest import ROOT
 
 COLUMNS = ("u_mm", "v_mm", "d_mm", "e_mm", "f_mm")
 OFFSET = (1.001, 264.505, 129.575)
 ANGLES = {1: (90.0, 90.0, -60.0), 2: (90.0, 90.0, 15.0)}
-SECOND = np.pi / 648000
 
 
 def machine(folder: Path, maps: str, more: str = "", poses: tuple[int, ...] = (1,)) -> Path:
@@ -81,11 +80,10 @@ def read_csv(path: Path) -> Floats:
 
 
 def by_hand(rows: Floats) -> Floats:
-    """Equation 35 where no carriage rotates: E·([u v 0] − [U1 V1 W1]) + D + e; E from SciPy, e by equations 11 and 12."""
+    """Equation 35 where no carriage rotates: E·([u v 0] − [U1 V1 W1]) + D + e; E from SciPy, e by the vectors of the axes."""
     u, v, *_ = rows.T
     D = rows[:, 2:]
-    sxy, syz, szx = SECOND * np.array(TABLE_7[20])
-    e = np.column_stack([-sxy * D[:, 1] - szx * D[:, 2], -syz * D[:, 2], 0 * D[:, 0]])
+    e = D @ (unit_vectors(TABLE_7[20]) - np.eye(3))
     scan = np.column_stack([u, v, 0 * u]) - OFFSET
     return Rotation.from_euler("ZXZ", ANGLES[1], degrees=True).apply(scan) + D + e
 

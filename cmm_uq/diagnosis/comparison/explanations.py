@@ -99,7 +99,7 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
     values : (k,) parameters about which it is linear.
     named : effects to leave out.
     """
-    points = model.artefact.points.at(model.placed(values))
+    points = model.artefact.points.at(model.where(values))
     found = []
     for effect in every().values():
         if effect.name in named or any(column not in points.columns for column in effect.columns):
@@ -132,7 +132,7 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
         return
     u = (2 * (along - along.min()) / span - 1)[:, None, None]
     forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
-    basis = effect.basis(points, ()) * np.array([c.prior_sd for c in effect.coefficients])
+    basis = model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
     for s, t in forms:
         columns = model.seen(basis * (1 + s * u + t * (1.5 * u**2 - 0.5)), values)
         yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)
@@ -141,7 +141,7 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
 def finer(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
     """An explanation with some of its shapes divided: each gives way to five about it that share its weight."""
     effect = every()[explanation.name]
-    points = model.artefact.points.at(model.placed(values))
+    points = model.artefact.points.at(model.where(values))
     shaped = [i for i, member in enumerate(explanation.members) if member.shape]
     even = dict(zip(shaped, evenly(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True))
     step = float(np.median(np.diff(np.sort(list(even.values())))))
@@ -200,4 +200,4 @@ def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
 
 def _seen(model: MeasurementModel, effect: Effect, points: Points, shape: tuple[float, ...], values: Floats) -> Floats:
     scale = np.array([c.prior_sd for c in effect.coefficients])
-    return model.seen(effect.basis(points, shape) * scale, values)
+    return model.seen(model.columns(effect, shape, values) * scale, values)

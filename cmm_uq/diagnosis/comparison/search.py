@@ -22,6 +22,7 @@ from cmm_uq.diagnosis.comparison.unknown_functions import unknown
 from cmm_uq.diagnosis.noise import sigma_grid
 from cmm_uq.diagnosis.recorded_noise import noise_kinds
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.measurement import SMALL_LEAN
 from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 
@@ -36,6 +37,9 @@ _MECHANISM = 0.2
 
 _PROBABLE = 0.02
 """Probability from which the period in a combination is refined."""
+
+_AGAIN = 3
+"""Times that everything is compared again about what was found."""
 
 NOT_TOLD_APART = 0.02
 """Odds from which another effect in the place of one counts as not told apart from it."""
@@ -103,6 +107,9 @@ class Found:
 def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed: int) -> Found:
     """Find what a model leaves out.
 
+    Squarenesses that are found so large that the model bends are modelled, and everything is compared again about them: else
+    what they leave out to first order would be taken for further effects.
+
     Parameters
     ----------
     model : what the job names, with its recording.
@@ -110,6 +117,30 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     alpha : false-alarm rate.
     seed : of the null distribution.
     """
+    found = _search(model, stated, alpha, seed)
+    for _ in range(_AGAIN):
+        whole = found.model
+        about = whole.estimate().about
+        if not found.effects or not whole.leans_beyond(
+            about - _without(model, whole), np.zeros_like(about), SMALL_LEAN
+        ):
+            break
+        again = _search(replace(model, within=whole), stated, alpha, seed)
+        if not again.effects:
+            break
+        before, found = found, again
+        if found.effects == before.effects:
+            break
+    return found
+
+
+def _without(model: MeasurementModel, whole: MeasurementModel) -> Floats:
+    """What the model by itself estimates, as parameters (k,) of one with effects more."""
+    own = dict(zip((u.key for u in model.unknowns), model.estimate().about, strict=True))
+    return np.array([own.get(unknown.key, 0.0) for unknown in whole.unknowns])
+
+
+def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: int) -> Found:
     first = model_comparison(model, stated, seed)
     if first.p_value >= alpha:
         return Found(first, first.comparison, None, frozenset(), (), model, 0.0)
@@ -193,7 +224,7 @@ def with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
 
 def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -> ModelComparison:
     """Compare all candidates for what a model leaves; ``seed`` is that of the null distribution."""
-    values = model.estimate().least_squares.value
+    values = model.estimate().about
     singles = known(model, values, tuple(effect.name for effect in model.effects))
     candidates = singles + several(singles) + unknown(model, values)
     comparison = comparison_of(model, stated, candidates)
@@ -229,7 +260,7 @@ def _with(compared: ModelComparison, versions: Sequence[Version], chosen: Key) -
             added.append(every()[explanation.name])
             if added[-1].shape:
                 shapes[explanation.name] = explanation.members[version.member].shape
-    return replace(compared.model, effects=(*compared.model.effects, *added), shapes=shapes)
+    return replace(compared.model, effects=(*compared.model.effects, *added), shapes=shapes, within=None)
 
 
 def _certified(model: MeasurementModel, sigma: float) -> Floats:

@@ -43,7 +43,7 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
     Errors along each axis of each reading and of the place, scales of time, and anything of each covariate of the
     observations.
     """
-    points = model.artefact.points.at(model.placed(values))
+    points = model.artefact.points.at(model.where(values))
     found = [*_of_readings(model, points, values), *_of_place(model, points, values), *_of_time(model, points, values)]
     found += [*_of_direction(model), *_of_all_scales(model, points, values)]
     for name, covariate in covariates(model).items():
@@ -142,7 +142,7 @@ def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> I
 def directions(model: MeasurementModel) -> Floats:
     """Unit vectors (m, 3) along which used observations see a point move; zero where they see differences of points."""
     points = model.artefact.points
-    values = model.estimate().least_squares.value
+    values = model.estimate().about
     seen = model.seen(np.broadcast_to(np.eye(3), (len(points), 3, 3)), values)
     length = np.linalg.norm(seen, axis=1, keepdims=True)
     return np.where(length > _SEEN, seen / np.maximum(length, _SEEN), 0.0)

@@ -46,7 +46,9 @@ def _adjustments(settings: tuple[Setting, ...]) -> list[Block]:
         Column(say("Beyond doubt"), numeric=False),
     )
     notes = (
-        say("X stays; Y is turned square to X, then Z to both. Turns are right-handed about the named axis."),
+        say(
+            "X stays; Y is turned square to X, then Z to both, about X first. Turns are right-handed about the named axis."
+        ),
         say(
             "Beyond doubt: the 95 % interval does not contain zero. Over the travel: what the adjustment "
             "moves at its far end."

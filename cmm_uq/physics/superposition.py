@@ -1,0 +1,139 @@
+"""Errors of several effects at once: displacements add up, on axes that lean as their squarenesses say.
+
+To first order every effect acts as if the others were not there. Squareness errors of hundreds of seconds are too large for
+that: their squares and products, and theirs with scale errors, are parts per million. So they act together, without
+approximation: each carriage moves along the unit vector of :func:`~cmm_uq.physics.kinematics.axis_directions`, by what its
+scale reads and errs (effects ``along_motion``), and rotations act on what the leaning motions carry. Everything else is added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cmm_uq.physics.effect import Effect
+from cmm_uq.physics.kinematics import (
+    SQUARENESSES,
+    along_directions,
+    axis_directions,
+    direction_derivatives,
+    leaning,
+)
+from cmm_uq.points import AXES, Floats, Points
+
+_SETTLED = 1e-9
+"""mm."""
+
+_ROUNDS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Superposition:
+    """Effects that act together.
+
+    Parameters
+    ----------
+    effects : in the order of their coefficients.
+    shapes : nonlinear parameters of the effects that have some, by the effect's name.
+    """
+
+    effects: tuple[Effect, ...]
+    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+
+    def errors(self, points: Points, coefficients: Floats) -> Floats:
+        """Errors e (n, 3), mm, of points as indicated, for coefficients (k,)."""
+        squareness = self._squareness(points, coefficients)
+        if squareness is None:
+            return np.asarray(self._basis(points) @ coefficients, dtype=np.float64)
+        directions = axis_directions(squareness)
+        others = np.where(self._leans, 0.0, coefficients)
+        e = self._basis(replace(points, directions=directions)) @ others
+        return np.asarray(e + leaning(points.carriages, directions), dtype=np.float64)
+
+    def derivatives(self, true: Points, coefficients: Floats) -> Floats:
+        """Change of e, (n, 3, k) in mm, for one unit of each coefficient.
+
+        Parameters
+        ----------
+        true : points where they truly are; the change is that where a machine would indicate them that has these
+            squarenesses and no other error. The columns of three scale errors then add up to the place itself.
+        coefficients : (k,) about which.
+        """
+        squareness = self._squareness(true, coefficients)
+        if squareness is None:
+            return self._basis(true)
+        directions = axis_directions(squareness)
+        indicated = replace(_indicated(true, directions), directions=directions)
+        basis = self._basis(indicated)
+        change = direction_derivatives(squareness)
+        for column, effect in self._leaning:
+            turned = along_directions(indicated.carriages, change[SQUARENESSES.index(str(effect.plane))])
+            basis[:, :, column] = (turned.T * effect.lean(indicated)).T
+        return basis
+
+    def beside(self, effect: Effect, shape: Sequence[float], true: Points, coefficients: Floats) -> Floats:
+        """Change of e, (n, 3, j) in mm, for one unit of each coefficient of one effect more; as :meth:`derivatives`."""
+        if not any(coefficients[column] for column, _ in self._leaning):
+            return effect.basis(true, shape)
+        whole = Superposition((*self.effects, effect), {**self.shapes, effect.name: shape})
+        own = len(effect.coefficients)
+        return whole.derivatives(true, np.append(coefficients, np.zeros(own)))[:, :, -own:]
+
+    def largest_lean(self, points: Points, sizes: Floats) -> float:
+        """Largest sum of leans in one plane, rad, where each effect may be as large as its coefficient of ``sizes`` (k,)."""
+        total = dict.fromkeys(SQUARENESSES, 0.0)
+        for column, effect in self._leaning:
+            total[str(effect.plane)] += float(sizes[column] * np.abs(effect.lean(points)).max(initial=0.0))
+        return max(total.values())
+
+    def _squareness(self, points: Points, coefficients: Floats) -> Floats | None:
+        """Squarenesses (3,) or (n, 3), rad, of all effects that are some; ``None`` where there are none."""
+        acting = [(effect, coefficients[column]) for column, effect in self._leaning if coefficients[column]]
+        if not acting:
+            return None
+        total: list[Floats] = [np.zeros(()) for _ in SQUARENESSES]
+        for effect, coefficient in acting:
+            plane = SQUARENESSES.index(str(effect.plane))
+            total[plane] = total[plane] + coefficient * effect.lean(points)
+        return np.stack(np.broadcast_arrays(*total), axis=-1)
+
+    @property
+    def _leaning(self) -> list[tuple[int, Effect]]:
+        """The effects that are a squareness, each with the place of its coefficient."""
+        first = np.cumsum([0, *(len(effect.coefficients) for effect in self.effects)])
+        return [(int(i), effect) for i, effect in zip(first, self.effects, strict=False) if effect.plane]
+
+    @property
+    def _leans(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """(k,) which coefficients are of a squareness."""
+        return np.array([bool(effect.plane) for effect in self.effects for _ in effect.coefficients], dtype=bool)
+
+    def _basis(self, points: Points) -> Floats:
+        """Displacements (n, 3, k), mm, for one unit of each coefficient, to first order but for where motions go."""
+        bases = [
+            _along_motion(effect, effect.basis(points, self.shapes.get(effect.name, ())), points)
+            for effect in self.effects
+        ]
+        return np.concatenate(bases, axis=2) if bases else np.zeros((len(points), 3, 0))
+
+
+def _along_motion(effect: Effect, basis: Floats, points: Points) -> Floats:
+    """What goes along an axis of the coordinates, turned into the motion of that axis where it leans."""
+    if points.directions is None or effect.along_motion is None:
+        return basis
+    axis = AXES.index(effect.along_motion)
+    return np.asarray(points.directions[..., axis, :, None] * basis[:, axis : axis + 1])
+
+
+def _indicated(true: Points, directions: Floats) -> Points:
+    """Where a machine whose motions have these directions, and no other error, indicates true points."""
+    points = true
+    for _ in range(_ROUNDS):
+        xyz = true.xyz - leaning(points.carriages, directions)
+        change = np.abs(xyz - points.xyz).max(initial=0.0)
+        points = true.at(xyz)
+        if not change > _SETTLED:
+            break
+    return points
