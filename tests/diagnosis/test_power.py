@@ -9,7 +9,7 @@ from scipy import stats
 
 from cmm_uq.diagnosis.comparison.search import model_comparison
 from cmm_uq.diagnosis.power import POWER, DrawnNoise, Power, powers, without_fault
-from cmm_uq.kinds import artefact_facts, artefact_of
+from cmm_uq.kinds import artefact_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning.noise import PlannedNoise
@@ -86,27 +86,3 @@ def test_drawn_noise_has_its_covariance() -> None:
     many = drawn.draws(np.random.default_rng(4), 4000)
     first, second = np.flatnonzero(measurement == measurement[0])
     assert abs(float(np.mean(many[first] * many[second])) - 4.0) < 5 * np.sqrt(41 / 4000)
-
-
-def test_the_gate_opens_as_often_as_predicted_under_set_up_offsets() -> None:
-    """Ten simulated recordings of a ballbar with offsets, predicted with them: within the central 99.9 % of the binomial."""
-    noise = PlannedNoise((1e-3, 1e-3, 1e-3), placing=1.5e-3)
-    chosen = setting(artefact_facts(kind="ballbar", length_mm=400.0, u_um=0.5), repeats=2)
-    points = joined(ready_plan(chosen)[1])
-    model = chosen.model(points)
-    values = np.array([unknown.prior_mean for unknown in model.unknowns])
-    drawn = DrawnNoise(noise.components(model, values), noise.typical, model.artefact.noise_scale)
-    quiet = without_fault(chosen.observed, model, noise.drawn, 0)
-    (power,) = powers(
-        quiet, effects(("rotation_x_z",)), stated=1e-3, sigma=1e-3, alpha=ALPHA, seed=0, noise=drawn
-    )  # fmt: skip
-    assert power.detectable is not None
-    acting = MeasurementModel(artefact_of(chosen.artefact, points), effects(("rotation_x_z",)))
-    random = np.random.default_rng(12)
-    alarms = 0
-    for _ in range(10):
-        sizes = np.array([size.nominal + size.sd * random.standard_normal() for size in acting.artefact.sizes])
-        xyz = acting.simulate(np.array([power.detectable]), sizes, noise.drawn, random)
-        alarms += model_comparison(chosen.model(points.at(xyz)), 1e-3, 0).p_value < ALPHA
-    low, high = stats.binom.interval(0.999, 10, power.detected(power.detectable))
-    assert low <= alarms <= high
