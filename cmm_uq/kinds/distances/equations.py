@@ -100,7 +100,6 @@ class DistanceSolution:
                 }
                 for i, (effect, parameter) in enumerate(FACTORS)
             },
-            "u_conditional_on": "white noise" if self.relative_length_u else "white noise, and the distance as known",
             "angles_deg": dict(zip(SQUARENESS, np.degrees(self.angles_rad).tolist(), strict=True)),
             "residual_sd_um": self.residual_sd / MICROMETRE,
         }
@@ -109,6 +108,11 @@ class DistanceSolution:
     def u(self) -> Floats:
         """(6,) standard uncertainties of the three scales, ppm, and the three squarenesses, ″, the distance's own included."""
         return np.hypot(self._u_of_residuals, self.relative_length_u / PPM * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+
+    @property
+    def conditional_on(self) -> str:
+        """What its uncertainties are conditional on, and those of the fitted model are not."""
+        return "white noise" if self.relative_length_u else "white noise, and the distance as known"
 
     @property
     def coverage_factors(self) -> tuple[float, ...] | None:
@@ -131,8 +135,13 @@ class DistanceSolution:
 
 
 def second_way_data(second_way: DistanceSolution | Text) -> dict[str, Any]:
-    """A solution, or why there is none, for results.json."""
-    return {"refused": second_way} if isinstance(second_way, str) else second_way.as_data()
+    """A solution, or why there is none, and what its uncertainties are conditional on, for results.json."""
+    if isinstance(second_way, str):
+        return {"distance_equations": {"refused": second_way}}
+    return {
+        "distance_equations": second_way.as_data(),
+        "conditional": {"distance_equations": second_way.conditional_on},
+    }
 
 
 def solve_distances(differences: Floats, distance: float | Floats, method: str = "QR") -> DistanceSolution:

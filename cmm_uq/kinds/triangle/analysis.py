@@ -177,6 +177,7 @@ def results(result: Result) -> Mapping[str, Any]:
             }
             for one in equations
         },
+        **({} if isinstance(equations, str) else {"conditional": {"equations": "white noise, and a few observations each"}}),
         "hardly_told_apart": [
             {"effects": [one, other], "correlation": correlation} for one, other, correlation in found.alike
         ],
