@@ -119,8 +119,8 @@ def _advice(plan: Plan) -> Text:
         )  # fmt: skip
     if repeats > enough:
         return say(
-            "With {enough} or more repeats, a minute of one more placing lowers every expected uncertainty more than a minute of "
-            "one more repeat. The plan has {repeats}: fewer repeats and more placings would tell more in the same time.",
+            "With {enough} or more repeats, a minute of one more placing lowers every expected uncertainty more than a minute "
+            "of one more repeat. The plan has {repeats}: fewer repeats and more placings would tell more in the same time.",
             enough=enough, repeats=repeats,
         )  # fmt: skip
     return say(

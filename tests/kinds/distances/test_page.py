@@ -31,7 +31,7 @@ def test_distance_equations_and_model_agree_on_the_real_recording() -> None:
 
 
 def test_distance_equations_are_as_uncertain_as_least_squares_under_white_noise() -> None:
-    """The certificate of the bar is part of both: u of the residuals and 5 µm on 404 mm; k of t, not of a normal distribution."""
+    """The certificate of the bar is part of both: u of the residuals and 5 µm on 404 mm; k is of t."""
     result = analysed("iota-1102-20C")
     found = results(result)["distance_equations"]["factors"]
     squares = result.least_squares
