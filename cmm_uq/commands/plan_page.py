@@ -337,4 +337,11 @@ def _smallest(plan: Plan) -> tuple[Block, ...]:
         false_alarms=100 * FALSE_ALARMS,
         sizes=SIZES[-1],
     )
-    return (Table(say("Smallest effects"), heads, rows, (note,)),)
+    notes: tuple[Text, ...] = (note,)
+    if plan.setting.plan.repeats > 1:
+        optimistic = say(
+            "With repeats, what changes from placing to placing looks in part like set-up offsets: such an effect may have to "
+            "be larger than is said here."
+        )
+        notes = (note, optimistic)
+    return (Table(say("Smallest effects"), heads, rows, notes),)
