@@ -208,7 +208,9 @@ def two_uncertainties(document: Document) -> list[str]:
     seen: dict[str, list[tuple[str, bool]]] = {}
     for table in tables(document).values():
         reason = any("conditional on" in note for note in table.notes)
-        for row in () if table.columns[0].numeric else table.rows:  # where rows are named by a position, no quantity is
+        for row in table.rows:
+            if NUMBER.fullmatch(row[0]):  # a position or a line, of which the columns are several quantities
+                continue
             cells = zip(table.columns, row, strict=True)
             for U in {cell for column, cell in cells if column.heading == "U" and cell not in WORDS}:
                 seen.setdefault(row[0], []).append((U, reason))
