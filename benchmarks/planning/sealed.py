@@ -52,7 +52,7 @@ def plans(setting):
 
 
 def predicted(setting, placings, rivals):
-    model = without_fault(setting.observed, setting.model(joined(placings)), setting.sigma, 0)
+    model = without_fault(setting.observed, setting.model(joined(placings)), Noise(setting.sigma), 0)
     found = powers(model, rivals, stated=setting.sigma, sigma=setting.sigma, alpha=ALPHA, seed=0, draws=96)
     return {power.effect: power for power in found}
 

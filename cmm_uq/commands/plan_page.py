@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from cmm_uq.commands.plan_noise import averaging_note, noise_data, noise_facts, worth, worth_data
 from cmm_uq.commands.plan_words import (
     CRITERIA,
     STATUS,
@@ -11,6 +12,7 @@ from cmm_uq.commands.plan_words import (
     base_name,
     combination,
     expected,
+    expected_white,
     named,
     pairs,
     smallest,
@@ -26,7 +28,7 @@ from cmm_uq.documents.program import program
 from cmm_uq.documents.results_file import head
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, number, plural, say
-from cmm_uq.units import MICROMETRE, unit
+from cmm_uq.units import unit
 
 SCHEMA = "cmm-uq/plan/1"
 
@@ -42,9 +44,10 @@ def plan_results(plan: Plan) -> dict[str, Any]:
     }  # fmt: skip
     return {
         **head(plan.job, SCHEMA),
-        "noise": {"coordinate_um": plan.setting.sigma / MICROMETRE, "stated": plan.setting.stated is not None},
+        "noise": noise_data(plan),
         "start": {"name": plan.name, "placings": len(plan.start.placings), **_outlook_data(plan.start)},
         "better": better,
+        "repeats": worth_data(plan),
         "free": list(plan.free),
         "conditions": [{"what": condition.what, "met": condition.met} for condition in plan.conditions],
         "placings": [
@@ -68,6 +71,7 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
                 "unit": p.unknown.unit,
                 "u": p.u,
                 "u_with_prior": p.u_with_prior,
+                "u_white": p.u_white,
                 "status": p.status,
             }
             for p in found.parameters
@@ -100,9 +104,6 @@ def plan_document(plan: Plan) -> Document:
     """The page of a plan."""
     facts = plan.job.facts
     total = sum(plan.minutes)
-    stated = NOTHING if plan.setting.stated is not None else say(" (assumed: the job states none)")
-    if plan.name == RECORDED and plan.setting.stated is None:
-        stated = say(" (from the recording's residuals)")
     return working_page(
         facts,
         say("Measurement plan"),
@@ -119,10 +120,7 @@ def plan_document(plan: Plan) -> Document:
                 (
                     (say("Start from"), base_name(plan)),
                     (say("To be measured"), _to_measure(plan, total)),
-                    (
-                        say("Noise of a coordinate"),
-                        say("{sigma:.2g} µm{stated}", sigma=plan.setting.sigma / MICROMETRE, stated=stated),
-                    ),
+                    *noise_facts(plan),
                 )
             ),
         ),
@@ -171,6 +169,7 @@ def _sections(plan: Plan) -> tuple[Section, ...]:
             tuple(placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first) if plan.to_measure else ()),
         ),
         Section(say("What these placings determine"), _determined(plan)),
+        Section(say("Repeats or placings"), worth(plan)),
         Section(say("What a better plan gains"), _gain(plan)),
         Section(say("Smallest effects that the diagnosis would find"), _smallest(plan)),
         Section(
@@ -212,12 +211,15 @@ def _determined(plan: Plan) -> tuple[Block, ...]:
     blocks: list[Block] = [Paragraph(say("No reading shows: {text}.", text=text)) for text in plan.free]
     if found is None:
         return tuple(blocks)
-    heads = (Column(say("Parameter"), numeric=False), Column(say("Expected u")), Column(say("Unit"), numeric=False),
-             Column(say("Allowed by physics")), Column(NOTHING, numeric=False))  # fmt: skip
+    heads = (
+        Column(say("Parameter"), numeric=False), Column(say("Expected u")), Column(say("Under white noise")),
+        Column(say("Unit"), numeric=False), Column(say("Allowed by physics")), Column(NOTHING, numeric=False),
+    )  # fmt: skip
     rows = tuple(
         (
             named(p),
             expected(p),
+            expected_white(p),
             unit_of(p),
             (number(p.unknown.prior_sd, ".3g") if p.unknown.prior_sd < 1e6 else say("any")),
             STATUS[p.status],
@@ -229,7 +231,7 @@ def _determined(plan: Plan) -> tuple[Block, ...]:
         "“Allowed by physics” is the standard deviation that the effect may have before anything is "
         "measured."
     )
-    blocks.append(Table(say("What to expect"), heads, rows, (note,)))
+    blocks.append(Table(say("What to expect"), heads, rows, (note, *averaging_note(plan))))
     blocks += [
         Paragraph(say("Stays free: {combination}.", combination=combination(parts)), tone="warning")
         for parts in found.free
@@ -335,4 +337,11 @@ def _smallest(plan: Plan) -> tuple[Block, ...]:
         false_alarms=100 * FALSE_ALARMS,
         sizes=SIZES[-1],
     )
-    return (Table(say("Smallest effects"), heads, rows, (note,)),)
+    notes: tuple[Text, ...] = (note,)
+    if plan.setting.plan.repeats > 1:
+        optimistic = say(
+            "With repeats, what changes from placing to placing looks in part like set-up offsets: such an effect may have to "
+            "be larger than is said here."
+        )
+        notes = (note, optimistic)
+    return (Table(say("Smallest effects"), heads, rows, notes),)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cmm_uq.commands.planning import RECORDED, Plan
+from cmm_uq.inference.linear_model import Unknown
 from cmm_uq.messages import DASH, Message, Text, Verbatim, listed, number, say
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import every
@@ -72,14 +73,26 @@ def _family(members: Sequence[Text]) -> Text:
 
 def expected(parameter: Determined) -> Text:
     """Expected standard uncertainty, in the unit of :func:`unit_of`."""
-    if parameter.u is None:
-        return DASH
-    return number(parameter.u / (MICROMETRE if parameter.unknown.unit == "mm" else 1.0), ".2g")
+    return _in_its_unit(parameter, parameter.u)
+
+
+def expected_white(parameter: Determined) -> Text:
+    """The same, if the noise were white."""
+    return _in_its_unit(parameter, parameter.u_white)
+
+
+def _in_its_unit(parameter: Determined, u: float | None) -> Text:
+    return DASH if u is None else number(u / (MICROMETRE if parameter.unknown.unit == "mm" else 1.0), ".2g")
 
 
 def unit_of(parameter: Determined) -> Text:
     """Unit of an expected uncertainty: sizes of the artefact in micrometres."""
-    return unit("µm") if parameter.unknown.unit == "mm" else parameter.unknown.unit
+    return parameter_unit(parameter.unknown)
+
+
+def parameter_unit(unknown: Unknown) -> Text:
+    """The same of an unknown."""
+    return unit("µm") if unknown.unit == "mm" else unknown.unit
 
 
 def _size_words(name: str) -> Text:
@@ -97,7 +110,12 @@ def _size_words(name: str) -> Text:
 
 def named(parameter: Determined) -> Text:
     """A parameter in words."""
-    owner, name = parameter.unknown.key
+    return parameter_name(parameter.unknown)
+
+
+def parameter_name(unknown: Unknown) -> Text:
+    """An unknown in words."""
+    owner, name = unknown.key
     if owner == ARTEFACT:
         return say("Artefact, {size}", size=_size_words(name))
     effect = every()[owner]

@@ -12,19 +12,22 @@ from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
 from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import READY, Condition
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.diagnosis.power import Power, powers, without_fault
+from cmm_uq.diagnosis.power import DrawnNoise, Power, powers, without_fault
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
 from cmm_uq.messages import Text, say
+from cmm_uq.model import MeasurementModel
 from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.candidates import candidates, thinned
 from cmm_uq.planning.exchange import choose, score_of
 from cmm_uq.planning.identifiability import Identifiability, identifiability
 from cmm_uq.planning.information import told, whole
+from cmm_uq.planning.noise import PlannedNoise, white_noise
 from cmm_uq.planning.placing import Placing, appended, joined, split
 from cmm_uq.planning.ready import ready_plan
+from cmm_uq.planning.repeats import Worth, worth_of_repeats
 from cmm_uq.planning.setting import Setting, Start
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import MICROMETRE
@@ -70,6 +73,7 @@ class Plan:
     kept : how many of the start are part of the better plan.
     scores : of the criterion, before and after; smaller is better.
     conditions : of the standard.
+    worth : repeats against placings; ``None`` where nothing is to be measured, or a recording is there.
     free : of a kind that names no effects, what no reading shows, in words.
     """
 
@@ -82,6 +86,7 @@ class Plan:
     scores: tuple[float, float] | None
     conditions: tuple[Condition, ...]
     free: tuple[Text, ...] = ()
+    worth: Worth | None = None
 
     @property
     def outlook(self) -> Outlook:
@@ -138,9 +143,7 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
         return _series_plan(job, setting)
     name, placings, points = _start(job, setting)
     setting = setting.sized(points)
-    if name == RECORDED and job.facts.recording.u_coordinate_um is None:
-        estimate = setting.model(points).estimate().least_squares
-        setting = replace(setting, sigma=max(estimate.sigma_of_residuals, 1e-3 * MICROMETRE))
+    setting = _with_noise(setting, name, points)
     rivals = setting.rivals(points)
     compared = setting.plan.criterion in (None, "separation")
     start = _outlook(setting, placings, points, rivals, power and compared, seed, _part(tell, 0.1, 0.5))
@@ -151,7 +154,23 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
         points = _after(setting, points, chosen[kept:]) if name == RECORDED else _joined(setting, chosen)
         better = _outlook(setting, chosen, points, rivals, power, seed, _part(tell, 0.6, 0.95))
     met = _of_standard(setting, name, start.points) + _in_time(setting, name, placings)
-    return Plan(job, setting, name, start, better, kept, scores, met)
+    worth = None if name == RECORDED else worth_of_repeats(setting, (better or start).placings)
+    return Plan(job, setting, name, start, better, kept, scores, met, worth=worth)
+
+
+def _with_noise(setting: Setting, name: Text, points: Points) -> Setting:
+    """The setting with the noise of what is planned: a recording is there with its residuals, unless another one is named."""
+    plan = setting.plan
+    said = plan.noise_from is not None or plan.placing_um is not None or plan.growth_um is not None
+    if name == RECORDED and not said:
+        estimate = setting.model(points).estimate().least_squares
+        shown = max(estimate.sigma_of_residuals, 1e-3 * MICROMETRE)
+        return replace(setting, sigma=setting.stated or shown, noise=None)
+    if setting.noise is None:
+        return setting
+    model = setting.model(points)
+    values = np.array([unknown.prior_mean for unknown in model.unknowns])
+    return replace(setting, noise=setting.noise.over(model, values))
 
 
 def _part(tell: Progress, low: float, high: float) -> Callable[[float], None]:
@@ -196,16 +215,25 @@ def _outlook(
     tell: Callable[[float], None],
 ) -> Outlook:  # fmt: skip
     model = setting.model(points)
-    found = identifiability(model, rivals)
+    found = identifiability(model, rivals, setting.noise)
     predicted: list[Power] = []
     if power and rivals:
         stated = setting.stated
-        quiet = without_fault(setting.observed, model, setting.sigma, seed)
-        asked = powers(quiet, rivals, stated=stated, sigma=setting.sigma, alpha=FALSE_ALARMS, seed=seed)
+        noise = setting.noise or white_noise(model)
+        quiet = without_fault(setting.observed, model, noise.drawn, seed)
+        asked = powers(
+            quiet, rivals, stated=stated, sigma=setting.sigma, alpha=FALSE_ALARMS, seed=seed,
+            noise=None if setting.noise is None else _drawn(model, setting.noise),
+        )  # fmt: skip
         for i, each in enumerate(asked):
             predicted.append(each)
             tell((i + 1) / len(rivals))
     return Outlook(placings, points, found, tuple(predicted))
+
+
+def _drawn(model: MeasurementModel, noise: PlannedNoise) -> DrawnNoise:
+    values = np.array([unknown.prior_mean for unknown in model.unknowns])
+    return DrawnNoise(noise.components(model, values), noise.typical, model.artefact.noise_scale)
 
 
 def _searched(

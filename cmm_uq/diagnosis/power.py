@@ -1,10 +1,11 @@
 """How large an effect must be for the diagnosis to find it, and to call it by its name.
 
-Nothing is approximated but the noise, which is white: recordings are drawn on the plan's own design, and the search's own
-statistic, with its own candidates, priors and false-alarm rate, decides on each. What it sees of a draw is a quadratic form,
-so that a recording costs some milliseconds. *Detected*: the lack-of-fit test rejects. *Named*: besides, the true effect alone
-is more probable than any other known effect alone and than none, and so much that no other is said to be as possible
-(:data:`~cmm_uq.diagnosis.comparison.search.NOT_TOLD_APART`): with twins that nothing tells apart, a lucky guess is no name.
+Nothing is approximated but slow noise and tails, of which there are none: recordings are drawn on the plan's own design, and
+the search's own statistic, with its own candidates, priors and false-alarm rate, decides on each. What it sees of a draw is a
+quadratic form, so that a recording costs some milliseconds. *Detected*: the lack-of-fit test rejects. *Named*: besides, the
+true effect alone is more probable than any other known effect alone and than none, and so much that no other is said to be as
+possible (:data:`~cmm_uq.diagnosis.comparison.search.NOT_TOLD_APART`): with twins that nothing tells apart, a lucky guess is no
+name.
 
 (Baarda 1968 and Teunissen 2018 call these sizes minimal detectable and minimal identifiable bias.)
 """
@@ -23,6 +24,7 @@ from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN
 from cmm_uq.diagnosis.comparison.lack_of_fit import DRAWS, statistic_of
 from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
+from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.kind import Observed
 from cmm_uq.physics.effect import Effect
@@ -89,25 +91,52 @@ class Power:
         return size / self.per_unit if size <= self.allowed * self.per_unit else None
 
 
-def without_fault(observe: Observed, model: MeasurementModel, sigma: float, seed: int) -> MeasurementModel:
+@dataclass(frozen=True, eq=False)
+class DrawnNoise:
+    """Noise of the observations of a recording, m of them, in one set of sizes.
+
+    Parameters
+    ----------
+    components, sizes : of the noise.
+    noise_scale : (m,).
+    """
+
+    components: Components
+    sizes: Sizes
+    noise_scale: Floats
+
+    def draws(self, random: np.random.Generator, count: int) -> Floats:
+        """(m, count) over the noise scale and the noise of a reading."""
+        drawn = self.components.repeated(self.sizes, count, random)[0]
+        return np.asarray(drawn.T / self.noise_scale[:, None] / self.sizes.coordinate[0])
+
+    def covariance(self, column: Floats) -> Floats:
+        """The covariance of :meth:`draws` times a column (m, 1)."""
+        scale = 1 / self.noise_scale[:, None] / self.sizes.coordinate[0]
+        variances = self.components.variances(self.sizes)[0][0] @ self.components.shares.T
+        turn = self.components.turn
+        return np.asarray(scale * (turn.T @ (variances[:, None] * (turn @ (scale * column)))))
+
+
+def without_fault(observe: Observed, model: MeasurementModel, noise: Noise, seed: int) -> MeasurementModel:
     """The same model of a recording drawn with nothing left out, in the placings of its own.
 
     Parameters
     ----------
     observe : makes the artefact of points.
     model : gives effects and placings.
-    sigma : noise of a coordinate, mm.
+    noise : that it has.
     """
     artefact = model.artefact
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(8,)))
     sizes = np.array([size.nominal for size in artefact.sizes])
-    xyz = model.simulate(np.zeros(len(model.unknowns) - len(sizes)), sizes, Noise(sigma), random)
+    xyz = model.simulate(np.zeros(len(model.unknowns) - len(sizes)), sizes, noise, random)
     return replace(model, artefact=observe(artefact.points.at(xyz)))
 
 
 def powers(
     model: MeasurementModel, effects: Sequence[Effect], *, stated: float | None, sigma: float, alpha: float, seed: int,
-    draws: int = 20,
+    draws: int = 20, noise: DrawnNoise | None = None,
 ) -> Iterator[Power]:  # fmt: skip
     """Power of the diagnosis of a model's recording, for effects that the model does not name.
 
@@ -120,9 +149,10 @@ def powers(
     alpha : false-alarm rate.
     seed : of the draws; those of the test itself are of seed 0 (:func:`~cmm_uq.diagnosis.comparison.search.search`).
     draws : recordings drawn of each effect and size.
+    noise : of these; white where it is left out. It has ``sigma`` as the noise of a reading.
     """
     compared = model_comparison(model, stated, 0)
-    rule = _Rule(compared.comparison, sigma, alpha)
+    rule = _Rule(compared.comparison, sigma, alpha, noise)
     for effect in effects:
         yield _power(rule, model, compared.values, effect, seed, draws)
 
@@ -172,6 +202,7 @@ class _Rule:
     comparison: Comparison
     sigma: float
     alpha: float
+    coloured: DrawnNoise | None = None
 
     @cached_property
     def _thresholds(self) -> Floats:
@@ -201,18 +232,22 @@ class _Rule:
         return np.asarray(np.interp(ratio, _LARGER, self._thresholds), dtype=np.float64)
 
     def noise(self, direction: Floats, seed: int, draws: int) -> Floats:
-        """White noise (m, draws) and what certificates leave open, in units of the noise, less what the baseline takes.
+        """Noise (m, draws) and what certificates leave open, in units of a reading's, less what the baseline takes.
 
         Its part along ``direction`` (m, 1) is spread evenly over its distribution, which leaves less to chance.
         """
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
-        white = self.comparison.rest(random.standard_normal((len(direction), draws)))
+        drawn, along = random.standard_normal((len(direction), draws)), direction
+        if self.coloured is not None:
+            drawn, along = self.coloured.draws(random, draws), self.comparison.rest(self.coloured.covariance(direction))
+        white = self.comparison.rest(drawn)
         even = special.ndtri((random.permutation(draws) + 0.5) / draws)
-        white = white - direction * (direction.T @ white) + direction * even
+        variance = float((direction.T @ along).item())
+        white = white + along / variance * (np.sqrt(variance) * even - direction.T @ white)
         certified = self.comparison.certified
         if certified.size:
             white = white + self.comparison.rest(certified @ random.standard_normal((certified.shape[1], draws)))
-        return white
+        return np.asarray(white, dtype=np.float64)
 
     def index(self, name: str) -> int | None:
         """Of an effect among the rivals; ``None`` where it is not one, or invisible."""

@@ -18,6 +18,7 @@ from cmm_uq.documents.results_file import diagnosis_data, head
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, number, say, together
+from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.units import MICROMETRE, unit
 
 
@@ -101,7 +102,8 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
     before, after = (
         model.residuals(model.estimate().least_squares.value) / MICROMETRE for model in (d.before, d.after)
     )
-    expanded = 2 * d.noise.coordinate.value * d.before.artefact.noise_scale
+    k = factor_of_noise(d.noise.coordinate)
+    expanded = k * d.noise.coordinate.value * d.before.artefact.noise_scale
     odd = {m for f in found.findings for m in f.measurements}
     gain = d.improvement
     plot = length_plot(
@@ -114,7 +116,9 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
         flagged=np.isin(d.before.artefact.measurement, list(odd)),
         before_label=say("Residuals of the job's model"),
         after_label=say("With what was left out"),
-        caption=say("Residual of each observation before and after, with U (k = 2) from the noise."),
+        caption=say(
+            "Residual of each observation before and after, with U (k = {k}) from the noise.", k=number(k, ".2f")
+        ),
         alternative=say(
             "Residual rms {rms_before_um:.1f} µm before and {rms_after_um:.1f} µm after.",
             rms_before_um=gain.rms_before_um,
@@ -243,9 +247,10 @@ def _where(found: Diagnosed) -> tuple[Block, ...]:
     )
     first = found.diagnosis.where[0]
     x, y, u = first.curve
+    k = factor_of_noise(found.diagnosis.noise.coordinate)
     plot = curve_with_band(
-        x, y, 2 * u, x_label=Verbatim(first.covariate), y_label=say("Error / µm"),
-        caption=say("What the residuals show: {what}, with U (k = 2).", what=first.what),
+        x, y, k * u, x_label=Verbatim(first.covariate), y_label=say("Error / µm"),
+        caption=say("What the residuals show: {what}, with U (k = {k}).", what=first.what, k=number(k, ".2f")),
         alternative=say("A function with a largest value of {amplitude_um:.3g} µm.", amplitude_um=first.amplitude_um),
     )  # fmt: skip
     note = say(

@@ -23,6 +23,7 @@ from cmm_uq.planning.suggestion import Suggestion
 from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding
 from cmm_uq.uncertainty.covariance import Covariance
+from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.uncertainty.quantity import Quantity
 
 LACK_OF_FIT = 0.01
@@ -58,6 +59,16 @@ class Noise:
     wider: float
     stated_um: float | None
     p_value: float | None
+
+    @property
+    def coverage_factor(self) -> float:
+        """K for 95 % of what is uncertain by this noise alone: Student's t, for its size is known so well and no better."""
+        return factor_of_noise(self.coordinate)
+
+    @property
+    def expanded(self) -> float:
+        """U of one reading of one coordinate, µm."""
+        return self.coverage_factor * self.coordinate.value
 
     @property
     def contradicts_stated(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from cmm_uq.files.limits import COLUMNS, LISTED
-from cmm_uq.jobs.table import AnyFloat, Column, Duration, Length, Names, Range, Table, at_least
+from cmm_uq.jobs.table import AnyFloat, Column, Duration, Length, Names, Range, Table, Uncertainty, at_least
 
 Criterion = Literal["separation", "D", "A", "worst"]
 
@@ -43,7 +43,8 @@ class PlanFacts(Table):
     """``[plan]``.
 
     ``ready`` names the plan to start from where there is no recording. With a ``criterion`` a better one is searched for:
-    of ``number`` placings, or of ``more`` beside those that there are.
+    of ``number`` placings, or of ``more`` beside those that there are. The noise is that of ``noise_from``, the results.json
+    of an earlier recording, or has the set-up offset and growth that are stated.
     """
 
     ready: str | None = None
@@ -64,6 +65,9 @@ class PlanFacts(Table):
     candidates: Annotated[int, Field(ge=1, le=2000)] = 300
     minutes_per_placing: Duration = 5.0
     seconds_per_point: Duration = 10.0
+    noise_from: str | None = None
+    placing_um: Uncertainty | None = None
+    growth_um: Uncertainty | None = None
     budget_min: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
 
     @model_validator(mode="after")
@@ -73,6 +77,10 @@ class PlanFacts(Table):
                 raise ValueError(f"volume_mm: {axis} = [{low:g}, {high:g}]: the first number must be the lower one")
         if self.number is not None and self.more is not None:
             raise ValueError("number and more are both given: a plan of so many, or so many beside what there is")
+        if self.noise_from is not None and (self.placing_um is not None or self.growth_um is not None):
+            raise ValueError(
+                "noise_from and placing_um or growth_um are both given: name the recording, or state the sizes"
+            )
         if self.criterion is None and (self.number is not None or self.more is not None):
             raise ValueError('number and more need a criterion: criterion = "separation", "D", "A" or "worst"')
         return self

@@ -17,6 +17,7 @@ from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.digitizer_calibration import calibration_file
 from cmm_uq.jobs.earlier import against_earlier
+from cmm_uq.jobs.earlier_noise import noise_file
 from cmm_uq.jobs.file_names import check_distinct
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
@@ -93,6 +94,9 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
         return Job(folder, facts, _no_points(machine), inputs | _contents(source, maps, MAP_BYTES))
+    noise = noise_file(facts.plan)
+    if noise is not None:
+        inputs |= _contents(source, [noise], TABLE_BYTES, written=True)
     if not recorded and not source.has(facts.recording.file):
         return Job(folder, facts, _no_points(machine), inputs)
     derived = facts.job.derived_from

@@ -24,18 +24,25 @@ _LEAST_SPREAD = 1.5
 """Longest over median length from which on noise may be seen to grow with it."""
 
 
-def noise_of(model: MeasurementModel, used: np.ndarray | None = None) -> Components:
+def noise_of(
+    model: MeasurementModel, used: np.ndarray | None = None, values: Floats | None = None
+) -> Components:  # fmt: skip
     """The noise of a model's observations.
 
     Parameters
     ----------
     model : with its recording.
     used : (m,) which observations; by default those that the model uses.
+    values : (k,) of the model's parameters, of a recording yet to be made; by default those that it is estimated to have.
     """
     artefact = model.artefact
     chosen = model.used if used is None else used
-    estimate = model.estimate()
-    xyz = model.placed(estimate.about)
+    step = 0.0
+    if values is None:
+        estimate = model.estimate()
+        values = estimate.about
+        step = display_step(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
+    xyz = model.placed(values)
     sensitivity = sensitivities(model, xyz)[chosen]
     rows = artefact.rows[chosen]
     turn, along = _machine_axes(rows, sensitivity)
@@ -44,13 +51,12 @@ def noise_of(model: MeasurementModel, used: np.ndarray | None = None) -> Compone
     turn = sparse.csr_array(helmert @ turn)
     axes = np.asarray(abs(helmert).power(2) @ _squares(along, artefact.noise_scale[chosen]))
     reading = axes.sum(axis=1)
-    length = _lengths(model, xyz)[chosen]
+    length = growing_lengths(model, xyz)[chosen]
     growth = np.asarray(
         abs(helmert).power(2) @ (artefact.noise_scale[chosen] ** 2 * (length / max(length.max(), 1e-9)) ** 2)
     )
     shares = np.column_stack([axes, reading * count, growth, reading])
     slow, frequency, gap = _slow(model, chosen, sensitivity)
-    step = display_step(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
     possible = {
         AXES: _axes_differ(axes), PLACING: bool(np.any(np.bincount(block) > 1)),
         GROWTH: bool(length.max() > _LEAST_SPREAD * np.median(length[length > 0])) if np.any(length > 0) else False,
@@ -182,7 +188,7 @@ def _axes_differ(axes: Floats) -> bool:
     return bool(np.sum(np.ptp(parts, axis=0) > _LEAST_SHARE) >= 2)
 
 
-def _lengths(model: MeasurementModel, xyz: Floats) -> Floats:
+def growing_lengths(model: MeasurementModel, xyz: Floats) -> Floats:
     """What noise may grow with, (m,) mm: the length observed, or the distance from the first point of the placing."""
     artefact, rows = model.artefact, model.artefact.rows
     if rows.shape[1] == 2:

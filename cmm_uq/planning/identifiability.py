@@ -18,7 +18,9 @@ from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.effect import Effect
+from cmm_uq.planning.expected import Expected, expected
 from cmm_uq.planning.information import certified, gram, scales
+from cmm_uq.planning.noise import PlannedNoise, uncorrelated, white_noise
 from cmm_uq.planning.separation import FAINT, cosines, imitators, left_of, visible
 from cmm_uq.points import Floats
 
@@ -43,12 +45,14 @@ class Determined:
     unknown : the parameter.
     u : standard uncertainty of its least-squares estimate, in its unit; ``None`` where the placings leave it free.
     u_with_prior : the same when what physics allows is used too.
+    u_white : like ``u``, if the noise were white.
     status : ``determined``, ``weak`` (the prior says almost as much) or ``free``.
     """
 
     unknown: Unknown
     u: float | None
     u_with_prior: float
+    u_white: float | None
     status: str
 
 
@@ -79,22 +83,29 @@ class Identifiability:
         return all(parameter.status != "free" for parameter in self.parameters)
 
 
-def identifiability(model: MeasurementModel, rivals: Sequence[Effect] = ()) -> Identifiability:
+def identifiability(
+    model: MeasurementModel, rivals: Sequence[Effect] = (), noise: PlannedNoise | None = None
+) -> Identifiability:  # fmt: skip
     """What the placings of a model's artefact determine of its effects, and how rivals would show besides.
 
     Parameters
     ----------
     model : effects that are to be determined, with the noise.
     rivals : effects that might act and are not named.
+    noise : of the recording to be; ``None`` for the white noise that the model states.
     """
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear = model.linearised(values)
     estimate = solve(_enough(linear))
-    information = gram(model, values) + certified(model.unknowns)
+    white = white_noise(model) if noise is None else noise.white
+    under_white = expected(model, white)
+    under_noise = under_white if noise is None else expected(model, noise)
+    information = gram(model, values, noise) + certified(model.unknowns)
     named = _named_pairs(information, [unknown.key[0] for unknown in model.unknowns])
-    alike, absorbed, unseen = _among_rivals(model, rivals) if rivals else ([], (), ())
+    alike, absorbed, unseen = _among_rivals(model, rivals, noise) if rivals else ([], (), ())
     return Identifiability(
-        _parameters(linear, estimate), _free(estimate), _singular_values(linear),
+        _parameters(linear, estimate, under_noise, under_white), _free(estimate),
+        _singular_values(uncorrelated(model, values, noise), white.coordinate),
         tuple(sorted([*named, *alike], key=lambda pair: -pair[2])), absorbed, unseen,
     )  # fmt: skip
 
@@ -115,27 +126,23 @@ def _enough(linear: LinearModel) -> LinearModel:
     )  # fmt: skip
 
 
-def _singular_values(linear: LinearModel) -> Floats:
-    sigma = linear.sigma or 1.0
+def _singular_values(linear: LinearModel, sigma: float) -> Floats:
     free = [i for i, unknown in enumerate(linear.unknowns) if not unknown.known]
     white = linear.reduced.design[:, free] * scales(linear.unknowns)[free] / sigma
     return np.asarray(linalg.svdvals(white)) if white.size else np.zeros(0)
 
 
-def _parameters(linear: LinearModel, estimate: LeastSquares) -> tuple[Determined, ...]:
-    scale, sigma = scales(linear.unknowns), linear.sigma or 1.0
-    white = linear.reduced.design * scale / sigma
-    prior = certified(linear.unknowns) + np.diag([float(u.key[0] != ARTEFACT) for u in linear.unknowns])
-    posterior = np.sqrt(np.maximum(np.diag(linalg.pinvh(white.T @ white + prior)), 0.0)) * scale
-    found = []
+def _parameters(
+    linear: LinearModel, estimate: LeastSquares, noisy: Expected, white: Expected
+) -> tuple[Determined, ...]:  # fmt: skip
+    scale, found = scales(linear.unknowns), []
     for i, unknown in enumerate(linear.unknowns):
         if unknown.known:
             continue
-        u = float(np.sqrt(estimate.covariance[i, i])) if estimate.determined[i] else None
-        weak = unknown.key[0] != ARTEFACT and posterior[i] ** 2 > WEAK * scale[i] ** 2
-        found.append(
-            Determined(unknown, u, float(posterior[i]), "free" if u is None else "weak" if weak else "determined")
-        )
+        u, u_white = (float(each.u[i]) if estimate.determined[i] else None for each in (noisy, white))
+        weak = unknown.key[0] != ARTEFACT and noisy.with_prior[i] ** 2 > WEAK * scale[i] ** 2
+        status = "free" if u is None else "weak" if weak else "determined"
+        found.append(Determined(unknown, u, float(noisy.with_prior[i]), u_white, status))
     return tuple(found)
 
 
@@ -147,11 +154,12 @@ def _free(estimate: LeastSquares) -> tuple[Mapping[tuple[str, str], float], ...]
 
 
 def _among_rivals(
-    model: MeasurementModel, rivals: Sequence[Effect]
+    model: MeasurementModel, rivals: Sequence[Effect], noise: PlannedNoise | None
 ) -> tuple[list[Pair], tuple[tuple[str, tuple[str, ...]], ...], tuple[str, ...]]:
     """Pairs of rivals not told apart, everything named fitted; rivals taken for named effects; rivals that do not show."""
     wider = replace(model, effects=(*model.effects, *rivals))
-    information = gram(wider, np.array([u.prior_mean for u in wider.unknowns])) + certified(wider.unknowns)
+    values = np.array([unknown.prior_mean for unknown in wider.unknowns])
+    information = gram(wider, values, noise) + certified(wider.unknowns)
     names = [unknown.key[0] for unknown in wider.unknowns]
     own = {effect.name for effect in model.effects} | {ARTEFACT}
     fitted = [i for i, name in enumerate(names) if name in own]

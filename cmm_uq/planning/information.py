@@ -1,7 +1,7 @@
 """How much each placing tells of every unknown.
 
-The placing's own freedoms are projected out, the noise is white, and so the information of placings adds (JCGM 101 has no
-word for it; Atkinson, Donev & Tobias 2007, *Optimum Experimental Designs*, 5.1). Unknowns are in units of their prior
+The placing's own freedoms are projected out, the noise of placings is independent, and so their information adds (JCGM 101
+has no word for it; Atkinson, Donev & Tobias 2007, *Optimum Experimental Designs*, 5.1). Unknowns are in units of their prior
 standard deviation, a size of the artefact in units of a tenth of a millimetre.
 """
 
@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.inference.linear_model import LinearModel, Unknown
+from cmm_uq.inference.linear_model import Unknown
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.effect import Effect
+from cmm_uq.planning.noise import PlannedNoise, uncorrelated
 from cmm_uq.planning.placing import Placing, joined
 from cmm_uq.planning.setting import Setting
 from cmm_uq.points import Floats, Points
@@ -64,10 +65,10 @@ def told(setting: Setting, placings: Sequence[Placing], also: tuple[Effect, ...]
         columns=plan.columns,
     )  # fmt: skip
     if setting.planning.shared:
-        return shared(setting.model(points, also))
+        return shared(setting.model(points, also), setting.noise)
     numbers = np.unique(points.measurement)
     models = [setting.model(points.select(points.measurement == number), also) for number in numbers]
-    matrices = [gram(model, np.array([u.prior_mean for u in model.unknowns])) for model in models]
+    matrices = [gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise) for model in models]
     return Told(models[0].unknowns, np.stack(matrices), certified(models[0].unknowns))
 
 
@@ -75,14 +76,19 @@ def whole(setting: Setting, points: Points, also: tuple[Effect, ...] = ()) -> Fl
     """Information (k, k) of a whole recording, in the rows of :func:`told`, without that of certificates."""
     model = setting.model(points, also)
     if setting.planning.shared:
-        return np.asarray(shared(model).each.sum(axis=0), dtype=np.float64)
-    return gram(model, np.array([u.prior_mean for u in model.unknowns]))
+        return np.asarray(shared(model, setting.noise).each.sum(axis=0), dtype=np.float64)
+    return gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise)
 
 
-def gram(model: MeasurementModel, values: Floats) -> Floats:
-    """Information (k, k) of all that a model's recording says about the parameters (k,), without any prior."""
-    linear = model.linearised(values)
-    white = linear.reduced.design * scales(linear.unknowns) / _sigma(linear)
+def gram(model: MeasurementModel, values: Floats, noise: PlannedNoise | None = None) -> Floats:
+    """Information (k, k) of all that a model's recording says about the parameters (k,), without any prior.
+
+    Parameters
+    ----------
+    noise : in its typical sizes; ``None`` for the white noise that the model states.
+    """
+    linear = uncorrelated(model, values, noise)
+    white = linear.reduced.design * scales(linear.unknowns) / _sigma(model, noise)
     return np.asarray(white.T @ white, dtype=np.float64)
 
 
@@ -100,19 +106,20 @@ def certified(unknowns: Sequence[Unknown], more: int = 0) -> Floats:
     return np.diag(values)
 
 
-def shared(model: MeasurementModel) -> Told:
+def shared(model: MeasurementModel, noise: PlannedNoise | None = None) -> Told:
     """Information of each measurement of a recording whose placing's freedoms are common to all of them: a swept bar."""
     values = np.array([u.prior_mean for u in model.unknowns])
-    linear = model.linearised(values)
+    linear = uncorrelated(model, values, noise)
     rows = np.hstack([linear.design * scales(linear.unknowns), linear.freedoms.dense()])
-    rows = rows / (linear.noise_scale[:, None] * _sigma(linear))
+    rows = rows / (linear.noise_scale[:, None] * _sigma(model, noise))
     numbers, index = np.unique(model.artefact.measurement, return_inverse=True)
     each = np.zeros((len(numbers), rows.shape[1], rows.shape[1]))
     np.add.at(each, index.ravel(), rows[:, :, None] * rows[:, None, :])
     return Told(linear.unknowns, each, certified(linear.unknowns, linear.freedoms.count))
 
 
-def _sigma(linear: LinearModel) -> float:
-    if linear.sigma is None:
+def _sigma(model: MeasurementModel, noise: PlannedNoise | None) -> float:
+    sigma = model.sigma if noise is None else noise.coordinate
+    if sigma is None:
         raise ValueError("the information of a measurement needs the noise")
-    return linear.sigma
+    return sigma

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.earlier_noise import noise_file, noise_found
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.messages import Text
@@ -15,6 +16,7 @@ from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import Kind, Observe
 from cmm_uq.physics.catalogue import effects, every
 from cmm_uq.physics.effect import CONTRACT, Effect
+from cmm_uq.planning.noise import PlannedNoise
 from cmm_uq.planning.placing import Placing
 from cmm_uq.planning.volume import Volume
 from cmm_uq.points import Machine, Points
@@ -73,6 +75,7 @@ class Setting:
     named : effects that the job's model names.
     sigma : standard uncertainty of one coordinate, mm.
     stated : the same as the job states it; ``None`` where it does not.
+    noise : with its set-up offsets; ``None`` where it is taken as white.
     """
 
     artefact: ArtefactFacts
@@ -83,6 +86,7 @@ class Setting:
     named: tuple[Effect, ...]
     sigma: float
     stated: float | None = None
+    noise: PlannedNoise | None = None
 
     @classmethod
     def of(cls, job: Job, kind: Kind) -> Setting:
@@ -99,11 +103,11 @@ class Setting:
             raise CmmUqError("no effect is named, so there is nothing to determine", where="job.toml [model] effects",
                              fix="Name the error factors that the measurement shall determine")  # fmt: skip
         recorded = job.points.carriages if len(job.points) else None
-        stated = facts.recording.u_coordinate_um
+        stated, noise = facts.recording.u_coordinate_um, _noise(job)
         return cls(
             facts.artefact, observe, planning, plan, Volume.of(job.points.machine, plan, recorded),
-            effects(facts.model.effects, where="job.toml [model] effects"),
-            (stated or ASSUMED_NOISE_UM) * MICROMETRE, None if stated is None else stated * MICROMETRE,
+            effects(facts.model.effects, where="job.toml [model] effects"), noise.coordinate,
+            None if stated is None else stated * MICROMETRE, noise,
         )  # fmt: skip
 
     @property
@@ -157,3 +161,24 @@ class Setting:
             and not effect.shape
             and all(column in points.columns for column in effect.columns)
         )
+
+
+def _noise(job: Job) -> PlannedNoise:
+    """What an earlier recording showed, and else what the job states.
+
+    Raises
+    ------
+    CmmUqError : what the job names is no results.json with the noise of a recording.
+    """
+    plan, stated = job.facts.plan, job.facts.recording.u_coordinate_um
+    name = noise_file(plan)
+    if name is None:
+        each = (stated or ASSUMED_NOISE_UM) * MICROMETRE
+        return PlannedNoise((each, each, each), _micrometres(plan.placing_um), _micrometres(plan.growth_um))
+    found = noise_found(job.inputs[name], str(job.folder / name))
+    x, y, z = (size * MICROMETRE for size in found.reading_um)
+    return PlannedNoise((x, y, z), _micrometres(found.placing_um), _micrometres(found.growth_um))
+
+
+def _micrometres(size: float | None) -> float | None:
+    return None if size is None else size * MICROMETRE

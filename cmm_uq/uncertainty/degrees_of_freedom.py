@@ -16,6 +16,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.correlation import tied
+from cmm_uq.uncertainty.quantity import Quantity
 
 _ROUNDING = 1e-9
 
@@ -77,6 +78,18 @@ def coverage_factor(dof: Floats | float, coverage: float) -> Floats:
     # a t quantile with very many degrees of freedom is that of the normal distribution
     many = truncated > 1e10
     return np.asarray(np.where(many, special.ndtri(p), special.stdtrit(np.where(many, 1.0, truncated), p)))
+
+
+def factor_of_noise(noise: Quantity, u_noise: float = 1.0, u_known: float = 0.0) -> float:
+    """K for 95 % of what is uncertain by a noise whose size is itself uncertain, and besides by what is known well.
+
+    Parameters
+    ----------
+    noise : its standard deviation, with the standard uncertainty of that.
+    u_noise, u_known : standard uncertainties by the noise, and by all else, in one unit.
+    """
+    more = float(np.hypot(u_noise, u_known)) / u_noise if u_noise > 0 else np.inf
+    return float(coverage_factor(noise.degrees_of_freedom * more**4, 0.95))
 
 
 def check_coverage(coverage: float) -> None:

@@ -10,6 +10,12 @@ from cmm_uq.points import Floats
 from cmm_uq.units import Unit
 
 
+def expanded_of(draws: Floats, value: Floats) -> Floats:
+    """U (...) of draws (N, ...) about a value: the larger distance to an end of the 95 % interval."""
+    low, high = np.quantile(draws, [0.025, 0.975], axis=0)
+    return np.asarray(np.maximum(high - value, value - low))
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A quantity with its uncertainty.
@@ -43,6 +49,11 @@ class Quantity:
     def coverage_factor(self) -> float | None:
         """K = U/u; ``None`` where nothing is uncertain."""
         return self.expanded / self.u if self.u > 0 else None
+
+    @property
+    def degrees_of_freedom(self) -> float:
+        """Of a standard deviation that is known this well: ½·(value/u)² (JCGM 100:2008, E.4.3), at least one."""
+        return max(0.5 * (self.value / self.u) ** 2, 1.0) if self.u > 0 else float("inf")
 
     def times(self, factor: float, unit: Unit) -> Quantity:
         """The quantity multiplied by an exact factor, of either sign, in the unit of the product."""

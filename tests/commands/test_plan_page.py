@@ -82,3 +82,32 @@ def test_results_hold_finite_numbers_only(tmp_path: Path) -> None:
     data = plan_results(plan_of(tmp_path, "length_mm = 400.0", length=""))
     assert b"NaN" not in as_json(data)
     assert {p["u"] for p in data["start"]["determined"] if p["status"] == "free"} == {None}
+
+
+def test_what_is_not_known_of_the_noise_is_said(tmp_path: Path) -> None:
+    page = render_html(plan_document(plan_of(tmp_path, "")))
+    assert "averaged over the prior" in page
+    assert "u is the geometric mean" in page
+    stated = plan_of(tmp_path, "placing_um = 1.0\ngrowth_um = 0.0")
+    page = render_html(plan_document(stated))
+    assert "averaged over" not in page
+    # 20 placings of 20 s a bar: from four repeats on, see tests/planning/test_repeats.py; certificates set scales apart
+    data = plan_results(stated)
+    assert data["noise"]["placing_um"] == pytest.approx(1.0)
+    assert data["repeats"]["rows"][2]["readings"] == 120
+    assert "a minute of one more placing lowers every expected uncertainty more" in page
+
+
+def test_repeats_beyond_what_they_are_worth_are_named(tmp_path: Path) -> None:
+    page = render_html(plan_document(plan_of(tmp_path, "placing_um = 5.0\ngrowth_um = 0.0\nrepeats = 5")))
+    assert "With 1 or more repeats" in page
+    assert "fewer repeats and more placings would tell more in the same time" in page
+
+
+def test_a_table_has_one_figure_in_brackets_for_one_more_placing(tmp_path: Path) -> None:
+    data = plan_results(plan_of(tmp_path, "placing_um = 1.0\ngrowth_um = 0.0"))
+    row = data["repeats"]["rows"][2]
+    now, more = (one["u"]["squareness_xy.angle_arcsec"] for one in (row, row["one_placing_more"]))
+    assert more / now == pytest.approx(np.sqrt(20 / 21), rel=1e-9)
+    (determined,) = [p for p in data["start"]["determined"] if p["effect"] == "squareness_xy"]
+    assert determined["u"] == pytest.approx(now, rel=1e-9)

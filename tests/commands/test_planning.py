@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -132,6 +133,46 @@ def test_power_comes_for_every_effect_that_the_job_does_not_name(tmp_path: Path)
     found = {power.effect: power for power in plan.start.powers}
     assert found["rotation_x_z"].detectable is not None
     assert found["artefact_sag"].detectable is None  # one with the scales of X and Y
+
+
+def test_the_noise_of_a_plan_is_stated_or_that_of_an_earlier_recording_or_averaged(tmp_path: Path) -> None:
+    noise = planned(tmp_path).setting.noise
+    assert noise is not None
+    assert (noise.placing, noise.growth) == (None, None)
+    noise = planned(tmp_path, "placing_um = 0.5\ngrowth_um = 0.0").setting.noise
+    assert noise is not None
+    assert (noise.placing, noise.growth) == (pytest.approx(0.5e-3), 0.0)
+    (tmp_path / "earlier").mkdir()
+    earlier = {"coordinate_um": {"value": 2.0, "u": 0.1}, "placing_um": {"value": 0.3, "u": 0.4}}
+    content = json.dumps({"schema": "cmm-uq/results/1", "noise": earlier})
+    (tmp_path / "earlier" / "results.json").write_text(content, encoding="utf-8")
+    plan = planned(tmp_path, 'noise_from = "earlier"')
+    assert plan.setting.noise is not None
+    assert plan.setting.sigma == pytest.approx(2e-3)  # not the 1 µm that the job states
+    assert plan.setting.noise.placing == pytest.approx(0.5e-3)
+
+
+def test_set_up_offsets_make_what_is_expected_worse_by_what_the_repeats_share(tmp_path: Path) -> None:
+    """Three repeats: √(1/3 + 1) of a reading instead of √(1/3)."""
+    plan = planned(tmp_path, "placing_um = 1.0\ngrowth_um = 0.0", effects='"squareness_xy", "squareness_zx"')
+    assert plan.start.identifiability is not None
+    for one in plan.start.identifiability.parameters:
+        assert one.u is not None
+        assert one.u_white is not None
+        assert one.u / one.u_white == pytest.approx(2.0, rel=1e-6)
+    assert plan.worth is not None
+    assert plan.worth.enough == 4
+
+
+def test_what_the_diagnosis_would_find_is_larger_under_set_up_offsets(tmp_path: Path) -> None:
+    found = []
+    for offset in ("0.0", "2.0"):
+        plan = planned(tmp_path, f'rivals = ["rotation_x_z"]\nplacing_um = {offset}\ngrowth_um = 0.0', power=True)
+        (power,) = plan.start.powers
+        assert power.detectable is not None
+        found.append(power.detectable)
+    # √(1/3 + 4) over √(1/3) is 3.6; the test's own threshold has noise too
+    assert found[1] > 2 * found[0]
 
 
 @pytest.mark.parametrize(("plan", "effects", "length", "said"), [

@@ -8,13 +8,14 @@ import numpy as np
 from scipy import stats
 
 from cmm_uq.diagnosis.comparison.search import model_comparison
-from cmm_uq.diagnosis.power import POWER, Power, powers, without_fault
+from cmm_uq.diagnosis.power import POWER, DrawnNoise, Power, powers, without_fault
 from cmm_uq.kinds import artefact_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning.noise import PlannedNoise
 from cmm_uq.planning.placing import joined
 from cmm_uq.planning.ready import ready_plan
-from tests.planning.plans import GAUGE, setting
+from tests.planning.plans import BALLBAR, GAUGE, setting
 
 ALPHA = 0.01
 SETTING = setting(GAUGE, length_mm=820.0, repeats=1)
@@ -23,7 +24,7 @@ POINTS = joined(ready_plan(SETTING)[1])
 
 @cache
 def predicted() -> dict[str, Power]:
-    model = without_fault(SETTING.observed, SETTING.model(POINTS), SETTING.sigma, 0)
+    model = without_fault(SETTING.observed, SETTING.model(POINTS), Noise(SETTING.sigma), 0)
     rivals = effects(("rotation_y_y", "rotation_x_y", "rotation_y_x", "rotation_z_z"))
     found = powers(model, rivals, stated=SETTING.sigma, sigma=SETTING.sigma, alpha=ALPHA, seed=0)
     return {power.effect: power for power in found}
@@ -68,3 +69,20 @@ def test_the_gate_opens_as_often_as_predicted() -> None:
         alarms += model_comparison(SETTING.model(POINTS.at(xyz)), SETTING.sigma, 0).p_value < ALPHA
     low, high = stats.binom.interval(0.999, 10, power.detected(power.detectable))
     assert low <= alarms <= high
+
+
+def test_drawn_noise_has_its_covariance() -> None:
+    """The product with the covariance, against the dense one of readings and offsets shared by repeats."""
+    chosen = setting(BALLBAR, repeats=2)
+    model = chosen.model(joined(ready_plan(chosen)[1]))
+    noise = PlannedNoise((1e-3, 1e-3, 1e-3), placing=2e-3)
+    values = np.array([unknown.prior_mean for unknown in model.unknowns])
+    drawn = DrawnNoise(noise.components(model, values), noise.typical, model.artefact.noise_scale)
+    measurement = model.artefact.measurement
+    dense = np.eye(len(measurement)) + 4.0 * (measurement[:, None] == measurement)
+    column = np.random.default_rng(3).standard_normal((len(measurement), 1))
+    np.testing.assert_allclose(drawn.covariance(column), dense @ column, rtol=1e-9, atol=1e-9)
+    # of 4000 draws, the product of two that share an offset: 4 ± √(5² + 4²)/√4000, five of which are allowed
+    many = drawn.draws(np.random.default_rng(4), 4000)
+    first, second = np.flatnonzero(measurement == measurement[0])
+    assert abs(float(np.mean(many[first] * many[second])) - 4.0) < 5 * np.sqrt(41 / 4000)

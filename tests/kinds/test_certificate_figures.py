@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from itertools import chain
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 
 from cmm_uq.commands.analysis import outcome_of
-from cmm_uq.documents.document import Table
+from cmm_uq.documents.document import Document, Table
 from cmm_uq.documents.results_file import as_json
 from cmm_uq.kinds.shift_plate.page import _ROWS as EVERY
 from tests.conftest import ROOT
@@ -101,7 +102,7 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Scale, squareness, pitch, yaw and roll": lambda r: beside_estimates(r, r["equations"]),
     "Axis figures": axis_figures,
     "Error by position": lambda r: columns(r["curves"]["linearity_x"], "position_mm", "error_um", "U_um", "band_um"),
-    "The artefact's own dimensions (k = 2)": lambda r: columns(r["artefact"], "point", "distance_mm", "U_mm"),
+    "The artefact's own dimensions": lambda r: columns(r["artefact"], "point", "distance_mm", "U_mm"),
     "Plane figures": axis_figures,
     "Errors of axis X": curves_of("x"),
     "Errors of axis Y": curves_of("y"),
@@ -177,6 +178,64 @@ def test_a_figure_that_is_off_by_its_last_place_is_not_found() -> None:
         (sphere,) = records[0]
         off = [[{**sphere, key: sphere[key] * 1.05 + 0.02}], *records[1:]]
         assert len(missing(table, off)) == 1, key
+
+
+def stated(data: object, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Every expanded uncertainty of an effect's parameter, by where it stands; adjustments have the effect in a key."""
+    if isinstance(data, Mapping):
+        named = (str(data["effect"]),) if isinstance(data.get("effect"), str) else ()
+        for key, value in data.items():
+            if isinstance(value, Mapping) and isinstance(value.get("U"), float):
+                yield (*path, *named, key), value["U"]
+            yield from stated(value, (*path, *named, key))
+    elif isinstance(data, list):
+        for one in data:
+            yield from stated(one, path)
+
+
+def disagreeing(results: Results) -> list[str]:
+    """Parts of results.json that state another U of an estimated parameter than the estimates, and no reason."""
+    own = {path[-2:]: U for path, U in stated(results["estimates"])}
+    return [
+        ".".join(path)
+        for path, U in stated(results)
+        if path[-2:] in own and own[path[-2:]] != U and not results["conditional"].get(path[0])
+    ]
+
+
+def two_uncertainties(document: Document) -> list[str]:
+    """Rows of which two tables print different U, where no note of either says what one of them is conditional on."""
+    seen: dict[str, list[tuple[str, bool]]] = {}
+    for table in tables(document).values():
+        reason = any("conditional on" in note for note in table.notes)
+        for row in table.rows:
+            if NUMBER.fullmatch(row[0]):  # a position or a line, of which the columns are several quantities
+                continue
+            cells = zip(table.columns, row, strict=True)
+            for U in {cell for column, cell in cells if column.heading == "U" and cell not in WORDS}:
+                seen.setdefault(row[0], []).append((U, reason))
+    return [name for name, found in seen.items() if len({U for U, _ in found}) > 1 and not any(r for _, r in found)]
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_no_quantity_has_two_uncertainties_without_a_reason(example: str) -> None:
+    results = {"conditional": {}, **read_back(example)}
+    assert disagreeing(results) == []
+    assert two_uncertainties(document(example)) == []
+
+
+def test_two_uncertainties_of_one_quantity_are_seen() -> None:
+    """Without its reason, the second way to the factors of a ballbar is one."""
+    results = read_back("iota-1102-20C")
+    assert len(disagreeing({**results, "conditional": {}})) == 6
+    found = document("iota-1102-20C")
+    bare = [
+        replace(section, blocks=tuple(replace(b, notes=()) if isinstance(b, Table) else b for b in section.blocks))
+        for section in found.sections
+    ]
+    # 16″ of X–Y and 14″ of Y–Z are the same as printed
+    expected = [*(f"Scale error of {axis}" for axis in "XYZ"), "Angle Z–X − 90°"]
+    assert two_uncertainties(replace(found, sections=tuple(bare))) == expected
 
 
 @pytest.mark.parametrize("example", EXAMPLES)

@@ -7,7 +7,9 @@ import pytest
 from scipy import stats
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.uncertainty.degrees_of_freedom import check_coverage, coverage_factor, effective_dof
+from cmm_uq.uncertainty.degrees_of_freedom import check_coverage, coverage_factor, effective_dof, factor_of_noise
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import unit
 
 INDEPENDENT = np.eye(3)
 PAIR = np.array([[1.0, 0.5, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -77,3 +79,19 @@ def test_no_other_number_is_a_probability(coverage: float) -> None:
         check_coverage(coverage)
     check_coverage(1e-6)
     check_coverage(1 - 1e-6)
+
+
+def test_a_noise_from_few_residuals_widens_what_it_makes_uncertain() -> None:
+    """u(s)/s = (2ν)^−½ (JCGM 100, E.4.3): 0.1890 for 14, of which t is 2.14 (table G.2); 2.36 for 7."""
+    for freedom, k in ((14, 2.14), (7, 2.36)):
+        noise = Quantity(3.0, 3.0 / np.sqrt(2 * freedom), (2.0, 4.0), unit("µm"))
+        assert noise.degrees_of_freedom == pytest.approx(freedom)
+        assert factor_of_noise(noise) == pytest.approx(k, abs=0.005)
+
+
+def test_what_is_known_well_beside_the_noise_brings_k_towards_the_normal() -> None:
+    """ν·(u_c/u_noise)⁴ (G.2b): equal parts make four times 14, 56, whose t is 2.00; without noise it is 1.96."""
+    noise = Quantity(3.0, 3.0 / np.sqrt(28), (2.0, 4.0), unit("µm"))
+    assert factor_of_noise(noise, 2.0, 2.0) == pytest.approx(stats.t.ppf(0.975, 56), rel=1e-9)
+    assert factor_of_noise(noise, 0.0, 2.0) == pytest.approx(1.95996, abs=1e-5)
+    assert factor_of_noise(Quantity(3.0, 0.0, (3.0, 3.0), unit("µm"))) == pytest.approx(1.95996, abs=1e-5)

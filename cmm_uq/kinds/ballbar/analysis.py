@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
-
-import numpy as np
 
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import refusal
@@ -47,7 +45,7 @@ def results(result: Result) -> dict[str, Any]:
         "lengths": found.lengths.as_data(),
         "length_budget": budget_data(found.budget),
         "adjustments": [setting.as_data() for setting in found.settings],
-        "distance_equations": second_way_data(found.second_way),
+        **second_way_data(found.second_way),
     }
 
 
@@ -55,14 +53,13 @@ def _budget(result: Result, bar: Ballbar) -> Budget:
     """What one length's deviation from the reference is uncertain by: the readings, and the certified length."""
     coordinate = result.noise.coordinate
     origin = say("residuals of this recording") if coordinate.u > 0 else say("stated in the job")
-    dof = float(result.least_squares.degrees_of_freedom) if coordinate.u > 0 else np.inf
     lines = [
         Line(
             say("Coordinate of a ball, along the bar, twice"),
             coordinate.value,
             origin,
             unit=unit("µm"),
-            dof=max(dof, 1.0),
+            dof=coordinate.degrees_of_freedom,
             sensitivity=float(bar.noise_scale[0]),
         )
     ]
@@ -81,6 +78,7 @@ def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | Text:
     if not size.certified:
         return say("The length of the bar is not certified.")
     try:
-        return solve_distances((ends[:, 1] - ends[:, 0])[used], (size.nominal * bar.expansion)[used])
+        found = solve_distances((ends[:, 1] - ends[:, 0])[used], (size.nominal * bar.expansion)[used])
+        return replace(found, relative_length_u=size.sd / size.nominal)
     except CmmUqError as error:
         return refusal(error)

@@ -12,7 +12,7 @@ from cmm_uq.documents.wording import numbered
 from cmm_uq.kinds.ballbar.analysis import figures, results
 from cmm_uq.kinds.distances import page as adjustment_section
 from cmm_uq.kinds.distances.lengths import Lengths
-from cmm_uq.messages import NOTHING, Text, say
+from cmm_uq.messages import NOTHING, Text, number, say
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE, unit
 
@@ -34,8 +34,9 @@ def sections(result: Result) -> list[Section]:
         reference=say("{name} {length:.4f}\u00a0mm", name=name, length=lengths.reference),
         reference_expanded_um=2 * size.sd / MICROMETRE if size.certified else 0.0,
         caption=say(
-            "Deviation of each length from the {name}, as recorded and after the fitted model, with U (k = 2).",
+            "Deviation of each length from the {name}, as recorded and after the fitted model, with U (k = {k}).",
             name=name,
+            k=number(lengths.coverage_factor, ".2f"),
         ),
         alternative=say(
             "{count} lengths: as recorded they deviate by {low:.0f} to {high:.0f} µm from the {name}; "
@@ -75,8 +76,9 @@ def _table(lengths: Lengths, name: Text) -> Table:
     )
     left = len(lengths.length) - len(rows)
     note = say(
-        "U = {U} µm (k = 2) for each length, from the standard uncertainty of a coordinate.",
+        "U = {U} µm (k = {k}) for each length, from the standard uncertainty of a coordinate and how well that is known.",
         U=rounded(0.0, expanded)[1],
+        k=number(lengths.coverage_factor, ".2f"),
     )
     notes = (note, say("{left} more lengths are in the attached recording.", left=left)) if left > 0 else (note,)
     return Table(say("Lengths brought to 20 °C"), columns, tuple(rows), notes)

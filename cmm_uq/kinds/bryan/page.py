@@ -9,7 +9,7 @@ from cmm_uq.documents.residual_volume import residual_volume
 from cmm_uq.documents.result import Result
 from cmm_uq.kinds.bryan.analysis import figures, results
 from cmm_uq.kinds.distances import page as adjustment_section
-from cmm_uq.messages import say
+from cmm_uq.messages import number, say
 
 IN_TWO_STEPS = say(
     "The fixed ball is found first, as if the machine had no errors, and its centre takes up part of them. The fitted model "
@@ -32,7 +32,8 @@ def sections(result: Result) -> list[Section]:
         flagged=lengths.flagged,
         position_label=say("Position of the swept ball"),
         caption=say(
-            "Distance of the swept ball from the fixed one, as recorded and after the fitted model, with U (k = 2)."
+            "Distance of the swept ball from the fixed one, as recorded and after the fitted model, with U (k = {k}).",
+            k=number(lengths.coverage_factor, ".2f"),
         ),
         alternative=say(
             "{count} positions: about the best centre the distances deviate by {low:.1f} to {high:.1f} "

@@ -126,7 +126,7 @@ def _attitudes(found: DigitizerFigures) -> Table:
 def _residuals(result: Result, digitizer: Digitizer) -> Plot:
     after = result.residuals / MICROMETRE
     before = _before(digitizer) / MICROMETRE
-    expanded_um = 2 * result.noise.coordinate.value
+    expanded_um = result.noise.expanded
     what = (
         say("radial distance of each point of the sphere")
         if digitizer.scanned
@@ -136,7 +136,9 @@ def _residuals(result: Result, digitizer: Digitizer) -> Plot:
         digitizer.measurement.astype(float), before, after, expanded_before_um=expanded_um, expanded_after_um=expanded_um,
         reference=say("fitted sphere") if digitizer.scanned else say("common centre"), flagged=result.flagged,
         position_label=say("Attitude (its observations side by side)"), before_label=say("With the offset by centres"),
-        caption=say("Residuals, {what}, with U (k = 2) of a coordinate.", what=what),
+        caption=say(
+            "Residuals, {what}, with U (k = {k}) of a coordinate.", what=what, k=number(result.noise.coverage_factor, ".2f")
+        ),
         alternative=say(
             "{count} observations: with the offset by centres they deviate by {low:.1f} to {high:.1f} µm; after the "
             "fitted model {low_after:.1f} to {high_after:.1f} µm remain.",

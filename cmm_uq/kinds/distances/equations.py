@@ -20,6 +20,7 @@ from cmm_uq.kinds.distances.symmetric_systems import by_doolittle, by_jacobi
 from cmm_uq.messages import Text, commas, plural, say
 from cmm_uq.physics.rigid_body import SCALE, SQUARENESS
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.degrees_of_freedom import coverage_factor
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
 
 UNKNOWNS = 6
@@ -57,12 +58,14 @@ class DistanceSolution:
     covariance : (6, 6) of them, from the residuals.
     residuals : (m,) calibrated distance minus the one that e1 … e6 make of the readings, mm.
     residual_sd : mm; 0 without degrees of freedom.
+    relative_length_u : relative standard uncertainty of the distance, where it is certified; 0 where it is taken as known.
     """
 
     e: Floats
     covariance: Floats
     residuals: Floats
     residual_sd: float
+    relative_length_u: float = 0.0
 
     @property
     def scales_ppm(self) -> Floats:
@@ -81,14 +84,21 @@ class DistanceSolution:
 
     def as_data(self) -> dict[str, Any]:
         """For results.json: e1 … e6 with their covariance, the six factors and the angles that they give."""
-        factors = zip(
-            FACTORS, [*self.scales_ppm.tolist(), *self.squareness_arcsec.tolist()], self.u.tolist(), strict=True
-        )
+        u, k = self.u.tolist(), self.coverage_factors
+        values = [*self.scales_ppm.tolist(), *self.squareness_arcsec.tolist()]
         return {
             "e": self.e.tolist(),
             "e_covariance": self.covariance.tolist(),
             "factors": {
-                effect: {parameter: {"value": value, "u": u, "U": 2 * u}} for (effect, parameter), value, u in factors
+                effect: {
+                    parameter: {
+                        "value": values[i],
+                        "u": u[i],
+                        "U": None if k is None else k[i] * u[i],
+                        "k": None if k is None else k[i],
+                    }
+                }
+                for i, (effect, parameter) in enumerate(FACTORS)
             },
             "angles_deg": dict(zip(SQUARENESS, np.degrees(self.angles_rad).tolist(), strict=True)),
             "residual_sd_um": self.residual_sd / MICROMETRE,
@@ -96,7 +106,25 @@ class DistanceSolution:
 
     @property
     def u(self) -> Floats:
-        """(6,) standard uncertainties of the three scales, ppm, and the three squarenesses, ″, from the residuals."""
+        """(6,) standard uncertainties of the three scales, ppm, and the three squarenesses, ″, the distance's own included."""
+        return np.hypot(self._u_of_residuals, self.relative_length_u / PPM * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+
+    @property
+    def conditional_on(self) -> str:
+        """What its uncertainties are conditional on, and those of the fitted model are not."""
+        return "white noise" if self.relative_length_u else "white noise, and the distance as known"
+
+    @property
+    def coverage_factors(self) -> tuple[float, ...] | None:
+        """Of each for 95 %: Student's t with its effective degrees of freedom (JCGM 100, G.4); ``None`` without any."""
+        freedom, residual = len(self.residuals) - UNKNOWNS, self._u_of_residuals
+        if freedom < 1 or not np.all(residual > 0):
+            return None
+        return tuple(float(k) for k in coverage_factor(freedom * (self.u / residual) ** 4, 0.95))
+
+    @property
+    def _u_of_residuals(self) -> Floats:
+        """(6,) of these, from the residuals alone."""
         step = 1e-6
         changes = [
             (_reported(self.e + step * unit) - _reported(self.e - step * unit)) / (2 * step)
@@ -107,8 +135,13 @@ class DistanceSolution:
 
 
 def second_way_data(second_way: DistanceSolution | Text) -> dict[str, Any]:
-    """A solution, or why there is none, for results.json."""
-    return {"refused": second_way} if isinstance(second_way, str) else second_way.as_data()
+    """A solution, or why there is none, and what its uncertainties are conditional on, for results.json."""
+    if isinstance(second_way, str):
+        return {"distance_equations": {"refused": second_way}}
+    return {
+        "distance_equations": second_way.as_data(),
+        "conditional": {"distance_equations": second_way.conditional_on},
+    }
 
 
 def solve_distances(differences: Floats, distance: float | Floats, method: str = "QR") -> DistanceSolution:

@@ -23,7 +23,7 @@ class Lengths:
     length : (m,) as indicated, at 20 °C, mm.
     reference : that it is compared with, mm.
     residual_um : (m,) what the fitted model leaves, µm.
-    expanded_um : U (k = 2) of each for the noise of its points, µm.
+    expanded_um, coverage_factor : U of each for the noise of its points, µm, and its k.
     used, flagged : (m,) whether the error factors rest on it, and whether the screening found its measurement odd.
     """
 
@@ -33,6 +33,7 @@ class Lengths:
     reference: float
     residual_um: Floats
     expanded_um: float
+    coverage_factor: float
     used: NDArray[np.bool_]
     flagged: NDArray[np.bool_]
 
@@ -46,6 +47,7 @@ class Lengths:
         return {
             "reference_mm": self.reference,
             "U_um": self.expanded_um,
+            "k": self.coverage_factor,
             "each": [
                 {"measurement": int(m), "repeat": int(r), "length_mm": length, "deviation_um": deviation,
                  "residual_um": residual, "used": bool(used), "flagged": bool(flagged)}
@@ -66,8 +68,8 @@ def lengths_of(result: Result, length: Floats, reference: float) -> Lengths:
     reference : that it is compared with, mm.
     """
     artefact = result.artefact
-    expanded = 2 * result.noise.coordinate.value * float(artefact.noise_scale[0])
+    expanded = result.noise.expanded * float(artefact.noise_scale[0])
     return Lengths(
         artefact.measurement, artefact.repeat, length, reference, result.residuals / MICROMETRE, expanded,
-        result.model.used, result.flagged,
+        result.noise.coverage_factor, result.model.used, result.flagged,
     )  # fmt: skip

@@ -65,28 +65,29 @@ def _second_way(result: Result, solution: DistanceSolution | Text, remarks: tupl
                 tone="note",
             )
         ]
-    values = [*solution.scales_ppm, *solution.squareness_arcsec]
+    values, factors = [*solution.scales_ppm, *solution.squareness_arcsec], solution.coverage_factors
     rows: list[tuple[Text, ...]] = []
     for i, (effect, _) in enumerate(FACTORS):
-        value, u = (
-            rounded(float(values[i]), float(2 * solution.u[i]))
-            if solution.u[i] > 0
-            else (number(values[i], ".4g"), NOTHING)
-        )
+        value, U, k = number(values[i], ".4g"), NOTHING, NOTHING
+        if factors is not None:
+            value, U = rounded(float(values[i]), float(factors[i] * solution.u[i]))
+            k = number(factors[i], ".2f")
         name = (
             say("Scale error of {axis}", axis=Verbatim(effect[-1].upper()))
             if i < 3
             else say("Angle {plane} − 90°", plane=Verbatim(ANGLES[effect]))
         )
         model = result.parameters.get(effect)
-        beside = NOTHING if model is None else expanded(next(iter(model.values())))[0]
-        beside = say("not determined") if effect in result.free else beside
-        rows.append((name, value, u, beside, unit("ppm") if i < 3 else unit("″")))
+        beside = (NOTHING, NOTHING) if model is None else expanded(next(iter(model.values())))[:2]
+        beside = (say("not determined"), NOTHING) if effect in result.free else beside
+        rows.append((name, value, U, k, *beside, unit("ppm") if i < 3 else unit("″")))
     columns = (
         Column(say("Factor"), numeric=False),
         Column(say("Distance equations")),
         Column(say("U")),
+        Column(say("k")),
         Column(say("Fitted model")),
+        Column(say("U")),
         Column(say("Unit"), numeric=False),
     )
     e = commas(say("e{i} = {e}", i=i, e=signed(v, ".3e")) for i, v in enumerate(solution.e, 1))
@@ -97,7 +98,20 @@ def _second_way(result: Result, solution: DistanceSolution | Text, remarks: tupl
             factors=e,
             sd=sd,
         ),
-        say("U (k = 2) from the residuals alone; the artefact's length is taken as known."),
+        _why_they_differ(solution),
         *remarks,
     )
     return [Table(say("The six factors by the distance equations, a second way"), columns, tuple(rows), notes)]
+
+
+def _why_they_differ(solution: DistanceSolution) -> Text:
+    """What an uncertainty of the distance equations is conditional on, and that of the fitted model is not."""
+    if solution.relative_length_u:
+        return say(
+            "Distance equations: U from their residuals and from the certified length, conditional on white noise; k of "
+            "Student's t. Fitted model: U averaged over what the noise may be."
+        )
+    return say(
+        "Distance equations: U from their residuals, conditional on white noise and on the artefact's length as known; k of "
+        "Student's t. Fitted model: U averaged over what the noise may be, and over the length."
+    )

@@ -13,6 +13,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.messages import Text
+from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.units import MICROMETRE, PPM
 
 
@@ -25,14 +26,27 @@ class LineFigures:
     line : as recorded.
     position : in words.
     share : of the travel along it; ``None`` where no travel is stated.
-    expanded_scale_ppm, expanded_gap_um : U (k = 2) of slope and bidirectional error; the latter ``None`` without one.
+    scale_u_ppm, scale_factor : standard uncertainty of the slope, and k for 95 %.
+    gap_u_um, gap_factor : of the bidirectional error; ``None`` without one.
     """
 
     line: GaugeLine
     position: Text
     share: float | None
-    expanded_scale_ppm: float
-    expanded_gap_um: float | None
+    scale_u_ppm: float
+    scale_factor: float
+    gap_u_um: float | None
+    gap_factor: float
+
+    @property
+    def expanded_scale_ppm(self) -> float:
+        """U of the slope."""
+        return self.scale_factor * self.scale_u_ppm
+
+    @property
+    def expanded_gap_um(self) -> float | None:
+        """U of the bidirectional error; ``None`` without one."""
+        return None if self.gap_u_um is None else self.gap_factor * self.gap_u_um
 
     @property
     def short(self) -> bool:
@@ -47,11 +61,21 @@ class LineFigures:
             "position": self.position,
             "length_mm": line.length,
             "faces": line.faces,
-            "slope_ppm": {"value": line.scale_ppm, "U": self.expanded_scale_ppm},
+            "slope_ppm": {
+                "value": line.scale_ppm,
+                "u": self.scale_u_ppm,
+                "U": self.expanded_scale_ppm,
+                "k": self.scale_factor,
+            },
             "off_slope_um": line.linearity / MICROMETRE,
             "bidirectional_um": None
             if line.gap is None
-            else {"value": line.gap / MICROMETRE, "U": self.expanded_gap_um},
+            else {
+                "value": line.gap / MICROMETRE,
+                "u": self.gap_u_um,
+                "U": self.expanded_gap_um,
+                "k": self.gap_factor,
+            },
             "periodic": None
             if periodic is None
             else {
@@ -80,8 +104,9 @@ def figures(result: Result) -> GaugeFigures:
         LineFigures(
             line, position_on(machine, line.middle, line.direction),
             share_of_travel(machine, line.middle, line.direction, line.length),
-            2 * float(np.hypot(line.scale_noise * sigma, relative / PPM)),
-            None if line.gap is None else 2 * line.gap_noise * sigma / MICROMETRE,
+            float(np.hypot(line.scale_noise * sigma, relative / PPM)),
+            factor_of_noise(result.noise.coordinate, line.scale_noise * sigma, relative / PPM),
+            None if line.gap is None else line.gap_noise * sigma / MICROMETRE, result.noise.coverage_factor,
         )
         for line in lines_of(gauge)
     )  # fmt: skip

@@ -31,7 +31,7 @@ def sections(result: Result) -> list[Section]:
 
 def _plot(result: Result, gauge: StepGauge) -> Block:
     deviations, residuals = gauge.deviations() / MICROMETRE, result.residuals / MICROMETRE
-    expanded = 2 * result.noise.coordinate.value
+    expanded = result.noise.expanded
     return length_plot(
         _side_by_side(gauge),
         deviations,
@@ -43,7 +43,8 @@ def _plot(result: Result, gauge: StepGauge) -> Block:
         position_label=say("Certified distance from the first face / mm (lines side by side)"),
         caption=say(
             "Deviation of each face from its certified distance, as recorded and after the fitted model, "
-            "with U (k = 2)."
+            "with U (k = {k}).",
+            k=number(result.noise.coverage_factor, ".2f"),
         ),
         alternative=say(
             "{faces} faces on {lines} lines: as recorded they deviate by {low:.1f} to {high:.1f} µm "
@@ -66,7 +67,7 @@ def _side_by_side(gauge: StepGauge) -> Floats:
 
 
 def _table(result: Result, found: tuple[LineFigures, ...]) -> Table:
-    noise = 2 * result.noise.coordinate.value
+    noise = result.noise.expanded
     both = any(one.line.gap is not None for one in found)
     rows: list[tuple[Text, ...]] = []
     for one in found:
@@ -108,7 +109,10 @@ def _table(result: Result, found: tuple[LineFigures, ...]) -> Table:
             )
         )
     notes.append(
-        say("U (k = 2) from the standard uncertainty of a coordinate, for the slope also from the gauge's certificate.")
+        say(
+            "U for a coverage probability of 95 %, from the standard uncertainty of a coordinate and how well it is known, "
+            "for the slope also from the gauge's certificate; a line by itself, without what the other lines tell."
+        )
     )
     return Table(say("Each line by itself, at 20 °C"), tuple(columns), tuple(rows), tuple(notes))
 

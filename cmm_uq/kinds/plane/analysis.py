@@ -19,6 +19,7 @@ class PlaneFigures:
     """One plane with what is uncertain of its surface."""
 
     probed: ProbedPlane
+    coverage_factor: float
 
     @property
     def flatness_um(self) -> float | None:
@@ -28,7 +29,7 @@ class PlaneFigures:
     @property
     def surface(self) -> SurfaceFigures | None:
         """Of the compensated surface, where there is one."""
-        return None if self.probed.surface is None else SurfaceFigures(self.probed.surface)
+        return None if self.probed.surface is None else SurfaceFigures(self.probed.surface, self.coverage_factor)
 
     def as_data(self) -> dict[str, Any]:
         """For results.json."""
@@ -41,20 +42,21 @@ class PlaneFigures:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceFigures:
-    """A compensated surface with its uncertainty."""
+    """A compensated surface with its uncertainty; k is that of the noise."""
 
     surface: OffsetPlane
+    coverage_factor: float
 
     @property
     def expanded_across(self) -> float:
-        """U (k = 2) of its position along the normal, mm."""
+        """U of its position along the normal, mm."""
         normal = self.surface.normal
-        return 2 * float(np.sqrt(normal @ self.surface.covariance[:3, :3] @ normal))
+        return self.coverage_factor * float(np.sqrt(normal @ self.surface.covariance[:3, :3] @ normal))
 
     @property
     def expanded_normal(self) -> float:
-        """U (k = 2) of the least certain component of the normal."""
-        return 2 * float(np.sqrt(np.diag(self.surface.covariance)[3:].max()))
+        """U of the least certain component of the normal."""
+        return self.coverage_factor * float(np.sqrt(np.diag(self.surface.covariance)[3:].max()))
 
     @property
     def angle_deg(self) -> float:
@@ -67,7 +69,7 @@ class SurfaceFigures:
         return {
             "point_mm": surface.point.tolist(), "normal": surface.normal.tolist(),
             "normal_reversed": surface.reversed, "approach_deg": self.angle_deg,
-            "U_across_um": self.expanded_across / MICROMETRE, "U_normal": self.expanded_normal,
+            "U_across_um": self.expanded_across / MICROMETRE, "U_normal": self.expanded_normal, "k": self.coverage_factor,
             "covariance": {
                 "parameters": ["x_mm", "y_mm", "z_mm", "nx", "ny", "nz"], "units": ["mm"] * 3 + ["1"] * 3,
                 "matrix": surface.covariance.tolist(),
@@ -78,7 +80,7 @@ class SurfaceFigures:
 def figures(result: Result) -> tuple[PlaneFigures, ...]:
     """Of each plane of a result."""
     plane, noise = cast("PlaneSurface", result.artefact), result.noise.coordinate.value * MICROMETRE
-    return tuple(PlaneFigures(one) for one in plane.probed(noise))
+    return tuple(PlaneFigures(one, result.noise.coverage_factor) for one in plane.probed(noise))
 
 
 def results(result: Result) -> dict[str, Any]:

@@ -22,7 +22,7 @@ def sections(result: Result) -> list[Section]:
     probed = figures(result)
     blocks: list[Block] = [_flatness(result, probed), _by_point(result, plane), residual_volume(result, say("points"))]
     if any(one.surface is not None for one in probed):
-        blocks.insert(1, _surfaces(probed))
+        blocks.insert(1, _surfaces(result, probed))
     return [Section(say("The plane"), tuple(blocks))]
 
 
@@ -41,7 +41,7 @@ def _flatness(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
     return Table(say("Flatness as recorded"), columns, rows, (note,))
 
 
-def _surfaces(probed: tuple[PlaneFigures, ...]) -> Table:
+def _surfaces(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
     rows: list[tuple[Text, ...]] = []
     for one in probed:
         if (found := one.surface) is None:
@@ -61,8 +61,9 @@ def _surfaces(probed: tuple[PlaneFigures, ...]) -> Table:
     notes = (
         say(
             "The plane of the probe's centre, moved by the probe's offset against the normal that points "
-            "to where the probe came from (US 4,866,643, claim 1). U (k = 2) of the surface's position "
-            "along the normal, at its middle."
+            "to where the probe came from (US 4,866,643, claim 1). U (k = {k}) of the surface's position "
+            "along the normal, at its middle.",
+            k=number(result.noise.coverage_factor, ".2f"),
         ),
     )
     return Table(say("Surface, compensated for the probe's offset"), columns, tuple(rows), notes)
@@ -70,7 +71,7 @@ def _surfaces(probed: tuple[PlaneFigures, ...]) -> Table:
 
 def _by_point(result: Result, plane: PlaneSurface) -> Block:
     off = off_plane_um(plane)
-    residuals, expanded = result.residuals / MICROMETRE, 2 * result.noise.coordinate.value
+    residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
     return length_plot(
         plane.points.point[plane.rows[:, 0]],
         off,
@@ -80,7 +81,10 @@ def _by_point(result: Result, plane: PlaneSurface) -> Block:
         reference=say("least-squares plane"),
         flagged=result.flagged,
         position_label=say("Point on the plane"),
-        caption=say("Distance of each point from its plane, as recorded and after the fitted model, with U (k = 2)."),
+        caption=say(
+            "Distance of each point from its plane, as recorded and after the fitted model, with U (k = {k}).",
+            k=number(result.noise.coverage_factor, ".2f"),
+        ),
         alternative=say(
             "{count} points: as recorded they lie {low:.1f} to {high:.1f} µm from their plane; after the "
             "fitted model {low_after:.1f} to {high_after:.1f} µm remain.",

@@ -22,7 +22,7 @@ from cmm_uq.kinds.shifting.peak_to_valley import peak_to_valley
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.points import Floats, Ints, Points
-from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.uncertainty.quantity import Quantity, expanded_of
 from cmm_uq.units import MICROMETRE, PPM, unit
 
 KNOWN = "job.toml [artefact] known"
@@ -96,10 +96,11 @@ class ShiftResult(ShiftFound):
         return tuple(Quantity.of_draws(draws, unit("mm")) for draws in self.estimate.shifts.T)
 
     @cached_property
-    def distances(self) -> tuple[Floats, Floats] | None:
-        """Of the artefact's points from the first, (p,) mm, and their standard uncertainties; ``None`` without a scale."""
+    def distances(self) -> tuple[Floats, Floats, Floats] | None:
+        """Of the artefact's points from the first, (p,) mm, with u and U of each; ``None`` without a scale."""
         draws = self.estimate.artefact
-        return (draws.mean(axis=0), draws.std(axis=0, ddof=1)) if self.estimate.scale_known else None
+        mean, u = draws.mean(axis=0), draws.std(axis=0, ddof=1)
+        return (mean, u, expanded_of(draws, mean)) if self.estimate.scale_known else None
 
     @cached_property
     def beside_integrations(self) -> Curve | None:

@@ -19,6 +19,7 @@ from cmm_uq.kinds.shift_axis.series import RepeatedDrift, ShiftedSeries
 from cmm_uq.kinds.shifting.smooth_function import FINEST, SmoothFunction
 from cmm_uq.kinds.shifting.smooth_model import Coefficients, SmoothModel, sampled
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.quantity import expanded_of
 from cmm_uq.units import HOUR, MICROMETRE
 
 _TYPICAL = 5 * MICROMETRE
@@ -58,8 +59,7 @@ class Curve:
     @cached_property
     def expanded(self) -> Floats:
         """(m,) U: at each position the larger distance from the error to an end of its 95 % interval, mm."""
-        low, high = self.interval95
-        return np.maximum(high - self.error, self.error - low)
+        return expanded_of(self.draws, self.error)
 
     @cached_property
     def band(self) -> Floats:

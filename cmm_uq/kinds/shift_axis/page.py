@@ -14,6 +14,7 @@ from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.messages import NOTHING, Number, Text, Verbatim, commas, day, number, plural, say
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE, unit
@@ -235,7 +236,8 @@ def _residuals(result: ShiftResult) -> Section:
     series = result.estimate.series
     before, after = (r / MICROMETRE for r in result.estimate.residuals)
     size = result.disagreement_um
-    U = 2 * result.repeatability.value * series.noise_scale
+    k = factor_of_noise(result.repeatability)
+    U = k * result.repeatability.value * series.noise_scale
     plot = length_plot(
         series.numbers[series.point],
         before,
@@ -246,7 +248,7 @@ def _residuals(result: ShiftResult) -> Section:
         position_label=say("Point of the artefact"),
         before_label=say("Without a curve"),
         after_label=say("With the curve"),
-        caption=say("What the placings disagree by, without and with the curve, and U (k = 2)."),
+        caption=say("What the placings disagree by, without and with the curve, and U (k = {k}).", k=number(k, ".2f")),
         alternative=say(
             "The placings disagree by {before:.2f} µm rms without and {after:.2f} µm with the curve.",
             before=size[0],
@@ -282,15 +284,16 @@ def _artefact(result: ShiftResult) -> Section:
     blocks: list[Block] = [Facts(tuple((label, value) for label, value in rows if value))]
     if result.distances is not None:
         cells = tuple(
-            (number(n), *(rounded(x, 2 * s) if s > 0 else (number(x, ".4f"), Number("0"))))
-            for n, x, s in zip(estimate.series.numbers, *result.distances, strict=True)
+            (number(n), *(rounded(x, U) if U > 0 else (number(x, ".4f"), Number("0"))))
+            for n, x, _, U in zip(estimate.series.numbers, *result.distances, strict=True)
         )
         columns = (
             Column(say("Point")),
             Column(say("Distance from the first"), unit("mm")),
             Column(say("U"), unit("mm")),
         )
-        blocks.append(Table(say("The artefact's own dimensions (k = 2)"), columns, cells[:_MOST_ROWS]))
+        note = say("U is for a coverage probability of 95 %, from the posterior distribution.")
+        blocks.append(Table(say("The artefact's own dimensions"), columns, cells[:_MOST_ROWS], (note,)))
     return Section(say("Artefact and traceability"), tuple(blocks))
 
 

@@ -41,7 +41,7 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
         "artefact": {"point": estimate.series.numbers.tolist(),
                      "distance_mm": None if distances is None else distances[0].tolist(),
                      "u_um": None if distances is None else _um(distances[1]),
-                     "U_mm": None if distances is None else (2 * distances[1]).tolist()},
+                     "U_mm": None if distances is None else distances[2].tolist()},
         "shifts": [
             {"nominal_mm": nominal, "mm": quantity_data(shift)}
             for nominal, shift in zip(estimate.series.shifts.tolist(), result.shifts, strict=True)

@@ -21,7 +21,7 @@ from cmm_uq.kinds.shifting.peak_to_valley import peak_to_valley
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.points import AXES, Floats
-from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.uncertainty.quantity import Quantity, expanded_of
 from cmm_uq.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
 
 PEAK_TO_VALLEY = "peak_to_valley_um"
@@ -111,9 +111,11 @@ class PlaneShiftResult(ShiftFound):
         return found
 
     @cached_property
-    def balls(self) -> tuple[Floats, Floats]:
-        """(p, 2) places of the balls from the first, mm, and their standard uncertainties."""
-        return self.estimate.balls.mean(axis=0), self.estimate.balls.std(axis=0, ddof=1)
+    def balls(self) -> tuple[Floats, Floats, Floats]:
+        """(p, 2) places of the balls from the first, mm, with u and U of each."""
+        draws = self.estimate.balls
+        mean = draws.mean(axis=0)
+        return mean, draws.std(axis=0, ddof=1), expanded_of(draws, mean)
 
     @cached_property
     def table(self) -> ErrorMap:

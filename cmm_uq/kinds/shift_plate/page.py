@@ -326,10 +326,10 @@ def _plate(result: PlaneShiftResult) -> Section:
     rows += certificate_rows(facts.certificate)
     blocks: list[Block] = [Facts(tuple((label, value) for label, value in rows if value))]
     if estimate.free.square_known:
-        mean, u = result.balls
+        mean, _, expanded_places = result.balls
         cells = tuple(
             (number(ball), *(text for x, s in zip(place, spread, strict=True) for text in _coordinate(x, s)))
-            for ball, place, spread in zip(estimate.plate.numbers, mean, u, strict=True)
+            for ball, place, spread in zip(estimate.plate.numbers, mean, expanded_places, strict=True)
         )
         columns = (
             Column(say("Ball")),
@@ -339,8 +339,8 @@ def _plate(result: PlaneShiftResult) -> Section:
             Column(say("U"), unit("mm")),
         )
         note: Text = say(
-            "From the first ball, along the axes as the plate lay in the first placing. U (k = 2) is of the best fit of all "
-            "balls."
+            "From the first ball, along the axes as the plate lay in the first placing. U, for a coverage probability of "
+            "95 %, is of the best fit of all balls."
         )
         if not estimate.free.size_known:
             note = after(note, say("Their common scale is not determined: it is that of the machine."))
@@ -348,8 +348,8 @@ def _plate(result: PlaneShiftResult) -> Section:
     return Section(say("Artefact and traceability"), tuple(blocks))
 
 
-def _coordinate(x: float, u: float) -> tuple[Text, Text]:
-    return rounded(x, 2 * u) if u > 1e-9 else (number(x, ".4f"), Number("0"))
+def _coordinate(x: float, U: float) -> tuple[Text, Text]:
+    return rounded(x, U) if U > 2e-9 else (number(x, ".4f"), Number("0"))
 
 
 def _method(result: PlaneShiftResult) -> Section:

@@ -16,8 +16,8 @@ def plane_shift_results(result: PlaneShiftResult) -> dict[str, Any]:
     job, estimate = result.job, result.estimate
     plate, free = estimate.plate, estimate.free
     before, after = result.disagreement_um
-    balls, u = result.balls
-    u_um, U = u / MICROMETRE, 2 * u
+    balls, u, U = result.balls
+    u_um = u / MICROMETRE
     return {
         **head(job, effects=False),
         "estimates": {

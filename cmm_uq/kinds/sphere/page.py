@@ -28,7 +28,7 @@ def sections(result: Result) -> list[Section]:
 
 def _table(result: Result, sphere: Sphere) -> Table:
     probed, size = sphere.probed(), sphere.sizes[0]
-    noise = 2 * result.noise.coordinate.value
+    noise = result.noise.expanded
     repeated = probed.repeat.max() > 1
     rows: list[tuple[Text, ...]] = []
     for i, measurement in enumerate(probed.measurement):
@@ -55,7 +55,7 @@ def _table(result: Result, sphere: Sphere) -> Table:
 def _by_point(result: Result, sphere: Sphere) -> Plot:
     size = sphere.sizes[0]
     deviations = deviations_um(sphere)
-    residuals, expanded = result.residuals / MICROMETRE, 2 * result.noise.coordinate.value
+    residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
     name = say("certified radius") if size.certified else say("mean radius")
     return length_plot(
         sphere.points.point,
@@ -68,7 +68,9 @@ def _by_point(result: Result, sphere: Sphere) -> Plot:
         flagged=result.flagged,
         position_label=say("Point on the sphere"),
         caption=say(
-            "Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = 2).", name=name
+            "Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = {k}).",
+            name=name,
+            k=number(result.noise.coverage_factor, ".2f"),
         ),
         alternative=say(
             "{count} points: as recorded they deviate by {low:.1f} to {high:.1f} µm from the {name}; "

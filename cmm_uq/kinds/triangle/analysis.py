@@ -18,6 +18,7 @@ from cmm_uq.kinds.triangle.standard import DRAWS
 from cmm_uq.messages import Text
 from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats, Ints
+from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.units import ARCSECOND, MICROMETRE, Unit
 
 SIDES = ("1–2", "2–3", "3–1")
@@ -28,7 +29,7 @@ ALIKE = 0.9
 
 @dataclass(frozen=True)
 class Standard:
-    """Figures of the standard at 20 °C, each with U (k = 2) by Monte Carlo: sides and height, mm; angles, rad."""
+    """Figures of the standard at 20 °C, each with U for 95 % by Monte Carlo: sides and height, mm; angles, rad."""
 
     sides: tuple[tuple[float, float], ...]
     angles: tuple[tuple[float, float], ...]
@@ -56,22 +57,29 @@ class Sides:
     ----------
     measurement : (r,) of each (measurement, repeat).
     before_um, after_um : (r, 3) as recorded, and after the fitted model.
-    expanded_um : U (k = 2) of a side for the noise of its ends.
+    expanded_um, coverage_factor : U of a side for the noise of its ends, and its k.
     """
 
     measurement: Ints
     before_um: Floats
     after_um: Floats
     expanded_um: float
+    coverage_factor: float
 
 
 @dataclass(frozen=True)
 class ByEquations:
-    """A parameter by the source's equations, in the unit of its effect, with its standard uncertainty."""
+    """A parameter by the source's equations, in the unit of its effect, with its standard uncertainty and k for 95 %."""
 
     effect: str
     value: float
     u: float
+    coverage_factor: float
+
+    @property
+    def expanded(self) -> float:
+        """U."""
+        return self.coverage_factor * self.u
 
     @property
     def title(self) -> Text:
@@ -105,10 +113,10 @@ class TriangleFigures:
         standard = self._triangle.standard
         figures, draws = standard.figures(), standard.draws(self.result.posterior.seed)
         sides, angles = (
-            tuple((float(values[i]), 2 * float(drawn[:, i].std())) for i in range(3))
+            tuple((float(values[i]), _expanded(drawn[:, i])) for i in range(3))
             for values, drawn in ((figures.sides, draws.sides), (figures.angles, draws.angles))
         )
-        return Standard(sides, angles, (float(figures.height), 2 * float(draws.height.std())), DRAWS)
+        return Standard(sides, angles, (float(figures.height), _expanded(draws.height)), DRAWS)
 
     @cached_property
     def sides(self) -> Sides:
@@ -119,7 +127,8 @@ class TriangleFigures:
         before = (found - triangle.standard.sides) / MICROMETRE
         after = (found - _lengths(triangle, predicted)) / MICROMETRE
         measurement = points.measurement[np.lexsort((points.point, points.group))].reshape(-1, 3)[:, 0]
-        return Sides(measurement, before, after, 2 * float(np.sqrt(2)) * self.result.noise.coordinate.value)
+        noise = self.result.noise
+        return Sides(measurement, before, after, float(np.sqrt(2)) * noise.expanded, noise.coverage_factor)
 
     @cached_property
     def equations(self) -> tuple[ByEquations, ...] | Text:
@@ -129,10 +138,11 @@ class TriangleFigures:
             solution = solve_equations(triangle)
         except CmmUqError as error:
             return refusal(error)
-        u = solution.u(self.result.noise.coordinate.value * MICROMETRE, triangle.standard.u)
+        noise, dimensions = self.result.noise.coordinate, triangle.standard.u
+        by_noise, known = solution.u(noise.value * MICROMETRE, 0 * dimensions), solution.u(0.0, dimensions)
         return tuple(
-            ByEquations(name, float(value), float(own))
-            for name, value, own in zip(PARAMETERS, solution.values, u, strict=True)
+            ByEquations(name, float(value), float(np.hypot(one, other)), factor_of_noise(noise, one, other))
+            for name, value, one, other in zip(PARAMETERS, solution.values, by_noise, known, strict=True)
         )
 
     @cached_property
@@ -162,12 +172,22 @@ def results(result: Result) -> Mapping[str, Any]:
             )
         ],
         "equations": {"refused": equations} if isinstance(equations, str) else {
-            one.effect: {one.parameter: {"value": one.value, "u": one.u, "U": 2 * one.u}} for one in equations
+            one.effect: {
+                one.parameter: {"value": one.value, "u": one.u, "U": one.expanded, "k": one.coverage_factor}
+            }
+            for one in equations
         },
+        **({} if isinstance(equations, str) else {"conditional": {"equations": "white noise, and a few observations each"}}),
         "hardly_told_apart": [
             {"effects": [one, other], "correlation": correlation} for one, other, correlation in found.alike
         ],
     }  # fmt: skip
+
+
+def _expanded(draws: Floats) -> float:
+    """U of draws (N,): half the width of their 95 % interval."""
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return 0.5 * float(high - low)
 
 
 def _lengths(triangle: Triangle, xyz: Floats) -> Floats:

@@ -10,7 +10,7 @@ from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
 from cmm_uq.kinds.triangle.analysis import SIDES, ByEquations, Sides, Standard, TriangleFigures, results
-from cmm_uq.messages import NOTHING, Text, Verbatim, say, semicolons, signed
+from cmm_uq.messages import NOTHING, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import ARCSECOND, unit
 
@@ -40,7 +40,8 @@ def _standard(standard: Standard) -> Table:
         Column(say("Unit"), numeric=False),
     )
     note = say(
-        "U (k = 2) by Monte Carlo, {draws} draws of the dimensions of blocks and cylinders; angles by the cosine rule.",
+        "U for a coverage probability of 95 % by Monte Carlo, {draws} draws of the dimensions of blocks and cylinders; "
+        "angles by the cosine rule.",
         draws=standard.draws,
     )
     return Table(say("Sides and angles of the standard at 20 °C"), columns, tuple(rows), (note,))
@@ -56,7 +57,10 @@ def _sides(sides: Sides) -> Plot:
         expanded_after_um=sides.expanded_um,
         reference=say("certified side"),
         position_label=say("Placing (its three sides side by side)"),
-        caption=say("Each side minus its certified length, as recorded and after the fitted model, with U (k = 2)."),
+        caption=say(
+            "Each side minus its certified length, as recorded and after the fitted model, with U (k = {k}).",
+            k=number(sides.coverage_factor, ".2f"),
+        ),
         alternative=say(
             "{count} sides: as recorded they deviate by {low:.1f} to {high:.1f} µm; after the fitted "
             "model {low_after:.1f} to {high_after:.1f} µm remain.",
@@ -78,7 +82,7 @@ def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> list
         ]
     rows = []
     for one in equations:
-        value, U = rounded(one.value, 2 * one.u)
+        value, U = rounded(one.value, one.expanded)
         fitted: tuple[Text, ...] = (NOTHING, NOTHING)
         if one.effect in result.parameters:
             quantity = next(iter(result.parameters[one.effect].values()))
@@ -95,7 +99,8 @@ def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> list
     notes = (
         say(
             "Equations: one after the other from the sides of aligned placings (Manlay, Fast checking of "
-            "CMM geometry with a patented tool), U (k = 2). Fitted model: all observations at once."
+            "CMM geometry with a patented tool), each from a few of the observations, U for a coverage probability of 95 %, "
+            "conditional on white noise. Fitted model: all observations at once, U averaged over what the noise may be."
         ),
     )
     return [Table(say("Scale, squareness, pitch, yaw and roll"), columns, tuple(rows), notes)]

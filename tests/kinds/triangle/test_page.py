@@ -26,10 +26,10 @@ def test_the_source_s_equations_find_them_too() -> None:
 
 
 def test_angles_are_printed_with_their_uncertainty() -> None:
-    """A 3-4-5 triangle: 36.87°, 53.13°, 90°; the largest uncertainty at the right angle, 0.27″ for 0.1 µm and 0.1 µm."""
+    """A 3-4-5 triangle: 36.87°, 53.13°, 90°; the largest U at the right angle, 0.27″ for 0.1 µm and 0.1 µm; k = 1.96."""
     rows = {row[0]: row[1:] for row in table(JOB, "Sides and angles of the standard at 20 °C").rows}
     assert rows["Angle at 3"] == ("90.000000", "0.27″", "°")
-    assert rows["Side 1–2"] == ("500.00000", "0.00025", "mm")
+    assert rows["Side 1–2"] == ("500.00000", "0.00024", "mm")
 
 
 def test_the_picture_says_which_parameter_is_out() -> None:
