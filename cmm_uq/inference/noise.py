@@ -33,7 +33,12 @@ ABSENT = {AXES: 0.5, PLACING: 0.5, GROWTH: 0.8, SLOW: 0.6}
 """Probability, beforehand, that a component is absent."""
 
 AXES_SPREAD = 0.7
-"""Scale (half-normal) of the spread of the logarithms of the axes' noise, where they differ."""
+"""Scale (half-normal) of the spread of the logarithms of the axes' noise, where they differ.
+
+Two contrasts of them, normal with that spread, are then exponentially distributed as far as their distance from zero goes
+(∫ 2·φ(s)·exp(−r²/2s²) ds = exp(−r)), and that distance and a direction are sampled: what is known well of two numbers is no
+curved ridge in three.
+"""
 
 RATIO = {PLACING: 1.0, GROWTH: 1.0, SLOW: 1.0}
 """Scale (half-Cauchy) of a component's standard deviation over that of a reading."""
@@ -142,8 +147,10 @@ class Components:
         sigma, nothing = np.exp(column["log_sigma"] - self.log_scatter(latent)), np.zeros(len(latent))
         reading = np.repeat(sigma[:, None], 3, axis=1)
         if AXES in self.possible:
-            spread = _half_normal(column["spread"], ABSENT[AXES], AXES_SPREAD)
-            apart = spread[:, None] * (np.column_stack([column["first"], column["second"]]) @ _CONTRASTS.T)
+            radius = -AXES_SPREAD * np.log1p(-_present(column["spread"], ABSENT[AXES]))
+            way = np.column_stack([column["first"], column["second"]])
+            way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+            apart = radius[:, None] * (way @ _CONTRASTS.T)
             most = np.abs(apart).max(axis=1, keepdims=True)
             reading = reading * np.exp(apart * np.minimum(1.0, _FARTHEST / np.maximum(most, 1e-9)))
         apparent = np.hypot(sigma, self.display / np.sqrt(12))
@@ -280,10 +287,6 @@ def _rate(latent: Floats) -> Floats:
 def _present(latent: Floats, absent: float) -> Floats:
     """Standard normal numbers as probabilities within what is left when the component is absent, 0 where it is."""
     return np.asarray(np.clip((special.ndtr(latent) - absent) / (1 - absent), 0.0, 1 - 1e-9))
-
-
-def _half_normal(latent: Floats, absent: float, scale: float) -> Floats:
-    return np.asarray(scale * special.ndtri(0.5 + 0.5 * _present(latent, absent)))
 
 
 def _half_cauchy(latent: Floats, absent: float, scale: float) -> Floats:
