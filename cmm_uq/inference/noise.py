@@ -152,7 +152,8 @@ class Components:
             way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
             apart = radius[:, None] * (way @ _CONTRASTS.T)
             most = np.abs(apart).max(axis=1, keepdims=True)
-            reading = reading * np.exp(apart * np.minimum(1.0, _FARTHEST / np.maximum(most, 1e-9)))
+            each = np.exp(apart * np.minimum(1.0, _FARTHEST / np.maximum(most, 1e-9)))
+            reading = reading * each / np.sqrt(np.mean(each**2, axis=1, keepdims=True))
         apparent = np.hypot(sigma, self.display / np.sqrt(12))
         ratios = {
             name: apparent * _half_cauchy(column[name], ABSENT[name], RATIO[name]) if name in self.possible else nothing

@@ -143,8 +143,9 @@ def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> 
         centre, factor = mean, np.linalg.cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(d))
         left -= power == 1.0
         if not left:
-            break
-    return Proposal.single(centre, factor)
+            single = _worth(gain + known) > 0.5 * _ENOUGH * count
+            return Proposal.single(centre, factor) if single else _mixture(density, begin, first, random)
+    return _mixture(density, begin, first, random)
 
 
 def _mixture(density: LogDensity, centre: Floats, factor: Floats, random: Any) -> Proposal:

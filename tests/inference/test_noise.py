@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from cmm_uq.inference.noise import ABSENT, AXES, GROWTH, PLACING, SLOW, Components, Sizes, slow_variances
+from cmm_uq.inference.noise import ABSENT, AXES, AXES_SPREAD, GROWTH, PLACING, SLOW, Components, Sizes, slow_variances
 
 M = 12
 
@@ -69,12 +69,17 @@ def test_a_component_is_absent_as_often_as_its_prior_says(name: str) -> None:
     assert np.mean(present > 10) == pytest.approx(2 / np.pi * np.arctan(0.1), abs=0.006)
 
 
-def test_axes_are_equal_as_often_as_the_prior_says_and_keep_their_geometric_mean() -> None:
+def test_axes_are_equal_as_often_as_the_prior_says_and_keep_their_root_mean_square() -> None:
     noise = components((AXES,))
     latent = np.random.default_rng(4).standard_normal((100_000, noise.dimension))
     reading = noise.sizes(latent).reading
     assert np.mean(np.ptp(np.log(reading), axis=1) < 1e-12) == pytest.approx(ABSENT[AXES], abs=0.006)
-    assert np.allclose(np.log(reading).mean(axis=1), latent[:, 0])
+    assert np.allclose(0.5 * np.log(np.mean(reading**2, axis=1)), latent[:, 0])
+    apart = np.log(reading) - np.log(reading).mean(axis=1, keepdims=True)
+    present = apart[np.ptp(apart, axis=1) > 1e-12]
+    # two contrasts, normal with a half-normal spread s: 2/3 of the sum of their variances E s² = 0.49 in each logarithm
+    assert np.mean(present**2, axis=0) == pytest.approx(2 / 3 * AXES_SPREAD**2, rel=0.05)
+    assert np.mean(present) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_first_number_says_how_far_neighbouring_readings_scatter_about_each_other() -> None:
