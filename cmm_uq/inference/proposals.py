@@ -33,6 +33,8 @@ _STUCK = 1.01
 _PARTS, _WIDE, _NARROWER = 8, 0.1, 0.3
 """Distributions of a mixture; weight of one more as wide as all; their variance over that of all to begin with."""
 _REFITS, _RECALLED, _LEAST_ENOUGH = 5, 3, 0.02
+_FITS = 8
+"""Mixtures fitted to the density itself from which the best is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +151,7 @@ def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> 
 
 
 def _mixture(density: LogDensity, centre: Floats, factor: Floats, random: Any) -> Proposal:
-    """Several distributions, let in by degrees.
+    """Several distributions, let in by degrees, and in the end those of several fits of whose draws most count.
 
     The draws of some rounds count together, as if each came from the mean of what drew them.
     """
@@ -157,22 +159,25 @@ def _mixture(density: LogDensity, centre: Floats, factor: Floats, random: Any) -
     proposals = [Proposal.single(centre, factor)]
     draws: list[Floats] = []
     gains: list[Floats] = []
-    count, power, enough, left = 100 * (d + 1), 0.0, _ENOUGH, _LOOKS
-    for _ in range(_MOST_LOOKS):
+    count, power, enough = 100 * (d + 1), 0.0, _ENOUGH
+    tried: list[tuple[float, int]] = []
+    while len(proposals) <= _MOST_LOOKS or (power == 1.0 and len(tried) < _FITS):
         z = proposals[-1].draws(count, random)
         draws = [*draws, z][-_RECALLED:]
         gain = np.maximum(density(proposals[-1].parameters(z)) + 0.5 * np.sum(z**2, axis=1), _NEVER)
         gains = [*gains, gain][-_RECALLED:]
+        if power == 1.0:
+            own = -0.5 * np.sum(z**2, axis=1) - proposals[-1].log_density(z)
+            tried.append((_worth(gain + own), len(proposals) - 1))
+            if len(tried) == _FITS or tried[-1][0] > _ENOUGH * count:
+                break
         every, gain = np.vstack(draws), np.concatenate(gains)
         from_any = np.stack([proposal.log_density(every) for proposal in proposals[-_RECALLED:]])
         known = -0.5 * np.sum(every**2, axis=1) - special.logsumexp(from_any, axis=0)
         before, power = power, _highest_power(gain, known, power, enough * len(every))
         enough = max(0.5 * enough, _LEAST_ENOUGH) if power < min(1.0, _STUCK * before) else enough
         proposals.append(_fitted(proposals[-1], every, _weights(power * gain + known), random))
-        left -= power == 1.0
-        if not left:
-            break
-    return proposals[-1]
+    return proposals[max(tried)[1]] if tried else proposals[-1]
 
 
 def _fitted(proposal: Proposal, z: Floats, weight: Floats, random: Any) -> Proposal:
