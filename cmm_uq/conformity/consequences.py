@@ -75,12 +75,13 @@ def consequences(
         same = counted_with(artefact.points)[artefact.rows[:, 0]]
         before = with_uncertainty(lengths, predicted, noise, seed, same)
         after = with_uncertainty(late, predicted - draws[:, ours] @ whole.design[:, ours].T, noise, seed, same)
+    under = job.facts.circumstances
     return Consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(
             (
-                statement(wish, artefact, before, key, tested),
-                statement(wish, corrected, after, key, tested, artefact),
+                statement(wish, artefact, before, key, tested, None, under),
+                statement(wish, corrected, after, key, tested, artefact, under),
             )
             for i, wish in enumerate(job.facts.conformity, 1)
             for key in [f"[[conformity]] {i}"]

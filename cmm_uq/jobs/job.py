@@ -14,6 +14,7 @@ from pydantic import Field, ValidationInfo, create_model, field_validator, model
 from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, needed, standards_in, uncertainty_missing
 from cmm_uq.jobs.file_names import device_name
 from cmm_uq.jobs.machine import MachineFacts
@@ -124,6 +125,9 @@ class JobFile(Table):
     machine: MachineFacts
     artefact: ArtefactFacts
     recording: RecordingFacts
+    probe: ProbeFacts = ProbeFacts()
+    test_uncertainty: TestUncertainty = TestUncertainty()
+    rated_conditions: RatedConditions = RatedConditions()
     model: ModelFacts
     conformity: Annotated[list[ConformityFacts], Field(max_length=CONFORMITY.most)] = []
     plan: PlanFacts = PlanFacts()
@@ -135,10 +139,23 @@ class JobFile(Table):
     ) -> list[ConformityFacts]:  # fmt: skip
         artefact = info.data.get("artefact")
         for wish in wishes:
-            key = uncertainty_missing(wish, artefact, standards_in(info)) if artefact is not None else None
+            if artefact is None or "test_uncertainty" not in info.data:
+                continue  # what is wrong with these is said instead
+            key = uncertainty_missing(wish, artefact, info.data["test_uncertainty"], standards_in(info))
             if key is not None:
                 raise ValueError(". ".join(needed(key, wish)))
         return wishes
+
+    @property
+    def circumstances(self) -> Circumstances:
+        """Under which a standard's test was carried out; a digitizer on the ram is an optical probe."""
+        probe = self.probe
+        if probe.sensing is None and self.machine.digitizer is not None:
+            probe = probe.model_copy(update={"sensing": "optical"})
+        stated = "cte_per_k" in self.artefact.model_fields_set
+        return Circumstances(
+            self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None
+        )  # fmt: skip
 
     @model_validator(mode="before")
     @classmethod
