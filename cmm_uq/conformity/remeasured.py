@@ -47,8 +47,9 @@ def with_standing(items: Sequence[Decided], nominal: Ints, again: Again) -> tupl
     for i, item in enumerate(items):
         sets.setdefault((item.measurement, int(nominal[i])), []).append(i)
     eligible = {key: found for key, rows in sets.items() if (found := _one_outside(items, rows, again)) is not None}
-    if len(eligible) > again.lengths:
-        return tuple(items)
+    failed = {key for key, rows in sets.items() if any(items[i].decision.outcome == "fail" for i in rows)}
+    if len(eligible) > again.lengths or failed - set(eligible):
+        return tuple(items)  # the test fails, whatever more is measured
     standing: dict[int, Standing] = {}
     for outside, further in eligible.values():
         if further and any(items[i].decision.outcome == "fail" for i in further):
