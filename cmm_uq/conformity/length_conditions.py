@@ -208,9 +208,9 @@ def _shortest(plan: LengthPlan, places: _Places) -> Condition:
 
 
 def _repeated(plan: LengthPlan, places: _Places) -> Condition:
-    """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks."""
+    """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks; more do not help."""
     repeats = {line: sorted((m.repeats for m in found), reverse=True) for line, found in places.items()}
-    total = sum(sum(counts) for counts in repeats.values())
+    total = sum(min(count, plan.repeats) for counts in repeats.values() for count in counts[: plan.lengths])
     lost: tuple[Text, ...] = ()
     if total < plan.total:
         lost = (say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total),)

@@ -105,10 +105,9 @@ def acceptance_limit(risk: float, limit: float, u: float, prior: Known, *, signe
 
     if excess(limit) <= 0:
         return limit
-    lowest = 0.0 if signed else -_REACH * u
-    if excess(lowest) > 0:
+    if excess(0.0) > 0:
         return None
-    return float(optimize.brentq(excess, lowest, limit, xtol=1e-9 * limit))
+    return float(optimize.brentq(excess, 0.0, limit, xtol=1e-9 * limit))
 
 
 def _accepted(values: Floats, acceptance: float, u: float, *, signed: bool) -> Floats:

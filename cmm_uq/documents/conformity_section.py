@@ -158,8 +158,7 @@ _STANDING = {
 def _table(statement: Statement) -> Table:
     """Every error; those of one length in one measurement in one row, in the order of their repeats."""
     rows = _together(statement.errors)
-    notes = [
-        say("U: expanded uncertainty, k = 2. P: lowest probability in the row that a value is within its limit."),
+    notes: list[Text] = [
         plural(
             len(statement.errors),
             one=say("{count} value.", count=len(statement.errors)),
@@ -170,15 +169,20 @@ def _table(statement: Statement) -> Table:
         rows = sorted(rows, key=lambda row: min(item.limit_um - abs(item.error_um) for item in row))[:_LISTED]
         notes.append(say("The {count} rows nearest to their limits; results.json has all.", count=_LISTED))
     lengths = any(item.length_mm is not None for item in statement.errors)
+    known = any(item.u_um > 0 for item in statement.errors)
     columns = [
         Column(say("Measurement"), numeric=False),
         *((Column(say("Length"), unit("mm")),) if lengths else ()),
         Column(say("Errors") if statement.signed else say("Values"), unit("µm"), numeric=False),
-        Column(say("U"), unit("µm")), Column(say("Limit"), unit("µm")), Column(say("P")),
-        Column(say("Decision"), numeric=False),
+        *((Column(say("U"), unit("µm")), Column(say("P"))) if known else ()),
+        Column(say("Limit"), unit("µm")), Column(say("Decision"), numeric=False),
     ]  # fmt: skip
+    if known:
+        notes.append(
+            say("U: expanded uncertainty, k = 2. P: lowest probability in the row that a value is within its limit.")
+        )
     title = say("All values decided by {standard}", standard=Verbatim(statement.facts.standard))
-    cells = tuple(_row(row, lengths=lengths, signed_values=statement.signed) for row in rows)
+    cells = tuple(_row(row, lengths=lengths, known=known, signed_values=statement.signed) for row in rows)
     return Table(title, tuple(columns), cells, tuple(notes))
 
 
@@ -190,7 +194,7 @@ def _together(errors: Sequence[Decided]) -> list[list[Decided]]:
     return list(found.values())
 
 
-def _row(row: Sequence[Decided], *, lengths: bool, signed_values: bool) -> tuple[Text, ...]:
+def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: bool) -> tuple[Text, ...]:
     worst = least_favourable([replace(item, standing="counts") for item in row])
     chance, standing = worst.decision.probability_conforming, _STANDING[row[0].standing]
     values = commas(signed(item.error_um, "+.2f") if signed_values else number(item.error_um, ".2f") for item in row)
@@ -199,8 +203,7 @@ def _row(row: Sequence[Decided], *, lengths: bool, signed_values: bool) -> tuple
         DASH if worst.measurement is None else number(worst.measurement),
         *((DASH if worst.length_mm is None else number(worst.length_mm, ".6g"),) if lengths else ()),
         values,
-        significant(2 * worst.u_um) if worst.u_um > 0 else DASH,
+        *((significant(2 * worst.u_um), DASH if chance is None else probability(chance)) if known else ()),
         number(worst.limit_um, ".4g"),
-        DASH if chance is None else probability(chance),
         say("{decision}, {standing}", decision=decision, standing=standing) if standing else decision,
     )
