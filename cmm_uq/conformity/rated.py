@@ -11,6 +11,9 @@ from cmm_uq.points import Points
 
 SECONDS_PER_HOUR = 3600.0
 
+_ROUNDING = 1e-9
+"""K."""
+
 
 def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Condition, ...]:
     """Those that the job states; what was not recorded is not shown to be met."""
@@ -58,7 +61,7 @@ def _change(points: Points, most: float) -> Condition:
     time = points.columns["time_s"]
     largest = max(_largest_change(time, points.columns[name]) for name in columns)
     told = say("{what} ({largest:.3g} K in an hour)", what=what, largest=largest)
-    return Condition(what, () if largest <= most else (told,))
+    return Condition(what, () if largest <= most + _ROUNDING else (told,))
 
 
 def _largest_change(time_s: np.ndarray, values: np.ndarray) -> float:
@@ -76,4 +79,4 @@ def _difference(points: Points, most: float) -> Condition:
         return Condition(what, (say("{what}: one temperature at most is recorded", what=what),))
     largest = float(np.ptp(np.array([points.columns[name] for name in columns]), axis=0).max())
     told = say("{what} ({largest:.3g} K)", what=what, largest=largest)
-    return Condition(what, () if largest <= most else (told,))
+    return Condition(what, () if largest <= most + _ROUNDING else (told,))

@@ -60,7 +60,7 @@ class ArtefactFacts(Table):
         expanded, factor = given["U_um"], given["k"]
         numbers = all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in (expanded, factor))
         if not numbers or not 1 <= factor <= 10:
-            raise ValueError("U_um is a number in µm, and k one from 1 to 10")
+            raise ValueError("give U_um as a number in µm, and k as one from 1 to 10")
         return {**{key: value for key, value in data.items() if key not in given}, "u_um": expanded / factor}
 
     @model_validator(mode="after")
