@@ -35,7 +35,7 @@ NOT_CONSIDERED = say(
 
 BY_MEASUREMENT_ALONE = say(
     "Probabilities are what the measurement alone says, with nothing known of such machines beforehand: where the limit is "
-    "near they are too sure."
+    "near they may be off by several points either way."
 )
 
 
