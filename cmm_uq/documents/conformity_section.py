@@ -94,7 +94,7 @@ def _chances(statement: Statement) -> list[Text]:
     if statement.joint is not None and count > 1:
         said.append(
             say(
-                "Probability that all {count} are, with what they share: {chance}.", count=count,
+                "Probability that all {count} are, with what they share, by the measurement alone: {chance}.", count=count,
                 chance=probability(statement.joint),
             )
         )  # fmt: skip
@@ -112,7 +112,7 @@ def _chances(statement: Statement) -> list[Text]:
 def _evidence(statement: Statement) -> list[Block]:
     """Table of all errors, their picture where lengths differ, and the budget of the named one."""
     blocks: list[Block] = []
-    if statement.signed and all(item.length_mm is not None for item in statement.errors):
+    if statement.signed and len({item.length_mm for item in statement.errors} - {None}) > 1:
         blocks.append(_picture(statement))
     blocks.append(_table(statement))
     if statement.budget is not None:

@@ -22,7 +22,7 @@ FAR = 9.0
 
 
 def judged(errors: Mapping[tuple[int, int, float], float], standard: str = "ISO 10360-2:2009", further: int = 0,
-           lines: int = 7) -> Statement:  # fmt: skip
+           lines: int = 7, shuffled: int | None = None) -> Statement:  # fmt: skip
     """Seven lines three times; with further repeats of the shortest length of the first line alone."""
     artefact = gauge(SEVEN[:lines], errors=errors)
     if further:
@@ -34,6 +34,9 @@ def judged(errors: Mapping[tuple[int, int, float], float], standard: str = "ISO 
             {"reference_mm": np.concatenate([points.columns["reference_mm"], more.columns["reference_mm"]])},
         )  # fmt: skip
         artefact = StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4), both)
+    if shuffled is not None:
+        rows = np.random.default_rng(shuffled).permutation(len(artefact.points))
+        artefact = StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4), artefact.points.select(rows))
     facts = FACTS.model_copy(update={"standard": standard})
     return statement(facts, artefact, {}, "[[conformity]] 1", [LENGTHS])
 
@@ -96,3 +99,14 @@ def test_an_incomplete_test_is_measured_again_too_and_says_what_it_lacks() -> No
 ])  # fmt: skip
 def test_which_standards_measure_again(standard: str, outcome: str) -> None:
     assert judged(outside((1, 2)), standard).outcome == outcome
+
+
+@pytest.mark.parametrize("further", [0, 10])
+def test_the_order_of_the_rows_is_no_matter(further: int) -> None:
+    errors = {**outside((1, 2)), (2, 1, five(SEVEN[1])[-1]): 4.0}
+    plain, mixed = judged(errors, further=further), judged(errors, further=further, shuffled=1)
+    assert (mixed.outcome, mixed.missing, mixed.remarks) == (plain.outcome, plain.missing, plain.remarks)
+    assert mixed.joint == pytest.approx(plain.joint, abs=1e-9)
+    assert sorted(item.error_um for item in mixed.errors) == pytest.approx(
+        sorted(item.error_um for item in plain.errors)
+    )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy import optimize, stats
 
@@ -124,3 +126,23 @@ def test_a_prior_has_one_width() -> None:
     for prior in ({}, {"sd_um": 1.0, "share_of_limit": 0.3}):
         with pytest.raises(ValidationError, match="either sd_um or share_of_limit"):
             ConformityFacts(standard="ISO 10360-2:2009", limit_um=3.0, prior=prior)
+
+
+EVERY: list[Rule] = [
+    "simple", "ASME B89.7.3.1", "ISO 14253-1:2017", "ILAC-G8 binary", "ILAC-G8 non-binary", "JCGM 106", "Z540.3",
+    PosteriorProbability(posterior_probability=0.7), UnconditionalRisk(max_unconditional_false_accept=0.001),
+]  # fmt: skip
+RANK = ("pass", "conditional pass", "undecided", "conditional fail", "fail")
+
+
+@given(
+    st.floats(0, 30), st.floats(0, 30), st.floats(0.01, 8), st.floats(0.5, 40), st.sampled_from(EVERY), st.booleans()
+)
+def test_nearer_to_zero_is_never_judged_worse_and_nothing_beyond_the_limit_passes(
+    one: float, other: float, u: float, sd: float, rule: Rule, signed: bool
+) -> None:
+    near, far = sorted((one, other))
+    found = [decide(value, u, LIMIT, rule, signed=signed, prior=Known(0.0, sd)).outcome for value in (near, far)]
+    assert RANK.index(found[0]) <= RANK.index(found[1])
+    for value, outcome in zip((near, far), found, strict=True):
+        assert value <= LIMIT or outcome not in ("pass", "conditional pass")

@@ -91,7 +91,7 @@ def test_limits_open_with_length_like_a_trumpet() -> None:
 
 def test_the_decision_says_how_probable_it_is_that_all_conform() -> None:
     text = decision_block(stated(rule="ISO 14253-1")).explanation
-    assert "Probability that all 12 are, with what they share" in text
+    assert "Probability that all 12 are, with what they share, by the measurement alone: " in text
 
 
 def test_with_a_prior_the_decision_says_the_risks_of_all_machines() -> None:
@@ -99,3 +99,12 @@ def test_with_a_prior_the_decision_says_the_risks_of_all_machines() -> None:
     assert found.risks is not None
     assert "Of all such machines, by the prior stated" in decision_block(found).explanation
     assert "with nothing known of such machines" not in decision_block(found).explanation
+
+
+def test_values_of_one_length_have_no_picture() -> None:
+    """Two of 20 mm: nothing opens with the length."""
+    artefact = gauge(list(np.eye(3)[:2]), [[20.0]] * 2, errors={(1, 2, 20.0): 2.40})
+    found = statement(
+        ConformityFacts(standard="ISO 10360-2:2009", mpe=MPE), artefact, {}, "[[conformity]] 1", (LENGTHS,)
+    )
+    assert not any(isinstance(block, Plot) for block in conformity_section([found]).blocks)
