@@ -174,7 +174,7 @@ def _table(statement: Statement) -> Table:
         Column(say("Measurement"), numeric=False),
         *((Column(say("Length"), unit("mm")),) if lengths else ()),
         Column(say("Errors") if statement.signed else say("Values"), unit("µm"), numeric=False),
-        *((Column(say("U"), unit("µm")), Column(say("P"))) if known else ()),
+        *((Column(say("U"), unit("µm")), Column(say("P"), numeric=False)) if known else ()),
         Column(say("Limit"), unit("µm")), Column(say("Decision"), numeric=False),
     ]  # fmt: skip
     if known:

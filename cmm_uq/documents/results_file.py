@@ -234,7 +234,7 @@ def _statement(statement: Statement) -> dict[str, Any]:
 def _decided(item: Decided) -> dict[str, Any]:
     return {
         "measurement": item.measurement, "repeat": item.repeat, "length_mm": item.length_mm, "error_um": item.error_um,
-        "u_um": item.u_um, "limit_um": item.limit_um,
+        "u_um": item.u_um, "U_um": 2 * item.u_um, "limit_um": item.limit_um,
         "probability_conforming": item.decision.probability_conforming, "outcome": item.decision.outcome,
         "guard_band_um": item.decision.guard_band, "position": item.position or None, "standing": item.standing,
     }  # fmt: skip

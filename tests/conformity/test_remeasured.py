@@ -108,5 +108,5 @@ def test_the_order_of_the_rows_is_no_matter(further: int) -> None:
     assert (mixed.outcome, mixed.missing, mixed.remarks) == (plain.outcome, plain.missing, plain.remarks)
     assert mixed.joint == pytest.approx(plain.joint, abs=1e-9)
     assert sorted(item.error_um for item in mixed.errors) == pytest.approx(
-        sorted(item.error_um for item in plain.errors)
+        sorted(item.error_um for item in plain.errors), abs=1e-6
     )
