@@ -140,6 +140,11 @@ class ConformityFacts(Table):
 class Asked(Protocol):
     """What the check of a job must know of a standard."""
 
+    @property
+    def sensing(self) -> str | None:
+        """For which probes it is; ``None`` for any."""
+        ...
+
     def characteristic(self, name: str | None) -> object:
         """One that it decides; ``ValueError`` for a name that it does not."""
         ...
@@ -174,6 +179,17 @@ def uncertainty_missing(
 
 def _asked(wish: ConformityFacts, standards: Standards | None) -> Asked | None:
     return None if standards is None else standards.named(wish.standard)
+
+
+def probe_unfit(wish: ConformityFacts, sensing: str | None, standards: Standards | None) -> str | None:
+    """That a standard is for other probes than that of the recording, and how to mend it; ``None`` where it is for it."""
+    asked = _asked(wish, standards)
+    if asked is None or None in (asked.sensing, sensing) or asked.sensing == sensing:
+        return None
+    return (
+        f"the standard {wish.standard} is for {asked.sensing} probes, and the recording was made with one that is not. "
+        f"State {'ISO 10360-8:2013' if sensing == 'optical' else 'another standard'}, or leave the statement out"
+    )
 
 
 def needed(key: str, wish: ConformityFacts) -> tuple[str, str]:

@@ -15,7 +15,7 @@ from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
-from cmm_uq.jobs.conformity import ConformityFacts, needed, standards_in, uncertainty_missing
+from cmm_uq.jobs.conformity import ConformityFacts, needed, probe_unfit, standards_in, uncertainty_missing
 from cmm_uq.jobs.file_names import device_name
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
@@ -146,12 +146,20 @@ class JobFile(Table):
                 raise ValueError(". ".join(needed(key, wish)))
         return wishes
 
+    @field_validator("conformity")
+    @classmethod
+    def _standards_are_for_the_probe(cls, wishes: list[ConformityFacts], info: ValidationInfo) -> list[ConformityFacts]:
+        if "probe" in info.data and "machine" in info.data:
+            sensing = _sensing(info.data["probe"], info.data["machine"])
+            for wish in wishes:
+                if unfit := probe_unfit(wish, sensing, standards_in(info)):
+                    raise ValueError(unfit)
+        return wishes
+
     @property
     def circumstances(self) -> Circumstances:
-        """Under which a standard's test was carried out; a digitizer on the ram is an optical probe."""
-        probe = self.probe
-        if probe.sensing is None and self.machine.digitizer is not None:
-            probe = probe.model_copy(update={"sensing": "optical"})
+        """Under which a standard's test was carried out."""
+        probe = self.probe.model_copy(update={"sensing": _sensing(self.probe, self.machine)})
         stated = "cte_per_k" in self.artefact.model_fields_set
         return Circumstances(
             self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None
@@ -164,6 +172,11 @@ class JobFile(Table):
         if isinstance(data, dict) and not getattr(table, "with_recording", True):
             return {"recording": {"file": ""}, **data}
         return data
+
+
+def _sensing(probe: ProbeFacts, machine: MachineFacts) -> str | None:
+    """How the probe senses; a digitizer on the ram is an optical one."""
+    return probe.sensing or ("optical" if machine.digitizer is not None else None)
 
 
 Tables = Callable[[str], type[ArtefactFacts] | None]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import cmm_uq
 from cmm_uq.commands.reading import read_job
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
@@ -197,14 +198,14 @@ u_cte_per_k = 6e-7
 [rated_conditions]
 temperature_c = [18.0, 22.0]
 [probe]
-sensing = "optical"
+sensing = "contacting"
 """
     found = read_job(job(tmp_path, None, more))
     under = found.facts.circumstances
     assert (under.uncertainty.u_cte_per_k, under.rated.temperature_c, under.probe.sensing) == (
         6e-7,
         [18.0, 22.0],
-        "optical",
+        "contacting",
     )
     assert under.cte_per_k == pytest.approx(1.15e-5)
 
@@ -217,3 +218,26 @@ sensing = "optical"
 def test_what_they_cannot_say_is_refused_by_key(tmp_path: Path, more: str, told: str) -> None:
     with pytest.raises(CmmUqError, match=told):
         read_job(job(tmp_path, None, "\n" + more))
+
+
+@pytest.mark.parametrize(("more", "change"), [
+    ('\n[probe]\nsensing = "optical"\n', {}),
+    ("", {'chain = "XYZ"': 'chain = "XYZ"\ndigitizer = { offset_mm = [0.0, 0.0, 1.0], poses = [ { alpha_deg = 0.0, '
+          "beta_deg = 0.0, gamma_deg = 0.0 } ] }"}),
+])  # fmt: skip
+def test_a_recording_with_an_optical_probe_is_refused_before_anything_is_computed(
+    tmp_path: Path, more: str, change: dict[str, str]
+) -> None:
+    told = r"\[conformity\].*ISO 10360-2:2009 is for contacting probes.*State ISO 10360-8:2013"
+    with pytest.raises(CmmUqError, match=told):
+        read_job(job(tmp_path, change, more))
+
+
+def test_a_certificate_warns_of_a_warm_gauge_of_unknown_expansion(tmp_path: Path) -> None:
+    """Recorded at 23 °C; the example states 11.5e-6 /K."""
+    folder = job(tmp_path, {"cte_per_k = 1.15e-05\n": ""})
+    head, *rows = (folder / "recording.csv").read_text(encoding="utf-8").splitlines()
+    text = "\n".join([f"{head},temp_artefact_c", *(f"{row},23" for row in rows)])
+    (folder / "recording.csv").write_text(text, encoding="utf-8")
+    (warned,) = [text for text in cmm_uq.report(folder).warnings if "its expansion is not stated" in text]
+    assert warned.startswith("The artefact was up to 3 K from 20 °C")
