@@ -8,8 +8,9 @@ ROOT = Path(__file__).parents[2]
 KEEP = ROOT / "reports" / "mutation"
 
 _BY_ROOM = {
-    "conformity": "decision standards accuracy statement tolerances consequences length_conditions bar_conditions "
-                  "sphere_conditions measurement_lines plan_conditions copies",
+    "conformity": "decision risk standards accuracy statement tolerances consequences length_conditions bar_conditions "
+                  "sphere_conditions orientation_conditions measurement_lines plan_conditions copies rated remeasured "
+                  "shared_causes lengths_decided spheres_decided bars_decided",
     "documents": "wording",
     "uncertainty": "quantity rounding coverage_intervals degrees_of_freedom shapes",
     "inference": "least_squares linear_model posterior effective",

@@ -66,7 +66,8 @@ def job(
     recording : further keys of ``[recording]``, as ``u_coordinate_um``.
     conformity : a table for each statement of conformity.
     files : error maps and other tables that job.toml names, by name.
-    tables : further tables of job.toml: ``job``, ``laboratory``, ``model``, ``plan``.
+    tables : further tables of job.toml: ``job``, ``laboratory``, ``model``, ``plan``, ``test_uncertainty``,
+        ``rated_conditions``, ``probe``.
 
     Raises
     ------

@@ -49,7 +49,10 @@ def plan_results(plan: Plan) -> dict[str, Any]:
         "better": better,
         "repeats": worth_data(plan),
         "free": list(plan.free),
-        "conditions": [{"what": condition.what, "met": condition.met} for condition in plan.conditions],
+        "conditions": [
+            {"what": condition.what, "met": condition.met, "missing": list(condition.missing)}
+            for condition in plan.conditions
+        ],
         "placings": [
             {"measurement": number, "title": placing.title, "minutes": time,
              "middle_mm": placing.middle.tolist(), "points": len(placing.points)}

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cmm_uq.commands.plan_conformity import completing, of_standards
 from cmm_uq.commands.recorded import refuse_unfit
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
-from cmm_uq.conformity.plan_conditions import conditions
-from cmm_uq.conformity.plans import READY, Condition
+from cmm_uq.conformity.plans import Condition
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.diagnosis.power import DrawnNoise, Power, powers, without_fault
 from cmm_uq.errors import CmmUqError
@@ -69,10 +69,11 @@ class Plan:
     job, setting : what was asked.
     name : of the placings to start from, a ready plan or the recording.
     start : what these tell.
-    better : what the placings that were searched for tell, with those kept; ``None`` where none were.
+    better : what the placings tell that were searched for, or that complete a standard's test, with those kept; ``None``
+        where there are none.
     kept : how many of the start are part of the better plan.
     scores : of the criterion, before and after; smaller is better.
-    conditions : of the standard.
+    conditions : of the standards, by all that will have been measured.
     worth : repeats against placings; ``None`` where nothing is to be measured, or a recording is there.
     free : of a kind that names no effects, what no reading shows, in words.
     """
@@ -149,12 +150,17 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     start = _outlook(setting, placings, points, rivals, power and compared, seed, _part(tell, 0.1, 0.5))
     tell("Searching for better placings", 0.55)
     chosen, kept, scores = _searched(setting, start, rivals, name)
+    if chosen is None and name == RECORDED:
+        lacked = completing(job, setting, start.points, lambda added: _after(setting, start.points, added))
+        chosen, kept = ((*start.placings, *lacked), len(start.placings)) if lacked else (None, 0)
     better = None
     if chosen is not None:
         points = _after(setting, points, chosen[kept:]) if name == RECORDED else _joined(setting, chosen)
         better = _outlook(setting, chosen, points, rivals, power, seed, _part(tell, 0.6, 0.95))
-    met = _of_standard(setting, name, start.points) + _in_time(setting, name, placings)
-    worth = None if name == RECORDED else worth_of_repeats(setting, (better or start).placings)
+    final = start if better is None else better
+    recorded = len(start.points) if name == RECORDED else 0
+    met = of_standards(job, setting, name, final.points, recorded) + _in_time(setting, name, placings)
+    worth = None if name == RECORDED else worth_of_repeats(setting, final.placings)
     return Plan(job, setting, name, start, better, kept, scores, met, worth=worth)
 
 
@@ -285,15 +291,6 @@ def _affordable(setting: Setting, count: int, possible: Sequence[Placing], kept:
         raise CmmUqError(f"{budget:g} min are too short for a single placing{beside}, which takes {each:.1f} min",
                          where="job.toml [plan] budget_min", fix="Give more time, or fewer repeats")  # fmt: skip
     return min(count, int(left / each))
-
-
-def _of_standard(setting: Setting, name: str, points: Points) -> tuple[Condition, ...]:
-    """Conditions of the standard that a ready plan is named after; none for a plan of no standard."""
-    if name not in READY or setting.observe is None:
-        return ()
-    # where the lengths lie counts, not yet what certifies them
-    facts = setting.artefact.model_copy(update={"nominal": False})
-    return conditions(READY[name], setting.observe(facts, points, where=None), recorded=False)
 
 
 def _in_time(setting: Setting, name: str, placings: Sequence[Placing]) -> tuple[Condition, ...]:

@@ -75,12 +75,13 @@ def consequences(
         # corrected by the estimate, as the points were; a draw corrects by something else
         remaining = predicted + (late - lengths) - (draws - value)[:, ours] @ whole.design[:, ours].T
         after = with_uncertainty(late, remaining, noise, seed, same)
+    under = job.facts.circumstances
     return Consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(
             (
-                statement(wish, artefact, before, key, tested),
-                statement(wish, corrected, after, key, tested, artefact),
+                statement(wish, artefact, before, key, tested, None, under),
+                statement(wish, corrected, after, key, tested, artefact, under),
             )
             for i, wish in enumerate(job.facts.conformity, 1)
             for key in [f"[[conformity]] {i}"]

@@ -6,12 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cmm_uq.conformity.measurement_lines import crossed_travel, position_on
-from cmm_uq.conformity.plans import Condition, LengthPlan
+from cmm_uq.conformity.measurement_lines import PARALLELS, SPACE_DIAGONALS, crossed_travel, position_on
+from cmm_uq.conformity.plans import OFFSET_TOLERANCE_MM, Condition, LengthPlan
 from cmm_uq.messages import NOTHING, Text, commas, say
 from cmm_uq.model.artefact import Artefact
-from cmm_uq.points import Floats, Ints, Machine, Points
+from cmm_uq.points import AXES, Floats, Ints, Machine, Points
 
 SAME_LENGTH_MM = 1.0
 """Lengths no farther from each other than this are one nominal length."""
@@ -24,18 +25,76 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
         measured.setdefault(found.position, []).append(found)
     absent = tuple(line for line in plan.positions if line not in measured)
     return (
-        Condition(_positions(absent), absent),
+        Condition(_positions(plan, absent), absent),
         _long_enough(plan, artefact.points.machine, measured),
         _different(plan, measured),
         _shortest(plan, measured),
         _repeated(plan, measured),
+        *_both_sides(plan, artefact, measured),
+        *_offset(plan, artefact),
     )
 
 
-def _positions(absent: tuple[Text, ...]) -> Text:
-    if not absent:
-        return say("four space diagonals and three axes")
-    return say("four space diagonals and three axes; missing: {absent}", absent=commas(absent))
+def _positions(plan: LengthPlan, absent: tuple[Text, ...]) -> Text:
+    asked = commas(plan.positions)
+    if set(plan.positions) == {*SPACE_DIAGONALS, *PARALLELS}:
+        asked = say("four space diagonals and three axes")
+    return say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked
+
+
+def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[np.bool_]:
+    """Lengths between two points each, (m,), measured with the stylus tip so far across the ram at both ends.
+
+    Without recorded tips they count as measured with none; ``None`` asks for no particular offset.
+    """
+    tips = tip_offsets(points)
+    if offset_mm is None:
+        return np.ones(len(rows), dtype=bool)
+    if tips is None:
+        return np.full(len(rows), offset_mm == 0)
+    across = np.linalg.norm(tips, axis=1)[rows]
+    return np.asarray(np.all(np.abs(across - offset_mm) <= OFFSET_TOLERANCE_MM, axis=1))
+
+
+def tip_offsets(points: Points) -> Floats | None:
+    """Stylus tip offset across the ram, (n, 3) mm, zero along it; ``None`` where none is recorded."""
+    if not all(f"tip_{a}_mm" in points.columns for a in AXES):
+        return None
+    tips = np.column_stack([points.columns[f"tip_{a}_mm"] for a in AXES])
+    tips[:, AXES.index(points.machine.chain.replace("F", "")[-1].lower())] = 0.0
+    return np.asarray(tips, dtype=np.float64)
+
+
+def _offset(plan: LengthPlan, artefact: Artefact) -> tuple[Condition, ...]:
+    """That a tip offset is recorded where the plan asks for one."""
+    if not plan.offset_mm:
+        return ()
+    what = say("stylus tip {offset_mm:g} mm across the ram (tip_x_mm, tip_y_mm, tip_z_mm)", offset_mm=plan.offset_mm)
+    found = artefact.indications()
+    there = found is not None and with_offset(artefact.points, found.rows, plan.offset_mm).any()
+    return (Condition(what, () if there else (what,)),)
+
+
+def _both_sides(plan: LengthPlan, artefact: Artefact, places: _Places) -> tuple[Condition, ...]:
+    """Whether the lengths are bidirectional, where that is asked and known."""
+    if not plan.bidirectional or not places:
+        return ()
+    known = [one for found in places.values() for one in found if one.bidirectional is not None]
+    if not known:
+        return ()
+    what = say("ends of each length reached from opposite sides")
+    if not any(one.bidirectional for one in known):
+        short = say(
+            "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
+        )
+        return (Condition(what, (short,)),)
+    counts = {line: sum(bool(one.bidirectional) for one in found) for line, found in places.items()}
+    missing = tuple(
+        say("{lengths} bidirectional lengths along {line} ({count})", lengths=plan.lengths, line=line, count=count)
+        for line, count in counts.items()
+        if count < min(plan.lengths, len(places[line]))
+    )
+    return (Condition(what, missing),)
 
 
 @dataclass(frozen=True)
@@ -47,6 +106,7 @@ class _Measured:
     length: float
     share: float | None
     repeats: int
+    bidirectional: bool | None = None
 
 
 def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> Iterator[_Measured]:
@@ -56,7 +116,8 @@ def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> I
         return
     points = artefact.points
     group = points.group[found.rows[:, 0]]
-    original = ~np.isin(group, list(copies))
+    original = ~np.isin(group, list(copies)) & with_offset(points, found.rows, plan.offset_mm)
+    both = artefact.bidirectional(found.rows)
     nominal = nominals(found.lengths)
     middles, along = artefact.lines_of(found.rows)
     positions = np.array([position_on(points.machine, m, d) for m, d in zip(middles, along, strict=True)], dtype=object)
@@ -68,7 +129,7 @@ def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> I
             shares = [_share(points, middles[i], along[i], found.lengths[i]) for i in at]
             known = [share for share in shares if share is not None]
             yield _Measured(position, int(length), float(found.lengths[at].mean()), max(known, default=None),
-                            len(np.unique(group[at])))  # fmt: skip
+                            len(np.unique(group[at])), None if both is None else bool(both[at].any()))  # fmt: skip
 
 
 def _share(points: Points, middle: Floats, along: Floats, length: float) -> float | None:
@@ -147,9 +208,9 @@ def _shortest(plan: LengthPlan, places: _Places) -> Condition:
 
 
 def _repeated(plan: LengthPlan, places: _Places) -> Condition:
-    """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks."""
+    """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks; more do not help."""
     repeats = {line: sorted((m.repeats for m in found), reverse=True) for line, found in places.items()}
-    total = sum(sum(counts) for counts in repeats.values())
+    total = sum(min(count, plan.repeats) for counts in repeats.values() for count in counts[: plan.lengths])
     lost: tuple[Text, ...] = ()
     if total < plan.total:
         lost = (say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total),)

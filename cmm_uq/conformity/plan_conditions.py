@@ -6,6 +6,8 @@ digit does not count: that is a copy, where in a plan it is a wish.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from cmm_uq.conformity.bar_conditions import bar_positions
 from cmm_uq.conformity.length_conditions import lengths_measured
 from cmm_uq.conformity.plans import BarPlan, Condition, LengthPlan, Plan
@@ -29,3 +31,9 @@ def conditions(plan: Plan, artefact: Artefact, *, recorded: bool) -> tuple[Condi
         return bar_positions(plan, artefact, copies)
     forms = artefact.forms()
     return () if forms is None else sphere_points(plan, artefact.points, forms.directions, copies)
+
+
+def best_of(plans: Sequence[Plan], artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
+    """Conditions of the one of several plans that lacks least."""
+    each = [conditions(plan, artefact, recorded=recorded) for plan in plans]
+    return min(each, key=lambda found: sum(len(condition.missing) for condition in found))

@@ -7,24 +7,35 @@ A standard decides one characteristic or several (E0, R0, P_FTU). Each goes by o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from cmm_uq.conformity.copies import copies_in_words
-from cmm_uq.conformity.decision import needs_uncertainty
+from cmm_uq.conformity.decision import Decision, decide, needs_uncertainty
 from cmm_uq.conformity.plans import Condition
-from cmm_uq.conformity.statement import Decided, Statement
+from cmm_uq.conformity.rated import rated_conditions
+from cmm_uq.conformity.risk import Known, Risks, global_risks
+from cmm_uq.conformity.shared_causes import Causes, probability_of_all
+from cmm_uq.conformity.statement import Decided, Statement, counted, least_favourable
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, needed
 from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.budget import Budget
 from cmm_uq.uncertainty.quantity import Quantity
 
 NOT_CONSIDERED = say(
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
+)
+
+BY_MEASUREMENT_ALONE = say(
+    "Probabilities are what the measurement alone says, with nothing known of such machines beforehand: where the limit is "
+    "near they may be off by several points either way."
 )
 
 
@@ -34,6 +45,10 @@ def _nothing_asked(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ..
 
 def _nothing_needed(artefact: ArtefactFacts) -> str | None:
     return None
+
+
+def _nothing_more(test: Test) -> tuple[Condition, ...]:
+    return ()
 
 
 @dataclass(frozen=True)
@@ -49,6 +64,9 @@ class Characteristic:
         says whether these were measured or are a plan's.
     unstated : the key of ``[artefact]`` that a rule with an uncertainty needs and that is not stated; ``None`` when nothing is
         missing.
+    asks : what a complete test asks of artefact, probe and surroundings beside its points.
+    also : other names of it.
+    needs : the key of ``[test_uncertainty]`` without which a rule with an uncertainty says nothing.
     """
 
     name: str
@@ -56,6 +74,9 @@ class Characteristic:
     statement: Callable[[Test], Statement]
     conditions: Callable[..., tuple[Condition, ...]] = _nothing_asked
     unstated: Callable[[ArtefactFacts], str | None] = _nothing_needed
+    asks: Callable[[Test], tuple[Condition, ...]] = _nothing_more
+    also: tuple[str, ...] = ()
+    needs: str | None = None
 
 
 @dataclass(frozen=True)
@@ -67,11 +88,13 @@ class Standard:
     name : with its part and edition, as in ``[[conformity]] standard``.
     characteristics : that are decided; the first is meant where the job names none.
     remarks : what every statement by it says.
+    sensing : for which probes it is; ``None`` for any.
     """
 
     name: str
     characteristics: tuple[Characteristic, ...]
     remarks: tuple[Text, ...] = ()
+    sensing: Literal["contacting", "optical"] | None = None
 
     def characteristic(self, name: str | None) -> Characteristic:
         """One of them by name; without one the first.
@@ -80,15 +103,22 @@ class Standard:
         ------
         ValueError : it is not decided here.
         """
-        found = next((each for each in self.characteristics if name in (None, each.name)), None)
+        found = next((each for each in self.characteristics if name in (None, each.name, *each.also)), None)
         if found is None:
             known = ", ".join(each.name for each in self.characteristics)
             raise ValueError(f"characteristic = {name!r} of {self.name} is not decided here: only {known}")
         return found
 
-    def uncertainty_missing(self, wish: ConformityFacts, artefact: ArtefactFacts) -> str | None:
+    def uncertainty_missing(
+        self, wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty
+    ) -> str | None:  # fmt: skip
         """See :meth:`cmm_uq.jobs.conformity.Asked.uncertainty_missing`."""
-        return None if wish.rule == "simple" else self.characteristic(wish.characteristic).unstated(artefact)
+        if wish.rule == "simple":
+            return None
+        asked = self.characteristic(wish.characteristic)
+        if asked.needs is not None and not getattr(stated, asked.needs):
+            return asked.needs
+        return asked.unstated(artefact)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +133,7 @@ class Test:
     recorded : the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a measurement.
     accuracy : figures of performance with uncertainty, by name.
     key : of job.toml, for messages.
+    circumstances : under which it was carried out.
     """
 
     __test__ = False  # no test of pytest's
@@ -114,6 +145,7 @@ class Test:
     recorded: Artefact
     accuracy: Mapping[str, Quantity]
     key: str
+    circumstances: Circumstances = field(default_factory=Circumstances)
 
     def indications(self) -> Indications:
         """Errors of indication of the calibrated lengths.
@@ -130,10 +162,25 @@ class Test:
         return found
 
     def limits_um(self, lengths_mm: Floats) -> Floats:
-        """The limit of each of some lengths (m,), µm."""
-        if self.facts.mpe is not None:
-            return np.asarray(self.facts.mpe.a_um + lengths_mm / self.facts.mpe.k, dtype=np.float64)
-        return np.full(len(lengths_mm), self.facts.limit_um, dtype=np.float64)
+        """The limit of each of some lengths (m,), µm: ``limit_um``, A + L/K, B, or the lesser of these two."""
+        mpe = self.facts.mpe
+        if mpe is None:
+            return np.full(len(lengths_mm), self.facts.limit_um, dtype=np.float64)
+        most = np.full(len(lengths_mm), np.inf if mpe.b_um is None else mpe.b_um)
+        if mpe.a_um is None or mpe.k is None:
+            return most
+        return np.asarray(np.minimum(mpe.a_um + lengths_mm / mpe.k, most), dtype=np.float64)
+
+    def decide(self, value_um: float, u_um: float, limit_um: float, *, signed: bool) -> Decision:
+        """One value by the rule and the prior of the job."""
+        return decide(value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=self.prior(limit_um))
+
+    def prior(self, limit_um: float) -> Known | None:
+        """What the job says of an error with this limit beforehand."""
+        given = self.facts.prior
+        if given is None:
+            return None
+        return Known(given.mean_um, given.sd_um or (given.share_of_limit or 0.0) * limit_um)
 
     def refuse_without_uncertainty(self, u: float, name: str) -> None:
         """Refuse a rule that needs an uncertainty where there is none.
@@ -141,7 +188,7 @@ class Test:
         Parameters
         ----------
         u : the least of all.
-        name : the key of ``[artefact]`` that would state it.
+        name : the key that would state it.
 
         Raises
         ------
@@ -151,7 +198,23 @@ class Test:
             problem, fix = needed(name, self.facts)
             raise CmmUqError(problem, where=f"job.toml {self.key} rule", fix=fix)
 
-    def stated(self, quantity: Text, measured: Text, items: tuple[Decided, ...], remarks: Sequence[Text]) -> Statement:
+    def refuse_nothing_measured(self, measured: bool, what: str) -> None:
+        """Refuse a statement on something of which the recording has nothing.
+
+        Raises
+        ------
+        CmmUqError : with what is to be recorded.
+        """
+        if not measured:
+            name = f"{self.characteristic.name} of {self.facts.standard}"
+            raise CmmUqError(f"{name} is decided on {what}, and the recording has none",
+                             where=f"job.toml {self.key} characteristic",
+                             fix="Record them, or leave the statement out")  # fmt: skip
+
+    def stated(
+        self, quantity: Text, measured: Text, items: tuple[Decided, ...], remarks: Sequence[Text], *,
+        signed: bool = True, causes: Causes | None = None, budget: Budget | None = None,
+    ) -> Statement:  # fmt: skip
         """What was decided, with what the test lacks, and what the rule leaves out.
 
         Parameters
@@ -160,18 +223,47 @@ class Test:
         measured : what was measured, in the plural, for "… conform".
         items : all that was decided, in the recording's order.
         remarks : what the reader must know of this use of the standard.
+        signed : whether limits hold on both sides of zero.
+        causes : of the uncertainty of each item, from which follows the probability that all conform.
+        budget : of the least favourable one.
         """
-        asked = self.characteristic.conditions(self.recorded, recorded=True)
+        asked = (
+            *self.characteristic.conditions(self.recorded, recorded=True),
+            *self.characteristic.asks(self),
+            *rated_conditions(self.circumstances, self.recorded.points),
+        )
+        worst = least_favourable(items)
         more: list[Text] = []
-        if self.facts.rule == "simple" and items[0].u_um > 0:
+        if self.facts.rule == "simple" and worst.u_um > 0:
             more.append(NOT_CONSIDERED)
+        if self.facts.prior is None and worst.u_um > 0:
+            more.append(BY_MEASUREMENT_ALONE)
         more += self.standard.remarks
         if copies := copies_in_words(self.recorded.points):
             more.append(copies)
         missing = tuple(text for condition in asked for text in condition.missing)
         return Statement(
-            self.facts, self.characteristic.name, quantity, measured, items, missing, (*remarks, *more)
+            self.facts, self.characteristic.name, quantity, measured, items, missing, (*remarks, *more), signed,
+            None if causes is None else _joint(items, causes, signed), budget, self._risks(worst, signed),
         )  # fmt: skip
+
+    def _risks(self, worst: Decided, signed: bool) -> Risks | None:
+        """Of all machines alike, where such a length is decided by this rule."""
+        prior = self.prior(worst.limit_um)
+        if prior is None or worst.u_um <= 0:
+            return None
+        band = worst.decision.guard_band
+        accepted = -20.0 * worst.u_um if band is None else worst.limit_um - band
+        return global_risks(accepted, worst.limit_um, worst.u_um, prior, signed=signed)
+
+
+def _joint(items: Sequence[Decided], causes: Causes, signed: bool) -> float | None:
+    """Probability that all that counts conforms."""
+    rows = np.array([i for i, item in enumerate(items) if item.standing != "replaced"], dtype=np.int64)
+    left = counted(items)
+    return probability_of_all(
+        [item.error_um for item in left], [item.limit_um for item in left], causes.of(rows), signed=signed
+    )
 
 
 def characteristic_of(standard: Standard, facts: ConformityFacts, key: str) -> Characteristic:

@@ -1,6 +1,7 @@
-"""The standards that can be stated: what each compares with its limit, and on what recording; those of other packages too.
+"""The standards that can be stated, each with its characteristics, and those of other packages.
 
-Another package offers one as an entry point of the group ``cmm_uq.standards``, of the standard's own name.
+Another package offers one as an entry point of the group ``cmm_uq.standards``, of the standard's own name. What of each is
+tested, from which columns, and what is not: docs/standards.md.
 """
 
 from __future__ import annotations
@@ -9,22 +10,121 @@ from collections.abc import Collection, Mapping
 from functools import partial
 from types import MappingProxyType
 
-import numpy as np
-
-from cmm_uq.conformity.decision import decide
-from cmm_uq.conformity.plan_conditions import conditions
-from cmm_uq.conformity.plans import B89, ISO_10360_2, ISO_10360_5
+from cmm_uq.conformity.bars_decided import offset_positions, offset_probe, volumetric_performance
+from cmm_uq.conformity.lengths_decided import (
+    at_offset,
+    errors_of_indication,
+    length_unstated,
+    normal_expansion,
+    on_lines,
+    repeatability_range,
+    short,
+)
+from cmm_uq.conformity.orientation_conditions import orientations
+from cmm_uq.conformity.plan_conditions import best_of, conditions
+from cmm_uq.conformity.plans import (
+    B89,
+    B89_BIDIRECTIONAL,
+    B89_LINEAR,
+    B89_OFFSET,
+    B89_REPEATABILITY,
+    ISO_10360_2,
+    ISO_10360_2_OFFSET,
+    ISO_10360_5,
+    ISO_10360_8,
+    VDI_2617_2_1,
+)
+from cmm_uq.conformity.remeasured import Again
+from cmm_uq.conformity.spheres_decided import (
+    diameter_allowed,
+    form_error,
+    form_unstated,
+    range_of_centres,
+    repeats_of_sphere,
+    sensing_stated,
+    size_error,
+    size_unstated,
+)
 from cmm_uq.conformity.standard import Characteristic, Standard, Test, characteristic_of
-from cmm_uq.conformity.statement import Decided, Statement, least_favourable
+from cmm_uq.conformity.statement import Statement
 from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.circumstances import Circumstances
 from cmm_uq.jobs.conformity import ConformityFacts
-from cmm_uq.messages import Text, plural, say
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.plugins import STANDARDS, Plugin, named, offered
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+
+AGAIN = Again(repeats=3, outside=1, lengths=5, readings=10)
+"""Of ISO 10360-2:2009; see docs/standards.md."""
+
+_E0 = Characteristic(
+    "E0", LENGTHS, partial(errors_of_indication, chosen=at_offset(0.0), again=AGAIN), partial(conditions, ISO_10360_2),
+    length_unstated, normal_expansion,
+)  # fmt: skip
+_R0 = Characteristic(
+    "R0", LENGTHS, partial(repeatability_range, repeats=3, chosen=at_offset(0.0)), partial(conditions, ISO_10360_2),
+    needs="u_repeat_um",
+)  # fmt: skip
+_E150 = Characteristic(
+    "E150", LENGTHS, partial(errors_of_indication, chosen=at_offset(150.0), again=AGAIN),
+    partial(best_of, ISO_10360_2_OFFSET), length_unstated, normal_expansion,
+)  # fmt: skip
+_SPHERE = (partial(conditions, ISO_10360_5), partial(diameter_allowed, plan=ISO_10360_5))
+
+
+def _superseded(by: str) -> tuple[Text, ...]:
+    return (say("This edition is superseded by {by}.", by=Verbatim(by)),)
+
+
+_STANDARDS = (
+    Standard("ASME B89.4.1-1997", (
+        Characteristic("volumetric performance", BARS, volumetric_performance, partial(conditions, B89)),
+        Characteristic("repeatability", FORMS, range_of_centres, partial(repeats_of_sphere, B89_REPEATABILITY),
+                       needs="u_repeat_um"),
+        Characteristic("linear displacement accuracy", LENGTHS,
+                       partial(errors_of_indication, chosen=on_lines(B89_LINEAR.positions)),
+                       partial(conditions, B89_LINEAR), length_unstated),
+        Characteristic("offset probe performance", BARS, offset_probe, partial(offset_positions, B89_OFFSET),
+                       needs="u_repeat_um"),
+        Characteristic("bidirectional length", LENGTHS,
+                       partial(errors_of_indication, chosen=short(B89_BIDIRECTIONAL.longest_mm)),
+                       partial(orientations, B89_BIDIRECTIONAL), length_unstated),
+    ), _superseded("ASME B89.4.10360.2-2008")),
+    Standard("ASME B89.4.10360.2-2008", (_E0, _R0, _E150), (
+        say("ASME B89.4.10360.2-2008 takes over ISO 10360-2; what it adds to it is not tested here."),
+    ), "contacting"),
+    Standard("ISO 10360-2:2009", (_E0, _R0, _E150), sensing="contacting"),
+    Standard("ISO 10360-5:2010", (
+        Characteristic("P_FTU", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1]),
+        Characteristic("P_STU", FORMS, size_error, _SPHERE[0], size_unstated, _SPHERE[1]),
+    ), _superseded("ISO 10360-5:2020"), "contacting"),
+    Standard("ISO 10360-5:2020", (
+        Characteristic("P_Form.Sph.1x25:SS:Tact", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1],
+                       ("P_Form.Sph.1x25", "P_Form")),
+        Characteristic("P_Size.Sph.1x25:SS:Tact", FORMS, size_error, _SPHERE[0], size_unstated, _SPHERE[1],
+                       ("P_Size.Sph.1x25", "P_Size")),
+    ), sensing="contacting"),
+    Standard("ISO 10360-8:2013", (
+        Characteristic("P_Form.Sph.1x25:Tr:ODS", FORMS, form_error, partial(conditions, ISO_10360_8), form_unstated,
+                       sensing_stated, ("P_Form.Sph.1x25", "P_Form")),
+        Characteristic("P_Size.Sph.1x25:Tr:ODS", FORMS, size_error, partial(conditions, ISO_10360_8), size_unstated,
+                       sensing_stated, ("P_Size.Sph.1x25", "P_Size")),
+    ), sensing="optical"),
+    Standard("VDI/VDE 2617", (_E0,), (
+        say("VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions."),
+        say("VDI/VDE 2617 alone names no part: that of the length measuring uncertainty is VDI/VDE 2617-2.1."),
+    ), "contacting"),
+    Standard("VDI/VDE 2617-2.1", tuple(
+        Characteristic(name, LENGTHS, partial(errors_of_indication, chosen=on_lines(VDI_2617_2_1[name].positions)),
+                       partial(conditions, VDI_2617_2_1[name]), length_unstated)
+        for name in ("U3", "U1", "U2")
+    ), sensing="contacting"),
+)  # fmt: skip
+
+BUILT_IN: Mapping[str, Standard] = MappingProxyType({standard.name: standard for standard in _STANDARDS})
+"""The standards that are decided here, by name."""
 
 
 def statement(
@@ -34,6 +134,7 @@ def statement(
     key: str,
     tested: Collection[str],
     recorded: Artefact | None = None,
+    circumstances: Circumstances | None = None,
 ) -> Statement:
     """Compare what the standard asks for with its limit, and decide.
 
@@ -45,6 +146,7 @@ def statement(
     key : of job.toml, for messages.
     recorded : the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a measurement.
     tested : what of this kind of artefact a standard may be decided on.
+    circumstances : under which the test was carried out, by the job.
 
     Raises
     ------
@@ -59,125 +161,14 @@ def statement(
     if characteristic.observed not in tested:
         raise CmmUqError(f"{facts.standard} is not decided on a {artefact.kind}", where=f"job.toml {key} standard",
                          fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
+    under = circumstances or Circumstances()
+    if None not in (standard.sensing, under.probe.sensing) and standard.sensing != under.probe.sensing:
+        raise CmmUqError(f"{facts.standard} is for {standard.sensing} probes, and the recording was made with one that is not",
+                         where=f"job.toml {key} standard",
+                         fix="State ISO 10360-8:2013 of optical probes, or leave the statement out")  # fmt: skip
     return characteristic.statement(
-        Test(standard, characteristic, facts, artefact, recorded or artefact, accuracy, key)
+        Test(standard, characteristic, facts, artefact, recorded or artefact, accuracy, key, under)
     )  # fmt: skip
-
-
-def _volumetric_performance(test: Test) -> Statement:
-    """Range of the ballbar's lengths (ASME B89.4.1-1997, 5.5.2)."""
-    facts, artefact, accuracy = test.facts, test.artefact, test.accuracy
-    measured, bar = accuracy["b89_range_um"], artefact.sizes[0].nominal
-    limit = float(test.limits_um(np.array([bar]))[0])
-    decision = decide(measured.value, measured.u, limit, facts.rule, signed=False)
-    item = Decided(measured.value, measured.u, limit, decision, length_mm=bar)
-    return test.stated(say("range of the ballbar lengths"), say("lengths"), (item,), ())
-
-
-def _errors_of_indication(test: Test) -> Statement:
-    """Every error of indication against its own maximum permissible error (ISO 10360-2:2009, 6.3).
-
-    Its uncertainty is the test uncertainty (ISO/TS 23165): that of the calibrated length; the machine's own scatter is part
-    of what is tested. Copies are no measurements and are not decided.
-    """
-    facts, artefact, recorded = test.facts, test.artefact, test.recorded
-    found = test.indications()
-    points, first = artefact.points, found.rows[:, 0]
-    errors, u, limits = found.errors / MICROMETRE, found.u / MICROMETRE, test.limits_um(found.lengths)
-    test.refuse_without_uncertainty(float(u.min()), "u_um")
-    copies = list(recorded.points.copies)
-    items = tuple(
-        Decided(
-            float(errors[i]), float(u[i]), float(limits[i]),
-            decide(float(errors[i]), float(u[i]), float(limits[i]), facts.rule, signed=True),
-            int(points.measurement[first[i]]), int(points.repeat[first[i]]), float(found.lengths[i]),
-        )
-        for i in np.flatnonzero(~np.isin(recorded.points.group[first], copies))
-    )  # fmt: skip
-    worst = least_favourable(items)
-    remarks = [
-        (
-            say("u is the test uncertainty (ISO/TS 23165), from the calibrated length: {u_um:.3g} µm.", u_um=worst.u_um)
-            if worst.u_um > 0
-            else say("u_um is not stated: no uncertainty is considered, and no probability can be given.")
-        ),
-        plural(
-            len(items),
-            one=say(
-                "{count} length decided, each by its own u and limit; {worst}.", count=len(items), worst=_least(worst)
-            ),
-            many=say(
-                "{count} lengths decided, each by its own u and limit; {worst}.", count=len(items), worst=_least(worst)
-            ),
-        ),
-    ]
-    quantity = say("error of indication of length, worst against its limit")
-    return test.stated(quantity, say("lengths"), items, remarks)
-
-
-def _least(worst: Decided) -> Text:
-    return say(
-        "least favourable: measurement {measurement}, repeat {repeat}, {length:.5g} mm",
-        measurement=worst.measurement or 0, repeat=worst.repeat or 0, length=worst.length_mm or 0.0,
-    )  # fmt: skip
-
-
-def _length_unstated(artefact: ArtefactFacts) -> str | None:
-    return "u_um" if artefact.certified and not artefact.u_um else None
-
-
-def _form_error(test: Test) -> Statement:
-    """Probing form error: the largest range of radial distances from a least-squares sphere (ISO 10360-5:2010, 6.2).
-
-    Its uncertainty is the test uncertainty (ISO/TS 23165): half the form deviation of the test sphere.
-    """
-    facts, sphere, key, probed = test.facts, test.artefact, test.key, test.artefact.forms()
-    if probed is None:
-        raise CmmUqError(f"{facts.standard} compares the form of spheres, and the {sphere.kind} has none",
-                         where=f"job.toml {key} standard", fix="Leave the statement out")  # fmt: skip
-    worst = int(np.argmax(probed.form))
-    value, u = float(probed.form[worst]) / MICROMETRE, probed.certified / 2 / MICROMETRE
-    test.refuse_without_uncertainty(u, "form_um")
-    limit = float(test.limits_um(np.array([sphere.sizes[0].nominal]))[0])
-    decision = decide(value, u, limit, facts.rule, signed=False)
-    item = Decided(value, u, limit, decision, int(probed.measurement[worst]), int(probed.repeat[worst]),
-                   sphere.sizes[0].nominal)  # fmt: skip
-    remarks = [
-        (
-            say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm.", u=u)
-            if u > 0
-            else say("The test sphere is taken as perfectly round: its form deviation (form_um) is not given.")
-        )
-    ]
-    if len(probed.form) > 1:
-        remarks.append(
-            say(
-                "The largest of {count} spheres: measurement {measurement}.",
-                count=len(probed.form),
-                measurement=probed.measurement[worst],
-            )
-        )
-    return test.stated(say("probing form error"), say("points"), (item,), remarks)
-
-
-def _form_unstated(artefact: ArtefactFacts) -> str | None:
-    key = artefact.form_key
-    return key if key is not None and not getattr(artefact, key) else None
-
-
-_E0 = Characteristic("E0", LENGTHS, _errors_of_indication, partial(conditions, ISO_10360_2), _length_unstated)
-
-BUILT_IN: Mapping[str, Standard] = MappingProxyType({standard.name: standard for standard in (
-    Standard("ASME B89.4.1-1997",
-             (Characteristic("volumetric performance", BARS, _volumetric_performance, partial(conditions, B89)),)),
-    Standard("ISO 10360-2:2009", (_E0,)),
-    Standard("ISO 10360-5:2010",
-             (Characteristic("P_FTU", FORMS, _form_error, partial(conditions, ISO_10360_5), _form_unstated),)),
-    Standard("VDI/VDE 2617", (_E0,), (
-        say("VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions."),
-    )),
-)})  # fmt: skip
-"""The standards that are decided here, by name; VDI/VDE 2617 is held to the plan of ISO 10360-2."""
 
 
 def standard_named(name: str) -> Standard | None:

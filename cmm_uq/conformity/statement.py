@@ -7,12 +7,18 @@ from dataclasses import dataclass
 from typing import Literal
 
 from cmm_uq.conformity.decision import Decision
+from cmm_uq.conformity.risk import Risks
 from cmm_uq.jobs.conformity import ConformityFacts
-from cmm_uq.messages import Text
+from cmm_uq.messages import NOTHING, Text
+from cmm_uq.uncertainty.budget import Budget
 
-StatementOutcome = Literal["pass", "fail", "undecided", "incomplete"]
+StatementOutcome = Literal[
+    "pass", "conditional pass", "incomplete", "undecided", "conditional fail", "remeasure", "fail"
+]  # fmt: skip
 
-_GRAVEST = ("fail", "undecided", "pass")
+_GRAVEST = ("fail", "remeasure", "conditional fail", "undecided", "conditional pass", "pass")
+
+Standing = Literal["counts", "again", "replaced"]
 
 
 @dataclass(frozen=True)
@@ -25,6 +31,8 @@ class Decided:
     decision : what follows.
     measurement, repeat : that it comes from; ``None`` where it comes from all of them.
     length_mm : calibrated length or size that it belongs to.
+    position : where it was measured, in words.
+    standing : ``again`` where the standard asks for more readings before it counts, ``replaced`` where these were made.
     """
 
     error_um: float
@@ -34,6 +42,13 @@ class Decided:
     measurement: int | None = None
     repeat: int | None = None
     length_mm: float | None = None
+    position: Text = NOTHING
+    standing: Standing = "counts"
+
+    @property
+    def outcome(self) -> StatementOutcome:
+        """What follows from it for the test."""
+        return "remeasure" if self.standing == "again" else self.decision.outcome
 
 
 @dataclass(frozen=True)
@@ -49,6 +64,10 @@ class Statement:
     errors : all that was decided, in the recording's order.
     missing : what the test lacks of its standard's plan, in words.
     remarks : what the reader must know of this use of the standard.
+    signed : whether limits hold on both sides of zero.
+    joint : probability that all quantities conform, what they share being correlated; ``None`` where it is not known.
+    budget : uncertainty of the named quantity, line by line; ``None`` where it has none.
+    risks : of all machines alike, for the named quantity; ``None`` without a prior.
     """
 
     facts: ConformityFacts
@@ -58,6 +77,10 @@ class Statement:
     errors: tuple[Decided, ...]
     missing: tuple[Text, ...]
     remarks: tuple[Text, ...]
+    signed: bool = True
+    joint: float | None = None
+    budget: Budget | None = None
+    risks: Risks | None = None
 
     @property
     def scope(self) -> Literal["complete", "partial"]:
@@ -71,9 +94,9 @@ class Statement:
 
     @property
     def outcome(self) -> StatementOutcome:
-        """Fail when anything fails, else undecided when anything is, else pass, if the test is complete."""
-        gravest = self.named.decision.outcome
-        return "incomplete" if gravest == "pass" and self.missing else gravest
+        """The gravest of all; where nothing stands against the machine, ``incomplete`` if anything is missing."""
+        gravest = self.named.outcome
+        return "incomplete" if gravest in ("pass", "conditional pass") and self.missing else gravest
 
     @property
     def value_um(self) -> float:
@@ -96,12 +119,17 @@ class Statement:
         return self.named.decision
 
 
+def counted(errors: Sequence[Decided]) -> tuple[Decided, ...]:
+    """Those that no further readings stand for."""
+    return tuple(item for item in errors if item.standing != "replaced")
+
+
 def least_favourable(errors: Sequence[Decided]) -> Decided:
     """See :attr:`Statement.named`; where the probabilities agree to the last digit, the farthest towards or over its limit."""
 
     def order(item: Decided) -> tuple[int, float, float, float]:
         decision, room = item.decision, item.limit_um - abs(item.error_um)
         within, beyond = decision.probability_conforming, decision.probability_beyond
-        return _GRAVEST.index(decision.outcome), 0.0 if within is None else within, -(beyond or 0.0), room
+        return _GRAVEST.index(item.outcome), 0.0 if within is None else within, -(beyond or 0.0), room
 
-    return min(errors, key=order)
+    return min(counted(errors), key=order)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from cmm_uq.conformity.accuracy import TITLES
-from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents import tolerance_section
+from cmm_uq.documents.conformity_section import conformity_section
 from cmm_uq.documents.corner import corner_plot
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
-from cmm_uq.documents.document import Block, Column, Decision, Document, Facts, Paragraph, Section, Signature, Table
+from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Signature, Table
 from cmm_uq.documents.noise_words import noise_found
 from cmm_uq.documents.origin import CERTIFICATE, came_about
 from cmm_uq.documents.outcome import Outcome, Page
@@ -17,7 +17,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.documents.results_file import results
 from cmm_uq.documents.summary import summary
 from cmm_uq.documents.warning import warnings
-from cmm_uq.documents.wording import expanded, measured, probability, title_of
+from cmm_uq.documents.wording import expanded, title_of
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
@@ -25,7 +25,7 @@ from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, liste
 from cmm_uq.model.artefact import Size
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.uncertainty.rounding import rounded, significant
+from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE
 
 STATEMENTS = (
@@ -63,7 +63,7 @@ def certified(result: Result, page: Page) -> Outcome:
 
 
 def _certificate(result: Result, page: Page, told: tuple[Text, ...]) -> Document:
-    sections = [_performance(result), _conformity(result), _errors(result), _traceability(result)]
+    sections = [_performance(result), conformity_section(result.statements), _errors(result), _traceability(result)]
     sections += tolerance_section.sections(result)
     sections += page.sections(result)
     if result.job.facts.job.diagnosis_on_certificate:
@@ -170,40 +170,6 @@ def _performance(result: Result) -> Section:
         ),
     )
     return Section(say("Figures of performance"), (Table(say("Figures of performance"), columns, tuple(rows), notes),))
-
-
-def _conformity(result: Result) -> Section:
-    return Section(say("Statements of conformity"), tuple(_decision(statement) for statement in result.statements))
-
-
-def _decision(statement: Statement) -> Decision:
-    decision = statement.decision
-    value, u = measured(statement)
-    said = []
-    if statement.outcome == "incomplete":
-        said.append(
-            say(
-                "The {measured} measured conform; the test lacks what is named as missing.", measured=statement.measured
-            )
-        )
-    if decision.guard_band is None:
-        said.append(say("The uncertainty is too large for any value to be accepted."))
-    elif decision.guard_band > 0:
-        said.append(say("The guard band is {guard_band} µm.", guard_band=significant(decision.guard_band)))
-    if decision.probability_conforming is not None:
-        chance = probability(decision.probability_conforming)
-        said.append(say("Probability that the quantity is within the limit: {chance}.", chance=chance))
-    known = say(", u = {u} µm", u=u) if u else NOTHING
-    return Decision(
-        Verbatim(statement.facts.standard),
-        statement.quantity,
-        say("{value} µm{known}", value=value, known=known),
-        say("{limit_um:.4g} µm", limit_um=statement.limit_um),
-        decision.rule,
-        statement.outcome,
-        sentences((*said, *statement.remarks)),
-        statement.missing,
-    )
 
 
 def _errors(result: Result) -> Section:

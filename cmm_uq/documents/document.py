@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal
 from cmm_uq.documents.view_words import label
 from cmm_uq.messages import NOTHING, Text, say
 
-Outcome = Literal["pass", "fail", "undecided", "incomplete"]
+Outcome = Literal["pass", "conditional pass", "incomplete", "undecided", "conditional fail", "remeasure", "fail"]
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.screening.screened import Finding
+from cmm_uq.uncertainty.budget_results import budget_data
 from cmm_uq.uncertainty.covariance import Covariance
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -220,7 +221,13 @@ def _statement(statement: Statement) -> dict[str, Any]:
         "limit_um": statement.limit_um, "u_um": statement.u_um, "rule": rule_name(statement.facts.rule),
         "guard_band_um": statement.decision.guard_band, "decision": statement.outcome,
         "probability_conforming": statement.decision.probability_conforming, "scope": statement.scope,
-        "missing": list(statement.missing), "remarks": list(statement.remarks),
+        "missing": list(statement.missing), "remarks": list(statement.remarks), "probability_all_conform": statement.joint,
+        "mpe": None if statement.facts.mpe is None else statement.facts.mpe.model_dump(),
+        "prior": None if statement.facts.prior is None else statement.facts.prior.model_dump(),
+        "global_risks": None if statement.risks is None else {
+            "consumer": statement.risks.consumer, "producer": statement.risks.producer,
+        },
+        "test_uncertainty": None if statement.budget is None else budget_data(statement.budget),
         "errors": [_decided(item) for item in statement.errors],
     }  # fmt: skip
 
@@ -228,8 +235,9 @@ def _statement(statement: Statement) -> dict[str, Any]:
 def _decided(item: Decided) -> dict[str, Any]:
     return {
         "measurement": item.measurement, "repeat": item.repeat, "length_mm": item.length_mm, "error_um": item.error_um,
-        "u_um": item.u_um, "limit_um": item.limit_um,
+        "u_um": item.u_um, "U_um": 2 * item.u_um, "limit_um": item.limit_um,
         "probability_conforming": item.decision.probability_conforming, "outcome": item.decision.outcome,
+        "guard_band_um": item.decision.guard_band, "position": item.position or None, "standing": item.standing,
     }  # fmt: skip
 
 

@@ -18,6 +18,7 @@ WORDS: Mapping[str, Text] = {
     "replaced": say("□ stands for a character that the fonts of this file lack: {codes}. The HTML view shows it.",
                     codes=_BREAK),
     "pass": say("Pass"), "fail": say("Fail"), "undecided": say("Undecided"), "incomplete": say("Incomplete"),
+    "conditional pass": say("Conditional pass"), "conditional fail": say("Conditional fail"), "remeasure": say("Remeasure"),
 }  # fmt: skip
 """By the names that the templates use."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cmm_uq.conformity.lengths_decided import unknown_expansion
 from cmm_uq.documents.diagnosis_words import VERDICTS
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import title_of
@@ -24,6 +25,7 @@ def warnings(result: Result) -> tuple[Text, ...]:
             _convergence(result),
             _mismatch(result),
             _noise(result),
+            _expansion(result),
             _implausible(result),
             _undetermined(result),
             _screening(result),
@@ -84,6 +86,13 @@ def _noise(result: Result) -> list[Text]:
         for size in result.artefact.sizes
         if size.certified and size.sd == 0
     ]
+
+
+def _expansion(result: Result) -> list[Text]:
+    """An artefact of unknown expansion away from 20 °C: a mistake of its length for a length standard."""
+    certified = any(size.certified and size.role == "dimension" for size in result.artefact.sizes)
+    told = unknown_expansion(result.artefact, result.job.facts.artefact.cte_per_k)
+    return [told] if told and certified and result.artefact.indications() is not None else []
 
 
 def _implausible(result: Result) -> list[Text]:

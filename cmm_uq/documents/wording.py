@@ -14,6 +14,7 @@ from cmm_uq.uncertainty.rounding import rounded
 
 OUTCOME_WORDS: Mapping[str, Text] = {
     "pass": say("pass"), "fail": say("fail"), "undecided": say("undecided"), "incomplete": say("incomplete"),
+    "conditional pass": say("conditional pass"), "conditional fail": say("conditional fail"), "remeasure": say("remeasure"),
 }  # fmt: skip
 """What a statement of conformity comes to, in a table."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import model_validator
 
@@ -22,6 +22,7 @@ class Traceability(Table):
 class ArtefactFacts(Table):
     """``[artefact]``: what every kind of measurement has; a kind with more keys has a table of its own.
 
+    ``U_um`` with ``k`` may stand for ``u_um``.
     Without ``length_mm`` the artefact is uncalibrated, unless its certified figures stand in the recording.
 
     Attributes
@@ -46,6 +47,21 @@ class ArtefactFacts(Table):
     u_um: Uncertainty | None = None
     cte_per_k: AnyFloat = 0.0
     certificate: Traceability | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _expanded(cls, data: Any) -> Any:
+        """``U_um`` with its ``k`` in place of ``u_um``, as certificates state it."""
+        if not (isinstance(data, dict) and ("U_um" in data or "k" in data)):
+            return data
+        given = {key: data[key] for key in ("U_um", "k") if key in data}
+        if len(given) < 2 or "u_um" in data:
+            raise ValueError("give u_um, or U_um together with its coverage factor k")
+        expanded, factor = given["U_um"], given["k"]
+        numbers = all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in (expanded, factor))
+        if not numbers or not 1 <= factor <= 10:
+            raise ValueError("give U_um as a number in µm, and k as one from 1 to 10")
+        return {**{key: value for key, value in data.items() if key not in given}, "u_um": expanded / factor}
 
     @model_validator(mode="after")
     def _uncertainty_of_something(self) -> Self:

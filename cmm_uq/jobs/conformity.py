@@ -10,18 +10,28 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cmm_uq.errors import suggestion
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.table import Limit, Table, Uncertainty, at_least
+from cmm_uq.jobs.circumstances import TEST_KEYS, TestUncertainty
+from cmm_uq.jobs.table import LARGEST_UM, Limit, Table, Uncertainty, at_least
 
 
 class MaximumPermissibleError(Table):
-    """``mpe``: E = A + L/K, with L in mm and E in µm."""
+    """``mpe`` in one of three forms: A + L/K, min(A + L/K, B), or B; L in mm, A, B and the result in µm."""
 
-    a_um: Uncertainty
-    k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)]
+    a_um: Uncertainty | None = None
+    k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
+    b_um: Limit | None = None
+
+    @model_validator(mode="after")
+    def _one_of_three_forms(self) -> Self:
+        if (self.a_um is None) != (self.k is None):
+            raise ValueError("mpe = A + L/K needs both a_um and k")
+        if self.a_um is None and self.b_um is None:
+            raise ValueError("give mpe = { a_um = …, k = … }, the same with b_um = …, or { b_um = … }")
+        return self
 
 
 class GuardBand(Table):
-    """A guard band of so many expanded uncertainties (ILAC-G8:09/2019, 4.2.2)."""
+    """A guard band of so many expanded uncertainties; between acceptance and rejection lies *undecided*."""
 
     guard_band: Annotated[float, Field(ge=0, le=100)]
 
@@ -32,17 +42,70 @@ class FalseAccept(Table):
     max_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-12)]
 
 
-Rule = Literal["simple", "ISO 14253-1"] | GuardBand | FalseAccept
+class UncertaintyRatio(Table):
+    """Simple acceptance where the zone of the specification is so many times as wide as the uncertainty interval."""
+
+    uncertainty_ratio: Annotated[float, Field(gt=0, le=1e6)]
+
+
+class PosteriorProbability(Table):
+    """Accept when the probability of conforming, with what the prior says, is at least this (JCGM 106:2012, 8.3)."""
+
+    posterior_probability: Annotated[float, Field(gt=0.5, lt=1)]
+
+
+class UnconditionalRisk(Table):
+    """Accept so that of all items tested at most this share is wrongly accepted (JCGM 106:2012, 9.5.3)."""
+
+    max_unconditional_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-6)]
+
+
+class Prior(Table):
+    """``prior``: what is known of the tested errors beforehand, a normal distribution (JCGM 106:2012, 7.2).
+
+    Attributes
+    ----------
+    sd_um, share_of_limit : its standard deviation, or that over the limit of each error.
+    mean_um : its mean.
+    """
+
+    sd_um: Limit | None = None
+    share_of_limit: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
+    mean_um: Annotated[float, Field(ge=-LARGEST_UM, le=LARGEST_UM)] = 0.0
+
+    @model_validator(mode="after")
+    def _one_width(self) -> Self:
+        if (self.sd_um is None) == (self.share_of_limit is None):
+            raise ValueError("give either sd_um or share_of_limit: how far errors of such machines scatter")
+        return self
+
+
+RuleName = Literal[
+    "simple", "ASME B89.7.3.1", "ASME B89.7.3.1-2001", "ISO 14253-1", "ISO 14253-1:2017",
+    "ILAC-G8 binary", "ILAC-G8:09/2019 binary", "ILAC-G8 non-binary", "ILAC-G8:09/2019 non-binary",
+    "JCGM 106", "JCGM 106:2012", "Z540.3", "ANSI/NCSL Z540.3", "ANSI/NCSL Z540.3-2006",
+]  # fmt: skip
+"""Rules by name, with or without their edition."""
+
+Rule = RuleName | GuardBand | FalseAccept | UncertaintyRatio | PosteriorProbability | UnconditionalRisk
+
+_BY_PRIOR = ("JCGM 106", "JCGM 106:2012", "Z540.3", "ANSI/NCSL Z540.3", "ANSI/NCSL Z540.3-2006")
+
+
+def needs_prior(rule: Rule) -> bool:
+    """Whether a rule says nothing without a prior."""
+    return isinstance(rule, (PosteriorProbability, UnconditionalRisk)) or rule in _BY_PRIOR
 
 
 class ConformityFacts(Table):
-    """One ``[[conformity]]``: a standard, a limit and a decision rule."""
+    """One ``[[conformity]]``: a standard, a limit and a decision rule; ``prior`` for rules and risks that go by one."""
 
     standard: str
     characteristic: str | None = None
     limit_um: Limit | None = None
     mpe: MaximumPermissibleError | None = None
     rule: Rule = "ISO 14253-1"
+    prior: Prior | None = None
 
     @field_validator("standard")
     @classmethod
@@ -59,6 +122,15 @@ class ConformityFacts(Table):
         return self
 
     @model_validator(mode="after")
+    def _prior_where_needed(self) -> Self:
+        if needs_prior(self.rule) and self.prior is None:
+            raise ValueError(
+                f"the rule {_key_of(self.rule)} goes by what is known of such machines beforehand: "
+                "give prior = { sd_um = … } or { share_of_limit = … }"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _decided_here(self, info: ValidationInfo) -> Self:
         if asked := _asked(self, standards_in(info)):
             asked.characteristic(self.characteristic)
@@ -68,12 +140,19 @@ class ConformityFacts(Table):
 class Asked(Protocol):
     """What the check of a job must know of a standard."""
 
+    @property
+    def sensing(self) -> str | None:
+        """For which probes it is; ``None`` for any."""
+        ...
+
     def characteristic(self, name: str | None) -> object:
         """One that it decides; ``ValueError`` for a name that it does not."""
         ...
 
-    def uncertainty_missing(self, wish: ConformityFacts, artefact: ArtefactFacts) -> str | None:
-        """The key of ``[artefact]`` whose uncertainty the rule needs and does not have; ``None`` when nothing is missing."""
+    def uncertainty_missing(
+        self, wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty
+    ) -> str | None:  # fmt: skip
+        """The key whose uncertainty the rule needs and does not have; ``None`` when nothing is missing."""
         ...
 
 
@@ -90,20 +169,38 @@ def standards_in(info: ValidationInfo) -> Standards | None:
     return info.context if isinstance(info.context, Standards) else None
 
 
-def uncertainty_missing(wish: ConformityFacts, artefact: ArtefactFacts, standards: Standards | None) -> str | None:
+def uncertainty_missing(
+    wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty, standards: Standards | None
+) -> str | None:  # fmt: skip
     """See :meth:`Asked.uncertainty_missing`; ``None`` where there is nothing to check against."""
     asked = _asked(wish, standards)
-    return asked.uncertainty_missing(wish, artefact) if asked else None
+    return asked.uncertainty_missing(wish, artefact, stated) if asked else None
 
 
 def _asked(wish: ConformityFacts, standards: Standards | None) -> Asked | None:
     return None if standards is None else standards.named(wish.standard)
 
 
-def needed(key: str, wish: ConformityFacts) -> tuple[str, str]:
-    """That a rule needs an uncertainty which ``[artefact]`` does not state, and how to mend it."""
-    rule = wish.rule if isinstance(wish.rule, str) else next(iter(wish.rule.model_dump()))
+def probe_unfit(wish: ConformityFacts, sensing: str | None, standards: Standards | None) -> str | None:
+    """That a standard is for other probes than that of the recording, and how to mend it; ``None`` where it is for it."""
+    asked = _asked(wish, standards)
+    if asked is None or None in (asked.sensing, sensing) or asked.sensing == sensing:
+        return None
     return (
-        f"the rule {rule} needs the uncertainty of what {wish.standard} compares with, and [artefact] states no {key} above 0",
-        f'Give {key} in [artefact], or rule = "simple", which takes no account of it',
+        f"the standard {wish.standard} is for {asked.sensing} probes, and the recording was made with one that is not. "
+        f"State {'ISO 10360-8:2013' if sensing == 'optical' else 'another standard'}, or leave the statement out"
     )
+
+
+def needed(key: str, wish: ConformityFacts) -> tuple[str, str]:
+    """That a rule needs an uncertainty which the job does not state, and how to mend it."""
+    table = "test_uncertainty" if key in TEST_KEYS else "artefact"
+    return (
+        f"the rule {_key_of(wish.rule)} needs the uncertainty of what {wish.standard} compares with, "
+        f"and [{table}] states no {key} above 0",
+        f'Give {key} in [{table}], or rule = "simple", which takes no account of it',
+    )
+
+
+def _key_of(rule: Rule) -> str:
+    return rule if isinstance(rule, str) else next(iter(rule.model_dump()))

@@ -14,7 +14,8 @@ from pydantic import Field, ValidationInfo, create_model, field_validator, model
 from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.conformity import ConformityFacts, needed, standards_in, uncertainty_missing
+from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
+from cmm_uq.jobs.conformity import ConformityFacts, needed, probe_unfit, standards_in, uncertainty_missing
 from cmm_uq.jobs.file_names import device_name
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
@@ -124,6 +125,9 @@ class JobFile(Table):
     machine: MachineFacts
     artefact: ArtefactFacts
     recording: RecordingFacts
+    probe: ProbeFacts = ProbeFacts()
+    test_uncertainty: TestUncertainty = TestUncertainty()
+    rated_conditions: RatedConditions = RatedConditions()
     model: ModelFacts
     conformity: Annotated[list[ConformityFacts], Field(max_length=CONFORMITY.most)] = []
     plan: PlanFacts = PlanFacts()
@@ -135,10 +139,31 @@ class JobFile(Table):
     ) -> list[ConformityFacts]:  # fmt: skip
         artefact = info.data.get("artefact")
         for wish in wishes:
-            key = uncertainty_missing(wish, artefact, standards_in(info)) if artefact is not None else None
+            if artefact is None or "test_uncertainty" not in info.data:
+                continue  # what is wrong with these is said instead
+            key = uncertainty_missing(wish, artefact, info.data["test_uncertainty"], standards_in(info))
             if key is not None:
                 raise ValueError(". ".join(needed(key, wish)))
         return wishes
+
+    @field_validator("conformity")
+    @classmethod
+    def _standards_are_for_the_probe(cls, wishes: list[ConformityFacts], info: ValidationInfo) -> list[ConformityFacts]:
+        if "probe" in info.data and "machine" in info.data:
+            sensing = _sensing(info.data["probe"], info.data["machine"])
+            for wish in wishes:
+                if unfit := probe_unfit(wish, sensing, standards_in(info)):
+                    raise ValueError(unfit)
+        return wishes
+
+    @property
+    def circumstances(self) -> Circumstances:
+        """Under which a standard's test was carried out."""
+        probe = self.probe.model_copy(update={"sensing": _sensing(self.probe, self.machine)})
+        stated = "cte_per_k" in self.artefact.model_fields_set
+        return Circumstances(
+            self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None
+        )  # fmt: skip
 
     @model_validator(mode="before")
     @classmethod
@@ -147,6 +172,11 @@ class JobFile(Table):
         if isinstance(data, dict) and not getattr(table, "with_recording", True):
             return {"recording": {"file": ""}, **data}
         return data
+
+
+def _sensing(probe: ProbeFacts, machine: MachineFacts) -> str | None:
+    """How the probe senses; a digitizer on the ram is an optical one."""
+    return probe.sensing or ("optical" if machine.digitizer is not None else None)
 
 
 Tables = Callable[[str], type[ArtefactFacts] | None]

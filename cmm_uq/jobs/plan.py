@@ -55,7 +55,7 @@ class PlanFacts(Table):
     lengths_mm: Annotated[list[Length], Field(max_length=LISTED.most)] = []
     pitch_mm: Length | None = None
     grid: Annotated[list[Annotated[int, Field(ge=2, le=100)]], Field(min_length=2, max_length=2)] = [5, 5]
-    both_ways: bool = False
+    both_ways: bool | None = None
     repeats: Annotated[int, Field(ge=1, le=20)] = 3
     rivals: Names | None = None
     columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}

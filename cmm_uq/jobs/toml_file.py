@@ -20,6 +20,9 @@ from cmm_uq.files.toml import toml_of
 
 Facts = TypeVar("Facts", bound=BaseModel)
 
+_CHOICE = re.compile("GuardBand|FalseAccept|UncertaintyRatio|PosteriorProbability|UnconditionalRisk|literal")
+"""Of the names that stand in a location for one of several tables that a key may have, none of which the user wrote."""
+
 _SHOWN = 60
 """Characters of a key or a value in a message."""
 
@@ -84,7 +87,7 @@ def _plain(value: Any) -> Any:
 def _located(error: ErrorDetails, text: str, path: Path, model: type[BaseModel]) -> CmmUqError:
     """The first validation error, with line and key."""
     keys = [str(part) for part in error["loc"] if not (isinstance(part, str) and "[" in part)]
-    named = [key for key in keys if not re.match(r"^(GuardBand|FalseAccept|literal)", key)] or [str(error["loc"][0])]
+    named = [key for key in keys if not _CHOICE.match(key)] or [str(error["loc"][0])]
     line = _line_of(named, text)
     named = [shortened(key, _SHOWN) for key in named]
     where = f"{path}{f' line {line}' if line else ''}: [{named[0]}]{' ' + '.'.join(named[1:]) if named[1:] else ''}"

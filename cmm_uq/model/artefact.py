@@ -50,6 +50,8 @@ class Forms:
     form : (q,) range of the distances from the least-squares feature, mm.
     certified : form deviation of the artefact by its certificate, mm; 0 when it is not given.
     directions : (n, 3) outward direction of each point from the middle of its feature.
+    size : (q,) measured minus certified size at 20 °C, mm; ``None`` without a certificate.
+    centres : (q, 3) middles of the features, mm; ``None`` where they say nothing.
     """
 
     measurement: Ints
@@ -58,6 +60,8 @@ class Forms:
     form: Floats
     certified: float
     directions: Floats
+    size: Floats | None = None
+    centres: Floats | None = None
 
 
 Role = Literal["dimension", "sought", "set-up"]
@@ -157,6 +161,10 @@ class Artefact(ABC):
         """A point on the line of each length between two points, and the line's direction, (m, 3) each."""
         first, last = self.points.xyz[rows[:, 0]], self.points.xyz[rows[:, 1]]
         return 0.5 * (first + last), last - first
+
+    def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
+        """Whether the ends of each length between two points were reached from opposite sides, (m,); ``None``: not known."""
+        return None
 
     def forms(self) -> Forms | None:
         """Form errors of a test sphere; ``None`` when they have no meaning here."""

@@ -73,7 +73,9 @@ def test_a_recording_is_judged_and_only_what_is_missing_is_planned() -> None:
     plan = make_plan(read_job(ROOT / "examples" / "iota-1102-20C", recorded=False), power=False)
     assert plan.name == RECORDED
     assert plan.measured == 20
-    assert plan.to_measure == ()
+    (placing,) = plan.to_measure  # one position is a copy of another, so the twentieth is still to be measured
+    assert placing.title == "along +X +Y"
+    assert all(condition.met for condition in plan.conditions)
     # the noise that the residuals of the recording show, in Harris 2004 12.7 µm of a length, √2 of a coordinate
     assert plan.setting.sigma == pytest.approx(12.7e-3 / np.sqrt(2), rel=0.02)
 

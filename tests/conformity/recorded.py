@@ -19,6 +19,9 @@ MIDDLE = TRAVEL.mean(axis=1)
 DIAGONALS = [np.array([900.0 * a, 550 * b, 500]) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
 SEVEN = [*DIAGONALS, *np.eye(3)]
 
+BAR_U = 0.5 / np.sqrt(2.0)
+"""Of a bar's certificate, µm: 0.5 µm of the difference of two of its lengths."""
+
 Errors = Mapping[tuple[int, int, float], float]
 """Error, µm, of the length, mm, of a measurement and repeat."""
 
@@ -89,7 +92,7 @@ def bars(
         ends += [middle - half, middle + half]
     number = np.repeat(np.arange(1, len(directions) + 1), 2)
     points = Points(np.array(ends), number, np.tile([1, 2], len(directions)), np.ones_like(number), machine)
-    return Ballbar(bar_facts(300.0), points)
+    return Ballbar(bar_facts(300.0, BAR_U), points)
 
 
 def again(bar: Ballbar, numbers: Mapping[int, int], moved_mm: float = 0.0, *, turned: bool = False) -> Ballbar:
@@ -100,7 +103,7 @@ def again(bar: Ballbar, numbers: Mapping[int, int], moved_mm: float = 0.0, *, tu
         xyz[points.measurement == to] = points.xyz[points.measurement == of][:: -1 if turned else 1] + np.array(
             [moved_mm, 0, 0]
         )
-    return Ballbar(bar_facts(300.0), replace(points, xyz=xyz))
+    return Ballbar(bar_facts(300.0, BAR_U), replace(points, xyz=xyz))
 
 
 def sphere(

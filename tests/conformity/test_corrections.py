@@ -12,6 +12,7 @@ import pytest
 from cmm_uq.conformity.consequences import Consequences, consequences
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.noise import Sizes
+from cmm_uq.jobs.circumstances import Circumstances
 from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.kinds.ballbar.observe import Ballbar
@@ -45,7 +46,7 @@ def told(
     )  # fmt: skip
     described = kind_named(after.artefact.kind)
     assert described is not None
-    job: Any = SimpleNamespace(facts=SimpleNamespace(conformity=wishes))
+    job: Any = SimpleNamespace(facts=SimpleNamespace(conformity=wishes, circumstances=Circumstances()))
     return consequences(job, diagnosis, partial(kind, facts), described.tested, 0)
 
 

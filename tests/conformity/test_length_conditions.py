@@ -35,7 +35,7 @@ def test_a_plan_that_is_kept_says_how_amply() -> None:
     lines = [(X, [25.0, 720.0])] * 2 + [(Y, [28.126, 365.2])] * 2
     assert said(along(*lines)) == (
         [
-            "four space diagonals and three axes",
+            "parallel to X, parallel to Y",
             "longest length at least 66 % of the travel along each line: 66 % to 80 %",
             "2 lengths on each line: 2 to 2",
             "shortest length at most 30 mm: 28.13 mm",
@@ -49,7 +49,7 @@ def test_a_plan_that_is_not_kept_says_what_is_missing() -> None:
     """85 of 550 mm are 15.45 %."""
     assert said(along((Y, [30.126, 85.0]))) == (
         [
-            "four space diagonals and three axes; missing: parallel to X",
+            "parallel to X, parallel to Y; missing: parallel to X",
             "longest length at least 66 % of the travel along each line: 15 % to 15 %",
             "2 lengths on each line: 2 to 2",
             "shortest length at most 30 mm: 30.13 mm",

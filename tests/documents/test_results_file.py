@@ -104,8 +104,10 @@ def test_every_length_is_in_the_table_of_errors_with_its_own_limit() -> None:
     rows = np.genfromtxt(ROOT / "examples" / "step-gauge-simulated" / "recording.csv", delimiter=",", names=True)
     assert len(found["errors"]) == np.sum(rows["reference_mm"] > 0)
     for entry in found["errors"]:
-        assert entry.keys() == {"measurement", "repeat", "length_mm", "error_um", "u_um", "limit_um",
-                                "probability_conforming", "outcome"}  # fmt: skip
+        assert entry.keys() == {
+            "measurement", "repeat", "length_mm", "position", "error_um", "u_um", "U_um", "limit_um", "guard_band_um",
+            "probability_conforming", "outcome", "standing",
+        }  # fmt: skip
         assert entry["limit_um"] == pytest.approx(4 + entry["length_mm"] / 100)
         assert entry["u_um"] == pytest.approx(0.4 * entry["length_mm"] / 820)
     assert (

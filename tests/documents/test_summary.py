@@ -33,7 +33,7 @@ def test_a_failed_test_says_what_it_lacks_after_its_figures() -> None:
     outcome, remark = said("iota-1102-20C", "ASME B89.4.1-1997")
     assert outcome == "FAIL"
     assert remark.startswith(
-        "340 µm against 60 µm; conforming with less than\u00a00.01\u00a0%; missing: 1 of 20 positions"
+        "339.9 µm against 60 µm; conforming with less than\u00a00.01\u00a0%; missing: 1 of 20 positions"
     )
 
 

@@ -13,6 +13,7 @@ import pytest
 
 from cmm_uq.commands.reading import NAMEABLE, read_job
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.circumstances import TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, uncertainty_missing
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.kinds import artefact_facts
@@ -166,13 +167,13 @@ def test_simple_acceptance_and_figures_without_a_certificate_need_no_uncertainty
 
 def test_a_test_sphere_without_its_form_is_refused_by_name() -> None:
     wish = ConformityFacts(standard="ISO 10360-5:2010", limit_um=3.0)
-    missing = partial(uncertainty_missing, wish, standards=NAMEABLE.standards)
+    missing = partial(uncertainty_missing, wish, stated=TestUncertainty(), standards=NAMEABLE.standards)
     assert missing(artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1)) == "form_um"
     assert missing(artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.1)) is None
 
 
 def test_references_in_the_recording_count_as_certified_unless_they_are_nominal() -> None:
     wish = ConformityFacts(standard="VDI/VDE 2617", limit_um=3.0)
-    missing = partial(uncertainty_missing, wish, standards=NAMEABLE.standards)
+    missing = partial(uncertainty_missing, wish, stated=TestUncertainty(), standards=NAMEABLE.standards)
     assert missing(artefact_facts(kind="step_gauge")) == "u_um"
     assert missing(artefact_facts(kind="step_gauge", nominal=True)) is None

@@ -83,6 +83,23 @@ def offset_by_other_ways(results: Results) -> list[Record]:
     return list(zip(found["offset_mm"].values(), found["by_centres_mm"], found["closed_form_mm"], strict=True))
 
 
+def decided(results: Results) -> list[Record]:
+    """Values of one length in one measurement, as a row has them, in the order of the first."""
+    (stated,) = results["conformity"]
+    rows: dict[tuple[Any, ...], list[Any]] = {}
+    for one in stated["errors"]:
+        key = (one["measurement"], one["length_mm"], one["u_um"], one["limit_um"], one["standing"])
+        rows.setdefault(key, []).append(one)
+    return list(rows.values())
+
+
+def of_test_value(results: Results) -> list[Record]:
+    (stated,) = results["conformity"]
+    return [[line] for line in stated["test_uncertainty"]["budget"]]
+
+
+STATED = ("ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617")
+
 RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Figures of performance": lambda r: [[quantity] for quantity in r["accuracy_uncertainty"].values()],
     "Error factors of the machine": parameters,
@@ -111,6 +128,8 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Offset of the mount": offset,
     "The offset by other ways": offset_by_other_ways,
     "Every attitude": lambda r: [[pose] for pose in r["digitizer"]["poses"]],
+    **{f"All values decided by {name}": decided for name in STATED},
+    **{f"Contributions to the uncertainty of the test value named, {name}": of_test_value for name in STATED},
 }  # fmt: skip
 """Where in results.json the rows of a table stand, in their order, by the table's caption."""
 

@@ -66,12 +66,13 @@ def test_seven_lines_of_five_lengths_three_times_are_a_hundred_and_five_lengths(
     for placing in placings:
         reference = placing.points.columns["reference_mm"]
         assert len(np.unique(reference[reference > 0])) == 5
-        lengths += int(np.sum(reference > 0))
+        assert int(np.sum(reference > 0)) == 2 * 3 * 5  # there, and back
+        lengths += int(np.sum(reference > 0)) // 2
     assert lengths == 105
     for axis, placing in enumerate(placings[4:]):
         moved = np.ptp(placing.points.xyz, axis=0)
         assert np.flatnonzero(moved > 1e-6).tolist() == [axis]
-    diagonals = [np.sign(p.points.xyz[-1] - p.points.xyz[0]) for p in placings[:4]]
+    diagonals = [np.sign(p.points.xyz[1] - p.points.xyz[0]) for p in placings[:4]]
     assert len({tuple(d * d[2]) for d in diagonals}) == 4
 
 

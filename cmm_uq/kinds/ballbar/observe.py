@@ -7,13 +7,14 @@ leaves one scale common to all axes undetermined.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact, Indications, Size
 from cmm_uq.model.recorded import check_length, expansion
-from cmm_uq.points import Floats, Points
+from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.units import MICROMETRE, unit
 
 
@@ -77,6 +78,10 @@ class Ballbar(Artefact):
     def ends(self) -> Floats:
         """Both ends of each bar, (m, 2, 3) mm, in the recorded frame."""
         return np.asarray(self.points.xyz[self.rows], dtype=np.float64)
+
+    def bidirectional(self, rows: Ints) -> NDArray[np.bool_]:
+        """See :meth:`Artefact.bidirectional`: distances of centres never are."""
+        return np.zeros(len(rows), dtype=bool)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """See :meth:`Artefact.fit`: same middle, same direction, the bar's length."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.freedoms import Freedoms
@@ -127,6 +128,11 @@ class StepGauge(Artefact):
         """
         return self._lines.means(self.points.xyz)[rows[:, 1]], self.directions()[rows[:, 1]]
 
+    def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
+        """See :meth:`Artefact.bidirectional`: by the senses of travel."""
+        sense = self.approach()
+        return None if sense is None else np.asarray(sense[rows[:, 0]] * sense[rows[:, 1]] < 0)
+
     def directions(self, xyz: Floats | None = None) -> Floats:
         """Unit vector of each point's line, (n, 3), in the sense of growing distances."""
         bars = self._lines.sums(self._ends[:, None] * (self.points.xyz if xyz is None else xyz))
@@ -204,6 +210,10 @@ class GaugeBlocks(StepGauge):
 
     kind = "gauge_blocks"
     title = say("Gauge blocks")
+
+    def bidirectional(self, rows: Ints) -> NDArray[np.bool_]:
+        """See :meth:`Artefact.bidirectional`: the faces of a block look away from each other."""
+        return np.ones(len(rows), dtype=bool)
 
 
 def _ends(reference: Floats, lines: Placings) -> Floats:

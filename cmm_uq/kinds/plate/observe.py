@@ -18,7 +18,7 @@ from cmm_uq.model.artefact import Indications, Size
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
 from cmm_uq.model.rigid import Rigid
-from cmm_uq.points import Floats, Points
+from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.units import unit
 
 REFERENCES = ("reference_x_mm", "reference_y_mm", "reference_z_mm")
@@ -95,6 +95,10 @@ class Plate(Rigid):
         lengths = np.concatenate(certified)
         return Indications(np.concatenate(found) - lengths, lengths, size.sd * lengths / size.nominal,
                            np.concatenate(ends))  # fmt: skip
+
+    def bidirectional(self, rows: Ints) -> NDArray[np.bool_]:
+        """See :meth:`Artefact.bidirectional`: distances of centres never are."""
+        return np.zeros(len(rows), dtype=bool)
 
     def _refuse_another_plate(self, where: str | None) -> None:
         points, placings = self.points, self.placings

@@ -34,6 +34,7 @@ class ProbedSpheres:
     count : (q,) points of each.
     form : (q,) range of the radial distances, mm (ISO 10360-5:2010, P_Form).
     size : (q,) diameter of the least-squares sphere minus the certified one, mm (P_Size); not finite without a certificate.
+    centres : (q, 3) of the least-squares spheres, mm.
     """
 
     measurement: Ints
@@ -41,6 +42,7 @@ class ProbedSpheres:
     count: Ints
     form: Floats
     size: Floats
+    centres: Floats
 
 
 class Sphere(Radial):
@@ -77,23 +79,27 @@ class Sphere(Radial):
         """Form and size of each least-squares sphere."""
         runs = Placings.of(self.points.group)
         size = self.sizes[0]
-        first, form, diameter = [], [], []
+        first, form, diameter, centres = [], [], [], []
         for rows in runs.rows:
             ball = fit_sphere(self.points.xyz[rows], u_point=1.0)
             first.append(rows[0])
+            centres.append(ball.centre)
             form.append(ball.form_deviation)
             diameter.append(2 * ball.radius / float(self.expansion[rows].mean()))
         nominal = size.nominal if size.certified else np.nan
         return ProbedSpheres(
             self.points.measurement[first], self.points.repeat[first], runs.sizes, np.array(form),
-            np.array(diameter) - nominal,
+            np.array(diameter) - nominal, np.array(centres),
         )  # fmt: skip
 
     def forms(self) -> Forms:
         """See :meth:`Artefact.forms`: ISO 10360-5:2010, P_Form."""
         probed = self.probed()
         directions = self.directions(self.points.xyz)
-        return Forms(probed.measurement, probed.repeat, probed.count, probed.form, self.form, directions)
+        size = probed.size if self.sizes[0].certified else None
+        return Forms(
+            probed.measurement, probed.repeat, probed.count, probed.form, self.form, directions, size, probed.centres
+        )  # fmt: skip
 
     def _take_normals(self, where: str | None) -> None:
         """Normals as recorded, brought to unit length: the probe's errors act along them, and so they are seen exactly."""

@@ -10,10 +10,11 @@ from cmm_uq.points import Floats
 
 
 def iso_lines(setting: Setting) -> tuple[Placing, ...]:
-    """Seven lines through the middle of the volume (ISO 10360-2:2009, 6.3)."""
+    """Seven lines through the middle of the volume (ISO 10360-2:2009, 6.3), bidirectional unless the job says otherwise."""
+    both = setting.plan.model_copy(update={"both_ways": setting.plan.both_ways is not False})
 
     def shapes(fitting: Floats) -> list[Pattern]:
-        return [gauge(fitting, setting.plan)]
+        return [gauge(fitting, both)]
 
     return seven_lines(setting, faces_of(setting.artefact, setting.plan), shapes)
 

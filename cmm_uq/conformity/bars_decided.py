@@ -1,0 +1,141 @@
+"""Tests on a ballbar: the range of its lengths, and what a stylus tip to the side changes (ASME B89.4.1-1997).
+
+Both compare lengths of one bar with each other. What its certificate leaves uncertain is common to them and cancels;
+uncertain is what of the bar changes from one position to the next: its temperature, alignment and fixturing. The machine's own
+scatter is part of what is tested, as it is of ISO 10360-2.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from cmm_uq.conformity.length_conditions import tip_offsets
+from cmm_uq.conformity.measurement_lines import position_of
+from cmm_uq.conformity.plans import OFFSET_TOLERANCE_MM, Condition, OffsetPlan
+from cmm_uq.conformity.standard import Test
+from cmm_uq.conformity.statement import Decided, Statement
+from cmm_uq.messages import Text, say
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.points import Floats
+from cmm_uq.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, Line
+from cmm_uq.units import MICROMETRE, unit
+
+_OPPOSITE = -0.9
+"""Cosine of the angle between two tips from which on they look away from each other."""
+
+_RIGHT_ANGLE = 0.1
+"""Of a bar's direction, the part along a tip below which it is square to it."""
+
+
+def volumetric_performance(test: Test) -> Statement:
+    """Range of the ballbar's lengths (5.5.2)."""
+    artefact, measured = test.artefact, test.accuracy["b89_range_um"]
+    bar = artefact.sizes[0].nominal
+    budget, told = _budget(test)
+    u = budget.u if budget.u > 0 else measured.u
+    limit = float(test.limits_um(np.array([bar]))[0])
+    item = Decided(measured.value, u, limit, test.decide(measured.value, u, limit, signed=False), length_mm=bar)
+    return test.stated(say("range of the ballbar lengths"), say("lengths"), (item,), [told], signed=False,
+                       budget=budget if budget.u > 0 else None)  # fmt: skip
+
+
+def _budget(test: Test) -> tuple[Budget, Text]:
+    """Of the difference of two lengths of the bar, and what it says in words."""
+    stated, size = test.circumstances.uncertainty, test.artefact.sizes[0]
+    two = partial(Line, origin=JUDGEMENT, unit=unit("µm"), sensitivity=float(np.sqrt(2.0)))
+    expansion = (test.circumstances.cte_per_k or 0.0) * size.nominal / MICROMETRE
+    lines = [
+        Line(say("temperature of the bar, twice"), stated.u_temperature_k, JUDGEMENT, unit=unit("K"),
+             sensitivity=float(np.sqrt(2.0)) * expansion),
+        two(say("alignment of the bar, twice"), stated.u_alignment_um),
+        two(say("fixturing of the bar, twice"), stated.u_fixturing_um),
+        Line(say("repeated readings of the bar"), stated.u_repeat_um, JUDGEMENT, unit=unit("µm")),
+    ]  # fmt: skip
+    what = say("range of the lengths of a bar of {length:.5g} mm", length=size.nominal)
+    budget = Budget(what, lines, unit=unit("µm"))
+    if budget.u > 0:
+        return budget, say(
+            "u is the test uncertainty: what of the bar changed between its positions ([test_uncertainty]), {u:.3g} µm. "
+            "What its certificate leaves uncertain is common to all and cancels; the machine's own scatter is part of what "
+            "is tested.",
+            u=budget.u,
+        )  # fmt: skip
+    if size.certified and size.sd > 0:
+        bound = Budget(what, [two(say("certificate of the bar, twice"), size.sd / MICROMETRE, origin=CERTIFICATE)],
+                       unit=unit("µm"))  # fmt: skip
+        return bound, say(
+            "u is a bound of the test uncertainty, {u:.3g} µm: [test_uncertainty] does not say what of the bar changed "
+            "between its positions, and it is taken to be no more than its certificate leaves uncertain. The machine's own "
+            "scatter is part of what is tested.",
+            u=bound.u,
+        )  # fmt: skip
+    return budget, say(
+        "Nothing is stated of what the bar leaves uncertain ([test_uncertainty], u_um): in its place u is the machine's own "
+        "scatter, by which the range would differ if the test were made again."
+    )
+
+
+def offset_probe(test: Test) -> Statement:
+    """Difference of the bar's lengths with the stylus tip to one side and to the other, in each position."""
+    u = test.circumstances.uncertainty.u_repeat_um
+    test.refuse_without_uncertainty(u, "u_repeat_um")
+    found = _differences(test.artefact)
+    test.refuse_nothing_measured(
+        bool(found), "a bar measured with the stylus tip to both sides (tip_x_mm, tip_y_mm, tip_z_mm)"
+    )
+    bar = test.artefact.sizes[0].nominal
+    limit = float(test.limits_um(np.array([bar]))[0])
+    items = tuple(
+        Decided(value, u, limit, test.decide(value, u, limit, signed=True), number, None, bar, position)
+        for position, number, value in found
+    )
+    told = (
+        say("u is what of the bar changed between both readings ([test_uncertainty] u_repeat_um).")
+        if u > 0
+        else say("u_repeat_um is not stated: no uncertainty is considered, and no probability can be given.")
+    )
+    return test.stated(say("difference of the bar's lengths with opposite offsets, worst against its limit"),
+                       say("differences"), items, [told])  # fmt: skip
+
+
+def offset_positions(plan: OffsetPlan, artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
+    """Which positions were measured with tips to both sides."""
+    measured = {position for position, _, _ in _differences(artefact)}
+    missing = tuple(
+        say("{position} with the stylus tip to both sides", position=position)
+        for position in plan.positions
+        if position not in measured
+    )
+    return (Condition(say("four diagonals in vertical planes, each with two offsets"), missing),)
+
+
+def _differences(artefact: Artefact) -> list[tuple[Text, int, float]]:
+    """Position, measurement of the first reading, and the difference, µm, of each bar read with opposite tips."""
+    lengths, tips = artefact.lengths(), tip_offsets(artefact.points)
+    if lengths is None or tips is None:
+        return []
+    points, first = artefact.points, artefact.rows[:, 0]
+    _, along = artefact.lines_of(artefact.rows)
+    tip = tips[first]
+    copied = np.isin(points.group[first], list(points.copies))
+    sides: dict[Text, list[tuple[Floats, int, list[float]]]] = {}
+    for i in np.flatnonzero(~copied & (np.linalg.norm(tip, axis=1) > OFFSET_TOLERANCE_MM)):
+        direction = along[i] / np.linalg.norm(along[i])
+        side = tip[i] / np.linalg.norm(tip[i])
+        if abs(float(direction @ side)) > _RIGHT_ANGLE:
+            continue
+        here = sides.setdefault(position_of(direction), [])
+        same = next((one for one in here if float(one[0] @ side) > -_OPPOSITE), None)
+        if same is None:
+            here.append((side, int(points.measurement[first[i]]), [float(lengths[i])]))
+        else:
+            same[2].append(float(lengths[i]))
+    return [
+        (position, one[1], (float(np.mean(one[2])) - float(np.mean(other[2]))) / MICROMETRE)
+        for position, here in sides.items()
+        for k, one in enumerate(here)
+        for other in here[k + 1 :]
+        if float(one[0] @ other[0]) < _OPPOSITE
+    ]

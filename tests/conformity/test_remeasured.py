@@ -1,0 +1,112 @@
+"""One of three outside: what is to be measured again, what that decides, and where it is too late."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from cmm_uq.conformity.standards import statement
+from cmm_uq.conformity.statement import Statement
+from cmm_uq.jobs.conformity import ConformityFacts, MaximumPermissibleError
+from cmm_uq.kinds import artefact_facts
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
+from cmm_uq.model.kind import LENGTHS
+from cmm_uq.points import Points
+from tests.conformity.recorded import SEVEN, five, gauge
+
+FACTS = ConformityFacts(standard="ISO 10360-2:2009", mpe=MaximumPermissibleError(a_um=2.5, k=300.0))
+SHORT = {i + 1: five(line)[0] for i, line in enumerate(SEVEN)}
+FAR = 9.0
+
+
+def judged(errors: Mapping[tuple[int, int, float], float], standard: str = "ISO 10360-2:2009", further: int = 0,
+           lines: int = 7, shuffled: int | None = None) -> Statement:  # fmt: skip
+    """Seven lines three times; with further repeats of the shortest length of the first line alone."""
+    artefact = gauge(SEVEN[:lines], errors=errors)
+    if further:
+        points, first = artefact.points, gauge(SEVEN[:1], errors=errors, repeats=3 + further).points
+        more = first.select((first.repeat > 3) & (first.point <= 2))
+        both = Points(
+            np.vstack([points.xyz, more.xyz]), np.concatenate([points.measurement, more.measurement]),
+            np.concatenate([points.point, more.point]), np.concatenate([points.repeat, more.repeat]), points.machine,
+            {"reference_mm": np.concatenate([points.columns["reference_mm"], more.columns["reference_mm"]])},
+        )  # fmt: skip
+        artefact = StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4), both)
+    if shuffled is not None:
+        rows = np.random.default_rng(shuffled).permutation(len(artefact.points))
+        artefact = StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4), artefact.points.select(rows))
+    facts = FACTS.model_copy(update={"standard": standard})
+    return statement(facts, artefact, {}, "[[conformity]] 1", [LENGTHS])
+
+
+def outside(*where: tuple[int, int]) -> dict[tuple[int, int, float], float]:
+    return {(line, repeat, SHORT[line]): FAR for line, repeat in where}
+
+
+def test_one_of_three_is_to_be_measured_ten_times_more() -> None:
+    found = judged(outside((1, 2)))
+    assert (found.outcome, found.scope) == ("remeasure", "complete")
+    assert (found.named.measurement, found.named.repeat, found.named.standing) == (1, 2, "again")
+    assert any("measure 10 times more" in text and "measurement 1, 20 mm" in text for text in found.remarks)
+
+
+def test_two_of_three_fail() -> None:
+    assert judged(outside((1, 2), (1, 3))).outcome == "fail"
+
+
+def test_five_lengths_may_be_measured_again_and_a_sixth_fails() -> None:
+    assert judged(outside(*((line, 1) for line in range(1, 6)))).outcome == "remeasure"
+    assert judged(outside(*((line, 1) for line in range(1, 7)))).outcome == "fail"
+
+
+def test_a_length_that_fails_leaves_nothing_to_be_measured_again() -> None:
+    found = judged(outside((1, 2), (2, 1), (2, 2)))
+    assert found.outcome == "fail"
+    assert not any("times more" in text for text in found.remarks)
+
+
+@pytest.mark.parametrize(("further", "outcome"), [(9, "remeasure"), (10, "pass"), (11, "pass")])
+def test_ten_more_that_lie_inside_decide_it(further: int, outcome: str) -> None:
+    found = judged(outside((1, 2)), further=further)
+    assert found.outcome == outcome
+    assert len(found.errors) == 105 + further
+    if outcome == "pass":
+        assert [item.standing for item in found.errors].count("replaced") == 1
+        assert any("was measured 10 times more, all inside: measurement 1, 20 mm" in text for text in found.remarks)
+        assert found.named.error_um != pytest.approx(FAR)
+
+
+@pytest.mark.parametrize("late", [4, 9, 13])
+def test_one_of_the_ten_outside_fails(late: int) -> None:
+    assert judged(outside((1, 2), (1, late)), further=10).outcome == "fail"
+
+
+def test_one_of_the_ten_too_near_to_the_limit_is_undecided() -> None:
+    """2.56 of 2.5667 µm with u = 0.01: 75 %."""
+    errors = {**outside((1, 2)), (1, 7, SHORT[1]): 2.56}
+    assert judged(errors, further=10).outcome == "undecided"
+
+
+def test_an_incomplete_test_is_measured_again_too_and_says_what_it_lacks() -> None:
+    found = judged(outside((1, 2)), lines=3)
+    assert (found.outcome, found.scope) == ("remeasure", "partial")
+
+
+@pytest.mark.parametrize(("standard", "outcome"), [
+    ("ASME B89.4.10360.2-2008", "remeasure"), ("VDI/VDE 2617", "remeasure"), ("VDI/VDE 2617-2.1", "fail"),
+])  # fmt: skip
+def test_which_standards_measure_again(standard: str, outcome: str) -> None:
+    assert judged(outside((1, 2)), standard).outcome == outcome
+
+
+@pytest.mark.parametrize("further", [0, 10])
+def test_the_order_of_the_rows_is_no_matter(further: int) -> None:
+    errors = {**outside((1, 2)), (2, 1, five(SEVEN[1])[-1]): 4.0}
+    plain, mixed = judged(errors, further=further), judged(errors, further=further, shuffled=1)
+    assert (mixed.outcome, mixed.missing, mixed.remarks) == (plain.outcome, plain.missing, plain.remarks)
+    assert mixed.joint == pytest.approx(plain.joint, abs=1e-9)
+    assert sorted(item.error_um for item in mixed.errors) == pytest.approx(
+        sorted(item.error_um for item in plain.errors), abs=1e-6
+    )
