@@ -147,8 +147,8 @@ class _Panels:
         height = self.count * self.panel_mm + _BELOW + _ABOVE
         self.figure = new_figure(height)
         ax = self.figure.add_axes((0, 0, 1, 1))
-        spare = (WIDTH_MM - _LEFT - self.count * self.panel_mm) / 2
-        ax.set(xlim=np.array([-_LEFT - spare, WIDTH_MM - _LEFT - spare]) / self.panel_mm)
+        # the panels stand at the left, so that the last name, which begins over its own panel, has the room beside them
+        ax.set(xlim=np.array([-_LEFT, WIDTH_MM - _LEFT]) / self.panel_mm)
         ax.set(ylim=np.array([-_BELOW, height - _BELOW]) / self.panel_mm)
         ax.set_axis_off()
         self.ax: Axes = ax

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.warning import warnings
 from cmm_uq.documents.wording import expanded, measured, probability, title_of
 
 
-def summary(result: Result) -> list[tuple[str, str, str]]:
+def summary(result: Result, warnings: Iterable[str]) -> list[tuple[str, str, str]]:
     """Rows of what, figure and remark: what was measured, the figures, the decisions, the warnings."""
     facts, free = result.job.facts, {key for combination in result.undetermined for key in combination}
     rows = [(
@@ -32,7 +33,7 @@ def summary(result: Result) -> list[tuple[str, str, str]]:
                 f"k = {k}" if known else "",
             ))  # fmt: skip
     rows += [(each.facts.standard, each.outcome.upper(), _remark(each)) for each in result.statements]
-    return rows + [("Warning", text, "") for text in warnings(result)]
+    return rows + [("Warning", text, "") for text in warnings]
 
 
 def _remark(statement: Statement) -> str:

@@ -16,6 +16,7 @@ from cmm_uq.files.limits import CONFORMITY, EFFECTS
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.conformity import ConformityFacts, needed, standards_in, uncertainty_missing
 from cmm_uq.jobs.file_names import device_name
+from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
@@ -38,6 +39,8 @@ class JobFacts(Table):
     """``[job]``: identification, and free text for the certificate.
 
     ``origin`` and ``derived_from`` are written by the commands that make a recording out of another.
+    ``recalibration_agreed`` is the date of the next calibration, where the customer agreed to be told one
+    (ISO/IEC 17025:2017, 7.8.4.3); no other is printed.
     """
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=100)]
@@ -53,6 +56,7 @@ class JobFacts(Table):
     conditions: str = ""
     remarks: str = ""
     diagnosis_on_certificate: bool = False
+    recalibration_agreed: dt.date | None = None
     origin: Origin = MEASURED
     derived_from: DerivedFrom | None = None
 
@@ -71,16 +75,6 @@ class JobFacts(Table):
         if device_name(self.id):
             raise ValueError("must name a folder of its own, and Windows takes this name for a device")
         return self
-
-
-class Laboratory(Table):
-    """``[laboratory]``: who answers for the certificate."""
-
-    name: str = ""
-    address: str = ""
-    accreditation: str = ""
-    signatory: str = ""
-    signatory_role: str = ""
 
 
 class RecordingFacts(Table):

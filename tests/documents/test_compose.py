@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.commands.analysis import Result, analyse, outcome_of
-from cmm_uq.documents.compose import STATEMENTS
+from cmm_uq.documents.certificate import STATEMENTS
+from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.document import Decision, Document, Facts, Table
 from cmm_uq.documents.html import render_html
-from cmm_uq.documents.warning import warnings
 from tests.conftest import ROOT
 
 
@@ -89,7 +89,7 @@ def test_the_sentences_on_scope_and_reproduction_are_there(document: Document) -
 
 
 def test_what_is_mandatory_and_missing_is_named_in_one_warning(result: Result) -> None:
-    (missing,) = [text for text in warnings(result) if "ISO/IEC 17025" in text]
+    (missing,) = [text for text in formal_warnings(result.job) if "ISO/IEC 17025" in text]
     for clause in ("7.8.2.1 b", "7.8.2.1 e", "7.8.2.1 g", "7.8.2.1 j", "7.8.2.1 o"):
         assert clause in missing
     assert "7.8.2.1 f" not in missing
@@ -98,15 +98,17 @@ def test_what_is_mandatory_and_missing_is_named_in_one_warning(result: Result) -
 def test_a_complete_job_has_no_such_warning_and_its_particulars_are_printed(job: Path) -> None:
     path = job / "job.toml"
     text = path.read_text(encoding="utf-8")
-    text = text.replace("[job]\n", '[job]\ncustomer = "<b>Müller & Söhne</b>"\nissued = 2004-09-30\n', 1)
+    text = text.replace(
+        "[job]\n", '[job]\ncustomer = "<b>Müller & Söhne</b>"\naddress = "Ort"\nissued = 2004-09-30\n', 1
+    )
     text = text.replace(
         "[machine]\n", '[laboratory]\nname = "L"\naddress = "A"\nsignatory = "S"\n[machine]\nserial = "7"\n', 1
     )
     path.write_text(text, encoding="utf-8")
     found = analyse(job)
-    assert not any("ISO/IEC 17025" in text for text in warnings(found))
     made = outcome_of(found).document
-    assert facts(made)["Customer"] == "<b>Müller & Söhne</b>"
+    assert not any("ISO/IEC 17025" in text for text in made.warnings)
+    assert facts(made)["Customer"] == "<b>Müller & Söhne</b>\nOrt"
     assert made.signatures[0].name == "S"
     html = render_html(made)
     assert "&lt;b&gt;Müller &amp; Söhne&lt;/b&gt;" in html
