@@ -9,6 +9,7 @@ import datetime as dt
 
 from cmm_uq.documents.traceability_section import certified_on_this_machine
 from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.as_found import KEY
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.messages import Text, Verbatim, day, say, semicolons
@@ -18,7 +19,8 @@ def formal_warnings(job: Job) -> tuple[Text, ...]:
     """What an assessor would hold against a certificate of this job, whatever was measured."""
     if job.origin != MEASURED:
         return ()
-    return (*_circular(job.facts), *_dates(job.facts), *_missing(job.facts))
+    found = None if job.as_found is None else job.as_found.job.date
+    return (*_circular(job.facts), *_dates(job.facts, found), *_missing(job.facts))
 
 
 def _missing(facts: JobFile) -> list[Text]:
@@ -65,7 +67,7 @@ def _circular(facts: JobFile) -> list[Text]:
     ]
 
 
-def _dates(facts: JobFile) -> list[Text]:
+def _dates(facts: JobFile, found: dt.date | None) -> list[Text]:
     """Pairs of dates of which the first must not be earlier than the second."""
     job = facts.job
     chain = facts.artefact.certificate or Traceability()
@@ -74,6 +76,7 @@ def _dates(facts: JobFile) -> list[Text]:
         (job.date, chain.date, say("the artefact was certified after it was measured with"), "[artefact.certificate] date"),
         (chain.due, job.date, say("the artefact was due for calibration before this"), "[artefact.certificate] due"),
         (chain.due, chain.date, say("the artefact's certificate was due before its date"), "[artefact.certificate] due"),
+        (job.date, found, say("the machine was found as it was after it was left"), KEY),
         (
             job.recalibration_agreed, job.date, say("the next calibration is agreed for a day before this one"),
             "[job] recalibration_agreed",

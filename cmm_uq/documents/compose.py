@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from cmm_uq.documents import tolerance_section
+from cmm_uq.documents.as_found_section import as_found_data, as_found_section, quantities_left
+from cmm_uq.documents.capability import decided_below, with_capability
 from cmm_uq.documents.certificate import certificate_of
 from cmm_uq.documents.conformity_section import conformity
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
@@ -16,6 +18,7 @@ from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.results_file import results
 from cmm_uq.documents.results_section import error_factors, performance
+from cmm_uq.documents.stating import Stating
 from cmm_uq.documents.summary import summary
 from cmm_uq.documents.traceability_section import traceability
 from cmm_uq.documents.warning import warnings
@@ -30,9 +33,15 @@ def certified(result: Result, page: Page) -> Outcome:
     result : of the analysis.
     page : what its kind adds.
     """
-    document = _certificate(result, page)
+    result, stating = with_capability(result)
+    document = _certificate(result, page, stating)
     draws = posterior_file(result.draws, result.job.origin) if len(result.draws) else None
-    data = results(result) if draws is None else {**results(result), "posterior": draws.entry}
+    data = (
+        results(result)
+        | as_found_data(result.job)
+        | stating.data()
+        | ({} if draws is None else {"posterior": draws.entry})
+    )
     passed = all(statement.outcome == "pass" for statement in result.statements)
     return Outcome(
         result, document, page.with_further(result, data), tuple(summary(result, document.warnings)), document.warnings,
@@ -41,7 +50,7 @@ def certified(result: Result, page: Page) -> Outcome:
     )  # fmt: skip
 
 
-def _certificate(result: Result, page: Page) -> Document:
+def _certificate(result: Result, page: Page, stating: Stating) -> Document:
     diagnosis = diagnosis_sections(result.diagnosed) if result.job.facts.job.diagnosis_on_certificate else ()
     sections = [
         *_ordered(result, page.sections(result)), *tolerance_section.sections(result), method(result),
@@ -54,7 +63,8 @@ def _certificate(result: Result, page: Page) -> Document:
         seed=result.posterior.seed,
     )
     files = (Verbatim(posterior_name(result.job.origin)),) if len(result.draws) else ()
-    return certificate_of(result.job, sections, warnings(result), produced_by, files)
+    told = (*warnings(result), *stating.warnings(), *decided_below(result, stating))
+    return certificate_of(result.job, sections, told, produced_by, files)
 
 
 def _ordered(result: Result, own: list[Section]) -> list[Section]:
@@ -63,9 +73,10 @@ def _ordered(result: Result, own: list[Section]) -> list[Section]:
     The results of an artefact without lengths are the error factors, and without these the first of the kind's own sections.
     """
     figures, factors, decided = performance(result), error_factors(result), conformity(result)
+    before = as_found_section(result.job, quantities_left(result), result.statements)
     rests_on = traceability(result)
     if figures.blocks:
-        return [figures, decided, factors, rests_on, *own]
+        return [figures, decided, before, factors, rests_on, *own]
     if factors.blocks:
-        return [factors, decided, rests_on, *own]
-    return [*own[:1], decided, rests_on, *own[1:]]
+        return [factors, decided, before, rests_on, *own]
+    return [*own[:1], decided, before, rests_on, *own[1:]]

@@ -44,6 +44,12 @@ class Quantity:
         """K = U/u; ``None`` where nothing is uncertain."""
         return self.expanded / self.u if self.u > 0 else None
 
+    def at_least(self, expanded: float) -> Quantity:
+        """The quantity with this expanded uncertainty (95 %, k = 2) where its own is smaller, else as it is."""
+        if self.expanded >= expanded:
+            return self
+        return Quantity(self.value, expanded / 2, (self.value - expanded, self.value + expanded), self.unit)
+
     def times(self, factor: float, unit: Unit) -> Quantity:
         """The quantity multiplied by an exact factor, of either sign, in the unit of the product."""
         low, high = sorted(factor * end for end in self.interval95)

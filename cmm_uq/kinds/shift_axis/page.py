@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from cmm_uq.documents.as_found_section import Left
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.plots import curve_with_band
 from cmm_uq.documents.warning import not_converged
@@ -12,7 +13,7 @@ from cmm_uq.kinds.shift_axis.curve_page import MOST_ROWS, beside_integrations, c
 from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.kinds.shifting.page import artefact_section, figures_section, method_section, summary_rows
 from cmm_uq.messages import Number, Text, Verbatim, commas, number, plural, say
-from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import unit
 
@@ -65,17 +66,20 @@ def summary(result: ShiftResult, warnings: Iterable[Text]) -> list[tuple[Text, T
         points=len(series.numbers),
         placings=len(series.shifts),
     )
-    return summary_rows(result.job, measured, _quantities(result), warnings)
+    return summary_rows(result.job, measured, quantities(result), warnings)
 
 
-def _quantities(result: ShiftResult) -> list[tuple[Text, Quantity]]:
-    named: list[tuple[Text, Quantity]] = [
-        (say("Linearity error, peak to valley"), result.linearity),
-        (say("Repeatability (one reading)"), result.repeatability),
-    ]
+def quantities(result: ShiftResult) -> list[Left]:
+    """Figures of performance, with their places in results.json."""
+    named: list[Left] = [
+        (
+            f"linearity_{result.axis}", "peak_to_valley_um", say("Linearity error, peak to valley"), result.linearity,
+        ),
+        ("noise", "coordinate_um", say("Repeatability (one reading)"), result.repeatability),
+    ]  # fmt: skip
     if result.scale is not None:
         scale = say("Mean sensitivity error of axis {axis}", axis=Verbatim(result.axis))
-        named.insert(1, (scale, result.scale))
+        named.insert(1, (SCALE[result.axis].name, "ppm", scale, result.scale))
     return named
 
 
@@ -83,7 +87,7 @@ def _figures(result: ShiftResult) -> Section:
     meaning = say(
         "Linearity error: of the estimated curve about the straight line through the ends of the first series."
     )
-    return figures_section(say("Axis figures"), _quantities(result), meaning)
+    return figures_section(say("Axis figures"), quantities(result), meaning)
 
 
 def _open(result: ShiftResult) -> Section:

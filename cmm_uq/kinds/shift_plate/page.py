@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from cmm_uq.documents.as_found_section import Left
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.warning import not_converged
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
@@ -12,7 +13,6 @@ from cmm_uq.kinds.shift_plate.undetermined import title
 from cmm_uq.kinds.shifting.page import artefact_section, figures_section, method_section, summary_rows
 from cmm_uq.messages import Number, Text, Verbatim, after, commas, listed, number, plural, say, sentences, signed
 from cmm_uq.points import AXES
-from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import unit
 
@@ -56,15 +56,16 @@ def summary(result: PlaneShiftResult, warnings: Iterable[Text]) -> list[tuple[Te
         balls=len(plate.numbers),
         placings=len(plate.placings),
     )
-    return summary_rows(result.job, measured, _quantities(result), warnings)
+    return summary_rows(result.job, measured, quantities(result), warnings)
 
 
-def _quantities(result: PlaneShiftResult) -> list[tuple[Text, Quantity]]:
-    named: list[tuple[Text, Quantity]] = []
+def quantities(result: PlaneShiftResult) -> list[Left]:
+    """Figures of performance, with their places in results.json."""
+    named: list[Left] = []
     for name, parameters in result.scalars.items():
         for parameter, quantity in parameters.items():
-            named.append((_words(name, parameter), quantity))
-    return [*named, (say("Repeatability (one coordinate)"), result.repeatability)]
+            named.append((name, parameter, _words(name, parameter), quantity))
+    return [*named, ("noise", "coordinate_um", say("Repeatability (one coordinate)"), result.repeatability)]
 
 
 def _words(name: str, parameter: str) -> Text:
@@ -91,7 +92,7 @@ def _figures(result: PlaneShiftResult) -> Section:
         a=Verbatim(a),
         b=Verbatim(b),
     )
-    return figures_section(say("Plane figures"), _quantities(result), meaning)
+    return figures_section(say("Plane figures"), quantities(result), meaning)
 
 
 def _middle(result: PlaneShiftResult) -> Text:

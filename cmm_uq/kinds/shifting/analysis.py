@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq import __version__
+from cmm_uq.documents.as_found_section import as_found_data, as_found_section
 from cmm_uq.documents.certificate import certificate_of
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.documents.posterior_file import posterior_file
@@ -36,8 +37,13 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
     """The certificate of a shift job, with the correction table beside it."""
     if isinstance(found, ShiftResult):
         sections, told, results = axis_page.sections(found), axis_page.warnings(found), shift_results(found)
+        left = axis_page.quantities(found)
     else:
         sections, told, results = plane_page.sections(found), plane_page.warnings(found), plane_shift_results(found)
+        left = plane_page.quantities(found)
+    sections.insert(1, as_found_section(found.job, left))
+    told += tuple(found.stating.warnings())
+    results |= as_found_data(found.job) | found.stating.data()
     chains, table = found.estimate.chains, table_file(found.job)
     draws = posterior_file(found.draws, found.job.origin)
     produced_by = say(

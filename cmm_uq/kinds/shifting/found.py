@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from cmm_uq.documents.stating import Stating
 from cmm_uq.inference.draws import Draws, by_ensemble
 from cmm_uq.inference.ensembles import Chains
 from cmm_uq.jobs.job import Job
@@ -94,6 +95,11 @@ class ShiftFound(ABC):
         return Draws(
             {name: unit for name, (_, unit) in found.items()}, by_ensemble(values, chains.steps, len(chains.draws))
         )
+
+    @cached_property
+    def stating(self) -> Stating:
+        """How quantities are stated: not below the laboratory's capability."""
+        return Stating.of(self.job)
 
     @property
     def repeatability(self) -> Quantity:

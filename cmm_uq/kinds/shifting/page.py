@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from cmm_uq.documents.as_found_section import Left
 from cmm_uq.documents.document import Block, Facts, Paragraph, Section
 from cmm_uq.documents.origin import file_name
 from cmm_uq.documents.stated import SIGN, stated_table
@@ -13,10 +14,9 @@ from cmm_uq.inference.ensembles import Chains
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.messages import NOTHING, Text, Verbatim, day, number, say
-from cmm_uq.uncertainty.quantity import Quantity
 
-Named = Sequence[tuple[Text, Quantity]]
-"""Quantities that are stated, each with its name."""
+Named = Sequence[Left]
+"""Quantities that are stated, each with its place in results.json and its name."""
 
 
 def table_file(job: Job) -> str:
@@ -38,13 +38,16 @@ def figures_section(caption: Text, named: Named, meaning: Text) -> Section:
         meaning,
         say("U is the expanded uncertainty for a coverage probability of 95 %, from the posterior distribution."),
     )
-    return Section(say("Figures of performance"), (stated_table(caption, named, notes),))
+    return Section(
+        say("Figures of performance"),
+        (stated_table(caption, [(name, quantity) for _, _, name, quantity in named], notes),),
+    )
 
 
 def summary_rows(job: Job, what: Text, named: Named, warnings: Iterable[Text]) -> list[tuple[Text, Text, Text]]:
     """Rows of what, figure and remark, for the end of a command."""
     rows: list[tuple[Text, Text, Text]] = [(say("Measured"), what, day(job.facts.job.date))]
-    for name, quantity in named:
+    for _, _, name, quantity in named:
         value, U, k = expanded(quantity)
         rows.append((name, say("{value} ± {u} {unit}", value=value, u=U, unit=quantity.unit), say("k = {k}", k=k)))
     return rows + [(say("Warning"), text, NOTHING) for text in warnings]

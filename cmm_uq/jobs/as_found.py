@@ -1,0 +1,98 @@
+"""``[job] as_found``: what the machine showed before it was adjusted, from the results.json of its report."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.origin import Origin
+
+KEY = "[job] as_found"
+
+_FIX = "Name the results.json that cmm-uq report wrote of the machine as it was found, or the folder it lies in"
+
+
+class _Part(BaseModel):
+    """Of a results.json only what is needed; further keys are none of this module's business."""
+
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Figure(_Part):
+    """A quantity as results.json has it."""
+
+    value: float
+    u: float
+    interval95: Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class Found(_Part):
+    """A statement of conformity as results.json has it."""
+
+    standard: str
+    characteristic: str = ""
+    decision: str
+
+
+class _Job(_Part):
+    id: str
+    origin: Origin
+    date: Annotated[dt.date, Field(strict=False)] | None = None
+    machine: str = ""
+    serial: str = ""
+
+
+class AsFound(_Part):
+    """What was found before the adjustment: of which job, the estimates, the figures of the lengths, and the decisions."""
+
+    schema_: Annotated[Literal["cmm-uq/results/1"], Field(alias="schema")]
+    job: _Job
+    estimates: dict[str, dict[str, Figure]]
+    accuracy_uncertainty: dict[str, Figure] = {}
+    conformity: list[Found] = []
+
+
+def as_found_file(given: str | None) -> str | None:
+    """Name of the results.json that a job names, itself or the folder in which it lies; ``None`` where it names none."""
+    if given is None:
+        return None
+    name = given.removesuffix("/")
+    return name if name.endswith(".json") else f"{name}/results.json"
+
+
+def as_found_of(
+    name: str | None, inputs: Mapping[str, bytes], folder: Path, origin: Origin, machine: str, serial: str
+) -> AsFound | None:
+    """What was found; ``None`` where the job names nothing.
+
+    Parameters
+    ----------
+    name : of the results.json, among ``inputs``.
+    folder : of the job, for messages.
+    origin, machine, serial : of the job.
+
+    Raises
+    ------
+    CmmUqError : it is no results.json of a report, of another machine, or of a recording of another origin.
+    """
+    if name is None:
+        return None
+    where = str(folder / name)
+    try:
+        found = AsFound.model_validate_json(inputs[name])
+    except ValidationError as error:
+        first = error.errors()[0]
+        at = ".".join(map(str, first["loc"]))
+        told = f"{at}: {first['msg'][0].lower()}{first['msg'][1:]}" if at else "it is no JSON"
+        raise CmmUqError(f"is no results.json of a report: {told}", where=where, fix=_FIX) from None
+    for what, then, now in (("machine", found.job.machine, machine), ("serial number", found.job.serial, serial)):
+        if then and now and then != now:
+            raise CmmUqError(f"is of {what} {then!r}, and this job of {now!r}", where=where, fix=_FIX)
+    if found.job.origin != origin:
+        raise CmmUqError(f"is of a {found.job.origin} recording, and this one is {origin}", where=where, fix=_FIX)
+    return found
