@@ -23,7 +23,12 @@ STATEMENTS = (
 
 
 def certificate_of(
-    job: Job, sections: list[Section], told: tuple[Text, ...], produced_by: Text, files: tuple[Text, ...] = ()
+    job: Job,
+    sections: list[Section],
+    told: tuple[Text, ...],
+    produced_by: Text,
+    files: tuple[Text, ...] = (),
+    decided: Text = NOTHING,
 ) -> Document:
     """Sections and warnings between what every certificate has.
 
@@ -34,6 +39,7 @@ def certificate_of(
     told : warnings on the results; those on what the job does not state follow them.
     produced_by : program, sampler and seed.
     files : attached beside job and recording.
+    decided : what every statement of conformity comes to, for the first page.
     """
     facts = job.facts
     first, *others = (section for section in sections if section.blocks)
@@ -50,7 +56,7 @@ def certificate_of(
         issuer=tuple(
             Verbatim(line) for line in (facts.laboratory.name, *facts.laboratory.address.splitlines()) if line
         ),
-        particulars=_particulars(facts),
+        particulars=_particulars(facts, decided),
         warnings=(*told, *formal_warnings(job)),
         sections=tuple(sorted(
             (replace(first, blocks=(*first.blocks, under)) if under.rows else first, *others), key=lambda one: one.opinion
@@ -65,7 +71,7 @@ def certificate_of(
     )  # fmt: skip
 
 
-def _particulars(facts: JobFile) -> tuple[Facts, ...]:
+def _particulars(facts: JobFile, decided: Text) -> tuple[Facts, ...]:
     job, machine, laboratory = facts.job, facts.machine, facts.laboratory
     measured = job.origin == MEASURED
     groups = (
@@ -90,6 +96,7 @@ def _particulars(facts: JobFile) -> tuple[Facts, ...]:
             (say("Method"), job.procedure),
             (say("Operator"), job.operator),
             (say("Remarks"), job.remarks),
+            (say("Conformity"), decided),
         ),
     )
     return tuple(Facts(rows) for group in groups if (rows := tuple((k, foreign(v)) for k, v in group if v)))

@@ -8,7 +8,7 @@ from cmm_uq.documents import tolerance_section
 from cmm_uq.documents.as_found_section import as_found_data, as_found_section, quantities_left
 from cmm_uq.documents.capability import decided_below, with_capability
 from cmm_uq.documents.certificate import certificate_of
-from cmm_uq.documents.conformity_section import conformity
+from cmm_uq.documents.conformity_section import conformity, in_short
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
 from cmm_uq.documents.document import Document, Section
 from cmm_uq.documents.method_section import method, posterior_section
@@ -64,7 +64,7 @@ def _certificate(result: Result, page: Page, stating: Stating) -> Document:
     )
     files = (Verbatim(posterior_name(result.job.origin)),) if len(result.draws) else ()
     told = (*warnings(result), *stating.warnings(), *decided_below(result, stating))
-    return certificate_of(result.job, sections, told, produced_by, files)
+    return certificate_of(result.job, sections, told, produced_by, files, in_short(result))
 
 
 def _ordered(result: Result, own: list[Section]) -> list[Section]:
