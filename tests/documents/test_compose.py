@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,8 @@ from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.document import Decision, Document, Facts, Table
 from cmm_uq.documents.html import render_html
 from tests.conftest import ROOT
+from tests.documents.test_completeness import changed
+from tests.kinds.simulated import analysed
 
 
 @pytest.fixture(scope="module")
@@ -161,3 +164,58 @@ def test_the_summary_carries_the_certificates_figures(result: Result, document: 
     for row in table(document, "Figures of performance").rows:
         assert any(f"{row[1]} ± {row[2]}" in line for line in lines)
     assert any("FAIL" in line for line in lines)
+
+
+def test_results_and_decisions_come_first_and_what_interprets_them_is_in_the_annex(document: Document) -> None:
+    titles = [(section.title, section.opinion) for section in document.sections]
+    assert titles == [
+        ("Figures of performance", False), ("Statements of conformity", False), ("Error factors", False),
+        ("Artefact and traceability", False), ("Lengths", False), ("Budget of one length", False), ("Method", False),
+        ("The adjustment that the machine needs", True), ("Posterior distribution", True),
+    ]  # fmt: skip
+
+
+def test_the_first_page_says_what_every_statement_comes_to(document: Document) -> None:
+    assert dict(document.particulars[-1].rows)["Conformity"] == "ASME B89.4.1-1997, volumetric performance: fail"
+
+
+def test_the_conditions_stand_with_the_results(document: Document) -> None:
+    table, under = document.sections[0].blocks
+    assert isinstance(table, Table)
+    assert dict(under.rows) == {"Conditions": "20 °C, controlled; 11 thermocouples on the machine"}
+
+
+def test_the_annex_is_marked_as_such_and_comes_after_the_statements(document: Document) -> None:
+    html = render_html(document)
+    places = [html.index(text) for text in ("reproduced except in full", "Annex: opinions and interpretations", "7.8.7",
+                                            "What to turn and what to enter", "Posterior distribution:")]  # fmt: skip
+    assert places == sorted(places)
+
+
+@pytest.mark.parametrize(
+    "kind", ["sphere-simulated", "digitizer-simulated", "gauge-blocks-simulated", "shift-simulated"]
+)
+def test_every_kind_begins_with_its_results(kind: str) -> None:
+    made = outcome_of(analysed(kind)).document
+    assert isinstance(made.sections[0].blocks[0], Table)
+    assert "U" in [column.heading for column in made.sections[0].blocks[0].columns]
+    assert [section.opinion for section in made.sections] == sorted(section.opinion for section in made.sections)
+
+
+def test_the_formula_of_an_mpe_stands_with_its_limit() -> None:
+    """3 + 800/80 = 13 µm."""
+    made = outcome_of(analysed("gauge-blocks-simulated")).document
+    (decision,) = [block for section in made.sections for block in section.blocks if isinstance(block, Decision)]
+    assert decision.limit == "13 µm at L = 800 mm; MPE = (3 + L/80) µm, L in mm"
+
+
+def test_a_diagnosis_that_the_job_asks_for_is_an_opinion(result: Result) -> None:
+    asked = outcome_of(replace(result, job=changed(result.job, job={"diagnosis_on_certificate": True}))).document
+    assert [section.opinion for section in asked.sections if section.title == "What was left out"] == [True]
+
+
+def test_the_next_calibration_is_printed_only_where_the_customer_agreed(result: Result, document: Document) -> None:
+    label = "Next calibration, as agreed with the customer"
+    agreed = changed(result.job, job={"recalibration_agreed": dt.date(2005, 9, 1)})
+    assert label not in facts(document)
+    assert facts(outcome_of(replace(result, job=agreed)).document)[label] == "2005-09-01"
