@@ -7,6 +7,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -202,6 +203,20 @@ def test_the_pages_of_the_pdf_as_pictures_have_clean_margins_and_are_not_empty(
         assert down.min() >= 5
         assert down.max() <= 290
         assert ((down > 30) & (down < 270)).any()  # no page has its head and foot alone
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_heads_of_a_table_do_not_run_together_in_the_pdf(name: str, folder: str, tmp_path: Path) -> None:
+    if shutil.which("pdftotext") is None:
+        pytest.skip("no pdftotext is installed")
+    document = made(name, folder)
+    (tmp_path / "document.pdf").write_bytes(render_pdf(document, {}))
+    subprocess.run(["pdftotext", "-layout", "document.pdf", "text.txt"], cwd=tmp_path, check=True)
+    printed = (tmp_path / "text.txt").read_text(encoding="utf-8")
+    heads = [[column.heading for column in block.columns if column.heading]
+             for block in blocks(document.sections) if isinstance(block, Table)]  # fmt: skip
+    joined = [a.split()[-1] + b.split()[0] for row in heads for a, b in pairwise(row)]
+    assert [pair for pair in joined if len(pair) > 6 and pair in printed] == []
 
 
 def picture(path: Path) -> np.ndarray:
