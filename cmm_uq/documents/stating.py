@@ -14,7 +14,7 @@ from cmm_uq.messages import Text, commas, names, say
 from cmm_uq.uncertainty.quantity import Quantity
 
 
-@dataclass
+@dataclass(frozen=True)
 class Stating:
     """States quantities of one certificate, and keeps what was raised.
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ import pytest
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.derived_job import derived_toml
 
 FOUND: dict[str, Any] = {
     "schema": "cmm-uq/results/1",
@@ -67,3 +70,11 @@ def test_a_file_that_is_not_there_or_outside_is_refused(job: Path) -> None:
 def test_one_outside_the_job_is_refused(job: Path) -> None:
     with pytest.raises(CmmUqError, match="not inside the job folder"):
         read_job(naming(job, "../before", "{}"))
+
+
+def test_a_derived_recording_was_never_adjusted_and_agrees_on_nothing(job: Path) -> None:
+    read = read_job(naming(job, "before", json.dumps(FOUND)))
+    text = read.inputs["job.toml"].replace(b"[job]\n", b"[job]\nrecalibration_agreed = 2005-09-01\n", 1)
+    told = tomllib.loads(derived_toml(replace(read, inputs={**read.inputs, "job.toml": text}), "simulate", {}).decode())
+    assert told["job"].keys().isdisjoint({"as_found", "recalibration_agreed"})
+    assert told["job"]["place"] == read.facts.job.place
