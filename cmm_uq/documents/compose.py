@@ -8,7 +8,7 @@ from cmm_uq.documents import tolerance_section
 from cmm_uq.documents.as_found_section import as_found_data, as_found_section, quantities_left
 from cmm_uq.documents.capability import decided_below, with_capability
 from cmm_uq.documents.certificate import certificate_of
-from cmm_uq.documents.conformity_section import conformity, in_short
+from cmm_uq.documents.conformity_section import conformity_section
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
 from cmm_uq.documents.document import Document, Section
 from cmm_uq.documents.method_section import method, posterior_section
@@ -19,7 +19,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.documents.results_file import results
 from cmm_uq.documents.results_section import error_factors, performance
 from cmm_uq.documents.stating import Stating
-from cmm_uq.documents.summary import summary
+from cmm_uq.documents.summary import in_short, summary
 from cmm_uq.documents.traceability_section import traceability
 from cmm_uq.documents.warning import warnings
 from cmm_uq.messages import Verbatim, say
@@ -72,7 +72,7 @@ def _ordered(result: Result, own: list[Section]) -> list[Section]:
 
     The results of an artefact without lengths are the error factors, and without these the first of the kind's own sections.
     """
-    figures, factors, decided = performance(result), error_factors(result), conformity(result)
+    figures, factors, decided = performance(result), error_factors(result), conformity_section(result.statements)
     before = as_found_section(result.job, quantities_left(result), result.statements)
     rests_on = traceability(result)
     if figures.blocks:

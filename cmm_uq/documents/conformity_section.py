@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.document import Decision, Section
-from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import OUTCOME_WORDS, measured, probability
-from cmm_uq.messages import NOTHING, Text, Verbatim, lines, say, sentences
+from cmm_uq.documents.wording import measured, probability
+from cmm_uq.messages import NOTHING, Text, Verbatim, say, sentences
 from cmm_uq.uncertainty.rounding import significant
 
 
-def conformity(result: Result) -> Section:
+def conformity_section(statements: Sequence[Statement]) -> Section:
     """Every statement that the job asks for, in its order."""
-    return Section(say("Statements of conformity"), tuple(_decision(statement) for statement in result.statements))
-
-
-def in_short(result: Result) -> Text:
-    """What each statement comes to, a line each, for the first page."""
-    return lines(
-        say("{standard}, {what}: {outcome}", standard=Verbatim(one.facts.standard), what=Verbatim(one.characteristic),
-            outcome=OUTCOME_WORDS[one.outcome])
-        for one in result.statements
-    )  # fmt: skip
+    return Section(say("Statements of conformity"), tuple(_decision(statement) for statement in statements))
 
 
 def _decision(statement: Statement) -> Decision:
