@@ -89,5 +89,15 @@ def test_shifted_artefacts_keep_to_it_too(job: str, caption: str, quantity: str)
     assert any("calibration and measurement capability" in text for text in outcome.warnings)
 
 
+def test_the_curve_of_an_axis_keeps_to_it_at_every_position() -> None:
+    """50 µm + (589.964 − 99.988) mm / 10 = 99.0 µm at the far end; at the first position the error is zero by definition."""
+    found = analysed("shift-simulated")
+    capability = Capability(length=LengthCapability(a_um=50.0, k=10.0))
+    with_it = type(found)(**{**vars_of(found), "job": changed(found.job, laboratory={"cmc": capability})})
+    rows = tables(outcome_of(with_it).document)["Error by position"].rows
+    assert (rows[0][2], rows[1][2], rows[-1][2]) == ("0", "52", "99")
+    assert outcome_of(with_it).results["curves"]["linearity_x"]["U_um"][-1] == pytest.approx(98.9976, abs=1e-3)
+
+
 def vars_of(found: Result) -> dict[str, object]:
     return {name: getattr(found, name) for name in type(found).__dataclass_fields__}

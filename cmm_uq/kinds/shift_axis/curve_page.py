@@ -46,7 +46,7 @@ def curve_section(result: ShiftResult) -> Section:
             if one > 0
             else (number(x, ".3f"), *3 * (Number("0"),))
         )
-        for x, e, one, band in _sparse(curve.position, curve.error, curve.expanded, curve.band)
+        for x, e, one, band in _sparse(curve.position, curve.error, result.stated_along(curve), curve.band)
     )
     columns = (
         Column(say("Reading"), unit("mm")),

@@ -74,7 +74,7 @@ def _table(result: PlaneShiftResult, which: int) -> Table:
     cells: list[list[Text]] = [[number(x, ".1f") for x in own[0][1].position[::EVERY]]]
     for name, curve, size, text in own:
         columns += [Column(_KINDS[name.split("_")[0]], text), Column(say("U"), text)]
-        U = curve.expanded / size
+        U = result.stated_along(curve, size, text) / size
         pairs = [
             rounded(e, half) if half > 1e-9 else (Number("0"), Number("0"))
             for e, half in zip((curve.error / size)[::EVERY], U[::EVERY], strict=True)

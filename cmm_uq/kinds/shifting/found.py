@@ -46,6 +46,20 @@ class Estimated(Protocol):
         ...
 
 
+class Along(Protocol):
+    """A curve over the positions of an axis."""
+
+    @property
+    def position(self) -> Floats:
+        """(m,) mm."""
+        ...
+
+    @property
+    def expanded(self) -> Floats:
+        """(m,) U as evaluated."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class ShiftFound(ABC):
     """What was found.
@@ -100,6 +114,23 @@ class ShiftFound(ABC):
     def stating(self) -> Stating:
         """How quantities are stated: not below the laboratory's capability."""
         return Stating.of(self.job)
+
+    def stated_along(self, curve: Along, size: float = MICROMETRE, symbol: str = "µm") -> Floats:
+        """(m,) U of a curve by position, in its own unit, not below the laboratory's capability of that travel.
+
+        Parameters
+        ----------
+        curve : where it is zero by definition it stays so.
+        size, symbol : unit in which the capability is given.
+        """
+        capability = self.stating.capability
+        if capability is None:
+            return curve.expanded
+        travelled = np.abs(curve.position - curve.position[0])
+        least = size * np.array([capability.least(symbol, float(length)) for length in travelled])
+        return np.where(
+            curve.expanded > _STILL * curve.expanded.max(), np.maximum(curve.expanded, least), curve.expanded
+        )
 
     @property
     def repeatability(self) -> Quantity:
