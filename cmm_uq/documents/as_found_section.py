@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from cmm_uq.conformity.accuracy import TITLES
@@ -10,7 +10,7 @@ from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, title_of
-from cmm_uq.jobs.as_found import AsFound, Figure
+from cmm_uq.jobs.as_found import Figure
 from cmm_uq.jobs.job import Job
 from cmm_uq.messages import NOTHING, Text, Verbatim, day, say
 from cmm_uq.uncertainty.quantity import Quantity
@@ -38,7 +38,7 @@ def as_found_section(job: Job, left: Iterable[Left], statements: Iterable[Statem
     rows = tuple(
         (title_, *expanded(_quantity(before, now))[:2], *expanded(now)[:2], now.unit)
         for group, name, title_, now in left
-        if (before := _figures(found, group).get(name)) is not None
+        if (before := found.figure(group, name)) is not None
     )
     if rows:
         heads = (
@@ -77,10 +77,6 @@ def as_found_data(job: Job) -> dict[str, Any]:
         return {}
     found = job.as_found.model_dump(mode="json", include={"job", "estimates", "accuracy_uncertainty", "conformity"})
     return {"as_found": found}
-
-
-def _figures(found: AsFound, group: str) -> Mapping[str, Figure]:
-    return found.accuracy_uncertainty if group == "accuracy" else found.estimates.get(group, {})
 
 
 def _quantity(figure: Figure, now: Quantity) -> Quantity:

@@ -18,10 +18,11 @@ def with_capability(result: Result) -> tuple[Result, Stating]:
     """
     longest = max((s.nominal for s in result.artefact.sizes if s.role == "dimension" and s.unit == "mm"), default=0.0)
     stating = Stating.of(result.job, longest)
+    reported = [size.name for size in result.artefact.sizes if size.role != "set-up"]
     stated = replace(
         result,
         parameters={effect: stating.all(effect, found) for effect, found in result.parameters.items()},
-        sizes=stating.all("artefact", result.sizes),
+        sizes=dict(result.sizes) | stating.all("artefact", {name: result.sizes[name] for name in reported}),
         accuracy=stating.all("accuracy", result.accuracy),
     )
     return stated, stating

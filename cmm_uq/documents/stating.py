@@ -45,7 +45,7 @@ class Stating:
 
     def all(self, group: str, quantities: Mapping[str, Quantity]) -> dict[str, Quantity]:
         """Quantities of one group, each under ``group.name``."""
-        return {name: self.stated(f"{group}.{name}" if group else name, one) for name, one in quantities.items()}
+        return {name: self.stated(f"{group}.{name}", one) for name, one in quantities.items()}
 
     def warnings(self) -> list[Text]:
         """That U was raised, and of what."""

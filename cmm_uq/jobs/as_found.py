@@ -47,6 +47,10 @@ class _Job(_Part):
     serial: str = ""
 
 
+class _Identifiability(_Part):
+    undetermined: list[dict[str, float]] = []
+
+
 class AsFound(_Part):
     """What was found before the adjustment: of which job, the estimates, the figures of the lengths, and the decisions."""
 
@@ -55,6 +59,14 @@ class AsFound(_Part):
     estimates: dict[str, dict[str, Figure]]
     accuracy_uncertainty: dict[str, Figure] = {}
     conformity: list[Found] = []
+    identifiability: _Identifiability = _Identifiability()
+
+    def figure(self, group: str, name: str) -> Figure | None:
+        """An estimate, or of the group ``accuracy`` a figure of the lengths; ``None`` where nothing determined it."""
+        if group == "accuracy":
+            return self.accuracy_uncertainty.get(name)
+        free = any(f"{group}.{name}" in combination for combination in self.identifiability.undetermined)
+        return None if free else self.estimates.get(group, {}).get(name)
 
 
 def as_found_file(given: str | None) -> str | None:

@@ -48,6 +48,13 @@ def test_what_was_found_stands_beside_what_is_left_each_with_its_uncertainty(out
     )
 
 
+def test_what_nothing_determined_before_is_not_set_beside_what_is_left() -> None:
+    free = FOUND | {"identifiability": {"undetermined": [{"scale_x.ppm": 0.7, "scale_y.ppm": 0.7}]}}
+    rows = tables(adjusted(analysed_iota(), free).document)["The machine as found and as left"].rows
+    assert "Scale error of X" not in [row[0] for row in rows]
+    assert len(rows) == 1
+
+
 def test_its_figures_stand_in_results_json(outcome: Outcome) -> None:
     found = outcome.results["as_found"]
     assert found["job"]["id"] == "before"
