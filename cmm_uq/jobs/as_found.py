@@ -7,23 +7,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.origin import Origin
+from cmm_uq.jobs.results_named import Part, read_results
 
 KEY = "[job] as_found"
 
 _FIX = "Name the results.json that cmm-uq report wrote of the machine as it was found, or the folder it lies in"
 
 
-class _Part(BaseModel):
-    """Of a results.json only what is needed; further keys are none of this module's business."""
-
-    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
-
-
-class Figure(_Part):
+class Figure(Part):
     """A quantity as results.json has it."""
 
     value: float
@@ -31,7 +26,7 @@ class Figure(_Part):
     interval95: Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class Found(_Part):
+class Found(Part):
     """A statement of conformity as results.json has it."""
 
     standard: str
@@ -39,7 +34,7 @@ class Found(_Part):
     decision: str
 
 
-class _Job(_Part):
+class _Job(Part):
     id: str
     origin: Origin
     date: Annotated[dt.date, Field(strict=False)] | None = None
@@ -47,11 +42,11 @@ class _Job(_Part):
     serial: str = ""
 
 
-class _Identifiability(_Part):
+class _Identifiability(Part):
     undetermined: list[dict[str, float]] = []
 
 
-class AsFound(_Part):
+class AsFound(Part):
     """What was found before the adjustment: of which job, the estimates, the figures of the lengths, and the decisions."""
 
     schema_: Annotated[Literal["cmm-uq/results/1"], Field(alias="schema")]
@@ -67,14 +62,6 @@ class AsFound(_Part):
             return self.accuracy_uncertainty.get(name)
         free = any(f"{group}.{name}" in combination for combination in self.identifiability.undetermined)
         return None if free else self.estimates.get(group, {}).get(name)
-
-
-def as_found_file(given: str | None) -> str | None:
-    """Name of the results.json that a job names, itself or the folder in which it lies; ``None`` where it names none."""
-    if given is None:
-        return None
-    name = given.removesuffix("/")
-    return name if name.endswith(".json") else f"{name}/results.json"
 
 
 def as_found_of(
@@ -95,13 +82,7 @@ def as_found_of(
     if name is None:
         return None
     where = str(folder / name)
-    try:
-        found = AsFound.model_validate_json(inputs[name])
-    except ValidationError as error:
-        first = error.errors()[0]
-        at = ".".join(map(str, first["loc"]))
-        told = f"{at}: {first['msg'][0].lower()}{first['msg'][1:]}" if at else "it is no JSON"
-        raise CmmUqError(f"is no results.json of a report: {told}", where=where, fix=_FIX) from None
+    found = read_results(AsFound, inputs[name], where, "results.json of a report", _FIX)
     for what, then, now in (("machine", found.job.machine, machine), ("serial number", found.job.serial, serial)):
         if then and now and then != now:
             raise CmmUqError(f"is of {what} {then!r}, and this job of {now!r}", where=where, fix=_FIX)
