@@ -39,7 +39,9 @@ _BINS = 36
 _MASSES = (0.95, 0.5)  # probability inside the outer and the inner contour
 _SCALE = 0.9  # part of a panel's place that it fills
 _HEADROOM = 0.92  # part of a panel's height that its density fills
-_LEFT, _BELOW, _ABOVE = 14.0, 11.0, 4.5  # room for figures and names, mm
+_LEFT, _BELOW, _ABOVE = 14.0, 11.0, 4.5  # least room for figures and names, mm
+_MM = 25.4 / 72  # of a point
+_SLANT = 40  # of the figures under the panels, degrees
 
 
 def corner_plot(
@@ -143,13 +145,19 @@ class _Panels:
 
     def __init__(self, ranges: Floats, draws: Floats) -> None:
         self.ranges, self.count = ranges, len(ranges)
-        self.panel_mm = min(42.0, (WIDTH_MM - _LEFT - 1) / self.count, 120.0 / self.count)
-        height = self.count * self.panel_mm + _BELOW + _ABOVE
+        self.ticks = [
+            _ticks(low, high, most=1 if self.count > 8 else 2 if self.count > 5 else 4) for low, high in ranges
+        ]
+        longest = max(_width_mm(text, TINY) for _, texts in self.ticks for text in texts)
+        self.left = max(_LEFT, longest + 3.0)
+        below = max(_BELOW, longest * np.sin(np.radians(_SLANT)) + 4.0)
+        self.panel_mm = min(42.0, (WIDTH_MM - self.left - 1) / self.count, 120.0 / self.count)
+        height = self.count * self.panel_mm + below + _ABOVE
         self.figure = new_figure(height)
         ax = self.figure.add_axes((0, 0, 1, 1))
-        spare = (WIDTH_MM - _LEFT - self.count * self.panel_mm) / 2
-        ax.set(xlim=np.array([-_LEFT - spare, WIDTH_MM - _LEFT - spare]) / self.panel_mm)
-        ax.set(ylim=np.array([-_BELOW, height - _BELOW]) / self.panel_mm)
+        # the panels stand at the left, so that the last name, which begins over its own panel, has the room beside them
+        ax.set(xlim=np.array([-self.left, WIDTH_MM - self.left]) / self.panel_mm)
+        ax.set(ylim=np.array([-below, height - below]) / self.panel_mm)
         ax.set_axis_off()
         self.ax: Axes = ax
         relative = (draws - ranges[:, 0]) / np.ptp(ranges, axis=1)
@@ -232,24 +240,35 @@ class _Panels:
         """Ticks with their figures along the outer edges, and names with units over the densities."""
         length, distance = 0.8 / self.panel_mm, 1.4 / self.panel_mm
         for k, label in enumerate(labels):
-            values, texts = _ticks(self.ranges[k, 0], self.ranges[k, 1], most=2 if self.count > 5 else 4)
+            values, texts = self.ticks[k]
             x, y, edge = self.across(k, values), self.up(k, values), np.zeros(len(values))
             self.strokes(x, x, edge, edge - length, MUTED)
             if k:
                 self.strokes(edge, edge - length, y, y, MUTED)
             for place, text in zip(x, texts, strict=True):
-                self.ax.text(place, -distance, text, ha="right", va="top", rotation=40, rotation_mode="anchor",
+                self.ax.text(place, -distance, text, ha="right", va="top", rotation=_SLANT, rotation_mode="anchor",
                              fontsize=TINY)  # fmt: skip
             for place, text in zip(y if k else (), texts, strict=bool(k)):
                 self.ax.text(-distance, place, text, ha="right", va="center", fontsize=TINY)
+            size = SMALL if self.count <= 8 else TINY
+            room = WIDTH_MM - self.left - k * self.panel_mm - 1
             self.ax.text(k, self.count - k - 0.04, label, ha="left", va="bottom", fontweight="bold",
-                         fontsize=SMALL if self.count <= 8 else TINY)  # fmt: skip
+                         fontsize=size * min(1.0, room / _width_mm(label, size, "bold")))  # fmt: skip
 
     def strokes(self, x0: Floats, x1: Floats, y0: Floats, y1: Floats, colour: str) -> None:
         """Straight hairlines from (x0, y0) to (x1, y1), all in one path."""
         gap = np.full(len(x0), np.nan)
         x, y = np.column_stack([x0, x1, gap]), np.column_stack([y0, y1, gap])
         self.ax.plot(x.ravel(), y.ravel(), color=colour, lw=0.6, solid_capstyle="butt")
+
+
+def _width_mm(text: str, size: float, weight: str = "normal") -> float:
+    """Width of a text in the measuring font."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextPath
+
+    font = FontProperties(family="DejaVu Sans", weight=weight)
+    return _MM * max(float(TextPath((0, 0), str.__str__(text), size=size, prop=font).get_extents().x1), size)
 
 
 def _ticks(low: float, high: float, most: int) -> tuple[Floats, list[str]]:

@@ -9,6 +9,7 @@ import numpy as np
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.documents.diagnosis_words import VERDICT_WORDS, VERDICTS, lines, noise_words, sentence, summary_rows
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.improvement_table import improvement_table
 from cmm_uq.documents.origin import came_about
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.documents.plots import curve_with_band, length_plot
@@ -17,7 +18,7 @@ from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.results_file import diagnosis_data, head
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, number, say, together
+from cmm_uq.messages import Text, Verbatim, commas, day, names, number, say, together
 from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.units import MICROMETRE, unit
 
@@ -125,34 +126,11 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
             rms_after_um=gain.rms_after_um,
         ),
     )
-    rows = (
-        (say("Residual rms"), number(gain.rms_before_um, ".2f"), number(gain.rms_after_um, ".2f"), unit("µm")),
-        (
-            say("Rms on held-out {unseen}", unseen=gain.unseen),
-            number(gain.heldout_rms_before_um, ".2f"),
-            number(gain.heldout_rms_after_um, ".2f"),
-            unit("µm"),
-        ),
-        (
-            say("Gain in log predictive density"),
-            NOTHING,
-            say("{elpd_gain:.1f} ± {elpd_gain_se:.1f}", elpd_gain=gain.elpd_gain, elpd_gain_se=gain.elpd_gain_se),
-            NOTHING,
-        ),
-    )
-    heads = (
-        Column(say("Quantity"), numeric=False),
-        Column(say("Before")),
-        Column(say("After")),
-        Column(say("Unit"), numeric=False),
-    )
     changes = _changes(found)
-    table = Table(
-        say("Improvement"),
-        heads,
-        rows,
-        (say("{unseen:capital} are left out with all their repeats; ± is one standard error.", unseen=gain.unseen),),
-    )
+    table = improvement_table(
+        gain, say("Residual rms"), say("Rms on held-out {unseen}", unseen=gain.unseen),
+        say("{unseen:capital} are left out with all their repeats; ± is one standard error.", unseen=gain.unseen),
+    )  # fmt: skip
     return (plot, table, changes) if changes else (plot, table)
 
 

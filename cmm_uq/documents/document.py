@@ -93,10 +93,11 @@ Block = Paragraph | Facts | Table | Plot | Decision
 
 @dataclass(frozen=True)
 class Section:
-    """A titled part of the document."""
+    """A titled part of the document; ``opinion`` marks what interprets the results and belongs in the annex."""
 
     title: Text
     blocks: tuple[Block, ...]
+    opinion: bool = False
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ class Document:
     issuer : the laboratory that answers for it; lines of name and address. Empty when the job does not say.
     particulars : facts that identify customer, item, dates, method; the first thing after the title.
     warnings : what the reader must know before using a figure; shown on the first page.
-    sections : the results.
+    sections : the results; those of opinion last, which make up the annex.
     statements : sentences on scope, reproduction and the like, before the signatures.
     signatures : who authorises.
     attachments : names of the files that travel with the document.
@@ -150,8 +151,7 @@ class Document:
         """The document as plain dicts and lists of printable text, ready for JSON.
 
         Every block carries its ``kind``; tables and plots also their ``label``, counted through the document
-        ("Table 2", "Figure 1"), so that the views number them alike; columns also their ``need``, the characters of
-        their longest line.
+        ("Table 2", "Figure 1"), so that the views number them alike; tables also what their layout goes by.
         """
         data: dict[str, Any] = _printable(asdict(self))
         data["date"] = self.date.isoformat() if self.date else None
@@ -172,11 +172,29 @@ _NUMBERED = ("table", "plot")
 
 
 def _measure(table: dict[str, Any]) -> None:
-    """Give every column its longest line in characters; what is longer than any figure is set as text."""
+    """What the views must know to lay a table out.
+
+    Every column is given its longest line in characters (``need``), and the texts that are likely to be its widest: a line
+    (``longest``), a word of its cells (``word``) and one of its heading (``heading_word``). What is longer than any figure is
+    set as text. The table is given the characters of its narrowest line (``least``): figures whole, texts broken at words.
+    """
     for index, column in enumerate(table["columns"]):
-        cells = [column["heading"], column["unit"], *(row[index] for row in table["rows"])]
-        column["need"] = max(4, *(len(line) for cell in cells for line in cell.split("\n")))
+        cells = [line for row in table["rows"] for line in row[index].split("\n")]
+        head = [column["heading"], column["unit"]]
+        column["need"] = max(4, *map(len, head), *(len(line) for line in cells), 0)
         column["numeric"] = column["numeric"] and column["need"] <= _LONGEST_FIGURE
+        column["longest"] = max(cells, key=_width, default="")
+        column["word"] = max((word for line in cells for word in line.split(" ")), key=_width, default="")
+        column["heading_word"] = max((word for line in head for word in line.split()), key=_width, default="")
+    kept = [max(len(c["longest"] if c["numeric"] else c["word"]), len(c["heading_word"])) for c in table["columns"]]
+    table["least"] = sum(kept) + 2 * len(kept)
+
+
+def _width(line: str) -> float:
+    """Of a line, roughly, in widths of a small letter."""
+    return sum(
+        1.5 if c in "mwMW%—" else 0.6 if c in "fijlrtI.,:;'|()[] −-" else 1.2 if c.isupper() else 1.0 for c in line
+    )
 
 
 _LONGEST_FIGURE = 28

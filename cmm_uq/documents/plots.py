@@ -255,7 +255,7 @@ def curve_with_band(
     with house_style():
         figure = new_figure(72)
         ax = figure.subplots()
-        figure.subplots_adjust(left=0.085, right=0.975, bottom=0.14, top=0.97)
+        figure.subplots_adjust(left=0.105, right=0.975, bottom=0.14, top=0.97)  # room for ticks of six characters
         around = np.append(values - half, (values + half)[::-1])
         ax.fill(np.append(across, across[::-1]), around, color=ACCENT, alpha=0.16, lw=0)
         ax.plot(across, values, color=ACCENT, lw=1.3)

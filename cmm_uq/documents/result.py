@@ -13,6 +13,7 @@ from cmm_uq.conformity.consequences import Consequences
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.conformity.tolerances import Judged
 from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.documents.stating import Stating
 from cmm_uq.inference.draws import Draws
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import Posterior
@@ -173,17 +174,19 @@ class Result:
         return frozenset(effect for combination in self.undetermined for effect, _ in combination)
 
     def differences(self, combination: tuple[tuple[str, str], ...]) -> tuple[Difference, ...]:
-        """Differences, within a combination that the recording leaves free, of parameters in one unit."""
+        """Differences, within a combination that the recording leaves free, of parameters in one unit.
+
+        None with an uncertainty below the laboratory's capability.
+        """
         columns = {unknown.key: i for i, unknown in enumerate(self.posterior.unknowns)}
         units = {unknown.key: unknown.unit for unknown in self.posterior.unknowns}
         alike = [key for key in combination if units[key] == units[combination[0]]]
         draws = self.posterior.draws
-        return tuple(
-            Difference(
-                second, first, Quantity.of_draws(draws[:, columns[second]] - draws[:, columns[first]], units[first])
-            )
-            for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False)
-        )
+        stating, found = Stating.of(self.job), []
+        for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False):
+            quantity = Quantity.of_draws(draws[:, columns[second]] - draws[:, columns[first]], units[first])
+            found.append(Difference(second, first, stating.stated("differences", quantity)))
+        return tuple(found)
 
     @cached_property
     def covariance(self) -> Covariance:

@@ -44,6 +44,9 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
         "job": {
             "id": facts.id,
             "origin": facts.origin,
+            "date": facts.date.isoformat(),
+            "machine": job.facts.machine.name,
+            **({"serial": job.facts.machine.serial} if job.facts.machine.serial else {}),
             **({"derived_from": derived.model_dump()} if derived else {}),
             **({"altered": list(job.altered)} if job.altered else {}),
             "inputs_sha256": sha256(job.inputs),

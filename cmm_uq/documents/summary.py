@@ -1,15 +1,17 @@
-"""A result in a few lines, for the end of a command."""
+"""A result in a few lines, for the end of a command; its decisions in a line each, for the first page of a certificate."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.warning import warnings
-from cmm_uq.documents.wording import expanded, measured, probability, title_of
+from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, measured, probability, title_of
+from cmm_uq.messages import Text, Verbatim, lines, say
 
 
-def summary(result: Result) -> list[tuple[str, str, str]]:
+def summary(result: Result, warnings: Iterable[str]) -> list[tuple[str, str, str]]:
     """Rows of what, figure and remark: what was measured, the figures, the decisions, the warnings."""
     facts, free = result.job.facts, {key for combination in result.undetermined for key in combination}
     rows = [(
@@ -32,7 +34,16 @@ def summary(result: Result) -> list[tuple[str, str, str]]:
                 f"k = {k}" if known else "",
             ))  # fmt: skip
     rows += [(each.facts.standard, each.outcome.upper(), _remark(each)) for each in result.statements]
-    return rows + [("Warning", text, "") for text in warnings(result)]
+    return rows + [("Warning", text, "") for text in warnings]
+
+
+def in_short(result: Result) -> Text:
+    """What each statement comes to, a line each, for the first page."""
+    return lines(
+        say("{standard}, {what}: {outcome}", standard=Verbatim(one.facts.standard), what=Verbatim(one.characteristic),
+            outcome=OUTCOME_WORDS[one.outcome])
+        for one in result.statements
+    )  # fmt: skip
 
 
 def _remark(statement: Statement) -> str:

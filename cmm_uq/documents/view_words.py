@@ -17,6 +17,12 @@ WORDS: Mapping[str, Text] = {
     "page": say("Page {page} of {pages}", page=_BREAK, pages=_BREAK),
     "replaced": say("□ stands for a character that the fonts of this file lack: {codes}. The HTML view shows it.",
                     codes=_BREAK),
+    "annex": say("Annex: opinions and interpretations"),
+    "annex_clause": say("Opinions and interpretations by ISO/IEC 17025:2017, 7.8.7."),
+    "annex_note": say(
+        "What stands in this annex interprets the results above. It is no result of the "
+        "calibration, and no statement of conformity rests on it."
+    ),
     "pass": say("Pass"), "fail": say("Fail"), "undecided": say("Undecided"), "incomplete": say("Incomplete"),
     "conditional pass": say("Conditional pass"), "conditional fail": say("Conditional fail"), "remeasure": say("Remeasure"),
 }  # fmt: skip

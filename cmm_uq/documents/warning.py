@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from cmm_uq.conformity.lengths_decided import unknown_expansion
 from cmm_uq.documents.diagnosis_words import VERDICTS
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import title_of
-from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.messages import Text, commas, listed, say, sentences
+from cmm_uq.messages import Text, listed, say, sentences
 from cmm_uq.uncertainty.rounding import significant
 
 ASSUMED = 0.25
@@ -22,29 +23,47 @@ def warnings(result: Result) -> tuple[Text, ...]:
     return tuple(
         text
         for texts in (
-            _convergence(result),
+            not_converged(result.posterior),
             _mismatch(result),
             _noise(result),
             _expansion(result),
             _implausible(result),
             _undetermined(result),
             _screening(result),
-            _missing(result),
         )
         for text in texts
     )
 
 
-def _convergence(result: Result) -> list[Text]:
-    posterior = result.posterior
-    if posterior.converged:
+class Sampled(Protocol):
+    """What a sampling says of itself."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether its draws may be used."""
+        ...
+
+    @property
+    def ess_min(self) -> float:
+        """Least effective sample size."""
+        ...
+
+    @property
+    def rhat_max(self) -> float:
+        """Largest R-hat."""
+        ...
+
+
+def not_converged(sampled: Sampled) -> list[Text]:
+    """That figures must not be used, where the sampling did not converge."""
+    if sampled.converged:
         return []
     return [
         say(
             "The sampling did not converge (least effective sample size {ess_min:.0f}, R-hat "
             "{rhat_max:.3f}): estimates and uncertainties must not be used.",
-            ess_min=posterior.ess_min,
-            rhat_max=posterior.rhat_max,
+            ess_min=sampled.ess_min,
+            rhat_max=sampled.rhat_max,
         )
     ]
 
@@ -145,31 +164,3 @@ def _screening(result: Result) -> list[Text]:
         else say("{why:capital}. It is used as it stands.", why=finding.why)
         for finding in result.findings
     ]
-
-
-def _missing(result: Result) -> list[Text]:
-    """What ISO/IEC 17025:2017 asks for and the job does not say; a recording that nobody measured has no certificate."""
-    if result.job.origin != MEASURED:
-        return []
-    facts = result.job.facts
-    wanted = (
-        (facts.laboratory.name, say("name of the laboratory (7.8.2.1 b)")),
-        (facts.laboratory.address, say("address of the laboratory (7.8.2.1 b)")),
-        (facts.job.place, say("place of the measurement (7.8.2.1 c)")),
-        (facts.job.customer, say("customer (7.8.2.1 e)")),
-        (facts.job.procedure, say("method (7.8.2.1 f)")),
-        (facts.machine.serial, say("serial number of the machine (7.8.2.1 g)")),
-        (facts.job.issued, say("date of issue (7.8.2.1 j)")),
-        (facts.laboratory.signatory, say("who authorises it (7.8.2.1 o)")),
-        (facts.job.conditions, say("conditions (7.8.4.1 b)")),
-        (
-            facts.artefact.length_mm is None or facts.artefact.certificate,
-            say("certificate of the artefact (7.8.4.1 c)"),
-        ),
-    )
-    missing = [name for given, name in wanted if not given]
-    return (
-        [say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=commas(missing))]
-        if missing
-        else []
-    )

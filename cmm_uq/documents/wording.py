@@ -9,6 +9,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import NOTHING, Text, Verbatim, foreign, number, say
 from cmm_uq.model.measurement import ARTEFACT
+from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
 
@@ -70,3 +71,22 @@ def numbered(measurement: int, repeat: int | None) -> Text:
     if repeat is None:
         return number(measurement)
     return say("{measurement} ({repeat})", measurement=measurement, repeat=repeat)
+
+
+def deviating(what: Text, reference: Text, before_um: Floats, after_um: Floats, spec: str = ".1f") -> Text:
+    """The sentence in place of a picture of deviations: their range as recorded, and after the fitted model.
+
+    Parameters
+    ----------
+    what : deviates, with a verb: ``12 lengths: as recorded they deviate``.
+    reference : from what, with a space before it; or nothing.
+    before_um, after_um : deviations, µm.
+    spec : of the figures.
+    """
+    low, high, low_after, high_after = (
+        number(float(end), spec) for end in (before_um.min(), before_um.max(), after_um.min(), after_um.max())
+    )
+    return say(
+        "{what} by {low} to {high} µm{reference}; after the fitted model {low_after} to {high_after} µm remain.",
+        what=what, reference=reference, low=low, high=high, low_after=low_after, high_after=high_after,
+    )  # fmt: skip

@@ -11,10 +11,16 @@ from cmm_uq.jobs.table import AnyFloat, Length, Table, Uncertainty
 
 
 class Traceability(Table):
-    """The artefact's own certificate."""
+    """The artefact's own certificate.
+
+    Attributes
+    ----------
+    machine : measuring machine that the artefact was certified on, by its name or its serial number.
+    """
 
     number: str = ""
     laboratory: str = ""
+    machine: str = ""
     date: dt.date | None = None
     due: dt.date | None = None
 
@@ -77,6 +83,11 @@ class ArtefactFacts(Table):
     def certified(self) -> bool:
         """Whether lengths can be compared with it."""
         return self.length_mm is not None
+
+    @property
+    def traced(self) -> bool:
+        """Whether what is found rests on something of it that is certified, and so on its certificate."""
+        return self.certified
 
 
 class ReferencedFacts(ArtefactFacts):

@@ -18,7 +18,7 @@ from cmm_uq.jobs.origin import DERIVING, MEASURED, SIMULATED
 
 PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100
-OF_THE_CERTIFICATE = ("number", "issued")
+OF_THE_CERTIFICATE = ("number", "issued", "recalibration_agreed", "as_found")
 """Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
 IN_THE_RECORDING = ("temperature_log",)
 """Keys of ``[machine]`` whose figures stand in every recording that a command writes."""

@@ -7,35 +7,30 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import LISTED
 from cmm_uq.jobs.machine import DigitizerFacts, Pose
 from cmm_uq.jobs.origin import SIMULATED, Origin
+from cmm_uq.jobs.results_named import Part, read_results, results_named
 
 KEY = "[machine] digitizer"
 
 _FIX = "Name the results.json that cmm-uq report wrote of a job of kind digitizer"
 
 
-class _Part(BaseModel):
-    """Of a results.json only what is needed; further keys are none of this module's business."""
-
-    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
-
-
-class _Component(_Part):
+class _Component(Part):
     value: float
 
 
-class _Offset(_Part):
+class _Offset(Part):
     U1: _Component
     V1: _Component
     W1: _Component
 
 
-class _Pose(_Part):
+class _Pose(Part):
     pose: int
     alpha_deg: float
     beta_deg: float
@@ -47,18 +42,18 @@ Three = tuple[float, float, float]
 _Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
-class _Digitizer(_Part):
+class _Digitizer(Part):
     offset_mm: _Offset
     covariance_mm2: Annotated[list[_Row], Field(min_length=3, max_length=3)]
     poses: Annotated[list[_Pose], Field(min_length=1, max_length=LISTED.most)]
 
 
-class _Job(_Part):
+class _Job(Part):
     id: str
     origin: Origin
 
 
-class _Results(_Part):
+class _Results(Part):
     schema_: Annotated[Literal["cmm-uq/results/1"], Field(alias="schema")]
     job: _Job
     digitizer: _Digitizer
@@ -97,10 +92,7 @@ class DescribedDigitizer:
 
 def calibration_file(facts: DigitizerFacts | None) -> str | None:
     """Name of the results.json that a job names, itself or the folder in which it lies; ``None`` where it names none."""
-    if facts is None or facts.calibration is None:
-        return None
-    name = facts.calibration.removesuffix("/")
-    return name if name.endswith(".json") else f"{name}/results.json"
+    return None if facts is None else results_named(facts.calibration)
 
 
 def digitizer_of(
@@ -123,7 +115,7 @@ def digitizer_of(
     name = calibration_file(facts)
     if name is None or facts.offset_mm is not None:
         return DescribedDigitizer(_three(facts.offset_mm or []), tuple(facts.poses))
-    found = _read(inputs[name], str(folder / name))
+    found = read_results(_Results, inputs[name], str(folder / name), "calibration of a digitizer", _FIX)
     if found.job.origin == SIMULATED and origin != SIMULATED:
         raise CmmUqError(f"is of a simulated recording, job {found.job.id!r}", where=str(folder / name),
                          fix="Measure the digitizer: a simulated calibration serves simulated jobs only")  # fmt: skip
@@ -131,16 +123,6 @@ def digitizer_of(
     offset = [component.value for component in (given.offset_mm.U1, given.offset_mm.V1, given.offset_mm.W1)]
     poses = tuple(facts.poses) or tuple(Pose(**pose.model_dump()) for pose in given.poses)
     return DescribedDigitizer(_three(offset), poses, tuple(map(_three, given.covariance_mm2)), name, found.job.id)
-
-
-def _read(content: bytes, where: str) -> _Results:
-    try:
-        return _Results.model_validate_json(content)
-    except ValidationError as error:
-        first = error.errors()[0]
-        at = ".".join(map(str, first["loc"]))
-        told = f"{at}: {first['msg'][0].lower()}{first['msg'][1:]}" if at else "it is no JSON"
-        raise CmmUqError(f"is no calibration of a digitizer: {told}", where=where, fix=_FIX) from None
 
 
 def _three(values: Sequence[float]) -> Three:

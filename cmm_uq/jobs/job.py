@@ -14,9 +14,11 @@ from pydantic import Field, ValidationInfo, create_model, field_validator, model
 from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.as_found import AsFound
 from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, needed, probe_unfit, standards_in, uncertainty_missing
 from cmm_uq.jobs.file_names import device_name
+from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
@@ -39,6 +41,9 @@ class JobFacts(Table):
     """``[job]``: identification, and free text for the certificate.
 
     ``origin`` and ``derived_from`` are written by the commands that make a recording out of another.
+    ``recalibration_agreed`` is the date of the next calibration, where the customer agreed to be told one
+    (ISO/IEC 17025:2017, 7.8.4.3); no other is printed. ``as_found`` names the results.json, or the folder it lies in, of the
+    machine before it was adjusted (7.8.4.1 d).
     """
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=100)]
@@ -54,6 +59,8 @@ class JobFacts(Table):
     conditions: str = ""
     remarks: str = ""
     diagnosis_on_certificate: bool = False
+    recalibration_agreed: dt.date | None = None
+    as_found: str | None = None
     origin: Origin = MEASURED
     derived_from: DerivedFrom | None = None
 
@@ -72,16 +79,6 @@ class JobFacts(Table):
         if device_name(self.id):
             raise ValueError("must name a folder of its own, and Windows takes this name for a device")
         return self
-
-
-class Laboratory(Table):
-    """``[laboratory]``: who answers for the certificate."""
-
-    name: str = ""
-    address: str = ""
-    accreditation: str = ""
-    signatory: str = ""
-    signatory_role: str = ""
 
 
 class RecordingFacts(Table):
@@ -201,6 +198,7 @@ class Job:
     inputs : contents of each input by its path inside the folder, for hashes and attachments.
     altered : names of files that were changed after a command derived them.
     planned : whether the recording holds the nominal coordinates of a plan.
+    as_found : what the machine showed before it was adjusted, where the job names it.
     """
 
     folder: Path
@@ -209,6 +207,7 @@ class Job:
     inputs: Mapping[str, bytes]
     altered: tuple[str, ...] = ()
     planned: bool = False
+    as_found: AsFound | None = None
 
     @property
     def origin(self) -> Origin:

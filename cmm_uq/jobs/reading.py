@@ -14,6 +14,7 @@ from pydantic import create_model
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.as_found import as_found_of
 from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.digitizer_calibration import calibration_file
 from cmm_uq.jobs.earlier import against_earlier
@@ -24,6 +25,7 @@ from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
+from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.source import InFolder, InMemory, Source
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
@@ -90,7 +92,9 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     maps, logs, calibrations = _of_the_machine(facts.machine)
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
     check_distinct([*recordings, *maps, *logs, *calibrations], str(path))
-    inputs |= _contents(source, calibrations, TABLE_BYTES, written=True)
+    before = results_named(facts.job.as_found)
+    others = calibrations if before is None else [*calibrations, before]
+    inputs |= _contents(source, others, TABLE_BYTES, written=True)
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
         return Job(folder, facts, _no_points(machine), inputs | _contents(source, maps, MAP_BYTES))
@@ -113,7 +117,8 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     if earlier is not None:
         then = read_recording(inputs[earlier], str(folder / earlier), machine)
         points = against_earlier(points, then, facts.artefact.cte_per_k, where)
-    return Job(folder, facts, points, inputs, altered(derived, inputs), planned)
+    found = as_found_of(before, inputs, folder, facts.job.origin, facts.machine.name, facts.machine.serial)
+    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found)
 
 
 def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:

@@ -55,6 +55,12 @@ class Quantity:
         """Of a standard deviation that is known this well: ½·(value/u)² (JCGM 100:2008, E.4.3), at least one."""
         return max(0.5 * (self.value / self.u) ** 2, 1.0) if self.u > 0 else float("inf")
 
+    def at_least(self, expanded: float) -> Quantity:
+        """The quantity with this expanded uncertainty (95 %, k = 2) where its own is smaller, else as it is."""
+        if self.expanded >= expanded:
+            return self
+        return Quantity(self.value, expanded / 2, (self.value - expanded, self.value + expanded), self.unit)
+
     def times(self, factor: float, unit: Unit) -> Quantity:
         """The quantity multiplied by an exact factor, of either sign, in the unit of the product."""
         low, high = sorted(factor * end for end in self.interval95)

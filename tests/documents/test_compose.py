@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -9,11 +10,13 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.commands.analysis import Result, analyse, outcome_of
-from cmm_uq.documents.compose import STATEMENTS
+from cmm_uq.documents.certificate import STATEMENTS
+from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.document import Decision, Document, Facts, Table
 from cmm_uq.documents.html import render_html
-from cmm_uq.documents.warning import warnings
 from tests.conftest import ROOT
+from tests.documents.test_completeness import changed
+from tests.kinds.simulated import analysed
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +92,7 @@ def test_the_sentences_on_scope_and_reproduction_are_there(document: Document) -
 
 
 def test_what_is_mandatory_and_missing_is_named_in_one_warning(result: Result) -> None:
-    (missing,) = [text for text in warnings(result) if "ISO/IEC 17025" in text]
+    (missing,) = [text for text in formal_warnings(result.job) if "ISO/IEC 17025" in text]
     for clause in ("7.8.2.1 b", "7.8.2.1 e", "7.8.2.1 g", "7.8.2.1 j", "7.8.2.1 o"):
         assert clause in missing
     assert "7.8.2.1 f" not in missing
@@ -98,15 +101,17 @@ def test_what_is_mandatory_and_missing_is_named_in_one_warning(result: Result) -
 def test_a_complete_job_has_no_such_warning_and_its_particulars_are_printed(job: Path) -> None:
     path = job / "job.toml"
     text = path.read_text(encoding="utf-8")
-    text = text.replace("[job]\n", '[job]\ncustomer = "<b>Müller & Söhne</b>"\nissued = 2004-09-30\n', 1)
+    text = text.replace(
+        "[job]\n", '[job]\ncustomer = "<b>Müller & Söhne</b>"\naddress = "Ort"\nissued = 2004-09-30\n', 1
+    )
     text = text.replace(
         "[machine]\n", '[laboratory]\nname = "L"\naddress = "A"\nsignatory = "S"\n[machine]\nserial = "7"\n', 1
     )
     path.write_text(text, encoding="utf-8")
     found = analyse(job)
-    assert not any("ISO/IEC 17025" in text for text in warnings(found))
     made = outcome_of(found).document
-    assert facts(made)["Customer"] == "<b>Müller & Söhne</b>"
+    assert not any("ISO/IEC 17025" in text for text in made.warnings)
+    assert facts(made)["Customer"] == "<b>Müller & Söhne</b>\nOrt"
     assert made.signatures[0].name == "S"
     html = render_html(made)
     assert "&lt;b&gt;Müller &amp; Söhne&lt;/b&gt;" in html
@@ -159,3 +164,58 @@ def test_the_summary_carries_the_certificates_figures(result: Result, document: 
     for row in table(document, "Figures of performance").rows:
         assert any(f"{row[1]} ± {row[2]}" in line for line in lines)
     assert any("FAIL" in line for line in lines)
+
+
+def test_results_and_decisions_come_first_and_what_interprets_them_is_in_the_annex(document: Document) -> None:
+    titles = [(section.title, section.opinion) for section in document.sections]
+    assert titles == [
+        ("Figures of performance", False), ("Statements of conformity", False), ("Error factors", False),
+        ("Artefact and traceability", False), ("Lengths", False), ("Budget of one length", False), ("Method", False),
+        ("The adjustment that the machine needs", True), ("Posterior distribution", True),
+    ]  # fmt: skip
+
+
+def test_the_first_page_says_what_every_statement_comes_to(document: Document) -> None:
+    assert dict(document.particulars[-1].rows)["Conformity"] == "ASME B89.4.1-1997, volumetric performance: fail"
+
+
+def test_the_conditions_stand_with_the_results(document: Document) -> None:
+    table, under = document.sections[0].blocks
+    assert isinstance(table, Table)
+    assert dict(under.rows) == {"Conditions": "20 °C, controlled; 11 thermocouples on the machine"}
+
+
+def test_the_annex_is_marked_as_such_and_comes_after_the_statements(document: Document) -> None:
+    html = render_html(document)
+    places = [html.index(text) for text in ("reproduced except in full", "Annex: opinions and interpretations", "7.8.7",
+                                            "What to turn and what to enter", "Posterior distribution:")]  # fmt: skip
+    assert places == sorted(places)
+
+
+@pytest.mark.parametrize(
+    "kind", ["sphere-simulated", "digitizer-simulated", "gauge-blocks-simulated", "shift-simulated"]
+)
+def test_every_kind_begins_with_its_results(kind: str) -> None:
+    made = outcome_of(analysed(kind)).document
+    assert isinstance(made.sections[0].blocks[0], Table)
+    assert "U" in [column.heading for column in made.sections[0].blocks[0].columns]
+    assert [section.opinion for section in made.sections] == sorted(section.opinion for section in made.sections)
+
+
+def test_the_formula_of_an_mpe_stands_with_its_limit() -> None:
+    """3 + 800/80 = 13 µm."""
+    made = outcome_of(analysed("gauge-blocks-simulated")).document
+    (decision,) = [block for section in made.sections for block in section.blocks if isinstance(block, Decision)]
+    assert decision.limit == "13 µm at L = 800 mm; MPE = (3 + L/80) µm, L in mm"
+
+
+def test_a_diagnosis_that_the_job_asks_for_is_an_opinion(result: Result) -> None:
+    asked = outcome_of(replace(result, job=changed(result.job, job={"diagnosis_on_certificate": True}))).document
+    assert [section.opinion for section in asked.sections if section.title == "What was left out"] == [True]
+
+
+def test_the_next_calibration_is_printed_only_where_the_customer_agreed(result: Result, document: Document) -> None:
+    label = "Next calibration, as agreed with the customer"
+    agreed = changed(result.job, job={"recalibration_agreed": dt.date(2005, 9, 1)})
+    assert label not in facts(document)
+    assert facts(outcome_of(replace(result, job=agreed)).document)[label] == "2005-09-01"

@@ -13,7 +13,7 @@ from tests.kinds.simulated import analysed, blocks
 
 
 def said(job: str, standard: str) -> tuple[str, str]:
-    (row,) = [row for row in summary(analysed(job)) if row[0] == standard]
+    (row,) = [row for row in summary(analysed(job), ()) if row[0] == standard]
     return row[1:]
 
 
@@ -50,7 +50,7 @@ def test_without_an_uncertainty_no_probability_is_printed(tmp_path: Path) -> Non
     text = text.replace("u_um = 0.15\n", "").replace("[[conformity]]\n", '[[conformity]]\nrule = "simple"\n')
     (job / "job.toml").write_text(text, encoding="utf-8")
     result = analyse(job)
-    (row,) = [row for row in summary(result) if row[0] == "VDI/VDE 2617"]
+    (row,) = [row for row in summary(result, ()) if row[0] == "VDI/VDE 2617"]
     assert row[2].startswith("the lengths measured conform (2.47 µm against 4.25 µm); missing: ")
     (block,) = [
         b for section in outcome_of(result).document.sections for b in section.blocks if isinstance(b, Decision)

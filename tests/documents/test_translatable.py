@@ -18,6 +18,10 @@ from cmm_uq.documents.document import Column, Document, Paragraph, Plot, Section
 from cmm_uq.documents.origin import marked
 from cmm_uq.documents.program import NAME
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.job import JobFacts
+from cmm_uq.jobs.laboratory import Laboratory
+from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.messages import Message, Number, Verbatim, say
 from cmm_uq.physics.catalogue import every
 from cmm_uq.uncertainty.budgets.tables import TABLES
@@ -29,6 +33,13 @@ from tests.documents.saying import leaves, strangers
 from tests.uncertainty.test_ready_budget import BALLBAR, LENGTH, PROBING, SIMULATED, SPHERE, USE, ready
 
 EXAMPLES = sorted(path.name for path in (ROOT / "examples").iterdir() if (path / "job.toml").exists())
+KEYS = [
+    f"[{table}] {key}"
+    for table, keys in (("job", JobFacts), ("laboratory", Laboratory), ("machine", MachineFacts),
+                        ("artefact.certificate", Traceability))
+    for key in keys.model_fields
+]  # fmt: skip
+"""Of job.toml, as warnings name them."""
 SAMPLER = "emcee affine-invariant ensemble sampler exact draws"
 
 
@@ -39,7 +50,7 @@ def known_to(folder: Path) -> str:
         " ".join((name, *(p.name for p in effect.reported), *effect.columns)) for name, effect in every().items()
     ]
     decided = [one.name for standard in BUILT_IN.values() for one in standard.characteristics]
-    return "\n".join([*own, *effects, *READY, *decided, NAME, SAMPLER])
+    return "\n".join([*own, *effects, *READY, *decided, *KEYS, NAME, SAMPLER])
 
 
 def documents(folder: Path) -> list[Document]:

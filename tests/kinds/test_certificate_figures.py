@@ -15,7 +15,7 @@ import pytest
 from cmm_uq.commands.analysis import outcome_of
 from cmm_uq.documents.document import Document, Table
 from cmm_uq.documents.results_file import as_json
-from cmm_uq.kinds.shift_plate.page import _ROWS as EVERY
+from cmm_uq.kinds.shift_plate.curves_page import EVERY
 from tests.conftest import ROOT
 from tests.kinds.reading import tables
 from tests.kinds.simulated import analysed, document

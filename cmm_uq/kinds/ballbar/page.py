@@ -8,7 +8,7 @@ from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import residual_volume
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import numbered
+from cmm_uq.documents.wording import deviating, numbered
 from cmm_uq.kinds.ballbar.analysis import figures, results
 from cmm_uq.kinds.distances import page as adjustment_section
 from cmm_uq.kinds.distances.lengths import Lengths
@@ -38,17 +38,11 @@ def sections(result: Result) -> list[Section]:
             name=name,
             k=number(lengths.coverage_factor, ".2f"),
         ),
-        alternative=say(
-            "{count} lengths: as recorded they deviate by {low:.0f} to {high:.0f} µm from the {name}; "
-            "after the fitted model {low_after:.0f} to {high_after:.0f} µm remain.",
-            count=len(deviations),
-            low=deviations.min(),
-            high=deviations.max(),
-            name=name,
-            low_after=residuals.min(),
-            high_after=residuals.max(),
+        alternative=deviating(
+            say("{count} lengths: as recorded they deviate", count=len(deviations)),
+            say(" from the {name}", name=name), deviations, residuals, ".0f",
         ),
-    )
+    )  # fmt: skip
     volume = residual_volume(result, say("bars"))
     return [
         Section(say("Lengths"), (plot, volume, _table(lengths, name))),

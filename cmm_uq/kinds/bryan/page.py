@@ -7,9 +7,10 @@ from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import residual_volume
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import deviating
 from cmm_uq.kinds.bryan.analysis import figures, results
 from cmm_uq.kinds.distances import page as adjustment_section
-from cmm_uq.messages import number, say
+from cmm_uq.messages import NOTHING, number, say
 
 IN_TWO_STEPS = say(
     "The fixed ball is found first, as if the machine had no errors, and its centre takes up part of them. The fitted model "
@@ -35,16 +36,11 @@ def sections(result: Result) -> list[Section]:
             "Distance of the swept ball from the fixed one, as recorded and after the fitted model, with U (k = {k}).",
             k=number(lengths.coverage_factor, ".2f"),
         ),
-        alternative=say(
-            "{count} positions: about the best centre the distances deviate by {low:.1f} to {high:.1f} "
-            "µm; after the fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
-            count=len(deviations),
-            low=deviations.min(),
-            high=deviations.max(),
-            low_after=residuals.min(),
-            high_after=residuals.max(),
+        alternative=deviating(
+            say("{count} positions: about the best centre the distances deviate", count=len(deviations)), NOTHING,
+            deviations, residuals,
         ),
-    )
+    )  # fmt: skip
     return [
         Section(say("Distances"), (plot, residual_volume(result, say("swept positions")))),
         adjustment_section.section(result, found.settings, found.second_way, IN_TWO_STEPS),

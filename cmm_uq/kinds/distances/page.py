@@ -24,7 +24,7 @@ def section(
     remarks : on the second way.
     """
     blocks = [*_adjustments(settings), *_second_way(result, second_way, remarks)]
-    return Section(say("The adjustment that the machine needs"), tuple(blocks))
+    return Section(say("The adjustment that the machine needs"), tuple(blocks), opinion=True)
 
 
 def _adjustments(settings: tuple[Setting, ...]) -> list[Block]:

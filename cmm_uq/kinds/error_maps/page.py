@@ -7,6 +7,7 @@ from typing import Any
 from cmm_uq import __version__
 from cmm_uq.documents.diagnosis_words import VERDICT_WORDS, sentence
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.improvement_table import improvement_table
 from cmm_uq.documents.plots import curve_with_band
 from cmm_uq.documents.results_file import effect_data, finding_data, head, improvement_data, quantity_data
 from cmm_uq.documents.wording import probability
@@ -16,8 +17,7 @@ from cmm_uq.kinds.error_maps.diagnosis import Difference
 from cmm_uq.kinds.error_maps.search import ColumnComparison
 from cmm_uq.kinds.error_maps.squareness import squareness_data, squareness_sections
 from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, lines, names, number, say
-from cmm_uq.units import unit
+from cmm_uq.messages import Text, Verbatim, commas, day, lines, names, number, say
 
 _PICTURES = 3
 
@@ -161,38 +161,13 @@ def _picture(difference: Difference) -> Block:
 
 
 def _before_after(found: MapsDiagnosed) -> Table:
-    gain = found.diagnosis.improvement
-    rows = (
-        (
-            say("Rms of how the maps differ"),
-            number(gain.rms_before_um, ".2f"),
-            number(gain.rms_after_um, ".2f"),
-            unit("µm"),
-        ),
-        (
-            say("Rms on held-out parts of the travel"),
-            number(gain.heldout_rms_before_um, ".2f"),
-            number(gain.heldout_rms_after_um, ".2f"),
-            unit("µm"),
-        ),
-        (
-            say("Gain in log predictive density"),
-            NOTHING,
-            say("{elpd_gain:.1f} ± {elpd_gain_se:.1f}", elpd_gain=gain.elpd_gain, elpd_gain_se=gain.elpd_gain_se),
-            NOTHING,
-        ),
-    )
-    heads = (
-        Column(say("Quantity"), numeric=False),
-        Column(say("Before")),
-        Column(say("After")),
-        Column(say("Unit"), numeric=False),
-    )
     note = say(
         "A fifth of the travel at a time is predicted from the rest. Rotations count at a lever of "
         "one metre; ± is one standard error."
     )
-    return Table(say("Improvement"), heads, rows, (note,))
+    return improvement_table(
+        found.diagnosis.improvement, say("Rms of how the maps differ"), say("Rms on held-out parts of the travel"), note
+    )
 
 
 def _compared(found: MapsDiagnosed) -> Table:

@@ -12,6 +12,7 @@ from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.residual_volume import residual_volume
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import deviating
 from cmm_uq.kinds.gauge_lines.analysis import GaugeFigures, LineFigures, figures, results
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.messages import NOTHING, Text, listed, number, say, semicolons, sentences
@@ -46,17 +47,12 @@ def _plot(result: Result, gauge: StepGauge) -> Block:
             "with U (k = {k}).",
             k=number(result.noise.coverage_factor, ".2f"),
         ),
-        alternative=say(
-            "{faces} faces on {lines} lines: as recorded they deviate by {low:.1f} to {high:.1f} µm "
-            "from the mean of their line; after the fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
-            faces=len(deviations),
-            lines=len(set(gauge.measurement.tolist())),
-            low=deviations.min(),
-            high=deviations.max(),
-            low_after=residuals.min(),
-            high_after=residuals.max(),
+        alternative=deviating(
+            say("{faces} faces on {lines} lines: as recorded they deviate", faces=len(deviations),
+                lines=len(set(gauge.measurement.tolist()))),
+            say(" from the mean of their line"), deviations, residuals,
         ),
-    )
+    )  # fmt: skip
 
 
 def _side_by_side(gauge: StepGauge) -> Floats:

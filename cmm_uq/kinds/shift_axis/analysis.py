@@ -63,12 +63,16 @@ class ShiftResult(ShiftFound):
     @cached_property
     def scale(self) -> Quantity | None:
         """Mean sensitivity error, ppm; ``None`` where nothing determines it."""
-        return Quantity.of_draws(self.estimate.scale / PPM, unit("ppm")) if self.estimate.scale_known else None
+        if not self.estimate.scale_known:
+            return None
+        scale = Quantity.of_draws(self.estimate.scale / PPM, unit("ppm"))
+        return self.stating.stated(f"{SCALE[self.axis].name}.ppm", scale)
 
     @cached_property
     def linearity(self) -> Quantity:
         """Linearity error: peak to valley of the curve about the line through its ends at the first series, µm."""
-        return peak_to_valley(self.estimate.about_the_ends)
+        found = peak_to_valley(self.estimate.about_the_ends)
+        return self.stating.stated(f"linearity_{self.axis}.peak_to_valley_um", found)
 
     @cached_property
     def reported(self) -> Reported:

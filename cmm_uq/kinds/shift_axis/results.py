@@ -32,12 +32,12 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
             "coordinate_um": quantity_data(result.repeatability),
         },
         "sampling": sampling_data(estimate.chains, estimate.seed, len(estimate.sigma)),
-        "curves": {f"linearity_{axis}": curve_data(estimate.curve, MICROMETRE, "um")},
+        "curves": {f"linearity_{axis}": curve_data(estimate.curve, result.stated_along(estimate.curve), MICROMETRE, "um")},
         "integrations": {
             method: {"position_mm": curve.position.tolist(), "error_um": _um(curve.error), "u_um": _um(curve.u)}
             for method, curve in result.integrated.items()
         },
-        "beside_integrations": None if joint is None else curve_data(joint, MICROMETRE, "um"),
+        "beside_integrations": None if joint is None else curve_data(joint, joint.expanded, MICROMETRE, "um"),
         "artefact": {"point": estimate.series.numbers.tolist(),
                      "distance_mm": None if distances is None else distances[0].tolist(),
                      "u_um": None if distances is None else _um(distances[1]),
@@ -67,14 +67,14 @@ def sampling_data(chains: Chains, seed: int, draws: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def curve_data(curve: Curve, unit: float, suffix: str) -> dict[str, Any]:
-    """A curve with its uncertainty, in a unit with that suffix."""
+def curve_data(curve: Curve, expanded: Floats, unit: float, suffix: str) -> dict[str, Any]:
+    """A curve with its uncertainty, U as it is stated, in a unit with that suffix."""
     low, high = curve.interval95
     return {
         "position_mm": curve.position.tolist(), f"error_{suffix}": (curve.error / unit).tolist(),
         f"u_{suffix}": (curve.u / unit).tolist(),
         f"interval95_{suffix}": [(low / unit).tolist(), (high / unit).tolist()],
-        f"U_{suffix}": (curve.expanded / unit).tolist(), f"band_{suffix}": (curve.band / unit).tolist(),
+        f"U_{suffix}": (expanded / unit).tolist(), f"band_{suffix}": (curve.band / unit).tolist(),
         "simultaneous_factor95": curve.simultaneous_factor,
     }  # fmt: skip
 

@@ -59,7 +59,7 @@ class PlaneShiftResult(ShiftFound):
             found.setdefault(name, {})[parameter] = Quantity.of_draws(draws, own)
         for name, sized in self._sized.items():
             found.setdefault(name, {})[PEAK_TO_VALLEY] = peak_to_valley(sized)
-        return found
+        return {name: self.stating.all(name, quantities) for name, quantities in found.items()}
 
     @cached_property
     def reported(self) -> Reported:

@@ -2,59 +2,32 @@
 
 from __future__ import annotations
 
-from cmm_uq.documents.document import Block, Column, Facts, Paragraph, Plot, Section, Table
-from cmm_uq.documents.plots import curve_with_band
-from cmm_uq.documents.vector_plot import vector_plot
-from cmm_uq.documents.wording import expanded
-from cmm_uq.kinds.shift_axis.curve import Curve
-from cmm_uq.kinds.shift_axis.page import SIGN, certificate_rows, table_file
-from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
-from cmm_uq.kinds.shift_plate.undetermined import title
-from cmm_uq.kinds.shifting.facts import shift_facts
-from cmm_uq.messages import (
-    NOTHING,
-    Number,
-    Text,
-    Verbatim,
-    after,
-    commas,
-    day,
-    listed,
-    number,
-    plural,
-    say,
-    sentences,
-    signed,
-)
-from cmm_uq.points import AXES
-from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.uncertainty.rounding import rounded
-from cmm_uq.units import ARCSECOND, MICROMETRE, Unit, unit
+from collections.abc import Iterable
 
-_ROWS = 4
-"""Every so many of the positions stand in the table of a curve."""
+from cmm_uq.documents.as_found_section import Left
+from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.warning import not_converged
+from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
+from cmm_uq.kinds.shift_plate.curves_page import curves_section, residuals_section
+from cmm_uq.kinds.shift_plate.undetermined import title
+from cmm_uq.kinds.shifting.page import artefact_section, figures_section, method_section, summary_rows
+from cmm_uq.messages import Number, Text, Verbatim, after, commas, listed, number, plural, say, sentences, signed
+from cmm_uq.points import AXES
+from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.units import unit
 
 
 def sections(result: PlaneShiftResult) -> list[Section]:
-    """Figures, curves, what is not determined, residuals, placings, plate, method."""
+    """Figures, plate, curves, what is not determined, residuals, placings, method."""
     return [
-        _figures(result), _curves(result), _open(result), _residuals(result), _placings(result), _plate(result),
-        _method(result),
+        _figures(result), _plate(result), curves_section(result), _open(result), residuals_section(result),
+        _placings(result), _method(result),
     ]  # fmt: skip
 
 
 def warnings(result: PlaneShiftResult) -> tuple[Text, ...]:
     """What the reader must know before using a figure."""
-    found, chains, free = [], result.estimate.chains, result.estimate.free
-    if not chains.converged:
-        found.append(
-            say(
-                "The sampling did not converge (least effective sample size {ess_min:.0f}, R-hat "
-                "{rhat_max:.3f}): estimates and uncertainties must not be used.",
-                ess_min=chains.ess_min,
-                rhat_max=chains.rhat_max,
-            )
-        )
+    found, free = not_converged(result.estimate.chains), result.estimate.free
     if free.combinations:
         found.append(
             say(
@@ -73,36 +46,26 @@ def _with_each_other(names: tuple[str, ...]) -> Text:
     return together
 
 
-def summary(result: PlaneShiftResult) -> list[tuple[Text, Text, Text]]:
+def summary(result: PlaneShiftResult, warnings: Iterable[Text]) -> list[tuple[Text, Text, Text]]:
     """Rows of what, figure and remark, for the end of a command."""
     plate = result.estimate.plate
-    rows: list[tuple[Text, Text, Text]] = [
-        (
-            say("Measured"),
-            say(
-                "{name}, plane {plane}, {balls} balls in {placings} placings",
-                name=Verbatim(result.job.facts.machine.name),
-                plane=Verbatim(result.plane),
-                balls=len(plate.numbers),
-                placings=len(plate.placings),
-            ),
-            day(result.job.facts.job.date),
-        )
-    ]
-    rows += [
-        (name, say("{value} ± {u} {unit}", value=value, u=U, unit=own), say("k = {k}", k=k))
-        for name, value, U, k, own in _quantities(result)
-    ]
-    return rows + [(say("Warning"), text, NOTHING) for text in warnings(result)]
+    measured = say(
+        "{name}, plane {plane}, {balls} balls in {placings} placings",
+        name=Verbatim(result.job.facts.machine.name),
+        plane=Verbatim(result.plane),
+        balls=len(plate.numbers),
+        placings=len(plate.placings),
+    )
+    return summary_rows(result.job, measured, quantities(result), warnings)
 
 
-def _quantities(result: PlaneShiftResult) -> list[tuple[Text, Text, Text, Text, Text]]:
-    named: list[tuple[Text, Quantity]] = []
+def quantities(result: PlaneShiftResult) -> list[Left]:
+    """Figures of performance, with their places in results.json."""
+    named: list[Left] = []
     for name, parameters in result.scalars.items():
         for parameter, quantity in parameters.items():
-            named.append((_words(name, parameter), quantity))
-    named.append((say("Repeatability (one coordinate)"), result.repeatability))
-    return [(name, *expanded(quantity), quantity.unit) for name, quantity in named]
+            named.append((name, parameter, _words(name, parameter), quantity))
+    return [*named, ("noise", "coordinate_um", say("Repeatability (one coordinate)"), result.repeatability)]
 
 
 def _words(name: str, parameter: str) -> Text:
@@ -120,111 +83,21 @@ def _words(name: str, parameter: str) -> Text:
 
 
 def _figures(result: PlaneShiftResult) -> Section:
-    columns = (
-        Column(say("Quantity"), numeric=False),
-        Column(say("Value")),
-        Column(say("U")),
-        Column(say("k")),
-        Column(say("Unit"), numeric=False),
-    )
     a, b = (AXES[axis].upper() for axis in result.estimate.plate.axes)
-    notes = (
-        SIGN,
-        say(
-            "Scale and linearity: along the line through the middle of what was read, {middle}. "
-            "Straightness: about the line through its ends. Squareness: of these lines of {a} and {b}, "
-            "the angle between them less 90°.",
-            middle=_middle(result),
-            a=Verbatim(a),
-            b=Verbatim(b),
-        ),
-        say("U is the expanded uncertainty for a coverage probability of 95 %, from the posterior distribution."),
+    meaning = say(
+        "Scale and linearity: along the line through the middle of what was read, {middle}. "
+        "Straightness: about the line through its ends. Squareness: of these lines of {a} and {b}, "
+        "the angle between them less 90°.",
+        middle=_middle(result),
+        a=Verbatim(a),
+        b=Verbatim(b),
     )
-    return Section(
-        say("Figures of performance"), (Table(say("Plane figures"), columns, tuple(_quantities(result)), notes),)
-    )
+    return figures_section(say("Plane figures"), quantities(result), meaning)
 
 
 def _middle(result: PlaneShiftResult) -> Text:
     middle = result.estimate.plate.middle
     return commas(say("{axis} = {place} mm", axis=Verbatim(AXES[a]), place=signed(middle[a], ".0f")) for a in range(3))
-
-
-def _curves(result: PlaneShiftResult) -> Section:
-    blocks: list[Block] = []
-    for name, curve in result.curves.items():
-        blocks.append(_picture(name, curve, MICROMETRE, unit("µm"), result))
-    for name, curve in result.rotations.items():
-        blocks.append(_picture(name, curve, ARCSECOND, unit("″"), result))
-    blocks += [_table(result, which) for which in range(2)]
-    return Section(say("Errors of the axes"), tuple(blocks))
-
-
-def _picture(name: str, curve: Curve, size: float, text: Unit, result: PlaneShiftResult) -> Plot:
-    axis = name.split("_")[1]
-    words = title(name)
-    free = say(" These placings do not determine it.") if name in result.estimate.free.names else NOTHING
-    return curve_with_band(
-        curve.position,
-        curve.error / size,
-        curve.band / size,
-        x_label=say("Scale reading {axis} / mm", axis=Verbatim(axis)),
-        y_label=say("Error / {unit}", unit=text),
-        caption=say(
-            "{words:capital}, with the band that holds the whole curve with 95 % probability.{free}",
-            words=words,
-            free=free,
-        ),
-        alternative=say(
-            "{words:capital} runs from {low:.1f} to {high:.1f} {unit}; the band is at most {band:.1f} "
-            "{unit} to each side.",
-            words=words,
-            low=curve.error.min() / size,
-            high=curve.error.max() / size,
-            unit=text,
-            band=curve.band.max() / size,
-        ),
-    )
-
-
-_KINDS = {
-    "linearity": say("Linearity"),
-    "straightness": say("Straightness"),
-    "rotation": say("Rotation"),
-    "scale": say("Scale"),
-}
-
-
-def _table(result: PlaneShiftResult, which: int) -> Table:
-    """All curves of one axis by position."""
-    axis = AXES[result.estimate.plate.axes[which]]
-    own = [(n, c, MICROMETRE, unit("µm")) for n, c in result.curves.items() if n.split("_")[1] == axis]
-    own += [(n, c, ARCSECOND, unit("″")) for n, c in result.rotations.items() if n.split("_")[1] == axis]
-    columns = [Column(say("Reading"), unit("mm"))]
-    cells: list[list[Text]] = [[number(x, ".1f") for x in own[0][1].position[::_ROWS]]]
-    for name, curve, size, text in own:
-        columns += [Column(_KINDS[name.split("_")[0]], text), Column(say("U"), text)]
-        U = curve.expanded / size
-        pairs = [
-            rounded(e, half) if half > 1e-9 else (Number("0"), Number("0"))
-            for e, half in zip((curve.error / size)[::_ROWS], U[::_ROWS], strict=True)
-        ]
-        cells += [[value for value, _ in pairs], [half for _, half in pairs]]
-    notes = (
-        SIGN,
-        say("U: 95 % at that position."),
-        say(
-            "{table_file} holds all curves as an error map of the carriages, the squareness as a slope "
-            "of the second axis; beyond the readings it repeats the last value, uncalibrated.",
-            table_file=Verbatim(table_file(result.job)),
-        ),
-    )
-    return Table(
-        say("Errors of axis {axis}", axis=Verbatim(axis.upper())),
-        tuple(columns),
-        tuple(zip(*cells, strict=True)),
-        notes,
-    )
 
 
 def _open(result: PlaneShiftResult) -> Section:
@@ -272,27 +145,6 @@ def _open(result: PlaneShiftResult) -> Section:
     return Section(say("What the placings leave open"), (Paragraph(sentences(texts)),))
 
 
-def _residuals(result: PlaneShiftResult) -> Section:
-    plate = result.estimate.plate
-    before, after = (r / MICROMETRE for r in result.estimate.residuals)
-    size = result.disagreement_um
-    plot = vector_plot(
-        plate.flat,
-        [(say("Without curves"), before), (say("With the curves"), after)],
-        axis_labels=(
-            say("{plane} / mm", plane=Verbatim(plate.plane[0])),
-            say("{plane} / mm", plane=Verbatim(plate.plane[1])),
-        ),
-        caption=say("What the placings disagree by, with scales and squareness alone, and with the curves."),
-        alternative=say(
-            "The placings disagree by {before:.2f} µm rms without and {after:.2f} µm with the curves.",
-            before=size[0],
-            after=size[1],
-        ),
-    )
-    return Section(say("Residuals"), (plot,))
-
-
 def _placings(result: PlaneShiftResult) -> Section:
     plate = result.estimate.plate
     rows = tuple(
@@ -312,19 +164,8 @@ def _placings(result: PlaneShiftResult) -> Section:
 
 
 def _plate(result: PlaneShiftResult) -> Section:
-    facts, estimate = shift_facts(result.job), result.estimate
-    rows: list[tuple[Text, Text]] = [
-        (say("Artefact"), Verbatim(facts.name) if facts.name else say("Uncalibrated plate, shifted and turned")),
-        (say("Serial number"), Verbatim(facts.serial)),
-    ]
-    if (known := facts.known) is not None:
-        told = say(
-            "balls {first} to {last}: {length:.10g} mm, u = {u:g} µm",
-            first=known.from_point, last=known.to_point, length=known.length_mm, u=known.u_um,
-        )  # fmt: skip
-        rows.append((say("Known length"), told))
-    rows += certificate_rows(facts.certificate)
-    blocks: list[Block] = [Facts(tuple((label, value) for label, value in rows if value))]
+    estimate = result.estimate
+    blocks: list[Block] = []
     if estimate.free.square_known:
         mean, _, expanded_places = result.balls
         cells = tuple(
@@ -345,7 +186,7 @@ def _plate(result: PlaneShiftResult) -> Section:
         if not estimate.free.size_known:
             note = after(note, say("Their common scale is not determined: it is that of the machine."))
         blocks.append(Table(say("The plate's own geometry"), columns, cells, (note,)))
-    return Section(say("Artefact and traceability"), tuple(blocks))
+    return artefact_section(result.job, say("Uncalibrated plate, shifted and turned"), say("balls"), (), *blocks)
 
 
 def _coordinate(x: float, U: float) -> tuple[Text, Text]:
@@ -353,29 +194,11 @@ def _coordinate(x: float, U: float) -> tuple[Text, Text]:
 
 
 def _method(result: PlaneShiftResult) -> Section:
-    estimate, chains = result.estimate, result.estimate.chains
-    text = Paragraph(
-        say(
-            "The errors of both axes, the positions of the balls and all placings are fitted to all "
-            "readings at once. Linearity, straightness and rotation are smooth functions (Gaussian "
-            "processes, Matérn 7/2) whose sizes, correlation length and growth towards the ends are "
-            "sampled; all else is drawn from its exact conditional distribution."
-        )
+    estimate = result.estimate
+    text = say(
+        "The errors of both axes, the positions of the balls and all placings are fitted to all "
+        "readings at once. Linearity, straightness and rotation are smooth functions (Gaussian "
+        "processes, Matérn 7/2) whose sizes, correlation length and growth towards the ends are "
+        "sampled; all else is drawn from its exact conditional distribution."
     )
-    rows = (
-        (say("Readings (means)"), number(len(estimate.plate.ball))),
-        (say("Sampler"), say("{sampler}, seed {seed}", sampler=Verbatim(chains.sampler), seed=estimate.seed)),
-        (
-            say("Convergence"),
-            say(
-                "{reached}: {ess:.0f} effective samples, R-hat {rhat:.4f}, autocorrelation time "
-                "{time:.1f} of {steps} steps",
-                reached=say("reached") if chains.converged else say("NOT reached"),
-                ess=chains.ess_min,
-                rhat=chains.rhat_max,
-                time=chains.autocorrelation_time,
-                steps=chains.steps,
-            ),
-        ),
-    )
-    return Section(say("Method"), (text, Facts(rows)))
+    return method_section(text, len(estimate.plate.ball), estimate.chains, estimate.seed)

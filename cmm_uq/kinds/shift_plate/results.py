@@ -32,8 +32,11 @@ def plane_shift_results(result: PlaneShiftResult) -> dict[str, Any]:
         },
         "sampling": sampling_data(estimate.chains, estimate.seed, len(estimate.sigma)),
         "curves": {
-            **{name: curve_data(curve, MICROMETRE, "um") for name, curve in result.curves.items()},
-            **{name: curve_data(curve, ARCSECOND, "arcsec") for name, curve in result.rotations.items()},
+            **{name: curve_data(curve, result.stated_along(curve), MICROMETRE, "um") for name, curve in result.curves.items()},
+            **{
+                name: curve_data(curve, result.stated_along(curve, ARCSECOND, "″"), ARCSECOND, "arcsec")
+                for name, curve in result.rotations.items()
+            },
         },
         "artefact": {
             "point": plate.numbers.tolist(), "first_mm": balls[:, 0].tolist(), "second_mm": balls[:, 1].tolist(),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from cmm_uq import __version__
-from cmm_uq.documents.compose import certificate_of
+from cmm_uq.documents.as_found_section import as_found_data, as_found_section
+from cmm_uq.documents.certificate import certificate_of
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.documents.posterior_file import posterior_file
 from cmm_uq.inference.posterior import Progress
@@ -16,6 +17,7 @@ from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult, analyse_plane
 from cmm_uq.kinds.shift_plate.results import plane_shift_results
 from cmm_uq.kinds.shifting.correction_table import table_text
 from cmm_uq.kinds.shifting.facts import shift_facts
+from cmm_uq.kinds.shifting.page import table_file
 from cmm_uq.messages import Verbatim, say
 
 
@@ -34,12 +36,15 @@ def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Shi
 def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
     """The certificate of a shift job, with the correction table beside it."""
     if isinstance(found, ShiftResult):
-        sections, warnings, rows = axis_page.sections(found), axis_page.warnings(found), axis_page.summary(found)
-        results = shift_results(found)
+        sections, told, results = axis_page.sections(found), axis_page.warnings(found), shift_results(found)
+        left = axis_page.quantities(found)
     else:
-        sections, warnings, rows = plane_page.sections(found), plane_page.warnings(found), plane_page.summary(found)
-        results = plane_shift_results(found)
-    chains, table = found.estimate.chains, axis_page.table_file(found.job)
+        sections, told, results = plane_page.sections(found), plane_page.warnings(found), plane_shift_results(found)
+        left = plane_page.quantities(found)
+    sections.insert(1, as_found_section(found.job, left))
+    told += tuple(found.stating.warnings())
+    results |= as_found_data(found.job) | found.stating.data()
+    chains, table = found.estimate.chains, table_file(found.job)
     draws = posterior_file(found.draws, found.job.origin)
     produced_by = say(
         "cmm-uq {version}, {sampler}, seed {seed}",
@@ -47,10 +52,12 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
         sampler=Verbatim(chains.sampler),
         seed=found.estimate.seed,
     )
-    document = certificate_of(found.job, sections, warnings, produced_by, (Verbatim(table), Verbatim(draws.name)))
+    document = certificate_of(found.job, sections, told, produced_by, (Verbatim(table), Verbatim(draws.name)))
+    told = document.warnings
+    rows = axis_page.summary(found, told) if isinstance(found, ShiftResult) else plane_page.summary(found, told)
     files = {table: table_text(found.table), draws.name: draws.content}
     results["posterior"] = draws.entry
-    return Outcome(found, document, results, tuple(rows), warnings, files, draws=found.draws)
+    return Outcome(found, document, results, tuple(rows), told, files, draws=found.draws)
 
 
 OWN = OwnAnalysis(report=Recipe(analyse, outcome))

@@ -39,6 +39,11 @@ class ShiftFacts(ArtefactFacts):
             )
         return self
 
+    @property
+    def traced(self) -> bool:
+        """See :attr:`ArtefactFacts.traced`: one length may be known."""
+        return self.known is not None
+
 
 def shift_facts(job: Job) -> ShiftFacts:
     """``[artefact]`` of a shift job."""

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from cmm_uq.documents.stating import Stating
 from cmm_uq.inference.draws import Draws, by_ensemble
 from cmm_uq.inference.ensembles import Chains
 from cmm_uq.jobs.job import Job
@@ -42,6 +43,20 @@ class Estimated(Protocol):
     @property
     def residuals(self) -> tuple[Floats, Floats]:
         """What does not fit, mm: with no error of the machine but its scale, and with what was estimated."""
+        ...
+
+
+class Along(Protocol):
+    """A curve over the positions of an axis."""
+
+    @property
+    def position(self) -> Floats:
+        """(m,) mm."""
+        ...
+
+    @property
+    def expanded(self) -> Floats:
+        """(m,) U as evaluated."""
         ...
 
 
@@ -93,6 +108,28 @@ class ShiftFound(ABC):
         values = np.column_stack([draws for draws, _ in found.values()])
         return Draws(
             {name: unit for name, (_, unit) in found.items()}, by_ensemble(values, chains.steps, len(chains.draws))
+        )
+
+    @cached_property
+    def stating(self) -> Stating:
+        """How quantities are stated: not below the laboratory's capability."""
+        return Stating.of(self.job)
+
+    def stated_along(self, curve: Along, size: float = MICROMETRE, symbol: str = "µm") -> Floats:
+        """(m,) U of a curve by position, in its own unit, not below the laboratory's capability of that travel.
+
+        Parameters
+        ----------
+        curve : where it is zero by definition it stays so.
+        size, symbol : unit in which the capability is given.
+        """
+        capability = self.stating.capability
+        if capability is None:
+            return curve.expanded
+        travelled = np.abs(curve.position - curve.position[0])
+        least = size * np.array([capability.least(symbol, float(length)) for length in travelled])
+        return np.where(
+            curve.expanded > _STILL * curve.expanded.max(), np.maximum(curve.expanded, least), curve.expanded
         )
 
     @property

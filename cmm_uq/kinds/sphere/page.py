@@ -8,7 +8,7 @@ from cmm_uq.documents.document import Column, Plot, Section, Table
 from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot, volume_plot
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import numbered
+from cmm_uq.documents.wording import deviating, numbered
 from cmm_uq.kinds.sphere.analysis import about_centre, deviations_um, results
 from cmm_uq.kinds.sphere.observe import Sphere
 from cmm_uq.messages import Number, Text, number, say
@@ -72,17 +72,11 @@ def _by_point(result: Result, sphere: Sphere) -> Plot:
             name=name,
             k=number(result.noise.coverage_factor, ".2f"),
         ),
-        alternative=say(
-            "{count} points: as recorded they deviate by {low:.1f} to {high:.1f} µm from the {name}; "
-            "after the fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
-            count=len(deviations),
-            low=deviations.min(),
-            high=deviations.max(),
-            name=name,
-            low_after=residuals.min(),
-            high_after=residuals.max(),
+        alternative=deviating(
+            say("{count} points: as recorded they deviate", count=len(deviations)),
+            say(" from the {name}", name=name), deviations, residuals,
         ),
-    )
+    )  # fmt: skip
 
 
 def _over(result: Result, sphere: Sphere) -> Plot:

@@ -8,7 +8,7 @@ from cmm_uq.documents.document import Block, Column, Paragraph, Plot, Section, T
 from cmm_uq.documents.outcome import Page
 from cmm_uq.documents.plots import length_plot
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import expanded
+from cmm_uq.documents.wording import deviating, expanded
 from cmm_uq.kinds.triangle.analysis import SIDES, ByEquations, Sides, Standard, TriangleFigures, results
 from cmm_uq.messages import NOTHING, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.uncertainty.rounding import rounded
@@ -61,14 +61,8 @@ def _sides(sides: Sides) -> Plot:
             "Each side minus its certified length, as recorded and after the fitted model, with U (k = {k}).",
             k=number(sides.coverage_factor, ".2f"),
         ),
-        alternative=say(
-            "{count} sides: as recorded they deviate by {low:.1f} to {high:.1f} µm; after the fitted "
-            "model {low_after:.1f} to {high_after:.1f} µm remain.",
-            count=len(before),
-            low=before.min(),
-            high=before.max(),
-            low_after=after.min(),
-            high_after=after.max(),
+        alternative=deviating(
+            say("{count} sides: as recorded they deviate", count=len(before)), NOTHING, before, after
         ),
     )
 

@@ -125,13 +125,29 @@ class SimulatedTask(BudgetTable):
         return {"U_without_correction_mm": expanded_without_correction(self.budgets()["error"])}
 
 
-class LengthTest(BudgetTable):
+class MachineTest(BudgetTable):
+    """What both tests of ISO/TS 23165 have: an error that was found, and the budget of its test uncertainty."""
+
+    symbol: ClassVar[str]
+
+    error_um: float
+
+    @abstractmethod
+    def uncertainty(self) -> Budget:
+        """Of the test value."""
+
+    def budgets(self) -> Mapping[str, Budget]:
+        """Of the test value."""
+        return {self.symbol: self.uncertainty().of(self.error_um * MICROMETRE)}
+
+
+class LengthTest(MachineTest):
     """``method = "ISO/TS 23165 length"``."""
 
     meaning = say("ISO/TS 23165:2006: test uncertainty of an error of length measurement E.")
+    symbol = "E"
 
     method: Literal["ISO/TS 23165 length"]
-    error_um: float
     length_mm: Length
     u_calibration_um: Uncertainty
     temperature_c: Temperature = REFERENCE_TEMPERATURE
@@ -141,30 +157,28 @@ class LengthTest(BudgetTable):
     u_alignment_um: Uncertainty = 0.0
     u_fixturing_um: Uncertainty = 0.0
 
-    def budgets(self) -> Mapping[str, Budget]:
-        """Of the test value."""
-        budget = length_test_uncertainty(
+    def uncertainty(self) -> Budget:
+        """See :meth:`MachineTest.uncertainty`."""
+        return length_test_uncertainty(
             self.length_mm, self.u_calibration_um * MICROMETRE, temperature_c=self.temperature_c, cte_per_k=self.cte_per_k,
             u_cte_per_k=self.u_cte_per_k, u_temperature_k=self.u_temperature_k,
             u_alignment_mm=self.u_alignment_um * MICROMETRE, u_fixturing_mm=self.u_fixturing_um * MICROMETRE,
         )  # fmt: skip
-        return {"E": budget.of(self.error_um * MICROMETRE)}
 
 
-class ProbingTest(BudgetTable):
+class ProbingTest(MachineTest):
     """``method = "ISO/TS 23165 probing"``."""
 
     meaning = say("ISO/TS 23165:2006: test uncertainty of a probing error P.")
+    symbol = "P"
 
     method: Literal["ISO/TS 23165 probing"]
-    error_um: float
     form_um: Uncertainty
     u_form_um: Uncertainty
 
-    def budgets(self) -> Mapping[str, Budget]:
-        """Of the test value."""
-        budget = probing_test_uncertainty(self.form_um * MICROMETRE, self.u_form_um * MICROMETRE)
-        return {"P": budget.of(self.error_um * MICROMETRE)}
+    def uncertainty(self) -> Budget:
+        """See :meth:`MachineTest.uncertainty`."""
+        return probing_test_uncertainty(self.form_um * MICROMETRE, self.u_form_um * MICROMETRE)
 
 
 class Ballbar(BudgetTable):

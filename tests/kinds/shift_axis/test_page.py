@@ -49,8 +49,8 @@ def two_placings(tmp_path_factory: pytest.TempPathFactory) -> ShiftResult:
 
 def test_it_tells_what_was_read_and_what_was_found_in_this_order(document: Document) -> None:
     assert [section.title for section in document.sections] == [
-        "Figures of performance", "Error of the axis", "What the shifts leave open", "Residuals",
-        "Artefact and traceability", "Method",
+        "Figures of performance", "Artefact and traceability", "Error of the axis", "What the shifts leave open",
+        "Residuals", "Method",
     ]  # fmt: skip
 
 

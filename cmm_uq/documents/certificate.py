@@ -1,0 +1,116 @@
+"""What every certificate has (ISO/IEC 17025:2017, 7.8): particulars, results, statements, and opinions in an annex."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from cmm_uq.documents.completeness import formal_warnings
+from cmm_uq.documents.conditions import conditions
+from cmm_uq.documents.document import Document, Facts, Section, Signature
+from cmm_uq.documents.origin import CERTIFICATE, came_about
+from cmm_uq.jobs.job import Job, JobFacts, JobFile
+from cmm_uq.jobs.origin import MEASURED, SIMULATED
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed
+
+STATEMENTS = (
+    say("The results relate only to the item named above, in its condition and place at the time of the measurement."),
+    say(
+        "This certificate shall not be reproduced except in full without the written approval of the "
+        "issuing laboratory."
+    ),
+)
+"""ISO/IEC 17025:2017, 7.8.2.1 l) and the note to 7.8.2.1."""
+
+
+def certificate_of(
+    job: Job,
+    sections: list[Section],
+    told: tuple[Text, ...],
+    produced_by: Text,
+    files: tuple[Text, ...] = (),
+    decided: Text = NOTHING,
+) -> Document:
+    """Sections and warnings between what every certificate has.
+
+    Parameters
+    ----------
+    job : that was analysed.
+    sections : the first is that of the results, and is given the conditions under which they were found.
+    told : warnings on the results; those on what the job does not state follow them.
+    produced_by : program, sampler and seed.
+    files : attached beside job and recording.
+    decided : what every statement of conformity comes to, for the first page.
+    """
+    facts = job.facts
+    first, *others = (section for section in sections if section.blocks)
+    under = conditions(job)
+    return Document(
+        title=CERTIFICATE,
+        number=Verbatim(facts.job.number or facts.job.id),
+        subject=say(
+            "{name}, {came_about} {date}",
+            name=Verbatim(facts.machine.name),
+            came_about=came_about(job),
+            date=day(facts.job.date),
+        ),
+        issuer=tuple(
+            Verbatim(line) for line in (facts.laboratory.name, *facts.laboratory.address.splitlines()) if line
+        ),
+        particulars=_particulars(facts, decided),
+        warnings=(*told, *formal_warnings(job)),
+        sections=tuple(sorted(
+            (replace(first, blocks=(*first.blocks, under)) if under.rows else first, *others), key=lambda one: one.opinion
+        )),
+        statements=STATEMENTS,
+        signatures=(Signature(Verbatim(facts.laboratory.signatory), Verbatim(facts.laboratory.signatory_role)),)
+        if facts.laboratory.signatory
+        else (),
+        attachments=(*names(job.inputs), Verbatim("results.json"), *files),
+        produced_by=produced_by,
+        date=facts.job.issued or facts.job.date,
+    )  # fmt: skip
+
+
+def _particulars(facts: JobFile, decided: Text) -> tuple[Facts, ...]:
+    job, machine, laboratory = facts.job, facts.machine, facts.laboratory
+    measured = job.origin == MEASURED
+    groups = (
+        (
+            (say("Certificate number") if measured else say("Job"), job.number if measured and job.number else job.id),
+            (say("Customer"), "\n".join(filter(None, (job.customer, job.address)))),
+            (say("Order"), job.order),
+            (say("Accreditation"), laboratory.accreditation if measured else ""),
+            (say("Date of measurement") if job.origin != SIMULATED else say("Date"), day(job.date)),
+            (say("Date of issue"), day(job.issued) if job.issued else ""),
+            (say("Next calibration, as agreed with the customer"), _agreed(job)),
+        ),
+        (
+            (say("Machine"), machine.name),
+            (say("Manufacturer, model"), ", ".join(filter(None, (machine.manufacturer, machine.model)))),
+            (say("Serial number"), machine.serial),
+            (say("Owner"), machine.owner),
+            (say("Measuring range"), _travel(facts)),
+            (say("Place"), job.place),
+        ),
+        (
+            (say("Method"), job.procedure),
+            (say("Operator"), job.operator),
+            (say("Remarks"), job.remarks),
+            (say("Conformity"), decided),
+        ),
+    )
+    return tuple(Facts(rows) for group in groups if (rows := tuple((k, foreign(v)) for k, v in group if v)))
+
+
+def _travel(facts: JobFile) -> Text:
+    travel = [
+        say("{axis} {low} … {high}", axis=Verbatim(axis.upper()), low=signed(given[0], "g"), high=signed(given[1], "g"))
+        for axis in "xyz"
+        if (given := getattr(facts.machine.travel_mm, axis))
+    ]
+    return say("{travel} mm", travel=commas(travel)) if travel else NOTHING
+
+
+def _agreed(job: JobFacts) -> Text:
+    """No interval is recommended that the customer did not agree to (7.8.4.3)."""
+    return day(job.recalibration_agreed) if job.recalibration_agreed else NOTHING

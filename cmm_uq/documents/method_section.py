@@ -1,0 +1,91 @@
+"""How a certificate's figures were found: model, noise, sampler, convergence; and the posterior distribution as a picture."""
+
+from __future__ import annotations
+
+from cmm_uq.documents.corner import corner_plot
+from cmm_uq.documents.document import Facts, Paragraph, Section
+from cmm_uq.documents.noise_words import noise_found
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import title_of
+from cmm_uq.inference.posterior import Posterior
+from cmm_uq.messages import NOTHING, Text, Verbatim, listed, number, say
+from cmm_uq.model.measurement import ARTEFACT
+
+
+def posterior_section(result: Result) -> Section:
+    """Every parameter's density, and each pair; without blocks where there are none."""
+    posterior = result.posterior
+    set_up = {(ARTEFACT, size.name) for size in result.artefact.sizes if size.role == "set-up"}
+    shown = [i for i, unknown in enumerate(posterior.unknowns) if unknown.key not in set_up]
+    if not shown:
+        return Section(say("Posterior distribution"), ())
+    titles, draws = [title_of(posterior.unknowns[i].key, result) for i in shown], posterior.draws[:, shown]
+    plot = corner_plot(
+        draws, titles, units=[posterior.unknowns[i].unit for i in shown], estimates=draws.mean(axis=0),
+        caption=say("Posterior distribution: each parameter, and each pair."),
+        alternative=say("Marginal and pairwise posterior densities of {names}.", names=listed(titles)),
+    )  # fmt: skip
+    return Section(say("Posterior distribution"), (plot,))
+
+
+def method(result: Result) -> Section:
+    """The measurement model and how it was solved."""
+    ls, posterior, noise = result.least_squares, result.posterior, result.noise
+    sigma, (low, high) = noise.coordinate.value, noise.coordinate.interval95
+    spread = (
+        say(
+            "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the residuals",
+            sigma=sigma,
+            low=low,
+            high=high,
+        )
+        if noise.stated_um is None
+        else say(
+            "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the stated {stated:.3g} µm and the residuals",
+            sigma=sigma,
+            low=low,
+            high=high,
+            stated=noise.stated_um,
+        )
+    )
+    if noise.p_value is not None:
+        spread = say("{spread}; residuals under the stated figure: p = {p:.2g}", spread=spread, p=noise.p_value)
+    sizes = say(
+        "{count}, {rank}, {condition:.3g}", count=ls.rank + ls.null_space.shape[1], rank=ls.rank, condition=ls.condition
+    )
+    sampler = say(
+        "{sampler}, seed {seed}, {count} draws",
+        sampler=Verbatim(posterior.sampler), seed=posterior.seed, count=len(posterior.draws),
+    )  # fmt: skip
+    rows = (
+        (say("Observations used"), number(len(ls.residuals))),
+        (say("Parameters, rank, condition number"), sizes),
+        (say("Degrees of freedom"), number(ls.degrees_of_freedom)),
+        (
+            say("Residual standard deviation"),
+            NOTHING if ls.residual_sd is None else say("{sd:.1f} µm", sd=ls.residual_sd * 1e3),
+        ),
+        (say("Standard uncertainty of a coordinate"), spread),
+        (say("Noise"), noise_found(noise)),
+        (say("Sampler"), sampler),
+        (say("Convergence"), _convergence(posterior)),
+    )
+    text = Paragraph(
+        say(
+            "{what} are estimated from the observations with a linear measurement "
+            "model, by least squares (orthogonal factorisation) and as a posterior distribution with "
+            "priors as wide as physics allows; the certified length enters with its uncertainty. The "
+            "attached job, recording and results.json suffice to run it again.",
+            what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
+        )
+    )
+    return Section(say("Method"), (text, Facts(tuple((label, value) for label, value in rows if value))))
+
+
+def _convergence(posterior: Posterior) -> Text:
+    return say(
+        "{reached}: at least {ess:.0f} effective samples in every parameter, rank-normalised R-hat {rhat:.4f}, "
+        "autocorrelation time {time:.1f} of {steps} steps",
+        reached=say("reached") if posterior.converged else say("NOT reached"),
+        ess=posterior.ess_min, rhat=posterior.rhat_max, time=posterior.autocorrelation_time, steps=posterior.steps,
+    )  # fmt: skip

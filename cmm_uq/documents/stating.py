@@ -1,0 +1,64 @@
+"""Quantities with an uncertainty not below the laboratory's calibration and measurement capability (ILAC-P14:09/2020)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.laboratory import Capability
+from cmm_uq.messages import Text, commas, names, say
+from cmm_uq.uncertainty.quantity import Quantity
+
+
+@dataclass(frozen=True)
+class Stating:
+    """States quantities of one certificate, and keeps what was raised.
+
+    Parameters
+    ----------
+    capability : of the laboratory, if it gives one.
+    length_mm : that the capability of lengths is taken at.
+    raised : by name, U as evaluated and as stated.
+    """
+
+    capability: Capability | None
+    length_mm: float
+    raised: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, job: Job, length_mm: float = 0.0) -> Stating:
+        """For a job; without a length at the longest travel of the machine."""
+        spans = np.ptp(job.points.machine.travel_mm, axis=1)
+        longest = float(np.nanmax(spans)) if np.isfinite(spans).any() else 0.0
+        return cls(job.facts.laboratory.cmc, length_mm or longest)
+
+    def stated(self, name: str, quantity: Quantity) -> Quantity:
+        """The quantity with U not below the capability; ``name`` as in results.json."""
+        least = self.capability.least(quantity.unit, self.length_mm) if self.capability else 0.0
+        if quantity.expanded < least:
+            self.raised[name] = {"evaluated_U": quantity.expanded, "U": least}
+        return quantity.at_least(least)
+
+    def all(self, group: str, quantities: Mapping[str, Quantity]) -> dict[str, Quantity]:
+        """Quantities of one group, each under ``group.name``."""
+        return {name: self.stated(f"{group}.{name}", one) for name, one in quantities.items()}
+
+    def warnings(self) -> list[Text]:
+        """That U was raised, and of what."""
+        if not self.raised:
+            return []
+        return [
+            say(
+                "U is stated as the laboratory's calibration and measurement capability ([laboratory.cmc], k = 2), "
+                "which is larger than what was evaluated, of: {names}.",
+                names=commas(names(self.raised)),
+            )
+        ]
+
+    def data(self) -> dict[str, Any]:
+        """For results.json, where anything was raised."""
+        return {"cmc": {"length_mm": self.length_mm, "raised": self.raised}} if self.raised else {}

@@ -1,0 +1,128 @@
+"""The artefact of a certificate, its own certificate, and what makes the results traceable to the SI (7.8.4.1 c)."""
+
+from __future__ import annotations
+
+from cmm_uq.documents.document import Block, Facts, Paragraph, Section
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.wording import expanded
+from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.messages import Text, Verbatim, commas, day, names, say, sentences
+from cmm_uq.model.artefact import Size
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import MICROMETRE
+
+_NO_CERTIFICATE = say(
+    "No certificate of the artefact is stated, so the results are not shown to be traceable to the International System of "
+    "Units (SI)."
+)
+_OWN_MACHINE = say(
+    "The artefact was certified on the machine that is calibrated here. It is no independent reference, so the results are "
+    "not shown to be traceable to the International System of Units (SI)."
+)
+_UNCALIBRATED = say(
+    "No certified length enters. The size of lengths, and the scale that axes have in common, are not traceable to the metre "
+    "by this measurement; what the artefact shows by comparison with itself in other places needs no certified length."
+)
+_CHANGES = say(
+    "The results are changes since the earlier recording; they rest on it and on the artefact having stayed as it was."
+)
+
+
+def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further: Block) -> Section:
+    """The artefact and the statement of traceability.
+
+    Parameters
+    ----------
+    rows : of the artefact; those without a value are left out.
+    further : blocks after the statement.
+    """
+    facts = Facts(tuple((label, text) for label, text in rows if text))
+    said = (Paragraph(statement_of_traceability(job.facts)),) if job.origin == MEASURED else ()
+    return Section(say("Artefact and traceability"), (facts, *said, *further))
+
+
+def artefact_rows(job: Job, otherwise: Text) -> list[tuple[Text, Text]]:
+    """Name and serial number.
+
+    Parameters
+    ----------
+    otherwise : what an artefact without a name is.
+    """
+    artefact = job.facts.artefact
+    return [
+        (say("Artefact"), Verbatim(artefact.name) if artefact.name else otherwise),
+        (say("Serial number"), Verbatim(artefact.serial)),
+    ]
+
+
+def certificate_rows(chain: Traceability | None) -> list[tuple[Text, Text]]:
+    """The artefact's own certificate, if it has one."""
+    if chain is None:
+        return []
+    issued = [say("of {date}", date=day(chain.date))] if chain.date else []
+    issued += [say("due {date}", date=day(chain.due))] if chain.due else []
+    return [
+        (say("Its certificate"), sentences((*names(filter(None, (chain.number,))), *issued))),
+        (say("Issued by"), Verbatim(chain.laboratory)),
+    ]
+
+
+def certified_on_this_machine(facts: JobFile) -> bool:
+    """Whether the artefact's certificate comes from the machine that the artefact now tests."""
+    chain, machine = facts.artefact.certificate, facts.machine
+    own = {name.strip().casefold() for name in (machine.name, machine.serial) if name.strip()}
+    return chain is not None and chain.machine.strip().casefold() in own
+
+
+def statement_of_traceability(facts: JobFile) -> Text:
+    """To what the results are traceable, and through which certificate; or that they are not."""
+    chain = facts.artefact.certificate
+    if facts.recording.earlier:
+        return _CHANGES
+    if not facts.artefact.traced:
+        return _UNCALIBRATED
+    if certified_on_this_machine(facts):
+        return _OWN_MACHINE
+    if chain is None or not (chain.number or chain.laboratory):
+        return _NO_CERTIFICATE
+    certificate = [say("certificate {number}", number=Verbatim(chain.number))] if chain.number else []
+    certificate += [say("issued by {laboratory}", laboratory=Verbatim(chain.laboratory))] if chain.laboratory else []
+    return say(
+        "The results are traceable to the metre of the International System of Units (SI) through the calibration of the "
+        "artefact: {certificate}.",
+        certificate=commas(certificate),
+    )
+
+
+def traceability(result: Result) -> Section:
+    """The artefact, what of it is certified, and what the fit makes of that."""
+    artefact = result.job.facts.artefact
+    rows = artefact_rows(result.job, result.artefact.title)
+    compared = result.job.facts.recording.earlier
+    dimensions = [size for size in result.artefact.sizes if size.role == "dimension"]
+    certified = [] if compared else [size for size in dimensions if size.certified]
+    rows += [_certified(size) for size in certified]
+    if compared:
+        rows.append((say("References"), say("the earlier recording {file}", file=Verbatim(compared))))
+    elif dimensions and not certified:
+        rows.append((say("Certified length"), say("none: uncalibrated artefact (auto-calibration)")))
+    if artefact.cte_per_k:
+        cte = say("{cte:g} × 10⁻⁶ /K", cte=artefact.cte_per_k * 1e6)
+        rows.append((say("Coefficient of thermal expansion"), cte))
+    rows += certificate_rows(artefact.certificate)
+    rows += [_fitted(size, result.sizes[size.name]) for size in certified]
+    return traceability_section(result.job, tuple(rows))
+
+
+def _certified(size: Size) -> tuple[Text, Text]:
+    u = size.sd / MICROMETRE
+    figure = say("{nominal:.10g} {unit}, u = {u:g} µm", nominal=size.nominal, unit=size.unit, u=u)
+    return say("Certified {what} at 20 °C", what=size.what or say("{title:small}", title=size.title)), figure
+
+
+def _fitted(size: Size, quantity: Quantity) -> tuple[Text, Text]:
+    value, U, k = expanded(quantity)
+    figure = say("{value} {unit}, U = {U} {unit} (k = {k})", value=value, unit=size.unit, U=U, k=k)
+    return say("{size} after the fit", size=size.title), figure

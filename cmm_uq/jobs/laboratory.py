@@ -1,0 +1,62 @@
+"""``[laboratory]``: who answers for the certificate, and the least uncertainty that it may state."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from cmm_uq.jobs.table import Limit, Table, at_least
+
+_LENGTHS = {"mm": 1e-3, "µm": 1.0}
+"""Units of lengths, and how many of each a micrometre is."""
+
+_RATIOS, _ANGLES = ("ppm", "µm/m"), ("″",)
+
+
+class LengthCapability(Table):
+    """U = A + L/K of a length, L in mm and U in µm; without ``k`` the same for every length."""
+
+    a_um: Limit
+    k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
+
+
+class Capability(Table):
+    """``[laboratory.cmc]``: calibration and measurement capability, the least U (95 %, k = 2) that a certificate may state.
+
+    Attributes
+    ----------
+    length : of what is stated in mm or µm.
+    scale_ppm : of what is stated in ppm or µm/m.
+    angle_arcsec : of what is stated in ″.
+    """
+
+    length: LengthCapability | None = None
+    scale_ppm: Limit | None = None
+    angle_arcsec: Limit | None = None
+
+    def least(self, unit: str, length_mm: float) -> float:
+        """The least U of a quantity in its own unit; 0 where none is given for it.
+
+        Parameters
+        ----------
+        unit : as printed.
+        length_mm : that the quantity is of, or rests on.
+        """
+        if unit in _LENGTHS and self.length is not None:
+            per_length = length_mm / self.length.k if self.length.k else 0.0
+            return (self.length.a_um + per_length) * _LENGTHS[unit]
+        if unit in _RATIOS:
+            return self.scale_ppm or 0.0
+        return (self.angle_arcsec or 0.0) if unit in _ANGLES else 0.0
+
+
+class Laboratory(Table):
+    """``[laboratory]``: who answers for the certificate."""
+
+    name: str = ""
+    address: str = ""
+    accreditation: str = ""
+    signatory: str = ""
+    signatory_role: str = ""
+    cmc: Capability | None = None

@@ -1,0 +1,147 @@
+"""What a certificate must state by ISO/IEC 17025:2017, 7.8, whatever kind of measurement it is of."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from cmm_uq.commands.reading import read_job
+from cmm_uq.documents.completeness import formal_warnings
+from cmm_uq.documents.conditions import conditions
+from cmm_uq.documents.traceability_section import statement_of_traceability
+from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.job import Job
+from tests.conftest import ROOT
+
+CERTIFIED = {
+    "digitizer-simulated", "gauge-blocks-simulated", "iota-1102-20C", "plate-simulated", "shift-plate-simulated",
+    "shift-simulated", "sphere-simulated", "step-gauge-simulated", "triangle-simulated",
+}  # fmt: skip
+"""Examples of whose artefact something is certified."""
+
+UNCERTIFIED = {"bryan-simulated", "iota-1102-20C-compensated", "plane-simulated", "plate-two-dates-simulated"}
+
+
+def changed(job: Job, /, **tables: dict[str, Any]) -> Job:
+    """The job with other values in its tables."""
+    facts: BaseModel = job.facts
+    parts = {name: getattr(facts, name).model_copy(update=values) for name, values in tables.items()}
+    return replace(job, facts=facts.model_copy(update=parts))
+
+
+def measured(name: str, /, **tables: dict[str, Any]) -> Job:
+    """An example as if somebody had measured it."""
+    job = read_job(ROOT / "examples" / name)
+    return changed(changed(job, job={"origin": "measured"}), **tables)
+
+
+def missing(job: Job) -> list[str]:
+    """Keys that the warning names."""
+    found = [text for text in formal_warnings(job) if text.startswith("Not complete by ISO/IEC 17025:2017")]
+    return [part.rpartition(": ")[2] for text in found for part in text.removesuffix(".").split("; ")[1:]]
+
+
+WHOLE = {
+    "laboratory": {"name": "L", "address": "A", "signatory": "S"},
+    "job": {"origin": "measured", "place": "P", "customer": "C", "address": "D", "procedure": "M", "conditions": "20 °C",
+            "issued": dt.date(2030, 1, 1)},
+    "machine": {"serial": "7"},
+}  # fmt: skip
+CHAIN = Traceability(number="4711", laboratory="NMI", date=dt.date(2003, 5, 1), due=dt.date(2029, 5, 1))
+
+
+@pytest.mark.parametrize("name", sorted(CERTIFIED))
+def test_an_artefact_of_any_kind_that_is_certified_needs_its_certificate(name: str) -> None:
+    job = measured(name, **WHOLE, artefact={"certificate": None})
+    assert missing(job) == ["[artefact.certificate] number", "[artefact.certificate] laboratory"]
+    assert missing(changed(job, artefact={"certificate": CHAIN})) == []
+
+
+@pytest.mark.parametrize("name", sorted(UNCERTIFIED))
+def test_one_of_which_nothing_is_certified_needs_none(name: str) -> None:
+    assert missing(measured(name, **WHOLE)) == []
+
+
+@pytest.mark.parametrize("name", sorted(CERTIFIED | UNCERTIFIED))
+@pytest.mark.parametrize(
+    ("table", "key"), [(table, key) for table, keys in WHOLE.items() for key in keys if key != "origin"]
+)
+def test_each_statement_that_is_missing_is_named_with_its_key(name: str, table: str, key: str) -> None:
+    empty = None if key == "issued" else ""
+    job = changed(measured(name, **WHOLE, artefact={"certificate": CHAIN}), **{table: {key: empty}})
+    assert missing(job) == [f"[{table}] {key}"]
+
+
+@pytest.mark.parametrize("name", sorted(CERTIFIED | UNCERTIFIED))
+def test_a_recording_that_nobody_measured_is_asked_for_nothing(name: str) -> None:
+    job = read_job(ROOT / "examples" / name)
+    assert (formal_warnings(job) == ()) == (job.origin != "measured")
+
+
+@pytest.mark.parametrize(("says", "circular"), [
+    ("DEA Iota 1102", True), ("  dea iota 1102 ", True), ("A-17", True), ("another", False), ("", False),
+])  # fmt: skip
+def test_an_artefact_certified_on_the_machine_that_it_tests_is_told(says: str, circular: bool) -> None:
+    chain = CHAIN.model_copy(update={"machine": says})
+    job = measured("iota-1102-20C", machine={"serial": "A-17"}, artefact={"certificate": chain})
+    assert any("certified on the machine that it now tests" in text for text in formal_warnings(job)) == circular
+    assert ("no independent reference" in statement_of_traceability(job.facts)) == circular
+    assert ("traceable to the metre" in statement_of_traceability(job.facts)) != circular
+
+
+DAY, BEFORE, AFTER = dt.date(2026, 3, 2), dt.date(2026, 3, 1), dt.date(2026, 3, 3)
+
+
+@pytest.mark.parametrize(("dates", "chain", "told"), [
+    ({"issued": BEFORE}, {}, ["issued before it was measured, 2026-03-01 against 2026-03-02 ([job] issued)"]),
+    ({"issued": DAY}, {}, []),
+    ({}, {"date": AFTER}, ["the artefact was certified after it was measured with, 2026-03-02 against 2026-03-03 "
+                           "([artefact.certificate] date)"]),
+    ({}, {"date": DAY}, []),
+    ({}, {"due": BEFORE}, ["the artefact was due for calibration before this, 2026-03-01 against 2026-03-02 "
+                           "([artefact.certificate] due)"]),
+    ({}, {"due": DAY, "date": DAY}, []),
+    ({}, {"due": DAY, "date": AFTER}, ["after it was measured with", "was due before its date"]),
+    ({"recalibration_agreed": BEFORE}, {}, ["agreed for a day before this one"]),
+])  # fmt: skip
+def test_dates_out_of_their_order_are_told(
+    dates: dict[str, dt.date], chain: dict[str, dt.date], told: list[str]
+) -> None:
+    job = measured("sphere-simulated", job={"origin": "measured", "date": DAY, **dates},
+                   artefact={"certificate": Traceability(**chain)})  # fmt: skip
+    found = [text for text in formal_warnings(job) if text.startswith("Dates out of order")]
+    assert len(found) == len(told)
+    assert all(part in text for text, part in zip(found, told, strict=True))
+
+
+def test_the_statement_of_traceability_names_the_certificate_that_carries_it() -> None:
+    job = measured("sphere-simulated", artefact={"certificate": CHAIN})
+    assert statement_of_traceability(job.facts) == (
+        "The results are traceable to the metre of the International System of Units (SI) through the calibration of the "
+        "artefact: certificate 4711, issued by NMI."
+    )
+    assert "not shown to be traceable" in statement_of_traceability(measured("sphere-simulated").facts)
+
+
+@pytest.mark.parametrize(("name", "said"), [
+    ("bryan-simulated", "No certified length enters"), ("plate-two-dates-simulated", "changes since the earlier recording"),
+])  # fmt: skip
+def test_without_a_certified_length_nothing_is_said_to_be_traceable_to_the_metre(name: str, said: str) -> None:
+    text = statement_of_traceability(measured(name, artefact={"certificate": CHAIN}).facts)
+    assert said in text
+    assert "are traceable to" not in text
+
+
+def test_the_conditions_are_those_stated_and_the_least_and_largest_recorded_temperature() -> None:
+    job = measured("iota-1102-20C")
+    points = replace(job.points, columns={"temp_artefact_c": job.points.xyz[:, 0] * 0 + 20.5})
+    points.columns["temp_artefact_c"][:2] = -3.25, 31.0
+    assert dict(conditions(replace(job, points=points)).rows) == {
+        "Conditions": "20 °C, controlled; 11 thermocouples on the machine",
+        "Temperatures recorded": "artefact −3.25 to 31.00 °C",
+    }
+    assert conditions(changed(job, job={"conditions": ""})).rows == ()
