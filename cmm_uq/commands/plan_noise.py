@@ -14,7 +14,7 @@ from cmm_uq.inference.linear_model import Unknown
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, number, say
 from cmm_uq.planning.repeats import Repeated
 from cmm_uq.points import Floats
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 SHOWN = 6
 """Repeats in the table; results.json has all that are compared."""
@@ -91,7 +91,7 @@ def worth(plan: Plan) -> tuple[Block, ...]:
     )
     cells: list[tuple[Text, ...]] = [
         (say("Readings"), *(_pair(row.readings, row.readings_more, ".0f") for row in rows), NOTHING),
-        (say("Time"), *(_pair(row.minutes, row.minutes_more, ".0f") for row in rows), say("min")),
+        (say("Time"), *(_pair(row.minutes, row.minutes_more, ".0f") for row in rows), unit("min")),
     ]
     for i, unknown in enumerate(found.unknowns):
         figures = (_figure(unknown, row, i) for row in rows)

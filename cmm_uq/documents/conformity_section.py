@@ -66,6 +66,9 @@ def _limit(statement: Statement) -> Text:
     here = say("{limit:.4g} µm", limit=statement.limit_um)
     if statement.facts.mpe is None:
         return here
+    length = statement.named.length_mm
+    if length is not None:
+        here = say("{limit} at L = {length:.6g} mm", limit=here, length=length)
     return say("{here}; MPE = {formula}", here=here, formula=formula(statement.facts))
 
 

@@ -93,12 +93,12 @@ def test_a_triangle_without_one_of_its_corners_is_refused(row: int, tmp_path: Pa
 
 
 def test_more_observations_than_memory_holds_are_refused_before_the_estimate(tmp_path: Path) -> None:
-    """Each point of a probed plane is an observation; a flat grid of them passes everything else."""
-    rows = np.arange(OBSERVATIONS.most + 2)  # point 0 comes before contact and is none
-    noise = np.random.default_rng(3).normal(0, 1e-3, len(rows)) + 8.0 * (rows == 0)
-    columns = {"measurement": 1, "point": rows, "x_mm": rows % 150 * 2.0 + 100, "y_mm": rows // 150 * 2.0 + 100}
-    job = job_with("plane-simulated", lambda _: pd.DataFrame({**columns, "z_mm": noise - 300}), tmp_path)
-    with pytest.raises(
-        CmmUqError, match=f"{OBSERVATIONS.most + 1} observations are more than are estimated from at once"
-    ):
+    """Each coordinate of a ball is an observation; a flat grid of them passes everything else."""
+    balls = np.arange(OBSERVATIONS.most // 3 + 1)
+    grid = {"reference_x_mm": balls % 400 * 2.0, "reference_y_mm": balls // 400 * 2.0, "reference_z_mm": 0.0}
+    noise = np.random.default_rng(3).normal(0, 1e-3, (3, len(balls)))
+    read = {f"{axis}_mm": grid[f"reference_{axis}_mm"] + noise[i] for i, axis in enumerate("xyz")}
+    columns = {"measurement": 1, "point": balls + 1, "repeat": 1, **read, **grid}
+    job = job_with("plate-simulated", lambda _: pd.DataFrame(columns), tmp_path)
+    with pytest.raises(CmmUqError, match=f"{3 * len(balls)} observations are more than are estimated from at once"):
         diagnose_job(job)

@@ -56,7 +56,7 @@ def test_figures_are_stated_with_expanded_uncertainty_to_two_digits(document: Do
 def test_the_error_factors_stand_beside_their_least_squares_estimate(document: Document) -> None:
     rows = {row[0]: row for row in table(document, "Error factors of the machine").rows}
     assert rows["Squareness X–Y"][1] == "−174"
-    assert rows["Squareness X–Y"][4] == "−174.8"
+    assert rows["Squareness X–Y"][4] == "−174.7"
     assert rows["Squareness X–Y"][5] == "″"
 
 
