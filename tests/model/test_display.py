@@ -1,0 +1,48 @@
+"""The steps of a display are found where they matter, and rounding is shared by repeats as much as a simulation says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmm_uq.inference.noise import display_shared
+from cmm_uq.model.display import display_step
+
+
+def shown(step: float, count: int = 60) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    return np.asarray(step * np.round(np.random.default_rng(1).uniform(-400, 800, (count, 3)) / step))
+
+
+@pytest.mark.parametrize("step", [5e-3, 1e-3, 2e-3, 25.4e-4, 25.4 * 5e-5])
+def test_the_step_is_the_largest_of_which_all_coordinates_are_multiples(step: float) -> None:
+    assert display_step(shown(step), 1e-3) == pytest.approx(step)
+
+
+def test_a_step_that_is_fine_against_the_scatter_is_none() -> None:
+    """1 µm has a standard deviation of 0.29 µm: a hundredth of the variance of 2.9 µm."""
+    assert display_step(shown(1e-3), 2.8e-3) == pytest.approx(1e-3)
+    assert display_step(shown(1e-3), 3.0e-3) == 0.0
+
+
+def test_what_is_not_on_a_grid_or_too_little_has_no_step() -> None:
+    assert display_step(np.random.default_rng(2).uniform(0, 900, (60, 3)), 1e-3) == 0.0
+    assert display_step(shown(5e-3, 3), 1e-3) == 0.0
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.1, 0.2, 0.35])
+def test_rounding_that_repeats_share_is_as_simulated(ratio: float) -> None:
+    """Two repeats of a quantity anywhere on the grid: covariance of their rounding errors, four standard errors."""
+    random, count, step = np.random.default_rng(3), 400_000, 5e-3
+    true = random.uniform(-1, 1, count)
+    repeats = true + ratio * step * random.standard_normal((2, count))
+    errors = step * np.round(repeats / step) - repeats
+    products = errors[0] * errors[1]
+    found = display_shared(np.array([ratio * step]), step)[0]
+    assert abs(products.mean() - found) < 4 * products.std() / np.sqrt(count)
+    assert np.mean(errors**2) == pytest.approx(step**2 / 12, rel=0.01)
+
+
+def test_a_tiny_noise_shares_all_of_the_rounding_and_a_large_one_nothing() -> None:
+    shared = display_shared(np.array([1e-9, 1.0]), 5e-3)
+    assert shared == pytest.approx([5e-3**2 / 12, 0.0], rel=5e-3)
+    assert display_shared(np.array([1.0]), 0.0) == 0.0
