@@ -180,13 +180,14 @@ def _quantities(model: MeasurementModel, posterior: Posterior) -> dict[str, dict
 
 
 def sizes_of_noise(components: Components, posterior: NoisyPosterior) -> dict[str, Floats]:
-    """Draws (N,), mm, of the reading noise, all axes and each, and of every other component that the recording could show."""
-    sizes = posterior.sizes
-    found = {"coordinate": sizes.coordinate}
+    """Draws (N,), mm, of the reading noise, all axes and each, and of every other component that the recording could show.
+
+    A reading is what the display shows: its steps are part of it.
+    """
+    sizes, rounding = posterior.sizes, components.display / np.sqrt(12)
+    found = {"coordinate": np.hypot(sizes.coordinate, rounding)}
     if AXES in components.possible:
-        found |= dict(zip("xyz", sizes.reading.T, strict=True))
-    if components.display:
-        found["display"] = np.full_like(sizes.coordinate, components.display / np.sqrt(12))
+        found |= dict(zip("xyz", np.hypot(sizes.reading, rounding).T, strict=True))
     each = {PLACING: sizes.placing, GROWTH: sizes.growth, SLOW: sizes.slow}
     return found | {name: values for name, values in each.items() if name in components.possible}
 
@@ -205,7 +206,8 @@ def noise(
     }
     coordinate = found.pop("coordinate").size
     apart = float(np.mean(np.ptp(posterior.sizes.reading, axis=1) > 0))
-    return Noise(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value)
+    step = components.display / MICROMETRE
+    return Noise(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value, step)
 
 
 def _wider(estimate: Estimate, posterior: Posterior) -> float:

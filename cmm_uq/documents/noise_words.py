@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from cmm_uq.documents.result import Noise
 from cmm_uq.messages import Text, listed, say
 
@@ -43,9 +41,8 @@ def _found(noise: Noise) -> list[Text]:
     if noise.axes_apart > _SHOWN:
         x, y, z = (components[axis].size.value for axis in "xyz")
         there.append(say("a scatter that differs by axis (X {x:.2g}, Y {y:.2g}, Z {z:.2g} µm)", x=x, y=y, z=z))
-    if "display" in components:
-        step = components["display"].size.value * math.sqrt(12)
-        there.append(say("the steps of the display, {step:.2g} µm", step=step))
+    if noise.display_um:
+        there.append(say("the steps of the display, {step:.2g} µm", step=noise.display_um))
     size = {name: components[name].size.value for name in ("placing", "growth", "slow") if name in components}
     p = {name: components[name].probability for name in size}
     if p.get("placing", 0.0) > _SHOWN:

@@ -52,6 +52,7 @@ class Noise:
     wider : largest ratio of a parameter's standard uncertainty to what white noise would leave it.
     stated_um : what the job states, if anything.
     p_value : of the residuals' sum of squares under the stated noise (χ² test), if it is stated.
+    display_um : step in which coordinates are displayed, 0 where it is too fine to matter.
     """
 
     coordinate: Quantity
@@ -60,6 +61,7 @@ class Noise:
     wider: float
     stated_um: float | None
     p_value: float | None
+    display_um: float = 0.0
 
     @property
     def coverage_factor(self) -> float:

@@ -79,6 +79,7 @@ def results(result: Result) -> dict[str, Any]:
                 f"{name}_um": {**quantity_data(one.size), "probability": one.probability}
                 for name, one in result.noise.components.items()
             },
+            **({"display_step_um": result.noise.display_um} if result.noise.display_um else {}),
             "axes_differ_probability": result.noise.axes_apart,
             "p_value": result.noise.p_value,
             "contradicts_stated": result.noise.contradicts_stated,

@@ -128,6 +128,11 @@ class Components:
         object.__setattr__(self, "names", tuple(names))
 
     @property
+    def _rounding(self) -> float:
+        """Standard deviation of what the display rounds off, mm."""
+        return self.display / float(np.sqrt(12))
+
+    @property
     def least(self) -> float:
         """Reading noise, mm, below which a smaller one would show no other readings."""
         return self.display / 20
@@ -154,7 +159,7 @@ class Components:
             most = np.abs(apart).max(axis=1, keepdims=True)
             each = np.exp(apart * np.minimum(1.0, _FARTHEST / np.maximum(most, 1e-9)))
             reading = reading * each / np.sqrt(np.mean(each**2, axis=1, keepdims=True))
-        apparent = np.hypot(sigma, self.display / np.sqrt(12))
+        apparent = np.hypot(sigma, self._rounding)
         ratios = {
             name: apparent * _half_cauchy(column[name], ABSENT[name], RATIO[name]) if name in self.possible else nothing
             for name in (PLACING, GROWTH, SLOW)
@@ -188,7 +193,7 @@ class Components:
 
     def log_prior(self, latent: Floats, sizes: Sizes) -> Floats:
         """(w,) of the standard normal numbers; that of a coordinate has a uniform logarithm, or is near what is stated."""
-        known = self.log_prior_of_sigma(np.log(sizes.coordinate))
+        known = self.log_prior_of_sigma(np.log(np.hypot(sizes.coordinate, self._rounding)))
         return np.asarray(known - 0.5 * np.sum(latent[:, 1:] ** 2, axis=1))
 
     def log_prior_of_sigma(self, log_sigma: Floats) -> Floats:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from cmm_uq.commands.analysis import Result, analyse
+from cmm_uq.commands.analysis import Result, analyse, outcome_of
 from cmm_uq.errors import CmmUqError
 from tests.conftest import ROOT
 
@@ -202,3 +204,19 @@ def test_no_effect_at_all_is_a_model_too(job: Path) -> None:
     found = analyse(job)
     assert found.least_squares.residual_sd == pytest.approx(80e-3, abs=10e-3)
     assert found.parameters == {}
+
+
+def test_a_display_of_coarse_steps_is_part_of_the_noise_and_of_a_reading(tmp_path: Path) -> None:
+    """Coordinates of the simulated plate, 0.7 µm of noise, rounded to 5 µm: no reading is better than 5/√12 = 1.44 µm."""
+    job = tmp_path / "job"
+    shutil.copytree(ROOT / "examples" / "plate-simulated", job)
+    table = pd.read_csv(job / "recording.csv")
+    for column in ("x_mm", "y_mm", "z_mm"):
+        table[column] = (table[column] / 5e-3).round() * 5e-3
+    table.to_csv(job / "recording.csv", index=False)
+    found = analyse(job)
+    assert isinstance(found, Result)
+    noise = outcome_of(found).results["noise"]
+    assert noise["display_step_um"] == pytest.approx(5.0)
+    assert noise["coordinate_um"]["interval95"][0] > 5 / np.sqrt(12)
+    assert not any("display" in name for name in found.draws.names)

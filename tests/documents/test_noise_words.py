@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from cmm_uq.documents.noise_words import noise_found
 from cmm_uq.documents.result import Component, Noise
 from cmm_uq.uncertainty.quantity import Quantity
@@ -30,3 +32,7 @@ def test_what_is_probably_there_is_named_with_its_size_and_what_it_does_to_the_u
     assert "an offset of 2.3 µm of each set-up, shared by its repeats (probability 0.97)" in said
     assert "slow noise" not in said
     assert "up to 1.84 times" in said
+
+
+def test_the_steps_of_a_display_are_named() -> None:
+    assert "and the steps of the display, 5 µm" in noise_found(replace(noise({}), display_um=5.0))
