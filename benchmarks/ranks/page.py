@@ -30,9 +30,10 @@ are as the priors say is another question, and the coverage study's.
 
 *χ²*: of ten bins of ranks, of fewer where a bin would expect fewer than five; p is of one quantity, and *adjusted* for all
 of its table (Bonferroni). *Band*: how many quantities leave the simultaneous {100 * (1 - LEVEL):g} % band of the distribution
-function (Säilynoja et al. 2022), of which one in twenty is expected to. *Width*: standard deviation of the posteriors over the
-right one, by how far from the middle the ranks lie, with its 95 % interval; ranks of one recording depend on each other,
-and the interval allows for that."""
+function (Säilynoja et al. 2022), of which one in twenty is expected to, or the smallest level whose band one leaves, not
+adjusted. *Width*: standard deviation of the posteriors over the right one, by how far from the middle the ranks lie, with
+its 95 % interval; ranks of one recording depend on each other, and the interval allows for that. *Not converged*: chains
+that were stopped before they converged, as a certificate would say; their ranks count."""
 
 
 @dataclass
