@@ -18,24 +18,26 @@ from benchmarks.ranks.page import gathered, page
 from benchmarks.ranks.ranking import DRAWS, of_noise
 from benchmarks.ranks.uniformity import RANKS
 from cmm_uq.inference.linear_model import LinearModel, Unknown
-from cmm_uq.inference.noise import AXES, PLACING, Components
+from cmm_uq.inference.noise import AXES, GROWTH, PLACING, Components
 from cmm_uq.units import unit
 
 
 def components(*possible: str) -> Components:
     """Four observations, two along x and two along y, of a coordinate whose noise is stated as 2 µm."""
-    shares = np.repeat([[1.0, 0, 0, 1, 0, 1], [0, 1.0, 0, 1, 0, 1]], 2, axis=0)
+    shares = np.repeat([[1.0, 0, 0, 1, 0.5, 1], [0, 1.0, 0, 1, 1, 1]], 2, axis=0)
     return Components(sparse.eye_array(4, format="csr"), shares, np.zeros((4, 0)), np.zeros(0), possible, stated=2e-3)
 
 
 def test_the_noise_of_a_coordinate_is_drawn_from_the_density_that_the_sampler_takes_it_to_have() -> None:
     """A Kolmogorov–Smirnov test of ln σ against the package's prior, integrated; the first number of all may differ."""
-    noise, random = components(AXES, PLACING), np.random.default_rng(1)
+    noise, random = components(AXES, PLACING, GROWTH), np.random.default_rng(1)
     sizes = noise.sizes(np.vstack([latent(noise, random) for _ in range(4000)]))
     at = np.log(2e-3) + np.linspace(-8, 8, 20_001)
     density = np.exp(noise.log_prior_of_sigma(at))
     distribution = np.cumsum(density) / density.sum()
     assert stats.kstest(np.log(sizes.coordinate), lambda x: np.interp(x, at, distribution)).pvalue > 1e-3
+    # the moment that docs/noise.md gives, nine tenths of 0.2² and a tenth of 1², within four standard errors
+    assert np.mean(np.log(sizes.coordinate / 2e-3) ** 2) == pytest.approx(0.9 * 0.2**2 + 0.1, abs=0.035)
     assert np.mean(sizes.placing == 0) == pytest.approx(0.5, abs=0.04)  # five standard errors
 
 
