@@ -6,7 +6,7 @@ import json
 import os
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -57,12 +57,14 @@ def _beside(results: Mapping[str, Any], made: Recording) -> Iterator[tuple[str, 
         yield name, [quantity["value"], quantity["u"], *quantity["interval95"]], truth
 
 
-def run(tasks: Iterable[Task], processes: int) -> Iterator[dict[str, Any]]:
+def run(
+    tasks: Iterable[Any], processes: int, work: Callable[[Any], dict[str, Any]] = measured
+) -> Iterator[dict[str, Any]]:
     """Records of all tasks as they come, each process on one thread."""
     for name in BLAS:
         os.environ[name] = "1"
     with get_context("spawn").Pool(processes, maxtasksperchild=TASKS) as pool:
-        yield from pool.imap_unordered(measured, tasks)
+        yield from pool.imap_unordered(work, tasks)
 
 
 def kept(folder: Path) -> list[dict[str, Any]]:

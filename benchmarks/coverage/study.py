@@ -9,26 +9,49 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from benchmarks.coverage.cells import Cell, cells
-from benchmarks.coverage.measuring import Task, kept, run
+from benchmarks.coverage.measuring import kept, measured, run
 from benchmarks.coverage.page import page
 from benchmarks.coverage.tally import POOLED, Tally, tallies
 
 PAGE = Path(__file__).parents[2] / "docs" / "coverage-study.md"
 
 
-def waiting(chosen: list[Cell], folder: Path, seed: int, count: int) -> list[Task]:
+class Named(Protocol):
+    """A cell of a study."""
+
+    @property
+    def name(self) -> str:
+        """Of its file too."""
+
+
+AnyCell = TypeVar("AnyCell", bound=Named)
+
+
+def waiting(chosen: list[AnyCell], folder: Path, seed: int, count: int) -> list[tuple[AnyCell, int, int]]:
     """What is not done yet, the first recordings of all cells first."""
     done = {(record["cell"], record["number"]) for record in kept(folder)}
     return [(cell, seed, i) for i in range(count) for cell in chosen if (cell.name, i) not in done]
 
 
-def measure(tasks: list[Task], folder: Path, processes: int) -> None:
-    """Run them, and keep each record."""
+def measure(
+    tasks: Sequence[Any], folder: Path, processes: int, work: Callable[[Any], dict[str, Any]] = measured
+) -> None:
+    """Run them, and keep each record.
+
+    Parameters
+    ----------
+    tasks : of this study or of another one.
+    folder : of the records.
+    processes : at once.
+    work : what makes a record, which names its cell and its number, of a task.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     columns = (
         TextColumn("{task.description}"),
@@ -39,7 +62,7 @@ def measure(tasks: list[Task], folder: Path, processes: int) -> None:
     )
     with Progress(*columns) as progress:
         bar = progress.add_task("Recordings", total=len(tasks))
-        for record in run(tasks, processes):
+        for record in run(tasks, processes, work):
             file = folder / f"{record['cell'].replace(' ', '_').replace(',', '')}.jsonl"
             cut = file.exists() and not file.read_bytes().endswith(b"\n")
             with file.open("a", encoding="utf-8") as out:

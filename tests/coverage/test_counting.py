@@ -90,7 +90,7 @@ def test_a_run_is_taken_up_where_it_was_cut_off(tmp_path: Path, monkeypatch: pyt
     file.write_text(json.dumps(record(0, {"scale_x.ppm": True})) + '\n{"cell": "plate, ax', encoding="utf-8")
     tasks = study.waiting([cell], tmp_path, 3, 2)
     assert tasks == [(cell, 3, 1)]
-    monkeypatch.setattr(study, "run", lambda tasks, processes: (record(number, {}) for _, _, number in tasks))
+    monkeypatch.setattr(study, "run", lambda tasks, processes, work: (record(number, {}) for _, _, number in tasks))
     study.measure(tasks, tmp_path, 1)
     assert [each["number"] for each in kept(tmp_path)] == [0, 1]
     assert study.waiting([cell], tmp_path, 3, 2) == []
