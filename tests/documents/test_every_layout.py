@@ -16,9 +16,6 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from pypdf import PdfReader
 
-from cmm_uq.commands.plan import plan_outcome
-from cmm_uq.commands.reading import read_job
-from cmm_uq.commands.report import diagnosis_outcome
 from cmm_uq.documents.budget_page import budget_document
 from cmm_uq.documents.certificate import STATEMENTS
 from cmm_uq.documents.document import Block, Document, Facts, Plot, Section, Table
@@ -30,7 +27,7 @@ from tests.conftest import ROOT
 from tests.documents.samples import ballbar_certificate
 from tests.documents.test_html_layout import CONTRASTS, LABELS_COLLIDING, OVERLAPS, WIDER_THAN_PAPER
 from tests.documents.test_translatable import MODEL
-from tests.kinds.simulated import analysed, document
+from tests.kinds.simulated import analysed, diagnosed, document, planned
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -45,14 +42,6 @@ def report(name: str) -> Document:
     return marked(document(name), analysed(name).job)
 
 
-def diagnosis(name: str) -> Document:
-    return diagnosis_outcome(read_job(ROOT / "examples" / name)).document
-
-
-def plan(name: str) -> Document:
-    return plan_outcome(read_job(ROOT / "examples" / name, recorded=False), power=False).document
-
-
 def budget(folder: str) -> Document:
     file = Path(folder) / "budget-model.toml"
     file.write_text(MODEL, encoding="utf-8")
@@ -61,10 +50,10 @@ def budget(folder: str) -> Document:
 
 
 OTHERS: Mapping[str, Callable[[str], Document]] = {
-    "diagnosis of iota-1102-20C": lambda _: diagnosis("iota-1102-20C"),
-    "diagnosis of iota-1102-maps": lambda _: diagnosis("iota-1102-maps"),
-    "plan of plan-ballbar": lambda _: plan("plan-ballbar"),
-    "plan of plan-step-gauge": lambda _: plan("plan-step-gauge"),
+    "diagnosis of iota-1102-20C": lambda _: diagnosed("iota-1102-20C"),
+    "diagnosis of iota-1102-maps": lambda _: diagnosed("iota-1102-maps"),
+    "plan of plan-ballbar": lambda _: planned("plan-ballbar"),
+    "plan of plan-step-gauge": lambda _: planned("plan-step-gauge"),
     "sample": lambda _: ballbar_certificate(),
     "budget": budget,
 }

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.commands.plan import plan_outcome
 from cmm_uq.commands.reading import read_job
-from cmm_uq.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.conformity.plans import READY
 from cmm_uq.conformity.standards import BUILT_IN
 from cmm_uq.documents.budget_page import budget_document
@@ -30,6 +28,7 @@ from cmm_uq.uncertainty.ready_model import READY as MODELS
 from cmm_uq.units import Unit, unit
 from tests.conftest import ROOT
 from tests.documents.saying import leaves, strangers
+from tests.kinds.simulated import diagnosed, document, planned
 from tests.uncertainty.test_ready_budget import BALLBAR, LENGTH, PROBING, SIMULATED, SPHERE, USE, ready
 
 EXAMPLES = sorted(path.name for path in (ROOT / "examples").iterdir() if (path / "job.toml").exists())
@@ -53,17 +52,12 @@ def known_to(folder: Path) -> str:
     return "\n".join([*own, *effects, *READY, *decided, *KEYS, NAME, SAMPLER])
 
 
-def documents(folder: Path) -> list[Document]:
-    """All that the commands make of a job."""
+def documents(name: str) -> list[Document]:
+    """All that the commands make of an example."""
     found = []
-    for make, recorded in (
-        (report_outcome, True),
-        (diagnosis_outcome, True),
-        (lambda job: plan_outcome(job, power=False), False),
-    ):
+    for make, recorded in ((document, True), (diagnosed, True), (planned, False)):
         try:
-            job = read_job(folder, recorded=recorded)
-            found.append(marked(make(job).document, job))
+            found.append(marked(make(name), read_job(ROOT / "examples" / name, recorded=recorded)))
         except CmmUqError:  # what this kind does not offer, or needs a recording
             continue
     return found
@@ -79,8 +73,7 @@ def units(document: Document) -> Iterator[str]:
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_every_text_of_every_document_is_a_message_or_the_user_s(name: str) -> None:
-    folder = ROOT / "examples" / name
-    made, known = documents(folder), known_to(folder)
+    made, known = documents(name), known_to(ROOT / "examples" / name)
     assert made
     assert {document.title: strangers(document, known) for document in made} == {
         document.title: [] for document in made

@@ -5,6 +5,9 @@ from __future__ import annotations
 from functools import cache
 
 from cmm_uq.commands.analysis import Result, analyse, outcome_of
+from cmm_uq.commands.plan import plan_outcome
+from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.report import diagnosis_outcome
 from cmm_uq.documents.document import Block, Document, Table
 from tests.conftest import ROOT
 
@@ -20,6 +23,16 @@ def analysed(job: str) -> Result:
 @cache
 def document(job: str) -> Document:
     return outcome_of(analysed(job)).document
+
+
+@cache
+def diagnosed(job: str) -> Document:
+    return diagnosis_outcome(read_job(ROOT / "examples" / job)).document
+
+
+@cache
+def planned(job: str) -> Document:
+    return plan_outcome(read_job(ROOT / "examples" / job, recorded=False), power=False).document
 
 
 def blocks(job: str) -> list[Block]:
