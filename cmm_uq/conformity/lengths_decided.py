@@ -16,6 +16,7 @@ from cmm_uq.conformity.measurement_lines import position_on
 from cmm_uq.conformity.plans import Condition
 from cmm_uq.conformity.remeasured import Again, with_standing
 from cmm_uq.conformity.shared_causes import Causes, causes_of_lengths, length_budget, temperatures
+from cmm_uq.conformity.short_gauge import added_in_words
 from cmm_uq.conformity.standard import Test
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.jobs.artefact import ArtefactFacts
@@ -97,6 +98,7 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Aga
     budget = length_budget(
         float(found.lengths[named]), float(found.u[named]),
         REFERENCE_TEMPERATURE if degrees is None else float(degrees[named]), test.circumstances,
+        0.0 if found.u_beside is None else float(found.u_beside[named]),
     )  # fmt: skip
     return test.stated(
         say("error of indication of length, worst against its limit"), say("lengths"), items, remarks,
@@ -241,10 +243,11 @@ def _again_in_words(items: Sequence[Decided], again: Again | None) -> list[Text]
 
 def _unshown(test: Test, found: Indications) -> list[Text]:
     """What neither job nor recording say, and would have to."""
-    told = [unknown_expansion(test.artefact, test.circumstances.cte_per_k)]
+    under = test.circumstances
+    told = [unknown_expansion(test.artefact, under.cte_per_k), added_in_words(under.short_gauge, found)]
     if test.artefact.bidirectional(found.rows) is None:
         told.append(say("Whether the lengths are bidirectional is not recorded (approach_x, approach_y, approach_z)."))
-    if test.circumstances.uncertainty.u_cte_per_k and temperatures(found, test.artefact) is None:
+    if under.uncertainty.u_cte_per_k and temperatures(found, test.artefact) is None:
         told.append(
             say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")
         )

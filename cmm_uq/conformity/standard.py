@@ -23,6 +23,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, needed
+from cmm_uq.jobs.short_gauge import ShortGauge
 from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Floats
@@ -67,6 +68,7 @@ class Characteristic:
     asks : what a complete test asks of artefact, probe and surroundings beside its points.
     also : other names of it.
     needs : the key of ``[test_uncertainty]`` without which a rule with an uncertainty says nothing.
+    beside : how a short gauge recorded beside the artefact enters; not at all where left out.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Characteristic:
     asks: Callable[[Test], tuple[Condition, ...]] = _nothing_more
     also: tuple[str, ...] = ()
     needs: str | None = None
+    beside: Callable[[Artefact, ShortGauge | None], Artefact] | None = None
 
 
 @dataclass(frozen=True)
