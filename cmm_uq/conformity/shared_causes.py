@@ -48,6 +48,12 @@ class Causes:
         """(m,) standard uncertainty of each value, µm."""
         return np.asarray(np.sqrt((self.shared**2).sum(axis=1) + self.own**2), dtype=np.float64)
 
+    def at_least(self, least_um: Floats) -> Causes:
+        """The same with u not below some (m,), µm: what these have more is shared by all; where u is 0 it stays so."""
+        u = self.u
+        more = np.where((u > 0) & (u < least_um), np.sqrt(np.maximum(least_um**2 - u**2, 0.0)), 0.0)
+        return Causes(np.column_stack([self.shared, more]), self.own, self.set_up) if more.any() else self
+
     def of(self, chosen: Ints) -> Causes:
         """Those of some of the values."""
         return Causes(self.shared[chosen], self.own[chosen], self.set_up[chosen])

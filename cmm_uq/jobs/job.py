@@ -161,7 +161,8 @@ class JobFile(Table):
         probe = self.probe.model_copy(update={"sensing": _sensing(self.probe, self.machine)})
         stated = "cte_per_k" in self.artefact.model_fields_set
         return Circumstances(
-            self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None
+            self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None,
+            cmc=self.laboratory.cmc,
         )  # fmt: skip
 
     @model_validator(mode="before")
