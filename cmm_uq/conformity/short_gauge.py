@@ -125,9 +125,11 @@ def supplemented(artefact: Artefact, gauge: ShortGauge | None) -> Artefact:
     return artefact if gauge is None else Supplemented(artefact, gauge)
 
 
-def repeats_of_gauge(gauge: ShortGauge | None, wanted: int, shortest_mm: float) -> tuple[Condition, ...]:
-    """That the short gauge is short, and was measured as often as the lengths, each time anew."""
-    if gauge is None:
+def repeats_of_gauge(
+    gauge: ShortGauge | None, found: Indications, wanted: int, shortest_mm: float
+) -> tuple[Condition, ...]:
+    """That a short gauge which some lengths rest on is short, and was measured as often as these, each time anew."""
+    if gauge is None or found.u_beside is None or not found.u_beside.any():
         return ()
     points = gauge.points
     copies = set(points.copies)

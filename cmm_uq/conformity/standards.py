@@ -63,7 +63,9 @@ AGAIN = Again(repeats=3, outside=1, lengths=5, readings=10)
 
 
 def _short_gauge_repeated(test: Test) -> tuple[Condition, ...]:
-    return repeats_of_gauge(test.circumstances.short_gauge, ISO_10360_2.repeats, ISO_10360_2.shortest_mm)
+    return repeats_of_gauge(
+        test.circumstances.short_gauge, test.indications(), ISO_10360_2.repeats, ISO_10360_2.shortest_mm
+    )
 
 
 def _asked_of_gauges(test: Test) -> tuple[Condition, ...]:

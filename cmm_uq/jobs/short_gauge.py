@@ -17,7 +17,7 @@ from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 KEY = "[short_gauge]"
 
 FARTHEST_MM = 1.0
-"""From the certified length: a gauge farther off is another one, or in another unit."""
+"""From the certified length, or from the first repeat: a gauge farther off is another one, or in another place."""
 
 
 class ShortGaugeFacts(Table):
@@ -106,6 +106,7 @@ def short_gauge_of(facts: ShortGaugeFacts, content: bytes, where: str, machine: 
     ordered = sorted(points.rows_of_groups, key=lambda own: (points.measurement[own[0]], points.repeat[own[0]]))
     gauge = ShortGauge(facts, points, np.array([own[np.argsort(points.point[own])] for own in ordered], dtype=np.int64))
     _refuse_another(gauge, where)
+    _refuse_another_place(gauge, where)
     _refuse_one_side(gauge, where)
     return gauge
 
@@ -118,6 +119,19 @@ def _refuse_another(gauge: ShortGauge, where: str) -> None:
         raise CmmUqError(f"a length of {length:.5g} mm, where {KEY} length_mm is {gauge.facts.length_mm:g}",
                          where=f"{where} line {gauge.points.lines[gauge.rows[off, 0]]}",
                          fix="Give the length of the gauge that was recorded, in mm")  # fmt: skip
+
+
+def _refuse_another_place(gauge: ShortGauge, where: str) -> None:
+    """A measurement is one place: its repeats stand for each other."""
+    points, first = gauge.points, gauge.rows[:, 0]
+    for number in np.unique(points.measurement[first]):
+        own = gauge.rows[points.measurement[first] == number]
+        apart = np.linalg.norm(points.xyz[own] - points.xyz[own[0]], axis=2).max(axis=1)
+        off = int(np.argmax(apart))
+        if apart[off] > FARTHEST_MM:
+            raise CmmUqError(f"measurement {number} has the short gauge in two places, {apart[off]:.3g} mm apart",
+                             where=f"{where} line {points.lines[own[off, 0]]}",
+                             fix="Number each place as a measurement of its own, and its repeats in it")  # fmt: skip
 
 
 def _refuse_one_side(gauge: ShortGauge, where: str) -> None:

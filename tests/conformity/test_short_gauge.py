@@ -157,6 +157,7 @@ def test_to_lengths_met_from_both_sides_nothing_is_added() -> None:
     found = judged(both, short((9.0, 9.0, 9.0)))
     assert found.outcome == "pass"
     assert not any("short gauge" in text for text in found.remarks)
+    assert judged(both, short((9.0,))).outcome == "pass"
 
 
 def test_a_ballbar_takes_it_where_it_lies_and_keeps_its_other_bars() -> None:

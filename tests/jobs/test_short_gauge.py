@@ -43,6 +43,7 @@ def test_its_expansion_is_taken_off() -> None:
     (("1,1,1,0,0,0",), HEAD, "does not have points 1 and 2 alone", "line 2"),
     (("1,1,1,0,0,0", "1,2,1,20,0,0", "1,3,1,30,0,0"), HEAD, "does not have points 1 and 2 alone", "line 2"),
     (("1,1,1,0,0,0", "1,2,1,20,0,0", "1,1,2,0,0,0", "1,2,2,25,0,0"), HEAD, "a length of 25 mm", "line 4"),
+    (("1,1,1,0,0,0", "1,2,1,20,0,0", "1,1,2,0,0,2", "1,2,2,20,0,2"), HEAD, "two places, 2 mm apart", "line 4"),
     (("1,1,1,0,0,0,1,0,0", "1,2,1,20,0,0,1,0,0"), f"{HEAD},approach_x,approach_y,approach_z", "same side", "line 2"),
 ])  # fmt: skip
 def test_what_cannot_be_such_a_gauge_is_refused_by_its_line(
