@@ -23,7 +23,11 @@ def budget_table(measurand: Text, budget: Budget) -> Table:
     several = len(there) > 1
     columns = (
         Column(say("Cause"), numeric=False),
-        *((Column(say("Standard uncertainty")), Column(say("Sensitivity"))) if turned else ()),
+        *(
+            (Column(say("Standard uncertainty"), numeric=False), Column(say("Sensitivity"), numeric=False))
+            if turned
+            else ()
+        ),
         Column(say("Contribution"), unit("µm")),
         *((Column(say("Share")),) if several else ()),
         Column(say("Origin"), numeric=False),

@@ -43,14 +43,13 @@ def test_every_error_factor_has_at_least_the_laboratory_s_uncertainty(result: Re
         "Scale error of X": ("45", "2.00"), "Scale error of Y": ("45", "2.00"), "Scale error of Z": ("49", "2.00"),
         "Squareness X–Y": ("16", "2.01"), "Squareness Y–Z": ("15", "2.00"), "Squareness Z–X": ("17", "2.01"),
     }  # fmt: skip
-    assert list(outcome.results["cmc"]["raised"]) == ["scale_x.ppm", "scale_y.ppm", "squareness_yz.angle_arcsec"]
+    raised = [name for name in outcome.results["cmc"]["raised"] if not name.startswith("distance_equations")]
+    assert raised == ["scale_x.ppm", "scale_y.ppm", "squareness_yz.angle_arcsec"]
     assert outcome.results["cmc"]["raised"]["scale_x.ppm"]["evaluated_U"] == pytest.approx(
         result.parameters["scale_x"]["ppm"].expanded
     )
     assert outcome.results["estimates"]["scale_x"]["ppm"]["u"] == 22.5
-    assert any(
-        "of: scale_x.ppm, scale_y.ppm, squareness_yz.angle_arcsec." in text for text in outcome.document.warnings
-    )
+    assert any("of: scale_x.ppm, scale_y.ppm, squareness_yz.angle_arcsec" in text for text in outcome.document.warnings)
 
 
 def test_lengths_take_the_formula_at_the_artefact_s_length(result: Result) -> None:
