@@ -70,7 +70,7 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     posterior = with_curvature(model, components, drawn)
     figures = accuracy(model, estimate, posterior, seed)
     statements = [
-        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.facts.circumstances)
+        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances)
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
     result = Result(

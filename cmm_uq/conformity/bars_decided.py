@@ -34,11 +34,11 @@ def volumetric_performance(test: Test) -> Statement:
     artefact, measured = test.artefact, test.accuracy["b89_range_um"]
     bar = artefact.sizes[0].nominal
     budget, told = _budget(test)
-    u = budget.u if budget.u > 0 else measured.u
+    u = test.at_least(budget.u if budget.u > 0 else measured.u, bar)
     limit = float(test.limits_um(np.array([bar]))[0])
     item = Decided(measured.value, u, limit, test.decide(measured.value, u, limit, signed=False), length_mm=bar)
     return test.stated(say("range of the ballbar lengths"), say("lengths"), (item,), [told], signed=False,
-                       budget=budget if budget.u > 0 else None)  # fmt: skip
+                       budget=test.budget_at_least(budget, bar) if budget.u > 0 else None)  # fmt: skip
 
 
 def _budget(test: Test) -> tuple[Budget, Text]:
@@ -86,9 +86,9 @@ def offset_probe(test: Test) -> Statement:
         bool(found), "a bar measured with the stylus tip to both sides (tip_x_mm, tip_y_mm, tip_z_mm)"
     )
     bar = test.artefact.sizes[0].nominal
-    limit = float(test.limits_um(np.array([bar]))[0])
+    limit, known = float(test.limits_um(np.array([bar]))[0]), test.at_least(u, bar)
     items = tuple(
-        Decided(value, u, limit, test.decide(value, u, limit, signed=True), number, None, bar, position)
+        Decided(value, known, limit, test.decide(value, known, limit, signed=True), number, None, bar, position)
         for position, number, value in found
     )
     told = (

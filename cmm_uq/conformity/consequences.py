@@ -75,7 +75,7 @@ def consequences(
         # corrected by the estimate, as the points were; a draw corrects by something else
         remaining = predicted + (late - lengths) - (draws - value)[:, ours] @ whole.design[:, ours].T
         after = with_uncertainty(late, remaining, noise, seed, same)
-    under = job.facts.circumstances
+    under = job.circumstances
     return Consequences(
         {name: (before[name], after[name]) for name in before},
         tuple(

@@ -16,6 +16,7 @@ from cmm_uq.conformity.measurement_lines import position_on
 from cmm_uq.conformity.plans import Condition
 from cmm_uq.conformity.remeasured import Again, with_standing
 from cmm_uq.conformity.shared_causes import Causes, causes_of_lengths, length_budget, temperatures
+from cmm_uq.conformity.short_gauge import added_in_words
 from cmm_uq.conformity.standard import Test
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.jobs.artefact import ArtefactFacts
@@ -76,7 +77,7 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Aga
     artefact, first = test.artefact, found.rows[:, 0]
     points = artefact.points
     errors, limits = found.errors / MICROMETRE, test.limits_um(found.lengths)
-    causes = causes_of_lengths(found, artefact, test.circumstances)
+    causes = causes_of_lengths(found, artefact, test.circumstances).at_least(test.least_u(found.lengths))
     test.refuse_without_uncertainty(float(causes.u[rows].min()), "u_um")
     position = lines(artefact, found)
     items = tuple(
@@ -97,10 +98,11 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Aga
     budget = length_budget(
         float(found.lengths[named]), float(found.u[named]),
         REFERENCE_TEMPERATURE if degrees is None else float(degrees[named]), test.circumstances,
+        0.0 if found.u_beside is None else float(found.u_beside[named]),
     )  # fmt: skip
     return test.stated(
         say("error of indication of length, worst against its limit"), say("lengths"), items, remarks,
-        causes=causes.of(rows), budget=budget if worst.u_um > 0 else None,
+        causes=causes.of(rows), budget=test.budget_at_least(budget, worst.length_mm or 0.0) if worst.u_um > 0 else None,
     )  # fmt: skip
 
 
@@ -126,8 +128,9 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
             continue
         value, length = float(np.ptp(found.errors[own])) / MICROMETRE, float(found.lengths[own].mean())
         limit = float(test.limits_um(np.array([length]))[0])
+        known = test.at_least(u, length)
         items.append(Decided(
-            value, u, limit, test.decide(value, u, limit, signed=False), int(key[0]), None, length,
+            value, known, limit, test.decide(value, known, limit, signed=False), int(key[0]), None, length,
             position[own[0]],
         ))  # fmt: skip
     test.refuse_nothing_measured(bool(items), "repeats of lengths")
@@ -146,7 +149,7 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
     ]
     quantity = say("range of repeated lengths, worst against its limit")
     return test.stated(quantity, say("ranges"), tuple(items), remarks, signed=False,
-                       causes=_each_its_own(u, len(items)))  # fmt: skip
+                       causes=_each_its_own([item.u_um for item in items]))  # fmt: skip
 
 
 def length_unstated(artefact: ArtefactFacts) -> str | None:
@@ -241,15 +244,16 @@ def _again_in_words(items: Sequence[Decided], again: Again | None) -> list[Text]
 
 def _unshown(test: Test, found: Indications) -> list[Text]:
     """What neither job nor recording say, and would have to."""
-    told = [unknown_expansion(test.artefact, test.circumstances.cte_per_k)]
+    under = test.circumstances
+    told = [unknown_expansion(test.artefact, under.cte_per_k), added_in_words(under.short_gauge, found)]
     if test.artefact.bidirectional(found.rows) is None:
         told.append(say("Whether the lengths are bidirectional is not recorded (approach_x, approach_y, approach_z)."))
-    if test.circumstances.uncertainty.u_cte_per_k and temperatures(found, test.artefact) is None:
+    if under.uncertainty.u_cte_per_k and temperatures(found, test.artefact) is None:
         told.append(
             say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")
         )
     return [text for text in told if text]
 
 
-def _each_its_own(u: float, count: int) -> Causes:
-    return Causes(np.zeros((count, 0)), np.full(count, u), np.arange(count))
+def _each_its_own(u_um: Sequence[float]) -> Causes:
+    return Causes(np.zeros((len(u_um), 0)), np.array(u_um, dtype=np.float64), np.arange(len(u_um)))

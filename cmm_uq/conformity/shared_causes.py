@@ -48,6 +48,12 @@ class Causes:
         """(m,) standard uncertainty of each value, µm."""
         return np.asarray(np.sqrt((self.shared**2).sum(axis=1) + self.own**2), dtype=np.float64)
 
+    def at_least(self, least_um: Floats) -> Causes:
+        """The same with u not below some (m,), µm: what these have more is shared by all; where u is 0 it stays so."""
+        u = self.u
+        more = np.where((u > 0) & (u < least_um), np.sqrt(np.maximum(least_um**2 - u**2, 0.0)), 0.0)
+        return Causes(np.column_stack([self.shared, more]), self.own, self.set_up) if more.any() else self
+
     def of(self, chosen: Ints) -> Causes:
         """Those of some of the values."""
         return Causes(self.shared[chosen], self.own[chosen], self.set_up[chosen])
@@ -59,18 +65,26 @@ def temperatures(found: Indications, artefact: Artefact) -> Floats | None:
     return None if recorded is None else np.asarray(recorded[found.rows].mean(axis=1), dtype=np.float64)
 
 
-def length_budget(length_mm: float, u_mm: float, temperature_c: float, circumstances: Circumstances) -> Budget:
-    """Test uncertainty of one length (ISO/TS 23165:2006); ``u_mm`` is that of its calibration."""
+def length_budget(
+    length_mm: float, u_mm: float, temperature_c: float, circumstances: Circumstances, u_beside_mm: float = 0.0
+) -> Budget:
+    """Test uncertainty of one length (ISO/TS 23165:2006).
+
+    Parameters
+    ----------
+    u_mm : of all calibration, that of a short gauge beside it (``u_beside_mm``) included.
+    """
     stated = circumstances.uncertainty
     return length_test_uncertainty(
         length_mm,
-        u_mm,
+        float(_own(np.array(u_mm), u_beside_mm)),
         temperature_c=temperature_c,
         cte_per_k=circumstances.cte_per_k or 0.0,
         u_cte_per_k=stated.u_cte_per_k,
         u_temperature_k=stated.u_temperature_k,
         u_alignment_mm=stated.u_alignment_um * MICROMETRE,
         u_fixturing_mm=stated.u_fixturing_um * MICROMETRE,
+        u_beside_mm=u_beside_mm,
     )
 
 
@@ -78,14 +92,23 @@ def causes_of_lengths(found: Indications, artefact: Artefact, circumstances: Cir
     """Of every length of a recording, by the same budget."""
     recorded = temperatures(found, artefact)
     degrees = np.full(len(found.lengths), REFERENCE_TEMPERATURE) if recorded is None else recorded
-    wanted, which = np.unique(np.column_stack([found.lengths, found.u, degrees]), axis=0, return_inverse=True)
+    beside = np.zeros(len(found.u)) if found.u_beside is None else found.u_beside
+    own = _own(found.u, beside)
+    wanted, which = np.unique(np.column_stack([found.lengths, own, degrees]), axis=0, return_inverse=True)
     lines = np.array([
         [line.contribution for line in length_budget(float(length), float(u), float(t), circumstances).lines]
         for length, u, t in wanted
     ])[which.ravel()] / MICROMETRE  # fmt: skip
     calibration, expansion, temperature, alignment, fixturing = lines.T
-    shared = np.column_stack([calibration, np.sign(degrees - REFERENCE_TEMPERATURE) * expansion, temperature])
+    signed = np.sign(degrees - REFERENCE_TEMPERATURE) * expansion
+    further = [] if found.u_beside is None else [beside / MICROMETRE]
+    shared = np.column_stack([calibration, signed, temperature, *further])
     return Causes(shared, np.hypot(alignment, fixturing), artefact.points.measurement[found.rows[:, 0]])
+
+
+def _own(u: Floats, beside: Floats | float) -> Floats:
+    """What of a calibration is left without that of a gauge beside it."""
+    return np.asarray(np.where(np.asarray(beside) > 0, np.sqrt(np.maximum(u**2 - np.asarray(beside) ** 2, 0.0)), u))
 
 
 def probability_of_all(values: Sequence[float] | Floats, limits: Sequence[float] | Floats, causes: Causes, *,

@@ -27,7 +27,8 @@ def form_error(test: Test) -> Statement:
     budget = probing_test_uncertainty(probed.certified, test.circumstances.uncertainty.u_form_um * MICROMETRE)
     u = float(np.hypot(form / 2, test.circumstances.uncertainty.u_form_um))
     test.refuse_without_uncertainty(u, "form_um")
-    items = _items(test, probed, probed.form / MICROMETRE, u, signed=False)
+    known = test.at_least(u, test.artefact.sizes[0].nominal)
+    items = _items(test, probed, probed.form / MICROMETRE, known, signed=False)
     remarks: list[Text] = [
         say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, and what its calibration leaves "
             "uncertain, {u:.2g} µm.", u=u)
@@ -37,9 +38,9 @@ def form_error(test: Test) -> Statement:
         else say("The test sphere is taken as perfectly round: its form deviation (form_um) is not given.")
     ]  # fmt: skip
     remarks += _largest(items)
-    causes = Causes(np.full((len(items), 1), u), np.zeros(len(items)), np.arange(len(items)))
+    causes = Causes(np.full((len(items), 1), known), np.zeros(len(items)), np.arange(len(items)))
     return test.stated(say("probing form error"), say("points"), items, remarks, signed=False, causes=causes,
-                       budget=budget if u > 0 else None)  # fmt: skip
+                       budget=test.budget_at_least(budget, test.artefact.sizes[0].nominal) if u > 0 else None)  # fmt: skip
 
 
 def size_error(test: Test) -> Statement:
@@ -55,15 +56,16 @@ def size_error(test: Test) -> Statement:
     budget = length_budget(sphere.nominal, sphere.sd, degrees, test.circumstances)
     u = budget.u / MICROMETRE
     test.refuse_without_uncertainty(u, "u_um")
-    items = _items(test, probed, probed.size / MICROMETRE, u, signed=True)
+    known = test.at_least(u, sphere.nominal)
+    items = _items(test, probed, probed.size / MICROMETRE, known, signed=True)
     told = (
         say("u is the test uncertainty (ISO/TS 17865, as that of a length by ISO/TS 23165): {u:.2g} µm.", u=u)
         if u > 0
         else say("u_um is not stated: no uncertainty is considered, and no probability can be given.")
     )
-    causes = Causes(np.full((len(items), 1), u), np.zeros(len(items)), np.arange(len(items)))
+    causes = Causes(np.full((len(items), 1), known), np.zeros(len(items)), np.arange(len(items)))
     return test.stated(say("probing size error"), say("points"), items, [told, *_largest(items)], causes=causes,
-                       budget=budget if u > 0 else None)  # fmt: skip
+                       budget=test.budget_at_least(budget, sphere.nominal) if u > 0 else None)  # fmt: skip
 
 
 def range_of_centres(test: Test) -> Statement:
@@ -75,12 +77,13 @@ def range_of_centres(test: Test) -> Statement:
     u = test.circumstances.uncertainty.u_repeat_um
     test.refuse_without_uncertainty(u, "u_repeat_um")
     limit = float(test.limits_um(np.array([test.artefact.sizes[0].nominal]))[0])
+    known = test.at_least(u, test.artefact.sizes[0].nominal)
     items = []
     for number in np.unique(probed.measurement):
         own = _originals(test, probed) & (probed.measurement == number)
         if own.sum() > 1:
             value = float(np.ptp(probed.centres[own], axis=0).max()) / MICROMETRE
-            items.append(Decided(value, u, limit, test.decide(value, u, limit, signed=False), int(number)))
+            items.append(Decided(value, known, limit, test.decide(value, known, limit, signed=False), int(number)))
     test.refuse_nothing_measured(bool(items), "repeats of one sphere in its place")
     told = (
         say("u is what of the sphere changed between the repeats ([test_uncertainty] u_repeat_um).")

@@ -7,7 +7,7 @@ A standard decides one characteristic or several (E0, R0, P_FTU). Each goes by o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -23,15 +23,24 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, needed
+from cmm_uq.jobs.short_gauge import ShortGauge
 from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Floats
-from cmm_uq.uncertainty.budget import Budget
+from cmm_uq.uncertainty.budget import Budget, Line
 from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import MICROMETRE, unit
 
 NOT_CONSIDERED = say(
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
 )
+
+RAISED = say(
+    "Where the test uncertainty evaluated is smaller, u is half of the laboratory's calibration and measurement capability "
+    "([laboratory.cmc], k = 2)."
+)
+
+CMC = say("[laboratory.cmc]")
 
 BY_MEASUREMENT_ALONE = say(
     "Probabilities are what the measurement alone says, with nothing known of such machines beforehand: where the limit is "
@@ -67,6 +76,7 @@ class Characteristic:
     asks : what a complete test asks of artefact, probe and surroundings beside its points.
     also : other names of it.
     needs : the key of ``[test_uncertainty]`` without which a rule with an uncertainty says nothing.
+    beside : how a short gauge recorded beside the artefact enters; not at all where left out.
     """
 
     name: str
@@ -77,6 +87,7 @@ class Characteristic:
     asks: Callable[[Test], tuple[Condition, ...]] = _nothing_more
     also: tuple[str, ...] = ()
     needs: str | None = None
+    beside: Callable[[Artefact, ShortGauge | None], Artefact] | None = None
 
 
 @dataclass(frozen=True)
@@ -175,6 +186,28 @@ class Test:
         """One value by the rule and the prior of the job."""
         return decide(value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=self.prior(limit_um))
 
+    def least_u(self, lengths_mm: Floats) -> Floats:
+        """Standard uncertainty, µm, that each of some lengths (m,) is said to have at least: half the laboratory's capability.
+
+        The capability has k = 2 (ILAC-P14:09/2020); 0 where none is given.
+        """
+        cmc = self.circumstances.cmc
+        return np.array([0.5 * cmc.least(unit("µm"), float(each)) if cmc else 0.0 for each in lengths_mm])
+
+    def at_least(self, u_um: float, length_mm: float) -> float:
+        """A standard uncertainty not below that; one that is not stated stays 0."""
+        return max(u_um, float(self.least_u(np.array([length_mm]))[0])) if u_um > 0 else u_um
+
+    def budget_at_least(self, budget: Budget, length_mm: float) -> Budget:
+        """A budget of a test value, with a line for what the capability has more."""
+        scale = MICROMETRE if budget.unit == unit("mm") else 1.0
+        least = float(self.least_u(np.array([length_mm]))[0]) * scale
+        if not 0 < budget.u < least:
+            return budget
+        more = Line(say("raised to the laboratory's capability"), float(np.sqrt(least**2 - budget.variance)), CMC,
+                    unit=budget.unit)  # fmt: skip
+        return replace(budget, lines=[*budget.lines, more])
+
     def prior(self, limit_um: float) -> Known | None:
         """What the job says of an error with this limit beforehand."""
         given = self.facts.prior
@@ -239,6 +272,8 @@ class Test:
         if self.facts.prior is None and worst.u_um > 0:
             more.append(BY_MEASUREMENT_ALONE)
         more += self.standard.remarks
+        if self._raised(items):
+            more.append(RAISED)
         if copies := copies_in_words(self.recorded.points):
             more.append(copies)
         missing = tuple(text for condition in asked for text in condition.missing)
@@ -246,6 +281,14 @@ class Test:
             self.facts, self.characteristic.name, quantity, measured, items, missing, (*remarks, *more), signed,
             None if causes is None else _joint(items, causes, signed), budget, self._risks(worst, signed),
         )  # fmt: skip
+
+    def _raised(self, items: Sequence[Decided]) -> bool:
+        """Whether any was decided with the capability's uncertainty in place of a smaller one."""
+        if self.circumstances.cmc is None:
+            return False
+        nominal = self.artefact.sizes[0].nominal
+        least = self.least_u(np.array([nominal if item.length_mm is None else item.length_mm for item in items]))
+        return any(0 < item.u_um <= floor * (1 + 1e-9) for item, floor in zip(items, least, strict=True))
 
     def _risks(self, worst: Decided, signed: bool) -> Risks | None:
         """Of all machines alike, where such a length is decided by this rule."""

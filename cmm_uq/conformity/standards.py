@@ -33,8 +33,10 @@ from cmm_uq.conformity.plans import (
     ISO_10360_5,
     ISO_10360_8,
     VDI_2617_2_1,
+    Condition,
 )
 from cmm_uq.conformity.remeasured import Again
+from cmm_uq.conformity.short_gauge import repeats_of_gauge, supplemented
 from cmm_uq.conformity.spheres_decided import (
     diameter_allowed,
     form_error,
@@ -59,17 +61,28 @@ from cmm_uq.uncertainty.quantity import Quantity
 AGAIN = Again(repeats=3, outside=1, lengths=5, readings=10)
 """Of ISO 10360-2:2009; see docs/standards.md."""
 
+
+def _short_gauge_repeated(test: Test) -> tuple[Condition, ...]:
+    return repeats_of_gauge(
+        test.circumstances.short_gauge, test.indications(), ISO_10360_2.repeats, ISO_10360_2.shortest_mm
+    )
+
+
+def _asked_of_gauges(test: Test) -> tuple[Condition, ...]:
+    return (*normal_expansion(test), *_short_gauge_repeated(test))
+
+
 _E0 = Characteristic(
     "E0", LENGTHS, partial(errors_of_indication, chosen=at_offset(0.0), again=AGAIN), partial(conditions, ISO_10360_2),
-    length_unstated, normal_expansion,
+    length_unstated, _asked_of_gauges, beside=supplemented,
 )  # fmt: skip
 _R0 = Characteristic(
     "R0", LENGTHS, partial(repeatability_range, repeats=3, chosen=at_offset(0.0)), partial(conditions, ISO_10360_2),
-    needs="u_repeat_um",
+    asks=_short_gauge_repeated, needs="u_repeat_um", beside=supplemented,
 )  # fmt: skip
 _E150 = Characteristic(
     "E150", LENGTHS, partial(errors_of_indication, chosen=at_offset(150.0), again=AGAIN),
-    partial(best_of, ISO_10360_2_OFFSET), length_unstated, normal_expansion,
+    partial(best_of, ISO_10360_2_OFFSET), length_unstated, _asked_of_gauges, beside=supplemented,
 )  # fmt: skip
 _SPHERE = (partial(conditions, ISO_10360_5), partial(diameter_allowed, plan=ISO_10360_5))
 
@@ -166,9 +179,10 @@ def statement(
         raise CmmUqError(f"{facts.standard} is for {standard.sensing} probes, and the recording was made with one that is not",
                          where=f"job.toml {key} standard",
                          fix="State ISO 10360-8:2013 of optical probes, or leave the statement out")  # fmt: skip
-    return characteristic.statement(
-        Test(standard, characteristic, facts, artefact, recorded or artefact, accuracy, key, under)
-    )  # fmt: skip
+    whole, beside = recorded or artefact, characteristic.beside
+    if beside is not None:
+        artefact, whole = beside(artefact, under.short_gauge), beside(whole, under.short_gauge)
+    return characteristic.statement(Test(standard, characteristic, facts, artefact, whole, accuracy, key, under))
 
 
 def standard_named(name: str) -> Standard | None:

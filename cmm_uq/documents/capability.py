@@ -6,9 +6,6 @@ from dataclasses import replace
 
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.stating import Stating
-from cmm_uq.messages import Text, Verbatim, say
-from cmm_uq.uncertainty.rounding import significant
-from cmm_uq.units import unit
 
 
 def with_capability(result: Result) -> tuple[Result, Stating]:
@@ -24,24 +21,6 @@ def with_capability(result: Result) -> tuple[Result, Stating]:
         parameters={effect: stating.all(effect, found) for effect, found in result.parameters.items()},
         sizes=dict(result.sizes) | stating.all("artefact", {name: result.sizes[name] for name in reported}),
         accuracy=stating.all("accuracy", result.accuracy),
+        stating=stating,
     )
     return stated, stating
-
-
-def decided_below(result: Result, stating: Stating) -> list[Text]:
-    """Statements of conformity that rest on a smaller uncertainty than the laboratory may state."""
-    if stating.capability is None:
-        return []
-    found: list[Text] = []
-    for statement in result.statements:
-        length = statement.named.length_mm or stating.length_mm
-        least = stating.capability.least(unit("µm"), length)
-        if 0 < 2 * statement.u_um < least:
-            found.append(
-                say(
-                    "{standard} was decided with U = {U} µm, less than the laboratory's calibration and measurement "
-                    "capability of {least} µm ([laboratory.cmc]).",
-                    standard=Verbatim(statement.facts.standard), U=significant(2 * statement.u_um), least=significant(least),
-                )
-            )  # fmt: skip
-    return found

@@ -36,6 +36,7 @@ def _missing(facts: JobFile) -> list[Text]:
         (facts.laboratory.signatory, say("who authorises it (7.8.2.1 o)"), "[laboratory] signatory"),
         (facts.job.conditions, say("conditions (7.8.4.1 b)"), "[job] conditions"),
         *_of_the_artefact(facts),
+        *_of_the_short_gauge(facts),
     )
     missing = [say("{what}: {key}", what=what, key=Verbatim(key)) for given, what, key in wanted if not given]
     if not missing:
@@ -52,6 +53,22 @@ def _of_the_artefact(facts: JobFile) -> tuple[tuple[object, Text, str], ...]:
         (chain and chain.number, say("certificate of the artefact (7.8.4.1 c)"), "[artefact.certificate] number"),
         (
             chain and chain.laboratory, say("who certified the artefact (7.8.4.1 c)"), "[artefact.certificate] laboratory",
+        ),
+    )  # fmt: skip
+
+
+def _of_the_short_gauge(facts: JobFile) -> tuple[tuple[object, Text, str], ...]:
+    """What makes a short gauge beside the artefact traceable."""
+    if facts.short_gauge is None:
+        return ()
+    chain = facts.short_gauge.certificate
+    return (
+        (
+            chain and chain.number, say("certificate of the short gauge (7.8.4.1 c)"), "[short_gauge.certificate] number",
+        ),
+        (
+            chain and chain.laboratory, say("who certified the short gauge (7.8.4.1 c)"),
+            "[short_gauge.certificate] laboratory",
         ),
     )  # fmt: skip
 

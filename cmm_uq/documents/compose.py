@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from cmm_uq.documents import tolerance_section
 from cmm_uq.documents.as_found_section import as_found_data, as_found_section, quantities_left
-from cmm_uq.documents.capability import decided_below, with_capability
+from cmm_uq.documents.capability import with_capability
 from cmm_uq.documents.certificate import certificate_of
 from cmm_uq.documents.conformity_section import conformity_section
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
@@ -63,7 +63,7 @@ def _certificate(result: Result, page: Page, stating: Stating) -> Document:
         seed=result.posterior.seed,
     )
     files = (Verbatim(posterior_name(result.job.origin)),) if len(result.draws) else ()
-    told = (*warnings(result), *stating.warnings(), *decided_below(result, stating))
+    told = (*warnings(result), *stating.warnings())
     return certificate_of(result.job, sections, told, produced_by, files, in_short(result))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
-from cmm_uq.documents.budget_page import budget_blocks
+from cmm_uq.documents.conformity_budget import budget_table
 from cmm_uq.documents.conformity_plot import trumpet
 from cmm_uq.documents.document import Block, Column, Decision, Section, Table
 from cmm_uq.documents.wording import OUTCOME_WORDS, measured, probability
@@ -26,7 +26,7 @@ def conformity_section(statements: Sequence[Statement]) -> Section:
         if len(statement.errors) > 1:
             blocks += _evidence(statement)
         elif statement.budget is not None:
-            blocks += budget_blocks(_subject(statement), statement.budget)[:1]
+            blocks.append(budget_table(_subject(statement), statement.budget))
     return Section(say("Statements of conformity"), tuple(blocks))
 
 
@@ -119,7 +119,7 @@ def _evidence(statement: Statement) -> list[Block]:
         blocks.append(_picture(statement))
     blocks.append(_table(statement))
     if statement.budget is not None:
-        blocks += budget_blocks(_subject(statement), statement.budget)[:1]
+        blocks.append(budget_table(_subject(statement), statement.budget))
     return blocks
 
 

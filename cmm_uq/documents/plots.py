@@ -88,7 +88,7 @@ def length_plot(
             ax.axhspan(-reference_expanded_um, reference_expanded_um, color=BAND, lw=0, zorder=0)
             ax.axhline(0, color=INK, lw=0.7, zorder=1)
             bars(ax, x, values - half, values + half, max(0.28 * size, 0.6), colour)
-            dots(ax, x, values, size, colour)
+            dots(ax, x, values, size, colour, hollow=colour == MUTED)  # the two series differ in grey too
             _mark(ax, x[marked], values[marked], size)
             ax.grid(axis="y")
             ax.margins(y=0.08)

@@ -124,6 +124,7 @@ class Result:
     accuracy : figures of the lengths, by name; empty for artefacts without lengths.
     statements : of conformity, in the job's order.
     diagnosed : what the job's model leaves out, if anything.
+    stating : how a certificate states it; ``None`` of a result as evaluated.
     """
 
     job: Job
@@ -138,6 +139,15 @@ class Result:
     accuracy: Mapping[str, Quantity]
     statements: tuple[Statement, ...]
     diagnosed: Diagnosed
+    stating: Stating | None = None
+
+    def at_least(
+        self, name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
+    ) -> tuple[float, float]:
+        """U and k as a certificate states them; see :meth:`Stating.raised_to`."""
+        if self.stating is None:
+            return expanded, factor
+        return self.stating.raised_to(name, expanded, factor, unit, length_mm)
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
         """Every quantity that is reported, with its name."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +12,20 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.laboratory import Capability
 from cmm_uq.messages import Text, commas, names, say
 from cmm_uq.uncertainty.quantity import Quantity
+
+AtLeast = Callable[..., tuple[float, float]]
+"""U and k of a figure as a certificate states them; see :meth:`Stating.raised_to`."""
+
+
+def as_evaluated(
+    name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
+) -> tuple[float, float]:
+    """Nothing raised."""
+    return expanded, factor
+
+
+CAPABILITY_FACTOR = 2.0
+"""Coverage factor of a calibration and measurement capability (ILAC-P14:09/2020)."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +56,25 @@ class Stating:
         if quantity.expanded < least:
             self.raised[name] = {"evaluated_U": quantity.expanded, "U": least}
         return quantity.at_least(least)
+
+    def raised_to(
+        self, name: str, expanded: float, factor: float, unit_: str, length_mm: float | None = None
+    ) -> tuple[float, float]:
+        """U and k of a figure that is no :class:`Quantity`, U not below the capability, k = 2 where it is that.
+
+        Parameters
+        ----------
+        name : as in results.json.
+        expanded, factor : as evaluated; U in ``unit_``.
+        length_mm : that the capability is taken at; without it that of the certificate.
+        """
+        least = (
+            self.capability.least(unit_, self.length_mm if length_mm is None else length_mm) if self.capability else 0.0
+        )
+        if expanded >= least:
+            return expanded, factor
+        self.raised.setdefault(name, {"evaluated_U": expanded, "U": least})
+        return least, CAPABILITY_FACTOR
 
     def all(self, group: str, quantities: Mapping[str, Quantity]) -> dict[str, Quantity]:
         """Quantities of one group, each under ``group.name``."""

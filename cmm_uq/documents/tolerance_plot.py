@@ -55,14 +55,20 @@ def tolerance_plot(
             across = np.column_stack([*(np.clip(end[chosen], -reach, reach) for end in ends), gaps]).ravel()
             up = np.column_stack([rows[chosen], rows[chosen], gaps]).ravel()
             ax.plot(across, up, lw=1.6, color=colour, solid_capstyle="butt", zorder=2)
-            dots(ax, inside, rows[chosen], 4.0, colour)
+            if colour == ACCENT:
+                dots(ax, inside, rows[chosen], 4.0, colour)
+            else:
+                ax.plot(inside, rows[chosen], ls="", marker="x", ms=6.0, mec=colour, mew=1.6, zorder=4)
         for row in np.flatnonzero(np.abs(value) > reach):
             side = np.sign(value[row])
             text = f"{value[row]:+.1f}".replace("-", "−")
             ax.annotate(text, (side * reach, row), (-6 * side, 4), textcoords="offset points",
                         ha="right" if side > 0 else "left", color=MUTED)  # fmt: skip
         ax.set_yticks(rows, names)
-        ax.set(xlim=(-1.02 * reach, 1.02 * reach), xlabel=say("Parameter over its tolerance (band: inside)"))
+        ax.set(
+            xlim=(-1.02 * reach, 1.02 * reach),
+            xlabel=say("Parameter over its tolerance (band: inside; cross: outside beyond doubt)"),
+        )
         ax.invert_yaxis()
         ax.tick_params(left=False)
         ax.spines["left"].set_visible(False)

@@ -8,7 +8,8 @@ from cmm_uq.documents.wording import expanded
 from cmm_uq.jobs.artefact import Traceability
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.messages import Text, Verbatim, commas, day, names, say, sentences
+from cmm_uq.jobs.short_gauge import ShortGaugeFacts
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, sentences
 from cmm_uq.model.artefact import Size
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -112,8 +113,19 @@ def traceability(result: Result) -> Section:
         cte = say("{cte:g} × 10⁻⁶ /K", cte=artefact.cte_per_k * 1e6)
         rows.append((say("Coefficient of thermal expansion"), cte))
     rows += certificate_rows(artefact.certificate)
+    rows += _short_gauge(result.job.facts.short_gauge)
     rows += [_fitted(size, result.sizes[size.name]) for size in certified]
     return traceability_section(result.job, tuple(rows))
+
+
+def _short_gauge(gauge: ShortGaugeFacts | None) -> list[tuple[Text, Text]]:
+    """The short gauge beside the artefact, with its own certificate."""
+    if gauge is None:
+        return []
+    figure = say("{length:.10g} mm at 20 °C, u = {u:g} µm", length=gauge.length_mm, u=gauge.u_um)
+    what = commas((*names(filter(None, (gauge.name, gauge.serial))), figure))
+    chain = [text for _, text in certificate_rows(gauge.certificate) if text]
+    return [(say("Short gauge"), what), (say("Certificate of the short gauge"), sentences(chain) if chain else NOTHING)]
 
 
 def _certified(size: Size) -> tuple[Text, Text]:

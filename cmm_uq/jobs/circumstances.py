@@ -7,6 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from cmm_uq.jobs.laboratory import Capability
+from cmm_uq.jobs.short_gauge import ShortGauge
 from cmm_uq.jobs.table import Table, Temperature, Uncertainty
 
 
@@ -78,9 +80,13 @@ class Circumstances:
     ----------
     uncertainty, rated, probe : as the job states them.
     cte_per_k : coefficient of expansion of the artefact, 1/K; ``None`` where it is not stated.
+    short_gauge : recorded beside lengths that are not bidirectional by themselves.
+    cmc : of the laboratory, below which no test value is said to be known.
     """
 
     uncertainty: TestUncertainty = field(default_factory=TestUncertainty)
     rated: RatedConditions = field(default_factory=RatedConditions)
     probe: ProbeFacts = field(default_factory=ProbeFacts)
     cte_per_k: float | None = None
+    short_gauge: ShortGauge | None = None
+    cmc: Capability | None = None

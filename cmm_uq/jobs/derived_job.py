@@ -20,6 +20,8 @@ PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100
 OF_THE_CERTIFICATE = ("number", "issued", "recalibration_agreed", "as_found")
 """Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
+OF_THE_RECORDED_MACHINE = ("short_gauge",)
+"""Tables that speak of the machine as it was recorded, not of one simulated or compensated."""
 IN_THE_RECORDING = ("temperature_log",)
 """Keys of ``[machine]`` whose figures stand in every recording that a command writes."""
 
@@ -65,6 +67,9 @@ def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...]
             del table[key]
     for key, value in changes.items():
         table[key] = _inline(value) if isinstance(document, tomlkit.TOMLDocument) else deepcopy(value)
+    for key in OF_THE_RECORDED_MACHINE:
+        if key in document:
+            del document[key]
     for key in without:
         if key in document["machine"]:
             del document["machine"][key]

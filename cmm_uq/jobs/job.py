@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -22,6 +22,7 @@ from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.table import (
     Limit,
     Names,
@@ -122,6 +123,7 @@ class JobFile(Table):
     machine: MachineFacts
     artefact: ArtefactFacts
     recording: RecordingFacts
+    short_gauge: ShortGaugeFacts | None = None
     probe: ProbeFacts = ProbeFacts()
     test_uncertainty: TestUncertainty = TestUncertainty()
     rated_conditions: RatedConditions = RatedConditions()
@@ -159,7 +161,8 @@ class JobFile(Table):
         probe = self.probe.model_copy(update={"sensing": _sensing(self.probe, self.machine)})
         stated = "cte_per_k" in self.artefact.model_fields_set
         return Circumstances(
-            self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None
+            self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None,
+            cmc=self.laboratory.cmc,
         )  # fmt: skip
 
     @model_validator(mode="before")
@@ -199,6 +202,7 @@ class Job:
     altered : names of files that were changed after a command derived them.
     planned : whether the recording holds the nominal coordinates of a plan.
     as_found : what the machine showed before it was adjusted, where the job names it.
+    short_gauge : recorded beside the artefact, where the job names one.
     """
 
     folder: Path
@@ -208,6 +212,12 @@ class Job:
     altered: tuple[str, ...] = ()
     planned: bool = False
     as_found: AsFound | None = None
+    short_gauge: ShortGauge | None = None
+
+    @property
+    def circumstances(self) -> Circumstances:
+        """Under which a standard's test was carried out, with the short gauge recorded beside it."""
+        return replace(self.facts.circumstances, short_gauge=self.short_gauge)
 
     @property
     def origin(self) -> Origin:

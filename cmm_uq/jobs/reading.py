@@ -26,6 +26,8 @@ from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.results_named import results_named
+from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
+from cmm_uq.jobs.short_gauge import ShortGauge, short_gauge_of
 from cmm_uq.jobs.source import InFolder, InMemory, Source
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
@@ -91,6 +93,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     machine = _machine(facts.machine)
     maps, logs, calibrations = _of_the_machine(facts.machine)
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
+    recordings += [facts.short_gauge.file] if facts.short_gauge else []
     check_distinct([*recordings, *maps, *logs, *calibrations], str(path))
     before = results_named(facts.job.as_found)
     others = calibrations if before is None else [*calibrations, before]
@@ -118,7 +121,17 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
         then = read_recording(inputs[earlier], str(folder / earlier), machine)
         points = against_earlier(points, then, facts.artefact.cte_per_k, where)
     found = as_found_of(before, inputs, folder, facts.job.origin, facts.machine.name, facts.machine.serial)
-    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found)
+    gauge = _short_gauge(facts, inputs, folder, machine)
+    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge)
+
+
+def _short_gauge(facts: JobFile, inputs: Mapping[str, bytes], folder: Path, machine: Machine) -> ShortGauge | None:
+    """What was recorded of it, under the same mark of origin as the recording itself."""
+    if facts.short_gauge is None:
+        return None
+    content, where = inputs[facts.short_gauge.file], str(folder / facts.short_gauge.file)
+    check_mark(folder, facts.job.origin, content, where)
+    return short_gauge_of(facts.short_gauge, content, where, machine)
 
 
 def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
@@ -129,6 +142,8 @@ def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
                          fix="Leave [recording] out, and name what is measured under [machine]")  # fmt: skip
     if facts.machine.temperature_log is not None:
         raise CmmUqError(none, where=f"{path}: {KEY}", fix="Leave the log out")
+    if facts.short_gauge is not None:
+        raise CmmUqError(none, where=f"{path}: {SHORT_GAUGE}", fix="Leave the short gauge out")
 
 
 def read_machine(folder: Path, nameable: Nameable) -> Job:

@@ -31,12 +31,14 @@ class Indications:
     lengths : (m,) calibrated lengths, mm.
     u : (m,) standard uncertainty of the calibrated lengths, mm.
     rows : (m, 2) the points between which each length was measured, as rows of the recording.
+    u_beside : (m,) what of ``u`` comes from a further gauge that is shared by all that have it, mm; ``None``: nothing.
     """
 
     errors: Floats
     lengths: Floats
     u: Floats
     rows: Ints
+    u_beside: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)

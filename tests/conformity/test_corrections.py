@@ -46,7 +46,7 @@ def told(
     )  # fmt: skip
     described = kind_named(after.artefact.kind)
     assert described is not None
-    job: Any = SimpleNamespace(facts=SimpleNamespace(conformity=wishes, circumstances=Circumstances()))
+    job: Any = SimpleNamespace(facts=SimpleNamespace(conformity=wishes), circumstances=Circumstances())
     return consequences(job, diagnosis, partial(kind, facts), described.tested, 0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +16,7 @@ from cmm_uq.documents.conditions import conditions
 from cmm_uq.documents.traceability_section import statement_of_traceability
 from cmm_uq.jobs.artefact import Traceability
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.short_gauge import ShortGaugeFacts
 from tests.conftest import ROOT
 
 CERTIFIED = {
@@ -145,3 +147,18 @@ def test_the_conditions_are_those_stated_and_the_least_and_largest_recorded_temp
         "Temperatures recorded": "artefact −3.25 to 31.00 °C",
     }
     assert conditions(changed(job, job={"conditions": ""})).rows == ()
+
+
+def test_the_page_on_certificates_tells_of_every_clause_once_and_of_every_key_that_is_warned_of() -> None:
+    """ISO/IEC 17025:2017, 7.8.2.1 a to p and 7.8.4.1 a to f; rows marked as warned name exactly the keys of the warnings."""
+    page = (ROOT / "docs" / "certificate.md").read_text(encoding="utf-8")
+    table = page.split("| clause | asks for |")[1].split("\n\n")[0].splitlines()[2:]
+    cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in table]
+    letters = [cell[0].removeprefix("7.8.2.1 ").removeprefix("7.8.4.1 ") for cell in cells]
+    after = letters.index("7.8.2.2")
+    assert "".join(letters[:after]) == "abcdefghijklmnop"
+    assert "".join(letters[after + 1 :])[:6] == "abcdef"
+    warned = {key for cell in cells if "warned" in cell[2] for key in re.findall(r"`([^`]+)`", cell[3]) if "[" in key}
+    gauge = ShortGaugeFacts(file="s.csv", length_mm=20.0, u_um=0.1)
+    bare = measured("step-gauge-simulated", job={"origin": "measured", "procedure": ""})
+    assert warned == set(missing(replace(bare, facts=bare.facts.model_copy(update={"short_gauge": gauge}))))

@@ -67,7 +67,8 @@ def test_bars_are_as_long_as_the_expanded_uncertainty() -> None:
 def test_flagged_positions_wear_a_ring_in_both_panels() -> None:
     plain, ringed = Drawing(lengths().svg), Drawing(lengths(flagged=np.arange(20) == 4).svg)
     rings = [mark for mark in ringed.marks if mark not in plain.marks]
-    dots = [d for d in ringed.drawn(stroke_linecap="round") if len(outlines(d)) == 20]
+    drawn = [d for colour in (MUTED, ACCENT) for d in ringed.drawn(stroke=colour, stroke_linecap="round")]
+    dots = [d for d in drawn if len(outlines(d)) == 20]
     expected = sorted(tuple(strokes(d)[4, 0]) for d in dots)
     assert np.allclose(sorted(rings), expected, atol=0.02)
     assert any("flagged by screening" in text for text in ringed.texts)

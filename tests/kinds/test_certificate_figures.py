@@ -95,8 +95,11 @@ def decided(results: Results) -> list[Record]:
 
 
 def of_test_value(results: Results) -> list[Record]:
+    """Lines that contribute, in µm as printed."""
     (stated,) = results["conformity"]
-    return [[line] for line in stated["test_uncertainty"]["budget"]]
+    lines = stated["test_uncertainty"]["budget"]
+    scale = 1e3 if any(line["unit"] == "mm" for line in lines) else 1.0
+    return [[line | {"contribution": scale * line["contribution"]}] for line in lines if line["contribution"]]
 
 
 STATED = ("ASME B89.4.1-1997", "ISO 10360-2:2009", "ISO 10360-5:2010", "VDI/VDE 2617")

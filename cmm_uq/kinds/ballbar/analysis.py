@@ -45,7 +45,7 @@ def results(result: Result) -> dict[str, Any]:
         "lengths": found.lengths.as_data(),
         "length_budget": budget_data(found.budget),
         "adjustments": [setting.as_data() for setting in found.settings],
-        **second_way_data(found.second_way),
+        **second_way_data(found.second_way, result.at_least),
     }
 
 

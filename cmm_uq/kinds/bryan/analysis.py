@@ -41,5 +41,5 @@ def results(result: Result) -> dict[str, Any]:
     return {
         "lengths": found.lengths.as_data(),
         "adjustments": [setting.as_data() for setting in found.settings],
-        **second_way_data(found.second_way),
+        **second_way_data(found.second_way, result.at_least),
     }

@@ -15,13 +15,14 @@ from typing import Any
 
 import numpy as np
 
+from cmm_uq.documents.stating import AtLeast, as_evaluated
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.distances.symmetric_systems import by_doolittle, by_jacobi
 from cmm_uq.messages import Text, commas, plural, say
 from cmm_uq.physics.rigid_body import SCALE, SQUARENESS
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.degrees_of_freedom import coverage_factor
-from cmm_uq.units import ARCSECOND, MICROMETRE, PPM
+from cmm_uq.units import ARCSECOND, MICROMETRE, PPM, unit
 
 UNKNOWNS = 6
 
@@ -82,9 +83,25 @@ class DistanceSolution:
         """(3,) squareness X–Y, Y–Z, Z–X: what each angle has more than 90°."""
         return np.asarray((self.angles_rad - np.pi / 2) / ARCSECOND)
 
-    def as_data(self) -> dict[str, Any]:
+    def expanded(self, at_least: AtLeast = as_evaluated) -> tuple[tuple[float, float], ...] | None:
+        """U and k of each of the six factors; ``None`` where the residuals have no degrees of freedom.
+
+        Parameters
+        ----------
+        at_least : raises a U that a certificate does not state; by default none.
+        """
+        factors = self.coverage_factors
+        if factors is None:
+            return None
+        return tuple(
+            at_least(f"distance_equations.{effect}.{parameter}", factors[i] * float(self.u[i]), factors[i],
+                     unit("ppm" if parameter == "ppm" else "″"))
+            for i, (effect, parameter) in enumerate(FACTORS)
+        )  # fmt: skip
+
+    def as_data(self, at_least: AtLeast = as_evaluated) -> dict[str, Any]:
         """For results.json: e1 … e6 with their covariance, the six factors and the angles that they give."""
-        u, k = self.u.tolist(), self.coverage_factors
+        u, stated = self.u.tolist(), self.expanded(at_least)
         values = [*self.scales_ppm.tolist(), *self.squareness_arcsec.tolist()]
         return {
             "e": self.e.tolist(),
@@ -94,8 +111,8 @@ class DistanceSolution:
                     parameter: {
                         "value": values[i],
                         "u": u[i],
-                        "U": None if k is None else k[i] * u[i],
-                        "k": None if k is None else k[i],
+                        "U": None if stated is None else stated[i][0],
+                        "k": None if stated is None else stated[i][1],
                     }
                 }
                 for i, (effect, parameter) in enumerate(FACTORS)
@@ -134,12 +151,12 @@ class DistanceSolution:
         return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", jacobian, self.covariance, jacobian)), dtype=np.float64)
 
 
-def second_way_data(second_way: DistanceSolution | Text) -> dict[str, Any]:
+def second_way_data(second_way: DistanceSolution | Text, at_least: AtLeast) -> dict[str, Any]:
     """A solution, or why there is none, and what its uncertainties are conditional on, for results.json."""
     if isinstance(second_way, str):
         return {"distance_equations": {"refused": second_way}}
     return {
-        "distance_equations": second_way.as_data(),
+        "distance_equations": second_way.as_data(at_least),
         "conditional": {"distance_equations": second_way.conditional_on},
     }
 

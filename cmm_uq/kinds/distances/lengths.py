@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.documents.result import Result
 from cmm_uq.points import Floats, Ints
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +68,11 @@ def lengths_of(result: Result, length: Floats, reference: float) -> Lengths:
     reference : that it is compared with, mm.
     """
     artefact = result.artefact
-    expanded = result.noise.expanded * float(artefact.noise_scale[0])
+    noise = result.noise
+    expanded, factor = result.at_least(
+        "lengths.U_um", noise.expanded * float(artefact.noise_scale[0]), noise.coverage_factor, unit("µm"), reference
+    )
     return Lengths(
         artefact.measurement, artefact.repeat, length, reference, result.residuals / MICROMETRE, expanded,
-        result.noise.coverage_factor, result.model.used, result.flagged,
+        factor, result.model.used, result.flagged,
     )  # fmt: skip

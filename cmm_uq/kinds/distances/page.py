@@ -65,13 +65,13 @@ def _second_way(result: Result, solution: DistanceSolution | Text, remarks: tupl
                 tone="note",
             )
         ]
-    values, factors = [*solution.scales_ppm, *solution.squareness_arcsec], solution.coverage_factors
+    values, stated = [*solution.scales_ppm, *solution.squareness_arcsec], solution.expanded(result.at_least)
     rows: list[tuple[Text, ...]] = []
     for i, (effect, _) in enumerate(FACTORS):
         value, U, k = number(values[i], ".4g"), NOTHING, NOTHING
-        if factors is not None:
-            value, U = rounded(float(values[i]), float(factors[i] * solution.u[i]))
-            k = number(factors[i], ".2f")
+        if stated is not None:
+            value, U = rounded(float(values[i]), stated[i][0])
+            k = number(stated[i][1], ".2f")
         name = (
             say("Scale error of {axis}", axis=Verbatim(effect[-1].upper()))
             if i < 3

@@ -10,11 +10,12 @@ import numpy as np
 from cmm_uq.conformity.measurement_lines import position_on, share_of_travel
 from cmm_uq.conformity.plans import ISO_10360_2
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.stating import AtLeast
 from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.messages import Text
 from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
-from cmm_uq.units import MICROMETRE, PPM
+from cmm_uq.units import MICROMETRE, PPM, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,7 @@ class LineFigures:
     share : of the travel along it; ``None`` where no travel is stated.
     scale_u_ppm, scale_factor : standard uncertainty of the slope, and k for 95 %.
     gap_u_um, gap_factor : of the bidirectional error; ``None`` without one.
+    at_least : raises a U that a certificate does not state.
     """
 
     line: GaugeLine
@@ -37,16 +39,19 @@ class LineFigures:
     scale_factor: float
     gap_u_um: float | None
     gap_factor: float
+    at_least: AtLeast
 
     @property
-    def expanded_scale_ppm(self) -> float:
-        """U of the slope."""
-        return self.scale_factor * self.scale_u_ppm
+    def expanded_scale_ppm(self) -> tuple[float, float]:
+        """U and k of the slope."""
+        return self.at_least("lines.slope_ppm", self.scale_factor * self.scale_u_ppm, self.scale_factor, unit("µm/m"))
 
     @property
-    def expanded_gap_um(self) -> float | None:
-        """U of the bidirectional error; ``None`` without one."""
-        return None if self.gap_u_um is None else self.gap_factor * self.gap_u_um
+    def expanded_gap_um(self) -> tuple[float, float] | None:
+        """U and k of the bidirectional error; ``None`` without one."""
+        if self.gap_u_um is None:
+            return None
+        return self.at_least("lines.bidirectional_um", self.gap_factor * self.gap_u_um, self.gap_factor, unit("µm"))
 
     @property
     def short(self) -> bool:
@@ -64,8 +69,8 @@ class LineFigures:
             "slope_ppm": {
                 "value": line.scale_ppm,
                 "u": self.scale_u_ppm,
-                "U": self.expanded_scale_ppm,
-                "k": self.scale_factor,
+                "U": self.expanded_scale_ppm[0],
+                "k": self.expanded_scale_ppm[1],
             },
             "off_slope_um": line.linearity / MICROMETRE,
             "bidirectional_um": None
@@ -73,8 +78,8 @@ class LineFigures:
             else {
                 "value": line.gap / MICROMETRE,
                 "u": self.gap_u_um,
-                "U": self.expanded_gap_um,
-                "k": self.gap_factor,
+                "U": None if self.expanded_gap_um is None else self.expanded_gap_um[0],
+                "k": self.gap_factor if self.expanded_gap_um is None else self.expanded_gap_um[1],
             },
             "periodic": None
             if periodic is None
@@ -107,6 +112,7 @@ def figures(result: Result) -> GaugeFigures:
             float(np.hypot(line.scale_noise * sigma, relative / PPM)),
             factor_of_noise(result.noise.coordinate, line.scale_noise * sigma, relative / PPM),
             None if line.gap is None else line.gap_noise * sigma / MICROMETRE, result.noise.coverage_factor,
+            result.at_least,
         )
         for line in lines_of(gauge)
     )  # fmt: skip

@@ -32,7 +32,9 @@ def sections(result: Result) -> list[Section]:
 
 def _plot(result: Result, gauge: StepGauge) -> Block:
     deviations, residuals = gauge.deviations() / MICROMETRE, result.residuals / MICROMETRE
-    expanded = result.noise.expanded
+    expanded, factor = result.at_least(
+        "lines.faces_um", result.noise.expanded, result.noise.coverage_factor, unit("µm")
+    )
     return length_plot(
         _side_by_side(gauge),
         deviations,
@@ -45,7 +47,7 @@ def _plot(result: Result, gauge: StepGauge) -> Block:
         caption=say(
             "Deviation of each face from its certified distance, as recorded and after the fitted model, "
             "with U (k = {k}).",
-            k=number(result.noise.coverage_factor, ".2f"),
+            k=number(factor, ".2f"),
         ),
         alternative=deviating(
             say("{faces} faces on {lines} lines: as recorded they deviate", faces=len(deviations),
@@ -68,7 +70,7 @@ def _table(result: Result, found: tuple[LineFigures, ...]) -> Table:
     rows: list[tuple[Text, ...]] = []
     for one in found:
         line = one.line
-        scale, U = rounded(line.scale_ppm, one.expanded_scale_ppm)
+        scale, U = rounded(line.scale_ppm, one.expanded_scale_ppm[0])
         linearity = rounded(line.linearity / MICROMETRE, noise)[0]
         row: list[Text] = [
             number(line.measurement),
@@ -116,7 +118,7 @@ def _table(result: Result, found: tuple[LineFigures, ...]) -> Table:
 def _gap(one: LineFigures) -> tuple[Text, Text]:
     if one.line.gap is None or one.expanded_gap_um is None:
         return (NOTHING, NOTHING)
-    return rounded(one.line.gap / MICROMETRE, one.expanded_gap_um)
+    return rounded(one.line.gap / MICROMETRE, one.expanded_gap_um[0])
 
 
 def _periodic(lines: tuple[LineFigures, ...]) -> list[Block]:

@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.stating import AtLeast
 from cmm_uq.documents.wording import refusal
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.triangle.equations import PARAMETERS, solve_equations
@@ -19,7 +20,7 @@ from cmm_uq.messages import Text
 from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
-from cmm_uq.units import ARCSECOND, MICROMETRE, Unit
+from cmm_uq.units import ARCSECOND, MICROMETRE, Unit, unit
 
 SIDES = ("1–2", "2–3", "3–1")
 
@@ -69,17 +70,27 @@ class Sides:
 
 @dataclass(frozen=True)
 class ByEquations:
-    """A parameter by the source's equations, in the unit of its effect, with its standard uncertainty and k for 95 %."""
+    """A parameter by the source's equations, in the unit of its effect: u, k for 95 %, and how U is stated."""
 
     effect: str
     value: float
     u: float
-    coverage_factor: float
+    factor: float
+    at_least: AtLeast
 
     @property
     def expanded(self) -> float:
         """U."""
-        return self.coverage_factor * self.u
+        return self._stated[0]
+
+    @property
+    def coverage_factor(self) -> float:
+        """K of it."""
+        return self._stated[1]
+
+    @property
+    def _stated(self) -> tuple[float, float]:
+        return self.at_least(f"equations.{self.effect}", self.factor * self.u, self.factor, self.unit)
 
     @property
     def title(self) -> Text:
@@ -127,8 +138,10 @@ class TriangleFigures:
         before = (found - triangle.standard.sides) / MICROMETRE
         after = (found - _lengths(triangle, predicted)) / MICROMETRE
         measurement = points.measurement[np.lexsort((points.point, points.group))].reshape(-1, 3)[:, 0]
-        noise = self.result.noise
-        return Sides(measurement, before, after, float(np.sqrt(2)) * noise.expanded, noise.coverage_factor)
+        noise, longest = self.result.noise, float(np.max(triangle.standard.sides))
+        return Sides(measurement, before, after, *self.result.at_least(
+            "sides.U_um", float(np.sqrt(2)) * noise.expanded, noise.coverage_factor, unit("µm"), longest
+        ))  # fmt: skip
 
     @cached_property
     def equations(self) -> tuple[ByEquations, ...] | Text:
@@ -141,7 +154,13 @@ class TriangleFigures:
         noise, dimensions = self.result.noise.coordinate, triangle.standard.u
         by_noise, known = solution.u(noise.value * MICROMETRE, 0 * dimensions), solution.u(0.0, dimensions)
         return tuple(
-            ByEquations(name, float(value), float(np.hypot(one, other)), factor_of_noise(noise, one, other))
+            ByEquations(
+                name,
+                float(value),
+                float(np.hypot(one, other)),
+                factor_of_noise(noise, one, other),
+                self.result.at_least,
+            )
             for name, value, one, other in zip(PARAMETERS, solution.values, by_noise, known, strict=True)
         )
 

@@ -49,6 +49,7 @@ def length_test_uncertainty(
     u_temperature_k: float = 0.0,
     u_alignment_mm: float = 0.0,
     u_fixturing_mm: float = 0.0,
+    u_beside_mm: float = 0.0,
 ) -> Budget:
     """Test uncertainty of an error of length measurement E (ISO/TS 23165:2006), mm.
 
@@ -57,6 +58,7 @@ def length_test_uncertainty(
     u_calibration_mm : of the artefact's calibrated length.
     temperature_c, cte_per_k : of the artefact during the test.
     u_alignment_mm, u_fixturing_mm : by misalignment and by what the clamping does to the length.
+    u_beside_mm : of the short gauge measured beside lengths that are not bidirectional by themselves; no line where 0.
     """
     return Budget(
         say("test value of the error of length measurement, {length_mm:g} mm", length_mm=length_mm),
@@ -73,6 +75,11 @@ def length_test_uncertainty(
             ),
             Line(say("alignment of the artefact"), u_alignment_mm, JUDGEMENT, unit=unit("mm")),
             Line(say("fixturing of the artefact"), u_fixturing_mm, JUDGEMENT, unit=unit("mm")),
+            *(
+                [Line(say("calibration of the short gauge"), u_beside_mm, CERTIFICATE, unit=unit("mm"))]
+                if u_beside_mm
+                else []
+            ),
         ],
         unit=unit("mm"),
         factor=FACTOR,
