@@ -16,7 +16,7 @@ from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.documents.stating import Stating
 from cmm_uq.inference.draws import Draws
 from cmm_uq.inference.least_squares import LeastSquares
-from cmm_uq.inference.posterior import Posterior
+from cmm_uq.inference.posterior import NoisyPosterior
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
@@ -131,7 +131,7 @@ class Result:
     model: MeasurementModel
     findings: tuple[Finding, ...]
     estimate: Estimate
-    posterior: Posterior
+    posterior: NoisyPosterior
     draws: Draws
     parameters: Mapping[str, Mapping[str, Quantity]]
     sizes: Mapping[str, Quantity]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -11,11 +11,16 @@ from cmm_uq.conformity.measurement_lines import position_on, share_of_travel
 from cmm_uq.conformity.plans import ISO_10360_2
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.stating import AtLeast
+from cmm_uq.inference.combinations import uncertainty_of_sum
+from cmm_uq.inference.draws import evenly
 from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.messages import Text
-from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
+from cmm_uq.model.noise import noise_of
 from cmm_uq.units import MICROMETRE, PPM, unit
+
+_DRAWS = 2000
+"""Of the sizes of the noise, over which a line's uncertainties are taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,22 +107,23 @@ class GaugeFigures:
 
 def figures(result: Result) -> GaugeFigures:
     """Of a result."""
-    gauge, sigma = cast("StepGauge", result.artefact), result.noise.coordinate.value * MICROMETRE
+    gauge, sizes = cast("StepGauge", result.artefact), result.posterior.sizes
+    every = replace(result.model, used=np.ones_like(result.model.used))
+    components, sizes = noise_of(every), sizes.at(evenly(len(sizes.placing), _DRAWS))
     size, machine = gauge.sizes[0], gauge.points.machine
     relative = size.sd / size.nominal if size.certified else 0.0
-    lines = tuple(
-        LineFigures(
+    lines = []
+    for line in lines_of(gauge):
+        scale_u, scale_expanded = uncertainty_of_sum(components, sizes, line.scale_weights, relative / PPM)
+        gap_u, gap_expanded = uncertainty_of_sum(components, sizes, line.gap_weights / MICROMETRE)
+        lines.append(LineFigures(
             line, position_on(machine, line.middle, line.direction),
             share_of_travel(machine, line.middle, line.direction, line.length),
-            float(np.hypot(line.scale_noise * sigma, relative / PPM)),
-            factor_of_noise(result.noise.coordinate, line.scale_noise * sigma, relative / PPM),
-            None if line.gap is None else line.gap_noise * sigma / MICROMETRE, result.noise.coverage_factor,
-            result.at_least,
-        )
-        for line in lines_of(gauge)
-    )  # fmt: skip
+            scale_u, scale_expanded / scale_u, None if line.gap is None else gap_u,
+            gap_expanded / gap_u if gap_u else 2.0, result.at_least,
+        ))  # fmt: skip
     found = {one.position for one in lines}
-    return GaugeFigures(lines, tuple(position for position in ISO_10360_2.positions if position not in found))
+    return GaugeFigures(tuple(lines), tuple(position for position in ISO_10360_2.positions if position not in found))
 
 
 def results(result: Result) -> dict[str, Any]:

@@ -45,10 +45,10 @@ class GaugeLine:
     length : from its first to its farthest face, by the certificate, mm.
     faces : different ones.
     scale_ppm : slope of deviation over distance.
-    scale_noise : standard uncertainty of the slope, ppm, for 1 mm of that of a coordinate.
+    scale_weights : (n,) of all observations, mm, in ``scale_ppm``.
     linearity : largest deviation from that slope, of the mean of each face, mm.
     gap : mean difference of faces reached from both sides, outward minus inward, mm; ``None`` when there are none.
-    gap_noise : its standard uncertainty for 1 mm of that of a coordinate.
+    gap_weights : (n,) of all observations in ``gap``.
     periodic : the periodic part, where there is one.
     """
 
@@ -58,10 +58,10 @@ class GaugeLine:
     length: float
     faces: int
     scale_ppm: float
-    scale_noise: float
+    scale_weights: Floats
     linearity: float
     gap: float | None
-    gap_noise: float
+    gap_weights: Floats
     periodic: Periodic | None
 
 
@@ -76,13 +76,14 @@ def lines_of(gauge: StepGauge) -> tuple[GaugeLine, ...]:
         about = gauge.reference[rows] - gauge.reference[rows].mean()
         slope = float(about @ deviations[rows] / (about @ about))
         rest = means - means.mean() - slope * (faces - faces.mean())
-        gap, gap_noise = None, 0.0
+        slope_weights, gap, gap_weights = np.zeros(len(deviations)), None, np.zeros(len(deviations))
+        slope_weights[rows] = about / (about @ about)
         if reversals is not None and np.any(own := reversals.measurement == number):
             gap = float(reversals.gap[own].mean())
-            gap_noise = float(np.sqrt(np.sum(reversals.noise[own] ** 2)) / own.sum())
+            gap_weights[rows] = reversals.weights[rows] / own.sum()
         found.append(GaugeLine(
             int(number), directions[rows[0]], gauge.points.xyz[rows].mean(axis=0), float(np.ptp(faces)), len(faces),
-            slope / PPM, float(1 / np.sqrt(about @ about)) / PPM, float(np.abs(rest).max()), gap, gap_noise,
+            slope / PPM, slope_weights / PPM, float(np.abs(rest).max()), gap, gap_weights,
             periodic_part(faces, means),
         ))  # fmt: skip
     return tuple(found)

@@ -38,13 +38,13 @@ class Reversals:
     measurement : (p,) of each such face.
     reference : (p,) its certified distance, mm.
     gap : (p,) found when travelling away from the first face minus when travelling towards it, mm.
-    noise : (p,) standard uncertainty of ``gap`` per unit of that of one coordinate.
+    weights : (n,) of every observation in the gap of its face; 0 of a face that was not reached from both sides.
     """
 
     measurement: Ints
     reference: Floats
     gap: Floats
-    noise: Floats
+    weights: Floats
 
 
 class StepGauge(Artefact):
@@ -171,9 +171,9 @@ class StepGauge(Artefact):
             means.append(np.bincount(index[chosen], deviations[chosen], len(first)) / np.maximum(count, 1))
             counts.append(count)
         both = (counts[0] > 0) & (counts[1] > 0)
-        noise = np.sqrt(1 / counts[0][both] + 1 / counts[1][both])
+        weights = sense / np.maximum(np.where(sense > 0, counts[0][index], counts[1][index]), 1) * both[index]
         return Reversals(self.points.measurement[first[both]], self.reference[first[both]],
-                         (means[0] - means[1])[both], noise)  # fmt: skip
+                         (means[0] - means[1])[both], weights)  # fmt: skip
 
     def _distances(self, length: float) -> Floats:
         return np.asarray(self.reference * self.expansion * (length / self.sizes[0].nominal), dtype=np.float64)

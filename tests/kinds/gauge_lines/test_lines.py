@@ -43,6 +43,6 @@ def test_each_line_has_slope_linearity_and_backlash() -> None:
     assert lines[1].gap == pytest.approx(0.0, abs=1e-12)
     assert lines[2].scale_ppm == pytest.approx(0, abs=1e-6)
     assert lines[2].gap == pytest.approx(-6e-3)
-    assert lines[2].gap_noise == pytest.approx(np.sqrt(2 / 22))
+    assert np.linalg.norm(lines[2].gap_weights) == pytest.approx(np.sqrt(2 / 22))
     assert lines[1].linearity < 1e-9
     assert (lines[4].length, lines[4].faces) == (420.0, 22)

@@ -1,0 +1,38 @@
+"""What noise leaves uncertain of a weighted sum of observations, its components being of uncertain size."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import optimize, special
+
+from cmm_uq.inference.noise import Components, Sizes
+from cmm_uq.points import Floats
+
+_COVERAGE = 0.975
+
+
+def uncertainty_of_sum(
+    components: Components, sizes: Sizes, weights: Floats, beside: float = 0.0
+) -> tuple[float, float]:
+    """Standard uncertainty, and half the 95 % interval, of a sum of observations.
+
+    Given the sizes the sum is normal; over their draws it is a mixture of normal distributions about one value.
+
+    Parameters
+    ----------
+    components : of the noise of the observations.
+    sizes : in each of w draws.
+    weights : (m,) of the observations.
+    beside : standard uncertainty of a normal contribution that is no noise, in the unit of the sum.
+    """
+    variances, slow = components.variances(sizes)
+    squares = components.shares.T @ np.asarray(components.turn @ weights) ** 2
+    variance = variances @ squares + slow @ (components.slow.T @ weights) ** 2 + beside**2
+    u, sd = float(np.sqrt(variance.mean())), np.sqrt(variance)
+    if not u:
+        return 0.0, 0.0
+    sd = np.maximum(sd, 1e-12 * u)
+    half = optimize.brentq(
+        lambda t: float(special.ndtr(t * u / sd).mean()) - _COVERAGE, 0.0, float(sd.max() / u) * 2.0, xtol=1e-9
+    )
+    return u, float(half) * u
