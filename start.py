@@ -61,7 +61,7 @@ def test(arguments: list[str]) -> int:
         run("ruff", "check"),
         run("ruff", "format", "--check"),
         run("mypy"),
-        run("pytest", *(arguments or ["--numprocesses=auto", "--dist=loadgroup"])),
+        run("pytest", *(arguments or ["--numprocesses=auto", "--dist=loadfile"])),
     ]
     return max(results)
 

@@ -12,18 +12,6 @@ from cmm_uq.points import Machine, Points
 from tests.recordings import TRAVEL, bars
 
 ROOT = Path(__file__).parents[1]
-EXAMPLES = frozenset(path.name for path in (ROOT / "examples").iterdir())
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of one example go to one process, which analyses it once for all of them (``--dist loadgroup``)."""
-    for item in items:
-        parameters = (
-            item.callspec.params.values() if isinstance(item, pytest.Function) and hasattr(item, "callspec") else ()
-        )
-        for name in {value for value in parameters if isinstance(value, str)} & EXAMPLES:
-            item.add_marker(pytest.mark.xdist_group(name))
 
 
 @pytest.fixture

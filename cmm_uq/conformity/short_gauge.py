@@ -156,7 +156,8 @@ def added_in_words(gauge: ShortGauge | None, found: Indications) -> Text:
         return NOTHING
     return say(
         "To {count} of {all} errors of lengths that are not bidirectional by themselves that of the short gauge, "
-        "{length:g} mm, u = {u:.3g} µm, in the same place and direction is added, repeat by repeat.",
+        "{length:g} mm, u = {u:.3g} µm, in the same place and direction is added, repeat by repeat, by a procedure of this "
+        "program: the text of the standard was not at hand.",
         count=int(np.count_nonzero(found.u_beside)), all=len(found.errors), length=gauge.facts.length_mm, u=gauge.facts.u_um,
     )  # fmt: skip
 
