@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation
-from cmm_uq.diagnosis.noise import Kind, kinds
+from cmm_uq.diagnosis.noise import Kind
+from cmm_uq.diagnosis.shapes import kinds
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.noise import noise_of
 

@@ -16,6 +16,7 @@ from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.noise import Components, Sizes
+from cmm_uq.inference.slow import SlowFirst, products
 from cmm_uq.points import Floats, Ints
 
 SIGMA_BOUNDS = (1e-6, 10.0)
@@ -26,6 +27,9 @@ _JITTER = 1e-11
 
 _NUMBERS = 4_000_000
 """In one batch of matrices."""
+
+_MOST_FREE = 150
+"""Columns of placings up to which slow noise is eliminated before them."""
 
 _NUMBERS_DRAWN = 100_000_000
 """In the matrices that all draws of the parameters take."""
@@ -82,15 +86,15 @@ class Marginal:
         return np.asarray(self.noise.turn @ np.hstack([self.noise.slow, model.design, left[:, None]])) / self._length
 
     @cached_property
-    def _products(self) -> tuple[Floats, Floats]:
-        """Inner products (c, P²) of the columns, by class of the observations, and of the prior (P²,), which is data too."""
-        model, value = self.model, self.estimate.value
+    def _products(self) -> Floats:
+        """Inner products (c, P²) of the columns, by class of the observations."""
         index, shares = self.noise.classes
-        size = len(self._length)
-        found = np.zeros((len(shares), size, size))
-        order = np.argsort(index, kind="stable")
-        for i, rows in enumerate(np.split(order, np.cumsum(np.bincount(index, minlength=len(shares)))[:-1])):
-            found[i] = self._turned[rows].T @ self._turned[rows]
+        return products(self._turned, self._turned, index, len(shares))
+
+    @cached_property
+    def _prior(self) -> Floats:
+        """(P, P) precision of the columns beforehand, which is data too; of slow noise it is not known yet."""
+        model, value, size = self.model, self.estimate.value, len(self._length)
         first = size - 1 - len(value)
         prior = np.zeros((len(value), size))
         for i, unknown in enumerate(model.unknowns):
@@ -98,7 +102,7 @@ class Marginal:
                 prior[i, first + i] = 1 / self._sd(i)
                 prior[i, -1] = (unknown.prior_mean - value[i]) / self._sd(i)
         prior = prior / self._length
-        return found.reshape(len(shares), -1), (prior.T @ prior).ravel()
+        return np.asarray(prior.T @ prior)
 
     @cached_property
     def _blocks(self) -> Floats:
@@ -120,7 +124,7 @@ class Marginal:
     def _without_slow(self) -> tuple[Floats, Floats, Floats]:
         """Products and blocks without the columns of slow noise, whose coefficients are zero where it is absent."""
         P, c, j = len(self._length), self.noise.slow.shape[1], self._freedoms.columns.shape[1]
-        found, prior = (each.reshape(-1, P, P)[:, c:, c:] for each in self._products)
+        found, prior = self._products.reshape(-1, P, P)[:, c:, c:], self._prior[c:, c:]
         blocks = self._blocks.reshape(len(found), -1, j + P)
         kept = np.delete(np.arange(j + P), np.arange(j, j + c))
         return found.reshape(len(found), -1), prior.ravel(), blocks[:, :, kept].reshape(len(found), -1)
@@ -129,16 +133,41 @@ class Marginal:
     def _counts(self) -> Floats:
         return np.bincount(self.noise.classes[0], minlength=len(self.noise.classes[1])).astype(np.float64)
 
+    @cached_property
+    def _slow_first(self) -> SlowFirst | None:
+        """Products of slow noise with [placings, parameters, observations]; none where placings have too many columns."""
+        c = self.noise.slow.shape[1]
+        if not c or self._freedoms.count > _MOST_FREE:
+            return None
+        others = np.hstack([self._freedoms.dense(), self._turned[:, c:]])
+        return SlowFirst(self._turned[:, :c], others, self.noise.classes[0], len(self._counts))
+
+    def _without_slow_noise(self, slow: SlowFirst, v: Floats, variances: Floats) -> tuple[Floats, Floats]:
+        """As :meth:`_factors`, slow noise with variances (w, c) eliminated ahead of the placings."""
+        c, free = variances.shape[1], self._freedoms.count
+        least = np.maximum(variances, (1e-6 * self._scale) ** 2)
+        P = len(self._length)
+        prior = np.zeros((free + P - c, free + P - c))
+        prior[free:, free:] = self._prior[c:, c:]
+        at = np.arange(free)
+        prior[at, at] = self._absent.ravel()
+        left, logs = slow.precision(v, prior.ravel(), 1 / (least * self._length[:c] ** 2))
+        diagonal = np.arange(left.shape[1])
+        left[:, diagonal, diagonal] *= 1 + _JITTER
+        return _cholesky(left), -0.5 * np.log(v) @ self._counts - 0.5 * np.log(least).sum(axis=1) - logs
+
     def _factors(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them.
 
         What each placing leaves free is eliminated first, by itself; slow noise has no rows and columns where it is absent in
-        all of the sizes.
+        all of the sizes, and comes first where there are few placings.
         """
         variances, slow = self.noise.variances(sizes)
         v = variances @ self.noise.classes[1].T
         absent = not np.any(sizes.slow)
-        products, prior, blocks = self._without_slow if absent else (*self._products, self._blocks)
+        if not absent and self._slow_first is not None:
+            return self._without_slow_noise(self._slow_first, v, slow)
+        products, prior, blocks = self._without_slow if absent else (self._products, self._prior.ravel(), self._blocks)
         P = len(self._length) - absent * slow.shape[1]
         whole = ((1 / v) @ products + prior).reshape(-1, P, P)
         log = -0.5 * np.log(v) @ self._counts

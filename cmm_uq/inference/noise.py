@@ -19,7 +19,7 @@ a few readings or not at all during the recording, and no rate between is prefer
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -45,8 +45,12 @@ RATIO = {PLACING: 1.0, GROWTH: 1.0, SLOW: 1.0}
 
 LARGEST_RATIO = 300.0
 
-FREQUENCIES = 48
-"""Cosines of slow noise, of all axes together; what is faster counts as independent."""
+FREQUENCIES, FEWER = 72, 24
+"""Cosines of slow noise that one observation may see, of all axes together: as many as are used where it is quick, and
+where it is not; what is faster counts as independent."""
+
+NEGLIGIBLE = 0.05
+"""Variance of what is faster than the cosines, over that of a reading, up to which it may count as independent."""
 
 FASTEST = 200.0
 """Largest rate of slow noise, over the duration of the recording."""
@@ -104,12 +108,13 @@ class Components:
     ----------
     turn : (m, m) T, orthonormal.
     shares : (m, 6) of each variance in that of each turned observation.
-    slow : (m, 3·…) columns S of the untold observations, (m, 0) where no time is recorded.
+    slow : (m, 3·…) columns S of the unturned observations, (m, 0) where no time is recorded.
     frequency : of each of those columns, in half turns over the recording; 0 is a constant.
     possible : which components could show here.
     stated : standard uncertainty of a coordinate, mm, as the job states it.
     gap : typical time between neighbouring readings, over the duration of the recording.
     display : step in which coordinates are displayed, mm; 0 where it is too fine to matter.
+    time : (m,) of the unturned observations, from 0 to 1; (0,) where none is recorded.
     """
 
     turn: sparse.csr_array
@@ -120,6 +125,7 @@ class Components:
     stated: float | None = None
     gap: float = 0.0
     display: float = 0.0
+    time: Floats = field(default_factory=lambda: np.zeros(0))
     names: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -190,6 +196,39 @@ class Components:
         alone = self.display**2 / 12 - shared
         each = [*(sizes.reading.T**2), sizes.placing**2 + shared, sizes.growth**2, fast + alone]
         return np.column_stack(each), slow
+
+    @property
+    def most(self) -> int:
+        """Fastest of the cosines, in half turns over the recording."""
+        return int(self.frequency.max(initial=0.0))
+
+    def slowest(self, most: int) -> Components:
+        """With the cosines up to ``most`` half turns."""
+        kept = self.frequency <= most
+        return replace(self, slow=self.slow[:, kept], frequency=self.frequency[kept])
+
+    @property
+    def fewer(self) -> Components:
+        """With as many cosines as do where slow noise is not quick."""
+        return self.slowest(FEWER * self.most // FREQUENCIES) if self.most > FEWER else self
+
+    def quick(self, sizes: Sizes) -> Floats:
+        """(w,) part that is faster than the cosines of what no other reading shares."""
+        fast = slow_variances(sizes.slow, sizes.rate, self.frequency)[1]
+        return np.asarray(fast / (fast + sizes.coordinate**2 + self._rounding**2))
+
+    def exact(self, sizes: Sizes) -> Floats:
+        """Columns (m, c) with standard normal coefficients, mm, whose covariance is all of that of slow noise.
+
+        Parameters
+        ----------
+        sizes : of a single draw.
+        """
+        times, index = np.unique(self.time, return_inverse=True)
+        covariance = np.exp(-sizes.rate[0] * np.abs(times[:, None] - times))
+        factor = sizes.slow[0] * np.linalg.cholesky(covariance + 1e-12 * np.eye(len(times)))
+        seen = self.slow[:, self.frequency == 0]
+        return np.hstack([each[:, None] * factor[index.ravel()] for each in seen.T])
 
     def log_prior(self, latent: Floats, sizes: Sizes) -> Floats:
         """(w,) of the standard normal numbers; that of a coordinate has a uniform logarithm, or is near what is stated."""

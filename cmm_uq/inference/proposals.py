@@ -77,6 +77,13 @@ class Proposal:
         """(w,) up to a constant."""
         return np.asarray(special.logsumexp(self.log_each(z)[0], axis=1))
 
+    def log_probability(self, parameters: Floats) -> Floats:
+        """Logarithm of the density (w,) of parameters (w, d), with its constant."""
+        d = len(self.centre)
+        z = np.asarray(np.linalg.solve(self.factor, (parameters - self.centre).T).T, dtype=np.float64)
+        constant = special.gammaln(0.5 * (_DOF + d)) - special.gammaln(0.5 * _DOF) - 0.5 * d * np.log(np.pi * _DOF)
+        return np.asarray(self.log_density(z) + constant - np.linalg.slogdet(self.factor)[1])
+
     def log_each(self, z: Floats) -> tuple[Floats, Floats]:
         """Weighted log density of each distribution, and squared distance from its centre, (w, K)."""
         if len(self.weights) == 1:
@@ -103,7 +110,7 @@ def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> P
         proposal = Proposal.single(centre, width * factor)
         z = proposal.draws(500 * len(centre), random)
         theta = proposal.parameters(z)
-        weight = _weights(density(theta) - proposal.log_density(z))
+        weight = weights(density(theta) - proposal.log_density(z))
         # too few draws that count would make it degenerate: the approximation is then better than its correction
         if 1 / np.sum(weight**2) < 5 * len(centre):
             if width == 1.0:
@@ -111,7 +118,7 @@ def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> P
             width = max(1.0, width / 2**0.25)  # in many dimensions most of what is so much wider lies where nothing is
             continue
         looks += 1
-        mean, covariance = _moments(theta, weight)
+        mean, covariance = moments(theta, weight)
         centre, factor, width = mean, _root(covariance), 1.0
     return Proposal.single(centre, factor)
 
@@ -141,7 +148,7 @@ def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> 
         before, power = power, _highest_power(gain, known, power, _ENOUGH * count)
         if power < min(1.0, _STUCK * before):
             return _mixture(density, begin, first, random)
-        mean, covariance = _moments(theta, _weights(power * gain + known))
+        mean, covariance = moments(theta, weights(power * gain + known))
         centre, factor = mean, np.linalg.cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(d))
         left -= power == 1.0
         if not left:
@@ -176,14 +183,14 @@ def _mixture(density: LogDensity, centre: Floats, factor: Floats, random: Any) -
         known = -0.5 * np.sum(every**2, axis=1) - special.logsumexp(from_any, axis=0)
         before, power = power, _highest_power(gain, known, power, enough * len(every))
         enough = max(0.5 * enough, _LEAST_ENOUGH) if power < min(1.0, _STUCK * before) else enough
-        proposals.append(_fitted(proposals[-1], every, _weights(power * gain + known), random))
+        proposals.append(_fitted(proposals[-1], every, weights(power * gain + known), random))
     return proposals[max(tried)[1]] if tried else proposals[-1]
 
 
 def _fitted(proposal: Proposal, z: Floats, weight: Floats, random: Any) -> Proposal:
     """A mixture for weighted draws z, by expectation and maximisation from centres drawn among them."""
     d = z.shape[1]
-    mean, covariance = _moments(z, weight)
+    mean, covariance = moments(z, weight)
     covariance = covariance + 1e-9 * np.trace(covariance) * np.eye(d)
     worth = 1 / np.sum(weight**2)
     narrow = np.linalg.cholesky(_NARROWER * covariance)
@@ -216,7 +223,7 @@ def _root(covariance: Floats) -> Floats:
     return np.asarray(np.linalg.cholesky(covariance))
 
 
-def _moments(values: Floats, weight: Floats) -> tuple[Floats, Floats]:
+def moments(values: Floats, weight: Floats) -> tuple[Floats, Floats]:
     """Mean and covariance of weighted draws (w, d)."""
     mean = weight @ values
     about = values - mean
@@ -234,10 +241,11 @@ def _highest_power(gain: Floats, known: Floats, least: float, enough: float) -> 
     return low
 
 
-def _weights(log: Floats) -> Floats:
+def weights(log: Floats) -> Floats:
+    """Of draws whose density over that proposed has the logarithm (w,): their sum is one."""
     weight = np.exp(log - log.max())
     return np.asarray(weight / weight.sum())
 
 
 def _worth(log: Floats) -> float:
-    return float(1 / np.sum(_weights(log) ** 2))
+    return float(1 / np.sum(weights(log) ** 2))

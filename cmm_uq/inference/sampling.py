@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cmm_uq.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Progress, run_ensembles
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.marginal import Marginal
-from cmm_uq.inference.noise import Components
+from cmm_uq.inference.noise import NEGLIGIBLE, Components
 from cmm_uq.inference.posterior import NoisyPosterior
-from cmm_uq.inference.proposals import tempered
+from cmm_uq.inference.proposals import Proposal, moments, tempered, weights
 from cmm_uq.points import Floats
+
+_LOOKED_AT = 400
+"""Draws by which it is judged whether slow noise is quicker than a few cosines."""
+_WIDER = 2.0
+"""Times the spread under a few cosines in which to look for that under all."""
 
 
 def sample_with_noise(
@@ -27,15 +34,16 @@ def sample_with_noise(
     seed : the same seed gives the same draws.
     progress : told the part done, from 0 to 1.
     """
-    marginal = Marginal(model, noise, estimate)
+    marginal, proposal = sufficient(Marginal(model, noise, estimate), seed)
+    noise = marginal.noise
     chains = run_ensembles(
         marginal.log_density,
-        tempered(marginal.log_density, *start(marginal), seed),
+        proposal,
         seed,
         progress,
         effective_samples=LEAST_EFFECTIVE_SAMPLES,
         steps_at_once=100,
-        walkers=max(16, 4 * noise.dimension),
+        walkers=max(16, (2 if noise.most else 4) * noise.dimension + 2 * bool(noise.most)),
     )  # everything but the noise is drawn independently, given it
     every = chains.thinning(marginal.affordable_draws)
     sizes = noise.sizes(chains.thinned(every))
@@ -45,6 +53,29 @@ def sample_with_noise(
         sampler=chains.sampler, ess_min=chains.ess_min, rhat_max=chains.rhat_max, steps=chains.steps,
         autocorrelation_time=chains.autocorrelation_time, every=every, sizes=sizes,
     )  # fmt: skip
+
+
+def sufficient(marginal: Marginal, seed: int) -> tuple[Marginal, Proposal]:
+    """The density with as many cosines as slow noise of this recording takes, and what to propose for it.
+
+    Parameters
+    ----------
+    marginal : with all cosines.
+    seed : of the draws.
+    """
+    fewer = replace(marginal, noise=marginal.noise.fewer)
+    proposal = tempered(fewer.log_density, *start(fewer), seed)
+    if fewer.noise is marginal.noise:
+        return marginal, proposal
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(13,))))
+    z = proposal.draws(_LOOKED_AT, random)
+    latent = proposal.parameters(z)
+    weight = weights(fewer.log_density(latent) - proposal.log_density(z))
+    if weight @ fewer.noise.quick(fewer.noise.sizes(latent)) < NEGLIGIBLE:
+        return fewer, proposal
+    mean, covariance = moments(latent, weight)
+    wide = np.linalg.cholesky(covariance + 1e-4 * np.eye(len(mean)))
+    return marginal, tempered(marginal.log_density, mean, np.asarray(_WIDER * wide, dtype=np.float64), seed)
 
 
 def start(marginal: Marginal) -> tuple[Floats, Floats]:

@@ -14,6 +14,9 @@ from cmm_uq.points import Floats, Ints
 _LEAST_SHARE = 0.15
 """Part of the observations' variance that each of two axes must have for their noises to be told apart."""
 
+_ALONG = 1e-9
+"""Part of a coordinate below which an observation does not see it."""
+
 _LEAST_TIMES = 8
 """Different times from which on slow noise is reckoned with."""
 
@@ -56,15 +59,16 @@ def noise_of(
         abs(helmert).power(2) @ (artefact.noise_scale[chosen] ** 2 * (length / max(length.max(), 1e-9)) ** 2)
     )
     shares = np.column_stack([axes, reading * count, growth, reading])
-    slow, frequency, gap = _slow(model, chosen, sensitivity)
+    slow, frequency, gap, part = _slow(model, chosen, sensitivity, along)
     possible = {
         AXES: _axes_differ(axes), PLACING: bool(np.any(np.bincount(block) > 1)),
         GROWTH: bool(length.max() > _LEAST_SPREAD * np.median(length[length > 0])) if np.any(length > 0) else False,
         SLOW: slow.shape[1] > 0,
     }  # fmt: skip
     return Components(
-        turn, shares, slow, frequency, tuple(name for name, can in possible.items() if can), model.sigma, gap, step
-    )
+        turn, shares, slow, frequency, tuple(name for name, can in possible.items() if can), model.sigma, gap, step,
+        part,
+    )  # fmt: skip
 
 
 def sensitivities(model: MeasurementModel, xyz: Floats) -> Floats:
@@ -196,19 +200,23 @@ def growing_lengths(model: MeasurementModel, xyz: Floats) -> Floats:
     return distances_in_placing(xyz, artefact.points)[rows[:, 0]]
 
 
-def _slow(model: MeasurementModel, chosen: np.ndarray, sensitivity: Floats) -> tuple[Floats, Floats, float]:
-    """Columns (m, c) of slow noise as cosines of the time, their frequencies, and the typical part between readings.
+def _slow(
+    model: MeasurementModel, chosen: np.ndarray, sensitivity: Floats, along: Floats
+) -> tuple[Floats, Floats, float, Floats]:
+    """Columns (m, c) of slow noise as cosines of the time, their frequencies, the typical part between readings, the time.
 
-    Along the observation where its direction is that of the placing; else of each coordinate, with fewer frequencies.
+    Along the observation where its direction is that of the placing; else of each coordinate, with fewer frequencies where
+    observations see several of them.
     """
     artefact = model.artefact
     time = artefact.points.columns.get("time_s")
     if time is None or len(np.unique(time)) < _LEAST_TIMES:
-        return np.zeros((int(np.sum(chosen)), 0)), np.zeros(0), 0.0
+        return np.zeros((int(np.sum(chosen)), 0)), np.zeros(0), 0.0, np.zeros(0)
     seconds = time[artefact.rows].mean(axis=1)[chosen]
     part = (seconds - seconds.min()) / max(float(np.ptp(seconds)), 1e-9)
     by_axis = artefact.rows.shape[1] == 1 and _turning(sensitivity[:, 0], artefact.measurement[chosen])
-    most = min(FREQUENCIES // (3 if by_axis else 1), len(np.unique(seconds)) // 2)
+    several = 3 if by_axis and np.any(np.sum(np.abs(along[:, 0]) > _ALONG, axis=1) > 1) else 1
+    most = min(FREQUENCIES // several, len(np.unique(seconds)) - 1)
     gap = float(np.median(np.diff(np.unique(part))))
     frequency = np.arange(most + 1, dtype=np.float64)
     cosines = np.where(frequency > 0, np.sqrt(2.0), 1.0) * np.cos(np.pi * frequency * part[:, None])
@@ -216,8 +224,8 @@ def _slow(model: MeasurementModel, chosen: np.ndarray, sensitivity: Floats) -> t
         seen = sensitivity[:, 0]
         axes = np.flatnonzero(np.abs(seen).max(axis=0) > 1e-6)
         columns = (seen[:, axes, None] * cosines[:, None, :]).reshape(len(part), -1)
-        return columns, np.tile(frequency, len(axes)), gap
-    return artefact.noise_scale[chosen, None] * cosines, frequency, gap
+        return columns, np.tile(frequency, len(axes)), gap, part
+    return artefact.noise_scale[chosen, None] * cosines, frequency, gap, part
 
 
 def _turning(seen: Floats, measurement: Ints) -> bool:

@@ -11,7 +11,8 @@ from scipy import special, stats
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation, Member
 from cmm_uq.diagnosis.comparison.lack_of_fit import tail_probability
-from cmm_uq.diagnosis.noise import TAILS, drawn_shapes, kinds, shape_of, sigma_grid, tails
+from cmm_uq.diagnosis.noise import TAILS, shape_of, sigma_grid, tails
+from cmm_uq.diagnosis.shapes import drawn_shapes, kinds
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.inference.noise import Sizes, slow_variances

@@ -1,0 +1,186 @@
+"""A few shapes of the noise's components that stand for all that they could be.
+
+A shape is the noise of sizes in proportion to the reading noise. Many are drawn from their prior, evenly, and where few of
+those matter, from what the recording says of them; those that matter, whether or not something is missing, are kept, each with
+a weight that makes their sum an unbiased estimate of the integral over all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.diagnosis.noise import TAILS, Kind, shape_of, tails
+from cmm_uq.inference.least_squares import LeastSquares
+from cmm_uq.inference.linear_model import LinearModel, Unknown
+from cmm_uq.inference.marginal import Marginal
+from cmm_uq.inference.noise import NEGLIGIBLE, SLOW, Components, Sizes
+from cmm_uq.inference.proposals import tempered
+from cmm_uq.points import Floats
+from cmm_uq.units import unit
+
+SHAPES, KEPT = 512, 7
+"""How many are drawn from the prior, and how many stand for all."""
+
+_MORE, _ENOUGH = 256, 32
+"""Drawn from what the recording says, with and without something missing; how many draws must matter for none of these."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Latent numbers (n, d) of shapes for a reading noise of 1 mm, and their weights (n,), one in sum, for an average."""
+
+    latent: Floats
+    weight: Floats
+
+
+def kinds(
+    linear: LinearModel, components: Components, estimate: LeastSquares, rivals: Floats, residuals: Floats
+) -> list[Kind]:
+    """Shapes of the noise that a recording could show.
+
+    Parameters
+    ----------
+    linear : what is explained.
+    components : of the noise.
+    estimate : least squares of ``linear``.
+    rivals : (m, r) columns, mm, of what could be missing, for coefficients of standard deviation one.
+    residuals : (m,) of the estimate, mm.
+    """
+    components = _for_a_unit(components, estimate.sigma_of_residuals)
+    either = (
+        Marginal(linear, components, estimate),
+        Marginal(_with_rivals(linear, rivals), components, _without_rivals(estimate, rivals.shape[1])),
+    )
+    few = [_Density.of(marginal, components.fewer) for marginal in either]
+    shapes = Shapes(drawn_shapes(components), np.full(SHAPES, 1 / SHAPES))
+    shares = [density.share(shapes) for density in few]
+    if SLOW in components.possible and min(1 / np.sum(share**2) for share in shares) < _ENOUGH:
+        quick = np.mean(shares, axis=0) @ components.fewer.quick(components.sizes(shapes.latent))
+        told = few if quick < NEGLIGIBLE else [_Density.of(marginal, components) for marginal in either]
+        shapes = _more(shapes, told)
+        shares = [density.share(shapes) for density in told]
+    kept, weight = _representative(components.sizes(shapes.latent), shapes.weight, np.mean(shares, axis=0))
+    scale = linear.noise_scale
+    found = [
+        shape_of(components, components.sizes(shapes.latent[[i]]), scale, (1 - TAILS) * w)
+        for i, w in zip(kept, weight, strict=True)
+    ]
+    return [*found, tails(residuals / scale)]
+
+
+def _for_a_unit(components: Components, scatter: float) -> Components:
+    """The components with the display's step over the reading noise that the residuals leave it."""
+    step = components.display
+    if not step:
+        return components
+    reading = max(np.sqrt(max(scatter**2 - step**2 / 12, 0.0)), components.least)
+    return replace(components, display=step / reading)
+
+
+def drawn_shapes(components: Components) -> Floats:
+    """Latent numbers (n, d) of shapes for a reading noise of 1 mm, spread evenly over their prior; the first is white."""
+    d = components.dimension
+    numbers = np.zeros((SHAPES, d - 1))
+    if d > 1:
+        # a lattice by powers of the root of x^d = x + 1 (Roberts 2018), which leaves no gaps in any dimension
+        root = 1.5
+        for _ in range(30):
+            root = (1 + root) ** (1 / d)
+        steps = root ** -np.arange(1.0, d)
+        numbers = special.ndtri(np.clip((0.5 + np.outer(np.arange(SHAPES), steps)) % 1, 1e-6, 1 - 1e-6))
+    return _latent(components, numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class _Density:
+    """Of shapes, the reading noise integrated out.
+
+    Parameters
+    ----------
+    marginal : with the noise in its own size, not that for a unit.
+    sigma : mm, near which the reading noise is.
+    """
+
+    marginal: Marginal
+    sigma: float
+
+    @classmethod
+    def of(cls, marginal: Marginal, components: Components) -> _Density:
+        """Of a model's marginal density, with components for a unit."""
+        sigma = marginal.estimate.sigma_of_residuals or 1.0
+        return cls(replace(marginal, noise=replace(components, display=sigma * components.display)), sigma)
+
+    def log_probability(self, shapes: Floats) -> Floats:
+        """Of each shape (n,): the sum of squares has a gamma distribution given the shape."""
+        at = shapes.copy()
+        at[:, 0] += np.log(self.sigma)
+        log, squares = self.marginal.log_likelihood(self.marginal.noise.sizes(at))
+        count = max(self.marginal.estimate.degrees_of_freedom, 1)
+        value = log - 0.5 * count * np.log(np.maximum(squares, 1e-12))
+        return np.where(np.isfinite(value), value, -np.inf)
+
+    def share(self, shapes: Shapes) -> Floats:
+        """(n,) probability of each shape, in place of all."""
+        log = self.log_probability(shapes.latent) + np.log(shapes.weight)
+        return np.asarray(np.exp(log - special.logsumexp(log)))
+
+    def __call__(self, numbers: Floats) -> Floats:
+        """Log density (w,) of the standard normal numbers (w, d − 1) behind the ratios."""
+        held = np.where(np.isfinite(numbers), numbers, 0.0)
+        log = self.log_probability(_latent(self.marginal.noise, held)) - 0.5 * np.sum(held**2, axis=1)
+        return np.asarray(log, dtype=np.float64)
+
+
+def _latent(components: Components, numbers: Floats) -> Floats:
+    """With the first, which makes the reading noise 1 mm: (w, d) of (w, d − 1)."""
+    found = np.column_stack([np.zeros(len(numbers)), numbers])
+    found[:, 0] = components.log_scatter(found)
+    return found
+
+
+def _more(shapes: Shapes, densities: Sequence[_Density]) -> Shapes:
+    """With draws from what is proposed for the densities; all together count as drawn from the mixture of what drew them."""
+    n, d = shapes.latent.shape
+    proposals = [tempered(density, np.zeros(d - 1), np.eye(d - 1), seed) for seed, density in enumerate(densities)]
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(len(proposals))))
+    drawn = [proposal.parameters(proposal.draws(_MORE, random)) for proposal in proposals]
+    numbers = np.vstack([shapes.latent[:, 1:], *drawn])
+    prior = -0.5 * np.sum(numbers**2, axis=1) - 0.5 * (d - 1) * np.log(2 * np.pi)
+    by_any = [prior + np.log(n), *(proposal.log_probability(numbers) + np.log(_MORE) for proposal in proposals)]
+    weight = np.exp(prior - special.logsumexp(by_any, axis=0))
+    return Shapes(_latent(densities[0].marginal.noise, numbers), weight / weight.sum())
+
+
+def _representative(sizes: Sizes, prior: Floats, share: Floats) -> tuple[list[int], Floats]:
+    """Shapes that stand for all, and their weights: those of what each stands for (systematic resampling)."""
+    table = np.column_stack(
+        [sizes.reading, sizes.placing, sizes.growth, sizes.slow, np.where(sizes.slow > 0, sizes.rate, 0)]
+    )
+    _, first, index = np.unique(np.round(table, 9), axis=0, return_index=True, return_inverse=True)
+    before, part = (np.bincount(index.ravel(), each, len(first)) for each in (prior, share))
+    part = 0.9 * part / part.sum() + 0.1 * before
+    expected = KEPT * part
+    certain = expected >= 1
+    rest = np.where(certain, 0.0, part)
+    places = max(KEPT - int(certain.sum()), 0)
+    taken = np.zeros(len(part))
+    if places and rest.sum() > 0:
+        upper = np.cumsum(rest / rest.sum() * places)
+        taken = np.floor(upper + 0.5) - np.floor(np.append(0.0, upper[:-1]) + 0.5)
+        taken = taken * rest.sum() / (places * np.where(rest > 0, rest, 1.0))
+    weight = np.where(certain, 1.0, taken) * before
+    chosen = np.flatnonzero(weight > 0)
+    return first[chosen].tolist(), np.asarray(weight[chosen], dtype=np.float64)
+
+
+def _with_rivals(linear: LinearModel, rivals: Floats) -> LinearModel:
+    more = tuple(Unknown(("rival", str(i)), unit("1"), 0.0, 1.0, 1.0) for i in range(rivals.shape[1]))
+    return replace(linear, design=np.hstack([linear.design, rivals]), unknowns=(*linear.unknowns, *more))
+
+
+def _without_rivals(estimate: LeastSquares, count: int) -> LeastSquares:
+    return replace(estimate, value=np.append(estimate.value, np.zeros(count)))
