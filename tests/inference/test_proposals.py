@@ -27,6 +27,16 @@ def test_the_density_of_a_mixture_is_that_of_scipy_s_t_distributions() -> None:
     assert np.ptp(two().log_density(z) - wanted) < 1e-12
 
 
+def test_the_density_of_parameters_has_its_constant() -> None:
+    """The same of x = centre + factor·z: divided by the determinant of the factor."""
+    x = np.random.default_rng(1).normal(size=(50, 2)) * 3 + [10.0, 20.0]
+    z = (x - [10.0, 20.0]) / [2.0, 3.0]
+    wanted = sum(
+        w * stats.multivariate_t(c, f @ f.T, df=6).pdf(z) for w, c, f in zip(WEIGHTS, CENTRES, FACTORS, strict=True)
+    )
+    assert two().log_probability(x) == pytest.approx(np.log(wanted / 6), rel=1e-10)
+
+
 def test_draws_of_a_mixture_have_its_mean_and_covariance() -> None:
     """A t distribution with six degrees of freedom has 6/4 of its scale's covariance."""
     z = two().draws(400_000, np.random.RandomState(2))

@@ -70,6 +70,11 @@ def test_the_order_of_the_rows_says_nothing_without_a_time() -> None:
     assert noise_of(model).slow.shape[1] == 0
 
 
+@pytest.mark.parametrize(("name", "cosines"), [("plate-simulated", 3 * 73), ("sphere-simulated", 3 * 25)])
+def test_observations_along_one_axis_each_see_more_cosines_than_those_along_several(name: str, cosines: int) -> None:
+    assert noise_of(example(name, 2, timed=True)).slow.shape[1] == cosines
+
+
 def test_turning_keeps_every_length() -> None:
     turn = noise_of(example("plate-simulated", 2)).turn.toarray()
     assert np.allclose(turn @ turn.T, np.eye(len(turn)), atol=1e-12)
