@@ -38,6 +38,7 @@ class Kind:
     probability : beforehand.
     slow : (m, c) columns with standard normal coefficients that it has besides.
     log_factor : logarithm by which its density exceeds that of a normal distribution with this covariance.
+    unrounded : the same without the display's steps, where there are any.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Kind:
     probability: float
     slow: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     log_factor: float = 0.0
+    unrounded: Kind | None = None
 
     def white(self, columns: Floats) -> Floats:
         """W times columns (m, b)."""
@@ -75,7 +77,9 @@ def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probabil
     whitening = sparse.diags_array(1 / np.sqrt(v)) @ components.turn @ sparse.diags_array(noise_scale)
     log = float(np.log(noise_scale).sum() - 0.5 * np.log(v).sum())
     columns = columns / noise_scale[:, None] if columns.size else columns
-    return Kind("components", sparse.csr_array(whitening), log, probability, columns)
+    fine = replace(components, display=0.0) if components.display else None
+    unrounded = shape_of(fine, sizes, noise_scale, probability) if fine else None
+    return Kind("components", sparse.csr_array(whitening), log, probability, columns, unrounded=unrounded)
 
 
 def tails(residual: Floats) -> Kind:

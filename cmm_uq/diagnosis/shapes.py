@@ -29,6 +29,10 @@ _MORE, _ENOUGH = 256, 32
 """Drawn from what the recording says, with and without something missing; how many draws must matter for none of these."""
 
 
+_READINGS = 24
+"""Sizes of the reading noise that are tried beside a display's steps."""
+
+
 @dataclass(frozen=True, eq=False)
 class Shapes:
     """Latent numbers (n, d) of shapes for a reading noise of 1 mm, and their weights (n,), one in sum, for an average."""
@@ -50,7 +54,7 @@ def kinds(
     rivals : (m, r) columns, mm, of what could be missing, for coefficients of standard deviation one.
     residuals : (m,) of the estimate, mm.
     """
-    components = _for_a_unit(components, estimate.sigma_of_residuals)
+    components = _for_a_unit(Marginal(linear, components, estimate))
     either = (
         Marginal(linear, components, estimate),
         Marginal(_with_rivals(linear, rivals), components, _without_rivals(estimate, rivals.shape[1])),
@@ -72,13 +76,17 @@ def kinds(
     return [*found, tails(residuals / scale)]
 
 
-def _for_a_unit(components: Components, scatter: float) -> Components:
-    """The components with the display's step over the reading noise that the residuals leave it."""
-    step = components.display
-    if not step:
+def _for_a_unit(marginal: Marginal) -> Components:
+    """The components with the display's step over the reading noise that is most probable beside it."""
+    components = marginal.noise
+    if not components.display:
         return components
-    reading = max(np.sqrt(max(scatter**2 - step**2 / 12, 0.0)), components.least)
-    return replace(components, display=step / reading)
+    most = max(marginal.estimate.sigma_of_residuals, 2 * components.least)
+    reading = np.geomspace(components.least, most, _READINGS)
+    latent = _latent(components, np.zeros((_READINGS, components.dimension - 1)))
+    latent[:, 0] += np.log(reading)
+    log, squares = marginal.log_likelihood(components.sizes(latent))
+    return replace(components, display=components.display / float(reading[np.argmax(log - 0.5 * squares)]))
 
 
 def drawn_shapes(components: Components) -> Floats:

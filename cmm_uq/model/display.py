@@ -1,10 +1,14 @@
-"""The steps of a display: how fine a recording's coordinates are, as the recording itself shows."""
+"""The steps of a display: how fine a recording's coordinates are, as the recording itself shows, and what they do to it."""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
+from functools import cached_property
 
-from cmm_uq.points import Floats
+import numpy as np
+from scipy import sparse
+
+from cmm_uq.points import Floats, Ints
 
 INCH = 25.4
 _EXACT = 1e-5
@@ -35,3 +39,48 @@ def display_step(xyz: Floats, scatter: float) -> float:
         if np.abs(values / step - np.round(values / step)).max() < _EXACT:
             return step
     return 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Display:
+    """Rounding to steps that are not small beside the noise: it follows the coordinates, and so looks like physics.
+
+    Parameters
+    ----------
+    step : mm.
+    xyz : (n, 3) coordinates as a model has them, mm, without noise and not rounded.
+    rows : (m, j) points of each observation.
+    sensitivity : (m, j, 3) of the observations to their points.
+    """
+
+    step: float
+    xyz: Floats
+    rows: Ints
+    sensitivity: Floats
+
+    @classmethod
+    def of(cls, step: float, recorded: Floats, rows: Ints, sensitivity: Floats, residual: Floats) -> Display:
+        """Coordinates that differ from recorded ones (n, 3) as the residuals (m,) say, and no more."""
+        found = cls(step, recorded, rows, sensitivity)
+        return cls(step, recorded - found.moved(residual[:, None])[:, :, 0], rows, sensitivity)
+
+    @cached_property
+    def _all(self) -> sparse.csr_array:
+        """(m, 3·n)."""
+        m, slots = self.rows.shape
+        row = np.repeat(np.arange(m), 3 * slots)
+        column = (3 * self.rows[:, :, None] + np.arange(3)).ravel()
+        return sparse.csr_array((self.sensitivity.ravel(), (row, column)), shape=(m, self.xyz.size))
+
+    def moved(self, changed: Floats) -> Floats:
+        """Least displacement of the points (n, 3, b) that changes the observations by (m, b), mm."""
+        J = self._all
+        least = sparse.eye_array(J.shape[0]) * 1e-12
+        solved = sparse.linalg.splu(sparse.csc_array(J @ J.T + least)).solve(changed)
+        return np.asarray((J.T @ solved).reshape(len(self.xyz), 3, -1), dtype=np.float64)
+
+    def rounded(self, noise: Floats) -> Floats:
+        """What rounding adds to observations (m, b) with such noise, mm."""
+        shown = self.xyz[:, :, None] + self.moved(noise)
+        error = np.round(shown / self.step) * self.step - shown
+        return np.asarray(self._all @ error.reshape(self.xyz.size, -1), dtype=np.float64)

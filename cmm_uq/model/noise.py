@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from cmm_uq.inference.noise import AXES, FREQUENCIES, GROWTH, PLACING, SLOW, Components
-from cmm_uq.model.display import display_step
+from cmm_uq.model.display import Display, display_step
 from cmm_uq.model.drawn_noise import distances_in_placing
 from cmm_uq.model.measurement import MeasurementModel
 from cmm_uq.points import Floats, Ints
@@ -69,6 +69,17 @@ def noise_of(
         turn, shares, slow, frequency, tuple(name for name, can in possible.items() if can), model.sigma, gap, step,
         part,
     )  # fmt: skip
+
+
+def display_of(model: MeasurementModel) -> Display | None:
+    """The display's steps where the used observations lie, or ``None`` where they are too fine to matter."""
+    artefact, estimate = model.artefact, model.estimate()
+    step = display_step(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
+    seen = sensitivities(model, model.placed(estimate.about))[model.used] if step else np.zeros(0)
+    if not np.any(seen):
+        return None
+    rows = artefact.rows[model.used]
+    return Display.of(step, artefact.points.xyz, rows, seen, estimate.least_squares.residuals)
 
 
 def sensitivities(model: MeasurementModel, xyz: Floats) -> Floats:

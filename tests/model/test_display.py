@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.inference.noise import display_shared
-from cmm_uq.model.display import display_step
+from cmm_uq.model.display import Display, display_step
 
 
 def shown(step: float, count: int = 60) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -46,3 +46,42 @@ def test_a_tiny_noise_shares_all_of_the_rounding_and_a_large_one_nothing() -> No
     shared = display_shared(np.array([1e-9, 1.0]), 5e-3)
     assert shared == pytest.approx([5e-3**2 / 12, 0.0], rel=5e-3)
     assert display_shared(np.array([1.0]), 0.0) == 0.0
+
+
+def display(step: float = 5e-3) -> Display:
+    """Three coordinates of one point, then two lengths of pairs that share no point."""
+    random = np.random.default_rng(6)
+    sensitivity = np.zeros((5, 2, 3))
+    sensitivity[:3, 0] = np.eye(3)
+    rows = np.array([[0, 0], [0, 0], [0, 0], [1, 2], [3, 4]])
+    ways = random.standard_normal((2, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    sensitivity[3:, 1], sensitivity[3:, 0] = ways, -ways
+    return Display(step, random.uniform(0, 900, (5, 3)), rows, sensitivity)
+
+
+def test_points_move_as_little_as_the_observations_ask() -> None:
+    """A coordinate moves its point; a length moves both ends by half."""
+    some, changed = display(), np.array([1.0, 2.0, 3.0, 4.0, -2.0])
+    moved = some.moved(changed[:, None])[:, :, 0]
+    assert moved[0] == pytest.approx([1, 2, 3])
+    assert moved[2] == pytest.approx(2.0 * some.sensitivity[3, 1])
+    assert moved[1] == pytest.approx(-moved[2])
+    assert moved[4] == pytest.approx(-1.0 * some.sensitivity[4, 1])
+
+
+def test_rounding_is_that_of_the_coordinates_themselves() -> None:
+    some = display()
+    noise = 1e-3 * np.random.default_rng(7).standard_normal((5, 4))
+    found = some.rounded(noise)
+    for column in range(4):
+        shown = some.xyz[0] + noise[:3, column]
+        assert found[:3, column] == pytest.approx(np.round(shown / 5e-3) * 5e-3 - shown, abs=1e-9)
+    assert np.abs(found[3:]).max() < np.sqrt(6) * 2.5e-3
+
+
+def test_the_model_s_coordinates_are_the_recorded_ones_less_the_residuals() -> None:
+    some = display()
+    residual = np.array([1e-3, -2e-3, 0.5e-3, 3e-3, 0.0])
+    fitted = Display.of(5e-3, some.xyz + some.moved(residual[:, None])[:, :, 0], some.rows, some.sensitivity, residual)
+    assert fitted.xyz == pytest.approx(some.xyz, abs=1e-9)

@@ -22,6 +22,7 @@ from scipy import linalg, sparse, special
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
 from cmm_uq.diagnosis.noise import Kind
+from cmm_uq.model.display import Display
 from cmm_uq.points import Floats
 
 _BLOCK, _COLUMNS = 1_500_000, 500
@@ -59,6 +60,7 @@ class Comparison:
     noise_scale : (m,).
     least_noise : mm, the least that the noise may be; with it the largest coefficients are as large as physics allows.
     certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
+    display : steps to which all coordinates are rounded, where they matter.
     """
 
     observed: Floats
@@ -70,6 +72,7 @@ class Comparison:
     noise_scale: Floats
     least_noise: float
     certified: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    display: Display | None = None
 
     @cached_property
     def _reached(self) -> Floats:
@@ -112,12 +115,19 @@ class Comparison:
         """Explanations of which the baseline leaves anything."""
         return frozenset(i for i, _ in self._where)
 
-    def noise(self, kind: Kind, random: np.random.Generator, draws: int) -> Floats:
-        """What the baseline leaves (m, draws) of noise of one kind, a reading's standard deviation being one."""
-        found = kind.noise(random, draws)
+    def noise(self, kind: Kind, random: np.random.Generator, sigma: Floats) -> Floats:
+        """What the baseline leaves (m, draws), mm, of noise of one kind; ``sigma`` (draws,) is that of a reading, mm.
+
+        Where the display's steps matter, coordinates are rounded as the recording's were.
+        """
+        fine = kind.unrounded if self.display else None
+        found = (fine or kind).noise(random, len(sigma))
         if self.certified.size:
-            found += self.certified @ random.standard_normal((self.certified.shape[1], draws))
-        return self.rest(found)
+            found += self.certified @ random.standard_normal((self.certified.shape[1], len(sigma)))
+        if not (self.display and fine):
+            return sigma * self.rest(found)
+        found, scale = sigma * found, self.noise_scale[:, None]
+        return self.rest(found + self.display.rounded(scale * found) / scale)
 
     @cached_property
     def _noises(self) -> list[_Noise]:
@@ -212,7 +222,7 @@ class Comparison:
         found = np.empty((len(self.left), draws))
         for g in np.unique(kind):
             columns = np.flatnonzero(kind == g)
-            found[:, columns] = self.sigma[size[columns]] * self.noise(self.kinds[g], random, len(columns))
+            found[:, columns] = self.noise(self.kinds[g], random, self.sigma[size[columns]])
         return found
 
     def log_evidence(

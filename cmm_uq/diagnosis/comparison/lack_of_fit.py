@@ -21,6 +21,8 @@ NOTHING = 1 - sum(SHARES.values())
 
 DRAWS = 200
 _TAIL = 0.8
+_STEEPEST = 1.0
+"""Mean excess of log odds whose tail is that of Markov's inequality."""
 
 
 def log_prior(candidates: Sequence[Explanation]) -> Floats:
@@ -69,9 +71,14 @@ def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
 
 
 def tail_probability(draws: Floats, value: float) -> float:
-    """Probability of reaching a value, from draws; beyond their upper fifth with an exponential tail."""
+    """Probability of reaching a value of log odds, from draws; beyond their upper fifth with an exponential tail.
+
+    Log odds have a floor, near which draws may crowd; but however they do, the odds of what is not there exceed their mean,
+    which is one, a thousand times in no more than a thousandth of all cases (Markov's inequality). So the tail is
+    never steeper than that.
+    """
     start = float(np.quantile(draws, _TAIL))
     if value <= start:
         return float((np.sum(draws >= value) + 1) / (len(draws) + 1))
     beyond = draws[draws > start] - start
-    return float((1 - _TAIL) * np.exp(-(value - start) / beyond.mean()))
+    return float((1 - _TAIL) * np.exp(-(value - start) / max(float(beyond.mean()), _STEEPEST)))

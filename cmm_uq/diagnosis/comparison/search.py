@@ -23,6 +23,7 @@ from cmm_uq.diagnosis.noise import sigma_grid
 from cmm_uq.diagnosis.recorded_noise import noise_kinds
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.measurement import SMALL_LEAN
+from cmm_uq.model.noise import display_of
 from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 
@@ -247,7 +248,7 @@ def comparison_of(model: MeasurementModel, stated: float | None, candidates: Seq
     return Comparison(
         rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.freedoms.dense()]) / linear.noise_scale[:, None],
         noise_kinds(model, candidates), sigma, log_sigma, candidates, linear.noise_scale,
-        stated or sigma_left / _MISFIT, _certified(model, sigma_left),
+        stated or sigma_left / _MISFIT, _certified(model, sigma_left), display_of(model),
     )  # fmt: skip
 
 

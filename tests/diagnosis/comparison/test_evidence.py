@@ -16,6 +16,7 @@ from cmm_uq.diagnosis.shapes import drawn_shapes, kinds
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.inference.noise import Sizes, slow_variances
+from cmm_uq.model.display import Display
 from cmm_uq.points import Floats
 from cmm_uq.units import unit
 from tests.diagnosis.dense_noise import PROBABILITY, covariance, paired, rest, some_kinds
@@ -153,7 +154,7 @@ def test_strong_evidence_for_nothing_is_as_rare_as_it_says() -> None:
     g, s = np.divmod(chosen, len(c.sigma))
     data = np.empty((len(c.left), count))
     for i in range(count):
-        data[:, i] = c.sigma[s[i]] * c.noise(c.kinds[g[i]], random, 1)[:, 0]
+        data[:, i] = c.noise(c.kinds[g[i]], random, c.sigma[[s[i]]])[:, 0]
     nothing, something = c.log_evidence(data)
     for k in (3, 10, 30):
         rate = np.mean(something - nothing >= np.log(k), axis=1)
@@ -164,6 +165,25 @@ def test_the_tail_of_a_known_distribution_is_extrapolated() -> None:
     draws = np.random.default_rng(4).exponential(size=20_000)
     for value in (0.1, 3.0, 9.0):
         assert tail_probability(draws, value) == pytest.approx(np.exp(-value), rel=0.2)
+
+
+def test_log_odds_that_crowd_at_their_floor_have_no_steeper_tail_than_markov_s_inequality_allows() -> None:
+    draws = -1.6 + 0.01 * np.random.default_rng(4).exponential(size=200)
+    start = np.quantile(draws, 0.8)
+    assert tail_probability(draws, float(start) + 3.0) == pytest.approx(0.2 * np.exp(-3.0), rel=1e-12)
+
+
+def test_nothing_is_rounded_as_the_recording_was() -> None:
+    """Repeats of one coordinate with hardly any noise: all are shown alike, and far from where they are."""
+    scale, step = np.ones(8), 5e-3
+    fine = replace(paired(scale), display=5.0)
+    kind = shape_of(fine, Sizes(np.ones((1, 3)), *np.zeros((3, 1)), np.ones(1)), scale, 1.0)
+    xyz = np.repeat([[2e-3, 300.0, 300.0]], 8, axis=0)
+    rows, along = np.arange(8)[:, None], np.repeat([[[1.0, 0.0, 0.0]]], 8, axis=0)
+    c = Comparison(np.zeros(8), np.zeros((8, 0)), [kind], *sigma_grid(None, 1e-3), [], scale, 1e-4,
+                   display=Display(step, xyz, rows, along))  # fmt: skip
+    found = c.noise(kind, np.random.default_rng(1), np.full(5, 1e-5))
+    assert found == pytest.approx(np.full((8, 5), -2e-3), abs=1e-9)
 
 
 def test_a_stated_noise_is_mostly_believed() -> None:
