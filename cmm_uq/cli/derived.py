@@ -6,7 +6,6 @@ import json as json_text
 from collections.abc import Mapping
 from pathlib import Path
 
-from cmm_uq.cli.files_told import folder_of
 from cmm_uq.cli.printing import put_data, show_summary
 
 
@@ -25,6 +24,8 @@ def conclude_derived(
     ------
     OutputError : nobody takes what is said.
     """
+    from cmm_uq.cli.files_told import folder_of
+
     folder = folder_of(files)
     if json:
         manifest = json_text.loads(files["manifest.json"].read_bytes())
