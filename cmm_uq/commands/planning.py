@@ -180,7 +180,7 @@ def _with_noise(setting: Setting, name: Text, points: Points) -> Setting:
 
 
 def _part(tell: Progress, low: float, high: float) -> Callable[[int, int], None]:
-    what = "Predicting what the diagnosis would find: effect"
+    what = "Predicting the diagnosis: effect"
     return lambda count, total: tell(f"{what} {count} of {total}", low + (high - low) * count / total)
 
 

@@ -122,4 +122,4 @@ def write_diagnosis(
 
 def _sampled(what: str, part: float) -> str:
     """A stage with how much of the draws that are needed is there."""
-    return f"{what}: {part:.0%} of the draws needed"
+    return f"{what}: {part:.0%} of the draws"

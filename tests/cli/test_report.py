@@ -8,13 +8,14 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pikepdf
 import pytest
 
 from tests.cli.process import COMMAND, run
-from tests.cli.terminal import on_terminal
+from tests.cli.terminal import everything, on_terminal, until
 
 FILES = ["certificate.html", "certificate.pdf", "manifest.json", "posterior.npz", "results.json"]
 
@@ -159,3 +160,21 @@ def test_on_a_terminal_there_are_progress_and_a_decision_in_colour(iota: Path, t
     assert re.search(r"\x1b\[1;31mFAIL *\x1b\[0m", result)
     lines = re.sub(r"\x1b\[[0-9;]*m", "", result).split("\n")
     assert max(len(line) for line in lines if not line.startswith("Written to")) <= 60
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_ctrl_c_wipes_the_bar_away_and_leaves_one_line(iota: Path, tmp_path: Path) -> None:
+    import pty
+
+    master, slave = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "60"}
+    with subprocess.Popen([*COMMAND, "report", iota, "--out", tmp_path / "out"], stdin=slave, stdout=slave, stderr=slave,
+                          env=environment, start_new_session=True) as process:  # fmt: skip
+        os.close(slave)
+        assert "Sampling" in until(master, "Sampling", time.monotonic() + 60)
+        process.send_signal(signal.SIGINT)
+        shown = everything(master, time.monotonic() + 30)
+    os.close(master)
+    assert process.returncode == 130
+    assert shown.rpartition("\x1b[?25h")[2] == "cmm-uq: interrupted; nothing was written\r\n"
+    assert not (tmp_path / "out").exists()
