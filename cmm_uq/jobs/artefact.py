@@ -19,10 +19,16 @@ class Traceability(Table):
     """
 
     number: str = ""
+    """Number of the artefact's certificate, for the statement of traceability."""
     laboratory: str = ""
+    """Who certified the artefact."""
     machine: str = ""
+    """Measuring machine that the artefact was certified on, by its name or serial number: the machine that it tests
+    is warned of."""
     date: dt.date | None = None
+    """Date of the artefact's certificate."""
     due: dt.date | None = None
+    """Date by which the artefact is to be calibrated again."""
 
 
 class ArtefactFacts(Table):
@@ -47,12 +53,20 @@ class ArtefactFacts(Table):
     form_key: ClassVar[str | None] = None
 
     kind: str
+    """What kind of measurement it is; the further keys of the table depend on it."""
     name: str = ""
+    """Name of the artefact on the certificate."""
     serial: str = ""
+    """Serial number of the artefact."""
     length_mm: Length | None = None
+    """Certified length at 20 °C, of a sphere its diameter; left out for an artefact that is not calibrated."""
     u_um: Uncertainty | None = None
+    """Standard uncertainty (k = 1) of what is certified of the artefact; `U_um` with `k` may stand for it."""
     cte_per_k: AnyFloat = 0.0
+    """Coefficient of thermal expansion of the artefact, 1/K; its recorded temperature `temp_artefact_c` is corrected
+    by it."""
     certificate: Traceability | None = None
+    """The artefact's own certificate, to which the results are traceable."""
 
     @model_validator(mode="before")
     @classmethod
@@ -99,6 +113,7 @@ class ReferencedFacts(ArtefactFacts):
     with_references: ClassVar[bool] = True
 
     nominal: bool = False
+    """Whether the references in the recording are nominal only: their common scale then stays free."""
 
     @model_validator(mode="after")
     def _nominal_or_certified(self) -> Self:

@@ -32,12 +32,20 @@ class ShortGaugeFacts(Table):
     """
 
     file: str
+    """Its recording: points 1 and 2, the middles of its two faces, in every measurement and repeat."""
     length_mm: Length
+    """Certified length at 20 °C."""
     u_um: Limit
+    """Standard uncertainty (k = 1) of that length as it was met: of the certificate and of the gauge's temperature;
+    `U_um` with `k` may stand for it."""
     cte_per_k: AnyFloat = 0.0
+    """Coefficient of thermal expansion of the gauge, 1/K."""
     name: str = ""
+    """Name of the gauge on the certificate."""
     serial: str = ""
+    """Serial number of the gauge."""
     certificate: Traceability | None = None
+    """The gauge's own certificate."""
 
     @field_validator("cte_per_k")
     @classmethod
