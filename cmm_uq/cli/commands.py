@@ -6,7 +6,7 @@ import os
 
 import typer
 
-from cmm_uq.cli import budget, compensate, diagnose, plan, report, selftest, simulate
+from cmm_uq.cli import budget, compensate, diagnose, plan, report, schema, selftest, simulate
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError
 
@@ -26,6 +26,7 @@ app.command("plan")(plan.command)
 app.command("simulate")(simulate.command)
 app.command("compensate")(compensate.command)
 app.command("budget")(budget.command)
+app.command("schema")(schema.command)
 app.command("selftest")(selftest.command)
 
 
