@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from cmm_uq.cli.deferred import defer_scipy
 from cmm_uq.cli.printing import put
 
 
@@ -13,6 +14,7 @@ def command(
     name: Annotated[str, typer.Argument(help="job (with its plan), budget or truth.")] = "job",
 ) -> None:
     """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""
+    defer_scipy()
     from cmm_uq.commands.schemas import as_text, schema_named
 
     put(as_text(schema_named(name)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
@@ -13,7 +14,7 @@ from cmm_uq.jobs.schema import DRAFT, Schema, chosen_by, job_schema, schema_of
 from cmm_uq.jobs.truth import Truth
 from cmm_uq.kinds import names, table_of
 from cmm_uq.physics.effect import Effect
-from cmm_uq.plugins import naming_package
+from cmm_uq.plugins import EFFECTS, KINDS, STANDARDS, Plugin, naming_package, offered
 
 
 def tables() -> dict[str, type[ArtefactFacts]]:
@@ -72,6 +73,13 @@ def schema_named(name: str) -> Schema:
     if name not in SCHEMAS:
         raise CmmUqError(f"there is no schema {name!r}", fix=suggestion(name, SCHEMAS))
     return SCHEMAS[name]()
+
+
+def shipped(name: str) -> str:
+    """The text of a schema: as it comes with the package where nothing of other packages could be in it."""
+    if any(offered(group, Plugin) for group in (EFFECTS, KINDS, STANDARDS)):
+        return as_text(schema_named(name))
+    return (files("cmm_uq") / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
 
 
 def as_text(schema: Mapping[str, Any]) -> str:
