@@ -106,7 +106,7 @@ def _named(error: ErrorDetails) -> list[str]:
 
 def _located(error: ErrorDetails, named: list[str], text: str, path: Path, model: type[BaseModel]) -> CmmUqError:
     """A validation error, with line and key."""
-    line = _line_of(named, text)
+    line = line_of(named, text)
     table, word = _table_of(named[:-1], model), named[-1]
     named = [shortened(key, _SHOWN) for key in named]
     where = f"{path}{f' line {line}' if line else ''}: [{named[0]}]{' ' + '.'.join(named[1:]) if named[1:] else ''}"
@@ -181,7 +181,7 @@ def _model_inside(annotation: object) -> object:
     return annotation
 
 
-def _line_of(keys: list[str], text: str) -> int | None:
+def line_of(keys: list[str], text: str) -> int | None:
     """Line of the deepest of ``keys`` that stands in its table; the table's own line when none does."""
     table, found, count = "", None, -1
     wanted = int(keys[1]) if len(keys) > 1 and keys[1].isdigit() else None
