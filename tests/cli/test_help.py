@@ -44,7 +44,7 @@ def test_the_list_of_commands_is_not_cut() -> None:
 def test_alone_the_command_shows_the_three_most_used_calls() -> None:
     done = run()
     assert done.returncode == 0
-    assert re.findall(r"(?m)^  cmm-uq (\w+) JOB", done.stdout) == ["report", "diagnose", "plan"]
+    assert re.findall(r"(?m)^  cmm-uq (\w+)", done.stdout) == ["new", "report", "diagnose"]
     assert max(map(len, done.stdout.splitlines())) <= 80
 
 
