@@ -27,8 +27,8 @@ from tests.conftest import ROOT
 SHIPPED, PAGES = ROOT / "cmm_uq" / "schemas", ROOT / "docs" / "reference"
 WRITTEN = "<!-- written by python -m tests.reference_pages from what the program reads: edit that instead -->"
 EDITORS = (
-    "The same as JSON Schema, for editors that complete and explain (Even Better TOML, taplo, Tombi): `cmm-uq schema {name}` prints "
-    "it with the kinds, effects and standards of other packages that are installed; a first line `#:schema ./FILE` names it."
+    "The same as JSON Schema, for editors that complete and explain (Even Better TOML, taplo, Tombi): `cmm-uq schema {name}` "
+    "prints it with the kinds, effects and standards of other packages that are installed; a first line `#:schema ./FILE` names it."
 )
 ALL = "all"
 
@@ -62,9 +62,9 @@ def job() -> str:
     """Every key of job.toml but ``[plan]``."""
     schema = schema_named("job")
     parts = [
-        "A job is a folder with a `job.toml` and the recording that it names. `cmm-uq new KIND` writes one that runs, with every "
-        "key explained; `cmm-uq check JOB` says all that is wrong with it. Numbers in brackets such as 7.8.2.1 e are clauses of "
-        "ISO/IEC 17025:2017.",
+        "A job is a folder with a `job.toml` and the recording that it names. `cmm-uq new KIND` writes one that runs, with "
+        "every key explained; `cmm-uq check JOB` says all that is wrong with it. Numbers in brackets such as 7.8.2.1 e are "
+        "clauses of ISO/IEC 17025:2017.",
         EDITORS.format(name="job"),
         "Units stand at the end of a key's name. A standard uncertainty u has k = 1.",
     ]
@@ -101,7 +101,8 @@ def truth() -> str:
     schema = schema_named("truth")
     return page(
         "truth.toml, key by key",
-        "What `cmm-uq simulate JOB --truth FILE` draws a recording from. Parameters of every effect: [effects](../machine/effects.md).",
+        "What `cmm-uq simulate JOB --truth FILE` draws a recording from. Parameters of every effect: "
+        "[effects](../machine/effects.md).",
         EDITORS.format(name="truth"), keys_table(schema),
     )  # fmt: skip
 
@@ -151,8 +152,8 @@ def columns() -> str:
     ]  # fmt: skip
     return page(
         "The columns of a recording",
-        "A recording is a CSV in UTF-8 with one row a point; lines that begin with # are passed over. Any other numeric column is "
-        "a covariate: not used by the model, but searched when a mismatch is located.",
+        "A recording is a CSV in UTF-8 with one row a point; lines that begin with # are passed over. Any other numeric column "
+        "is a covariate: not used by the model, but searched when a mismatch is located.",
         "## Kinds",
         f"Every recording has {', '.join(f'`{name}`' for name in REQUIRED)}.",
         table(("kind", "what the numbers mean", "needs besides", "may have"), kinds),
