@@ -28,7 +28,8 @@ SHIPPED, PAGES = ROOT / "cmm_uq" / "schemas", ROOT / "docs" / "reference"
 WRITTEN = "<!-- written by python -m tests.reference_pages from what the program reads: edit that instead -->"
 EDITORS = (
     "The same as JSON Schema, for editors that complete and explain (Even Better TOML, taplo, Tombi): `cmm-uq schema {name}` "
-    "prints it with the kinds, effects and standards of other packages that are installed; a first line `#:schema ./FILE` names it."
+    "prints it with the kinds, effects and standards of other packages that are installed; a first line "
+    "`#:schema ./FILE` names it."
 )
 ALL = "all"
 
@@ -152,8 +153,8 @@ def columns() -> str:
     ]  # fmt: skip
     return page(
         "The columns of a recording",
-        "A recording is a CSV in UTF-8 with one row a point; lines that begin with # are passed over. Any other numeric column "
-        "is a covariate: not used by the model, but searched when a mismatch is located.",
+        "A recording is a CSV in UTF-8 with one row a point; lines that begin with # are passed over. Any other numeric "
+        "column is a covariate: not used by the model, but searched when a mismatch is located.",
         "## Kinds",
         f"Every recording has {', '.join(f'`{name}`' for name in REQUIRED)}.",
         table(("kind", "what the numbers mean", "needs besides", "may have"), kinds),
