@@ -90,13 +90,24 @@ def test_its_recording_has_the_columns_that_the_readme_names(name: str) -> None:
     assert len(files[README].decode().splitlines()) <= 12
 
 
-def test_it_becomes_a_measured_job_when_both_marks_are_taken_away_and_not_before(tmp_path: Path) -> None:
-    write_new("sphere", tmp_path / "job", {})
+def test_it_becomes_a_measured_job_when_every_mark_is_taken_away_and_not_before(tmp_path: Path) -> None:
+    write_new("sphere", tmp_path / "job", {"artefact": {"form_um": 0.1}})
     toml, csv = tmp_path / "job" / "job.toml", tmp_path / "job" / RECORDING
     toml.write_text(re.sub(r"(?m)^origin = .*\n", "", toml.read_text(encoding="utf-8")), encoding="utf-8")
     with pytest.raises(CmmUqError, match=r"was simulated, and job\.toml says measured"):
         read_job(tmp_path / "job")
     csv.write_text(csv.read_text(encoding="utf-8").split("\n", 1)[1], encoding="utf-8")
+    told = {problem.problem.removesuffix(" is still an example's") for problem in check_job(tmp_path / "job").problems}
+    assert told == {
+        "name",
+        "travel_mm",
+        "length_mm",
+        "u_um",
+        "standard",
+        "limit_um",
+        "rule",
+    }  # of form_um somebody answers
+    toml.write_text(toml.read_text(encoding="utf-8").replace("# EXAMPLE, put in your own:", "#"), encoding="utf-8")
     found = check_job(tmp_path / "job")
     assert found.sound
     assert "[laboratory] name" in [one.key for one in found.warnings]
@@ -169,6 +180,9 @@ def test_rows_that_were_measured_make_a_measured_job() -> None:
     job = read(job_of_rows("ballbar", REQUIRED, rows, {"machine": {"name": "Bridge 7"}}, id="mine"))
     assert job.origin == "measured"
     np.testing.assert_allclose(job.points.xyz, points.xyz, atol=1e-4)
+    assert (job.facts.artefact.length_mm, job.facts.artefact.u_um, job.facts.conformity) == (None, None, [])
+    with pytest.raises(CmmUqError, match=r"\[machine\].*is missing|machine"):
+        job_of_rows("ballbar", REQUIRED, rows, {}, id="mine")
 
 
 def test_a_kind_of_another_package_that_says_nothing_of_a_beginning_has_one(
