@@ -95,9 +95,8 @@ class Layout:
         if self.width is not None:
             room = self.width - len(_GAP) * len(widths)
             if sum(widths) > room and not self.verbose:
-                cells = [
-                    [row[0].partition(" (")[0], *row[1:]] for row in cells
-                ]  # what a name means stands in the document
+                # what a name means, in brackets behind it, stands in the document
+                cells = [[row[0].partition(" (")[0], *row[1:]] for row in cells]
                 widths = _widths(cells)
         while room is not None and sum(widths) > room and max(widths) > NARROWEST:
             widths[widths.index(max(widths))] -= 1
