@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import create_model
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.errors import CmmUqError, Gathered
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.as_found import as_found_of
@@ -23,7 +23,7 @@ from cmm_uq.jobs.file_names import check_distinct
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
-from cmm_uq.jobs.origin import altered, check_mark, is_planned
+from cmm_uq.jobs.origin import altered, check_examples, check_mark, is_planned
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
@@ -100,6 +100,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     inputs |= _contents(source, others, TABLE_BYTES, written=True)
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
+        check_examples(content, facts.job.origin, str(path))
         return Job(folder, facts, _no_points(machine), inputs | _contents(source, maps, MAP_BYTES))
     noise = noise_file(facts.plan)
     if noise is not None:
@@ -113,6 +114,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
         inputs |= _contents(source, others, TABLE_BYTES, written=True)
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
+    check_examples(content, facts.job.origin, str(path))
     points = read_recording(inputs[facts.recording.file], where, machine)
     planned = is_planned(inputs[facts.recording.file])
     if not planned:  # a plan has no times yet
@@ -198,8 +200,12 @@ def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def _contents(source: Source, names: Sequence[str], limit: Limit, *, written: bool = False) -> dict[str, bytes]:
-    fix = f"Put it beside job.toml, or mend its name in {source.toml}"
-    return {name: source.content(name, limit, fix, written=written) for name in names}
+    fix, found, wrong = f"Put it beside job.toml, or mend its name in {source.toml}", dict[str, bytes](), Gathered()
+    for name in names:
+        with wrong.going_on():
+            found[name] = source.content(name, limit, fix, written=written)
+    wrong.refuse()
+    return found
 
 
 def _no_points(machine: Machine) -> Points:

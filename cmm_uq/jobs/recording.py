@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import compress
 from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.files.cells import cells_of, column_problem
 from cmm_uq.files.numbers import LARGEST, numbers
 from cmm_uq.jobs.table import LONGEST_MM
@@ -57,23 +58,34 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
     CmmUqError : a column is missing or twice there, a cell is no number of a possible size, a row is incomplete, a point is
         there twice.
     """
-    header, rows, lines = _table(content, name)
-    _check_header(header, name)
+    wrong, table = Gathered(), dict[str, Floats]()
+    header, rows, lines = _table(content, name, wrong)
+    with wrong.going_on():
+        _check_header(header, name)
+    if not set(REQUIRED) <= set(header):
+        wrong.refuse()  # the cells of another table are another's
 
     def column_of(i: int) -> Floats:
         return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}")
 
-    table = {column: column_of(i) for i, column in enumerate(header)}
+    for i, column in enumerate(header):
+        with wrong.going_on():
+            table[column] = column_of(i)
     for column, values in table.items():
-        _check_size(values, column, lines, name)
-    _check_normals(table, lines, name)
+        with wrong.going_on():
+            _check_size(values, column, lines, name)
+    with wrong.going_on():
+        _check_normals(table, lines, name)
     for column in WHOLE:
         if column in table:
-            _check_whole(table[column], column, lines, name)
+            with wrong.going_on():
+                _check_whole(table[column], column, lines, name)
     for axis in "xyz":
         column = f"approach_{axis}"
         if column in table:
-            _check_directions(table[column], column, lines, name)
+            with wrong.going_on():
+                _check_directions(table[column], column, lines, name)
+    wrong.refuse()
     number = {column: table.get(column, np.ones(len(rows))).astype(np.int64) for column in WHOLE}
     points = Points(
         np.column_stack([table["x_mm"], table["y_mm"], table["z_mm"]]),
@@ -85,17 +97,19 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
     return points
 
 
-def _table(content: bytes, name: str) -> tuple[list[str], list[list[str]], list[int]]:
+def _table(content: bytes, name: str, wrong: Gathered) -> tuple[list[str], list[list[str]], list[int]]:
+    """Header, complete rows and their lines; rows of another length are gathered."""
     cells = cells_of(content, name, "Save the recording as CSV in UTF-8")
+    whole = [len(row) == len(cells.header) for row in cells.rows]
     for row, line in zip(cells.rows, cells.lines, strict=True):
         if len(row) != len(cells.header):
-            raise CmmUqError(
+            wrong.add(CmmUqError(
                 f"has {len(row)} cells where the header has {len(cells.header)}", where=f"{name} line {line}",
                 fix="Complete the row; if it is the last one, the file was cut off: export it again",
-            )  # fmt: skip
+            ))  # fmt: skip
     if not cells.rows:
         raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
-    return cells.header, cells.rows, cells.lines
+    return cells.header, list(compress(cells.rows, whole)), list(compress(cells.lines, whole))
 
 
 def _check_header(header: Sequence[str], name: str) -> None:
@@ -103,22 +117,24 @@ def _check_header(header: Sequence[str], name: str) -> None:
     if len(header) == 1 and ";" in header[0]:
         raise CmmUqError("cells are separated by semicolons", where=where,
                          fix="Separate them by commas, with a decimal point in numbers")  # fmt: skip
+    wrong = Gathered()
     for i, column in enumerate(header):
         if not column:
-            raise CmmUqError(f"column {i + 1} has no name", where=where, fix="Name it, or remove it")
-        if column in header[:i]:
-            raise CmmUqError(f"the column {column!r} is there twice", where=where, fix="Keep one")
-        if problem := column_problem(column):
-            raise CmmUqError(problem, where=where, fix="Name it with letters, digits and _")
+            wrong.add(CmmUqError(f"column {i + 1} has no name", where=where, fix="Name it, or remove it"))
+        elif column in header[:i]:
+            wrong.add(CmmUqError(f"the column {column!r} is there twice", where=where, fix="Keep one"))
+        elif problem := column_problem(column):
+            wrong.add(CmmUqError(problem, where=where, fix="Name it with letters, digits and _"))
     for column in header:
         known = QUANTITIES.get(OTHER_UNITS.sub("", column))
         if known and column not in (*REQUIRED, *OPTIONAL):
-            raise CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where,
-                             fix=f"Convert it and name it {known}")  # fmt: skip
+            wrong.add(CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where,
+                                 fix=f"Convert it and name it {known}"))  # fmt: skip
     for column in REQUIRED:
         if column not in header:
             unread = " (of an axis that nobody reads, give one number in all rows)" * column.endswith("_mm")
-            raise CmmUqError(f"no column {column!r}", where=where, fix=f"{suggestion(column, header)}{unread}")
+            wrong.add(CmmUqError(f"no column {column!r}", where=where, fix=f"{suggestion(column, header)}{unread}"))
+    wrong.refuse()
 
 
 def largest(column: str) -> float:
