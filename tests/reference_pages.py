@@ -168,9 +168,9 @@ def results() -> str:
     rows = [(f"`{name}`", unit_of(name) or "–", told) for name, told in RESULTS.items()]
     return page(
         "results.json of `cmm-uq report`, key by key",
-        "Schema `cmm-uq/results/1`. A part in capitals stands for any name, `[]` for each entry of a list. Numbers are finite; "
-        "what has no value is `null`. Kinds add keys of their own beside these, and a kind with an analysis of its own (`shift`, "
-        "`error_map`) has some of them only.",
+        "Schema `cmm-uq/results/1`. A part in capitals stands for any name, `[]` for each entry of a list. Numbers are "
+        "finite; what has no value is `null`. Kinds add keys of their own beside these, and a kind with an analysis of its "
+        "own (`shift`, `error_map`) has some of them only.",
         "A *quantity* is a table of", table(("key", "meaning"), [(f"`{name}`", told) for name, told in QUANTITY.items()]),
         "## Keys", table(("key", "unit", "meaning"), rows),
     )  # fmt: skip
