@@ -45,6 +45,7 @@ def files() -> dict[Path, str]:
         "budget": budget(),
         "columns": columns(),
         "commands": commands(),
+        "results": results(),
     }
     return schemas | {PAGES / f"{name}.md": text for name, text in pages.items()}
 
