@@ -13,6 +13,7 @@ from typer.models import ArgumentInfo, CommandInfo
 from cmm_uq.cli.commands import app
 from cmm_uq.commands.new import known
 from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
+from cmm_uq.documents.results_keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
 from cmm_uq.jobs.recording import REQUIRED
@@ -21,6 +22,7 @@ from cmm_uq.jobs.sentences import unit_of
 from cmm_uq.jobs.toml_text import without_place, written
 from cmm_uq.kinds import kind_named
 from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.planning.setting import Planning
 from cmm_uq.uncertainty.budgets.tables import TABLES
 from cmm_uq.uncertainty.input_keys import KINDS as DISTRIBUTIONS
 from tests.conftest import ROOT
@@ -45,6 +47,7 @@ def files() -> dict[Path, str]:
         "budget": budget(),
         "columns": columns(),
         "commands": commands(),
+        "results": results(),
     }
     return schemas | {PAGES / f"{name}.md": text for name, text in pages.items()}
 
@@ -87,7 +90,7 @@ def plan() -> str:
     ready = [
         (f"`{kind}`", ", ".join(f"`{plan}`" for plan in planning.ready))
         for kind in dict.fromkeys(known().values())
-        if (found := kind_named(kind)) is not None and (planning := found._loaded(found.plan)) is not None
+        if (found := kind_named(kind)) is not None and (planning := found.offers("plan", Planning)) is not None
     ]
     return page(
         "`[plan]` in job.toml, key by key",
@@ -160,6 +163,19 @@ def columns() -> str:
         f"Every recording has {', '.join(f'`{name}`' for name in REQUIRED)}.",
         table(("kind", "what the numbers mean", "needs besides", "may have"), kinds),
         "## Columns", table(("column", "unit", "meaning", "kinds", "effects that go by it"), rows),
+    )  # fmt: skip
+
+
+def results() -> str:
+    """Every key of results.json that every kind with an artefact has."""
+    rows = [(f"`{name}`", unit_of(name) or "–", told) for name, told in RESULTS.items()]
+    return page(
+        "results.json of `cmm-uq report`, key by key",
+        "Schema `cmm-uq/results/1`. A part in capitals stands for any name, `[]` for each entry of a list. Numbers are "
+        "finite; what has no value is `null`. Kinds add keys of their own beside these, and a kind with an analysis of its "
+        "own (`shift`, `error_map`) has some of them only.",
+        "A *quantity* is a table of", table(("key", "meaning"), [(f"`{name}`", told) for name, told in QUANTITY.items()]),
+        "## Keys", table(("key", "unit", "meaning"), rows),
     )  # fmt: skip
 
 

@@ -20,6 +20,8 @@ from cmm_uq.commands.plan import write_plan
 from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.documents.origin import origin_warnings
+from cmm_uq.documents.results_file import as_json
+from cmm_uq.documents.results_keys import RESULTS, described
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import SIMULATED
@@ -40,6 +42,19 @@ def read(files: dict[str, bytes]) -> Job:
     return job_of({name: content for name, content in files.items() if name not in (README, SCHEMA)})
 
 
+EVERY_RESULT = {key.partition(".")[0] for key in RESULTS}
+
+
+def paths(data: object, above: str = "") -> list[str]:
+    """Dotted names of the leaves of results.json, as the reference has them."""
+    if isinstance(data, dict) and data:
+        names = {key.replace(".", "·"): item for key, item in data.items()}  # a point in a name parts nothing
+        return [path for key, item in names.items() for path in paths(item, f"{above}.{key}" if above else key)]
+    if isinstance(data, list) and data and isinstance(data[0], dict):
+        return [path for item in data for path in paths(item, f"{above}[]")]
+    return [above] if data not in ({}, []) else []
+
+
 def test_every_built_in_kind_and_a_plate_that_is_shifted_can_be_begun() -> None:
     assert tuple(known()) == tuple(sorted(NAMES, key=list(known()).index))
     assert set(known()) == set(NAMES)
@@ -54,6 +69,8 @@ def test_a_new_job_is_reported_at_once_as_simulated_and_agrees_with_its_model(na
     assert found.origin == SIMULATED
     assert len(origin_warnings(job)) > 0
     assert found.results.get("diagnosis", {"verdict": "consistent"})["verdict"] == "consistent"
+    undescribed = [path for path in paths(json.loads(as_json(found.results))) if path.split(".")[0] in EVERY_RESULT]
+    assert name in ("shift", "shift_plate", "error_map") or [one for one in undescribed if not described(one)] == []
     statements = found.results.get("conformity", [])
     assert [(one["decision"], one["scope"]) for one in statements] == [("pass", "complete")] * len(job.facts.conformity)
 
@@ -88,6 +105,7 @@ def test_its_recording_has_the_columns_that_the_readme_names(name: str) -> None:
     named = re.findall(r"`(\w+)`", files[README].decode().split("Its columns: ")[1].split(";")[0])
     assert set(REQUIRED) <= set(named) <= set(header)
     assert len(files[README].decode().splitlines()) <= 12
+    assert files[README].decode().startswith(f"# {titles()[name]}\n")
 
 
 def test_it_becomes_a_measured_job_when_every_mark_is_taken_away_and_not_before(tmp_path: Path) -> None:
