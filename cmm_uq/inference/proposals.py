@@ -75,7 +75,8 @@ class Proposal:
 
     def log_density(self, z: Floats) -> Floats:
         """(w,) up to a constant."""
-        return np.asarray(special.logsumexp(self.log_each(z)[0], axis=1))
+        log, _ = self.log_each(z)
+        return log[:, 0] if len(self.weights) == 1 else np.asarray(special.logsumexp(log, axis=1))
 
     def log_each(self, z: Floats) -> tuple[Floats, Floats]:
         """Weighted log density of each distribution, and squared distance from its centre, (w, K)."""

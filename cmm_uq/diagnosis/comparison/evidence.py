@@ -24,7 +24,8 @@ from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacke
 from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.points import Floats
 
-_BLOCK, _COLUMNS = 1_500_000, 500
+_BLOCK, _COLUMNS = 150_000, 500
+"""Numbers of a block that a processor's cache holds; columns weighed at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,7 +327,8 @@ class Comparison:
         squares = known.squares[:, None, None, :] - (variance / (1 + ratio)) @ shown**2
         log = self.over_sigma(squares)
         log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
-        return np.asarray(np.logaddexp.reduce(log, axis=0), dtype=np.float64)
+        largest = log.max(axis=0)
+        return np.asarray(largest + np.log(np.exp(log - largest).sum(axis=0)), dtype=np.float64)
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
