@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,8 +44,13 @@ def position_on(machine: Machine, middle: Floats, direction: Floats) -> Text:
     A space diagonal goes from corner to corner: by its direction alone a line across a corner, or one that hardly leaves the
     floor, would pass for one, and that of a long machine would not. Without travel the direction decides.
     """
-    crossed = crossed_travel(machine, middle, direction)
-    u = direction / np.linalg.norm(direction)
+    return _position_on(machine, tuple(middle.tolist()), tuple(direction.tolist()))
+
+
+@lru_cache(maxsize=16_384)  # conditions, figures and remarks of several standards ask for the same lines
+def _position_on(machine: Machine, middle: tuple[float, ...], direction: tuple[float, ...]) -> Text:
+    crossed = crossed_travel(machine, np.array(middle), np.array(direction))
+    u = np.array(direction) / np.linalg.norm(direction)
     named = position_of(u)
     if crossed is None:
         return named

@@ -232,7 +232,7 @@ class Comparison:
         """
         total = np.full((len(self.explanations), 1 if left is None else left.shape[1]), -np.inf)
         for group, each in self.each(left, given, among):
-            gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight[:, None]
+            gains = _log_sum(each, 1) - np.log(AMPLITUDES) + group.weight[:, None]
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
         return self.log_evidence_of(given, left), total
@@ -245,7 +245,7 @@ class Comparison:
         most, best = total.copy(), {}
         for group, cube in self.each(None, given, among):
             each = cube[:, :, 0]
-            gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight
+            gains = _log_sum(each, 1) - np.log(AMPLITUDES) + group.weight
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
             largest = each.max(axis=1) + group.weight
@@ -275,7 +275,7 @@ class Comparison:
         """Log evidence (b,) of what is given, at its size, for data (m, b)."""
         known = self._beside(left, given)
         every = self.over_sigma(known.squares) + known.log[:, None]
-        return np.asarray(special.logsumexp(every, axis=0), dtype=np.float64)
+        return _log_sum(every, 0)
 
     def noise_probability(self, given: Sequence[Version]) -> Floats:
         """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
@@ -327,8 +327,7 @@ class Comparison:
         squares = known.squares[:, None, None, :] - (variance / (1 + ratio)) @ shown**2
         log = self.over_sigma(squares)
         log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
-        largest = log.max(axis=0)
-        return np.asarray(largest + np.log(np.exp(log - largest).sum(axis=0)), dtype=np.float64)
+        return np.asarray(np.logaddexp.reduce(log, axis=0), dtype=np.float64)
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
@@ -355,6 +354,18 @@ class Comparison:
         if key not in self._weighed:
             self._weighed[key] = self._by_noise(self._columns(version))
         return self._weighed[key]
+
+
+def _log_sum(log: Floats, axis: int) -> Floats:
+    """Logarithm of sums of what has these finite logarithms, in the steps of ``scipy.special.logsumexp``.
+
+    A search asks for thousands of small ones, and what scipy does beside these steps takes thrice their time.
+    """
+    largest = log.max(axis=axis, keepdims=True)
+    most = log == largest
+    count = most.sum(axis=axis, keepdims=True, dtype=np.float64)
+    others = np.exp(np.where(most, -np.inf, log) - largest).sum(axis=axis, keepdims=True)
+    return np.asarray((np.log1p(others / count) + np.log(count) + largest).squeeze(axis), dtype=np.float64)
 
 
 def _log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
