@@ -21,9 +21,11 @@ def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProc
     Not seen here: signals, what streams and terminals do, and what another order of hashes would change.
     """
     line, out, err = ["cmm-uq", *map(str, arguments)], io.StringIO(), io.StringIO()
-    with redirect_stdout(out), redirect_stderr(err), chdir(cwd or Path.cwd()), mock.patch.object(sys, "argv", line):
-        with warnings.catch_warnings(action="ignore"):
-            code = cli._ended()
+    with (
+        redirect_stdout(out), redirect_stderr(err), chdir(cwd or Path.cwd()),
+        mock.patch.object(sys, "argv", line), warnings.catch_warnings(action="ignore"),
+    ):  # fmt: skip
+        code = cli._ended()
     return subprocess.CompletedProcess(line, code, out.getvalue(), err.getvalue())
 
 
