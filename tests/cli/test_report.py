@@ -1,4 +1,4 @@
-"""The command as a user meets it: real processes, real files, real interruptions."""
+"""The command as a user meets it: real files, real interruptions, and a process of its own where that matters."""
 
 from __future__ import annotations
 
