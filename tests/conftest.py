@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -12,6 +13,12 @@ from cmm_uq.points import Machine, Points
 from tests.recordings import TRAVEL, bars
 
 ROOT = Path(__file__).parents[1]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Workers of one run share what takes long to make: see tests/kinds/simulated.py."""
+    if hasattr(config, "workerinput"):
+        os.environ["CMM_UQ_TESTS_SHARE"] = str(Path(config.option.basetemp).parent)
 
 
 @pytest.fixture

@@ -6,6 +6,8 @@ Exit codes: 0 done; 2 bad input; 3 output impossible; 4 done, and not conforming
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import os
 import sys
 import warnings
@@ -27,6 +29,9 @@ NOT_CONFORMING = 4
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Matrices here are small: more threads cost more than they gain, and how many there are would show in the last digits."""
 
+_NEW_OBJECTS = 100_000
+"""Between two looks for what refers to itself: by default every 700, a twentieth of a report's time for a few megabytes."""
+
 
 def main() -> None:
     """Run the command; whatever happens ends with one line and a documented exit code, never with a traceback."""
@@ -40,6 +45,7 @@ def main() -> None:
         warnings.simplefilter("ignore")  # what matters is an error or a warning of the report, not a line of a library
     _without_kde()
     any_character()
+    gc.set_threshold(_NEW_OBJECTS)
     code = _ended()
     try:
         if sys.stdout is not None:

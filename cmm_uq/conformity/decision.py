@@ -11,9 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from scipy import optimize, special
+from scipy import special
 
 from cmm_uq.conformity.risk import Known, acceptance_limit
+from cmm_uq.inference.root import root
 from cmm_uq.jobs.conformity import (
     FalseAccept,
     GuardBand,
@@ -228,7 +229,7 @@ def _guard_band(u: float, limit: float, risk: float, signed: bool) -> float | No
         return one_sided
     if _beyond(0.0, u, limit, signed) > risk:
         return None
-    return limit - float(optimize.brentq(lambda v: _beyond(v, u, limit, signed) - risk, 0.0, limit, xtol=1e-12 * limit))
+    return limit - root(lambda v: _beyond(v, u, limit, signed) - risk, 0.0, limit, 1e-12 * limit)
 
 
 def _posterior_band(u: float, limit: float, risk: float, signed: bool, prior: Known, side: float) -> float | None:
@@ -239,7 +240,7 @@ def _posterior_band(u: float, limit: float, risk: float, signed: bool, prior: Kn
 
     if excess(limit) <= 0:
         return 0.0
-    return None if excess(0.0) > 0 else limit - float(optimize.brentq(excess, 0.0, limit, xtol=1e-12 * limit))
+    return None if excess(0.0) > 0 else limit - root(excess, 0.0, limit, 1e-12 * limit)
 
 
 def rule_words(rule: Rule, band: float | None = None) -> Text:

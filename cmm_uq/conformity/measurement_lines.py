@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,12 +44,19 @@ def position_on(machine: Machine, middle: Floats, direction: Floats) -> Text:
     A space diagonal goes from corner to corner: by its direction alone a line across a corner, or one that hardly leaves the
     floor, would pass for one, and that of a long machine would not. Without travel the direction decides.
     """
-    crossed = crossed_travel(machine, middle, direction)
-    u = direction / np.linalg.norm(direction)
+    travel, place = machine.travel_mm, middle + machine.origin_mm
+    return _position_on(tuple(travel.ravel().tolist()), tuple(place.tolist()), tuple(direction.tolist()))
+
+
+@lru_cache(maxsize=16_384)  # conditions, figures and remarks of several standards ask for the same lines
+def _position_on(ends: tuple[float, ...], place: tuple[float, ...], direction: tuple[float, ...]) -> Text:
+    travel, along = np.reshape(ends, (-1, 2)), np.array(direction)
+    crossed = _crossed(travel, np.array(place), along)
+    u = along / np.linalg.norm(along)
     named = position_of(u)
     if crossed is None:
         return named
-    if np.all(crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(machine.travel_mm, axis=1)):
+    if np.all(crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(travel, axis=1)):
         return say("space diagonal {axes}", axes=_signed(u, np.ones(3, dtype=bool)))
     if named.startswith("space diagonal"):
         return say("oblique {axes}", axes=named.arguments["axes"])
@@ -56,11 +65,14 @@ def position_on(machine: Machine, middle: Floats, direction: Floats) -> Text:
 
 def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float | None:
     """Travel, mm, along a line through ``middle`` (3,) in the recorded frame; 0 outside it, ``None`` where none is stated."""
-    travel = machine.travel_mm
+    return _crossed(machine.travel_mm, middle + machine.origin_mm, direction)
+
+
+def _crossed(travel: Floats, place: Floats, direction: Floats) -> float | None:
+    """The same of scale readings ``place`` (3,), mm."""
     if not np.all(np.isfinite(travel)):
         return None
     u = direction / np.linalg.norm(direction)
-    place = middle + machine.origin_mm
     moving = np.abs(u) > 1e-9
     if np.any((np.abs(place - travel.mean(axis=1)) > 0.5 * np.ptp(travel, axis=1) + _ROUNDING)[~moving]):
         return 0.0

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
+from cmm_uq.inference.root import root
 from cmm_uq.points import Floats
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -107,7 +108,7 @@ def acceptance_limit(risk: float, limit: float, u: float, prior: Known, *, signe
         return limit
     if excess(0.0) > 0:
         return None
-    return float(optimize.brentq(excess, 0.0, limit, xtol=1e-9 * limit))
+    return root(excess, 0.0, limit, 1e-9 * limit)
 
 
 def _accepted(values: Floats, acceptance: float, u: float, *, signed: bool) -> Floats:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
 from cmm_uq.inference.noise import Components, Sizes
+from cmm_uq.inference.root import root
 from cmm_uq.points import Floats
 
 _COVERAGE = 0.975
@@ -32,7 +33,5 @@ def uncertainty_of_sum(
     if not u:
         return 0.0, 0.0
     sd = np.maximum(sd, 1e-12 * u)
-    half = optimize.brentq(
-        lambda t: float(special.ndtr(t * u / sd).mean()) - _COVERAGE, 0.0, float(sd.max() / u) * 2.0, xtol=1e-9
-    )
-    return u, float(half) * u
+    half = root(lambda t: float(special.ndtr(t * u / sd).mean()) - _COVERAGE, 0.0, float(sd.max() / u) * 2.0, 1e-9)
+    return u, half * u

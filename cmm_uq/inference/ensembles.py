@@ -103,7 +103,8 @@ def run_ensembles(
     def independence(z: Floats, random: Any) -> tuple[Floats, Floats]:
         """A proposal that does not depend on where the walkers are, with its Hastings ratio."""
         proposed = proposal.draws(len(z), random)
-        return proposed, proposal.log_density(z) - proposal.log_density(proposed)
+        before, after = np.split(proposal.log_density(np.vstack([z, proposed])), 2)
+        return proposed, before - after
 
     samplers, states = [], []
     for child in np.random.SeedSequence(seed).spawn(ENSEMBLES):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg
 
 from cmm_uq.inference.ensembles import Progress, converged, run_ensembles
 from cmm_uq.inference.linear_model import LinearModel, Unknown
@@ -164,6 +164,8 @@ class Density:
         return float(self._largest_evidence(best - _STEP, min(best + _STEP, np.log(SIGMA_BOUNDS[1]))))
 
     def _largest_evidence(self, low: float, high: float) -> float:
+        from scipy import optimize  # takes longer to import than most commands run
+
         found = optimize.minimize_scalar(lambda t: -self.conditional(t)[2], bounds=(low, high), method="bounded")
         return float(found.x)
 

@@ -75,7 +75,8 @@ class Proposal:
 
     def log_density(self, z: Floats) -> Floats:
         """(w,) up to a constant."""
-        return np.asarray(special.logsumexp(self.log_each(z)[0], axis=1))
+        log, _ = self.log_each(z)
+        return log[:, 0] if len(self.weights) == 1 else np.asarray(special.logsumexp(log, axis=1))
 
     def log_probability(self, parameters: Floats) -> Floats:
         """Logarithm of the density (w,) of parameters (w, d), with its constant."""

@@ -25,7 +25,7 @@ from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.physics.effect import Effect
-from cmm_uq.physics.superposition import Superposition
+from cmm_uq.physics.superposition import About, Superposition
 from cmm_uq.points import Floats
 from cmm_uq.units import ARCSECOND, Unit
 
@@ -207,9 +207,8 @@ class MeasurementModel:
     def linearised(self, values: Floats) -> LinearModel:
         """The model about parameters (k,): ``observed`` is what they leave unexplained plus what they explain."""
         artefact, used = self.artefact, self.used
-        coefficients, _ = self._split(values)
         true, unexplained = self._unexplained(values)
-        change = self._acting.derivatives(artefact.points.at(true), coefficients)
+        change = self._acting.derivatives(self._about(values))
         design = np.hstack([-artefact.project(true, change), artefact.size_change()])
         return LinearModel(
             (unexplained + design @ values)[used], design[used], self.unknowns,
@@ -238,8 +237,20 @@ class MeasurementModel:
     def columns(self, effect: Effect, shape: Sequence[float], values: Floats) -> Floats:
         """Errors e of the points, (n, 3, j) in mm, for one unit of each coefficient of one effect beside the model's own."""
         model, about = (self, values) if self.within is None else (self.within, self.within.estimate().about)
-        points = self.artefact.points.at(self.where(values))
-        return model._acting.beside(effect, shape, points, model._split(about)[0])
+        return model._about(about).columns(effect, shape)
+
+    def _about(self, values: Floats) -> About:
+        """Where columns are taken that are linear about parameters (k,)."""
+        key = values.tobytes()
+        if key not in self._abouts:
+            self._abouts.clear()
+            self._abouts[key] = self._acting.about(self.artefact.points.at(self.placed(values)), self._split(values)[0])
+        return self._abouts[key]
+
+    @cached_property
+    def _abouts(self) -> dict[bytes, About]:
+        """What :meth:`_about` found last."""
+        return {}
 
     @cached_property
     def _placed(self) -> dict[bytes, Floats]:

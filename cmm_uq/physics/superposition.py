@@ -30,6 +30,30 @@ _ROUNDS = 50
 
 
 @dataclass(frozen=True, eq=False)
+class About:
+    """Where the columns of effects that act together are taken, found once for all of them.
+
+    Parameters
+    ----------
+    points : as indicated, with the directions of the motions where they lean.
+    change : (3, ..., 3, 3) of those directions by the squarenesses; ``None`` where columns of these are to first order.
+    """
+
+    points: Points
+    change: Floats | None = None
+
+    def columns(self, effect: Effect, shape: Sequence[float] = ()) -> Floats:
+        """Change of e, (n, 3, j) in mm, for one unit of each coefficient of one effect, named in the model or not."""
+        basis = _along_motion(effect, effect.basis(self.points, shape), self.points)
+        if self.change is None or not effect.plane:
+            return basis
+        turned = along_directions(self.points.carriages, self.change[SQUARENESSES.index(str(effect.plane))])
+        found = basis.copy()
+        found[:, :, 0] = (turned.T * effect.lean(self.points)).T
+        return found
+
+
+@dataclass(frozen=True, eq=False)
 class Superposition:
     """Effects that act together.
 
@@ -46,40 +70,31 @@ class Superposition:
         """Errors e (n, 3), mm, of points as indicated, for coefficients (k,)."""
         squareness = self._squareness(points, coefficients)
         if squareness is None:
-            return np.asarray(self._basis(points) @ coefficients, dtype=np.float64)
+            return np.asarray(self.derivatives(About(points)) @ coefficients, dtype=np.float64)
         directions = axis_directions(squareness)
         others = np.where(self._leans, 0.0, coefficients)
-        e = self._basis(replace(points, directions=directions)) @ others
+        e = self.derivatives(About(replace(points, directions=directions))) @ others
         return np.asarray(e + leaning(points.carriages, directions), dtype=np.float64)
 
-    def derivatives(self, true: Points, coefficients: Floats) -> Floats:
-        """Change of e, (n, 3, k) in mm, for one unit of each coefficient.
+    def about(self, true: Points, coefficients: Floats) -> About:
+        """Where columns are linear about coefficients (k,).
 
         Parameters
         ----------
-        true : points where they truly are; the change is that where a machine would indicate them that has these
+        true : points where they truly are; their columns are taken where a machine would indicate them that has these
             squarenesses and no other error. The columns of three scale errors then add up to the place itself.
-        coefficients : (k,) about which.
         """
         squareness = self._squareness(true, coefficients)
         if squareness is None:
-            return self._basis(true)
+            return About(true)
         directions = axis_directions(squareness)
         indicated = replace(_indicated(true, directions), directions=directions)
-        basis = self._basis(indicated)
-        change = direction_derivatives(squareness)
-        for column, effect in self._leaning:
-            turned = along_directions(indicated.carriages, change[SQUARENESSES.index(str(effect.plane))])
-            basis[:, :, column] = (turned.T * effect.lean(indicated)).T
-        return basis
+        return About(indicated, direction_derivatives(squareness))
 
-    def beside(self, effect: Effect, shape: Sequence[float], true: Points, coefficients: Floats) -> Floats:
-        """Change of e, (n, 3, j) in mm, for one unit of each coefficient of one effect more; as :meth:`derivatives`."""
-        if not any(coefficients[column] for column, _ in self._leaning):
-            return effect.basis(true, shape)
-        whole = Superposition((*self.effects, effect), {**self.shapes, effect.name: shape})
-        own = len(effect.coefficients)
-        return whole.derivatives(true, np.append(coefficients, np.zeros(own)))[:, :, -own:]
+    def derivatives(self, about: About) -> Floats:
+        """Change of e, (n, 3, k) in mm, for one unit of each coefficient."""
+        bases = [about.columns(effect, self.shapes.get(effect.name, ())) for effect in self.effects]
+        return np.concatenate(bases, axis=2) if bases else np.zeros((len(about.points), 3, 0))
 
     def largest_lean(self, points: Points, sizes: Floats) -> float:
         """Largest sum of leans in one plane, rad, where each effect may be as large as its coefficient of ``sizes`` (k,)."""
@@ -109,14 +124,6 @@ class Superposition:
     def _leans(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """(k,) which coefficients are of a squareness."""
         return np.array([bool(effect.plane) for effect in self.effects for _ in effect.coefficients], dtype=bool)
-
-    def _basis(self, points: Points) -> Floats:
-        """Displacements (n, 3, k), mm, for one unit of each coefficient, to first order but for where motions go."""
-        bases = [
-            _along_motion(effect, effect.basis(points, self.shapes.get(effect.name, ())), points)
-            for effect in self.effects
-        ]
-        return np.concatenate(bases, axis=2) if bases else np.zeros((len(points), 3, 0))
 
 
 def _along_motion(effect: Effect, basis: Floats, points: Points) -> Floats:

@@ -1,4 +1,4 @@
-"""The command as a user meets it: real processes, real files, real interruptions."""
+"""The command as a user meets it: real files, real interruptions, and a process of its own where that matters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 import pikepdf
 import pytest
 
-from tests.cli.process import COMMAND, run
+from tests.cli.process import COMMAND, run, run_apart
 from tests.cli.terminal import everything, on_terminal, until
 
 FILES = ["certificate.html", "certificate.pdf", "manifest.json", "posterior.npz", "results.json"]
@@ -24,7 +24,7 @@ FILES = ["certificate.html", "certificate.pdf", "manifest.json", "posterior.npz"
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
     folder = tmp_path_factory.mktemp("empty")
     example = Path(__file__).parents[2] / "examples" / "iota-1102-20C"
-    return folder, run("report", example, "--verbose", cwd=folder)
+    return folder, run_apart("report", example, "--verbose", cwd=folder)
 
 
 def test_it_writes_its_files_and_their_manifest_below_reports(
@@ -62,7 +62,7 @@ def test_a_second_run_gives_the_same_bytes(
     done: tuple[Path, subprocess.CompletedProcess[str]], iota: Path, tmp_path: Path
 ) -> None:
     folder, _ = done
-    assert run("report", iota, "--out", tmp_path / "again", "--quiet").returncode == 0
+    assert run_apart("report", iota, "--out", tmp_path / "again", "--quiet").returncode == 0
     for name in FILES:
         assert (tmp_path / "again" / name).read_bytes() == (folder / "reports" / "iota-1102-20C" / name).read_bytes()
 
@@ -131,7 +131,7 @@ def test_an_interruption_leaves_no_half_report(iota: Path, tmp_path: Path, numbe
 
 
 def test_a_wrong_option_is_answered_with_exit_code_2(iota: Path) -> None:
-    assert run("report", iota, "--seed", "-1").returncode == 2
+    assert run_apart("report", iota, "--seed", "-1").returncode == 2
     assert run("reprot", iota).returncode == 2
 
 
@@ -151,7 +151,7 @@ def test_help_and_errors_import_nothing_heavy() -> None:
 def test_the_version_is_printed() -> None:
     from cmm_uq import __version__
 
-    assert run("--version").stdout.strip() == f"cmm-uq {__version__}"
+    assert run_apart("--version").stdout.strip() == f"cmm-uq {__version__}"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals of POSIX")

@@ -14,6 +14,7 @@ from cmm_uq.commands.analysis import analyse
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from tests.cli.process import run
 from tests.conftest import ROOT
+from tests.kinds.simulated import analysed
 
 EXAMPLE = ROOT / "examples" / "shift-simulated"
 
@@ -46,7 +47,7 @@ def test_compensating_by_the_table_brings_the_error_down(report: Path, tmp_path:
     (job / "job.toml").write_text(re.sub(r"(?m)^(chain = .*\n)", rf"\1{named}", text), encoding="utf-8")
     process = run("compensate", job, "--out", tmp_path / "out")
     assert process.returncode == 0, process.stderr
-    before, after = analyse(EXAMPLE), analyse(tmp_path / "out")
+    before, after = analysed(EXAMPLE.name), analyse(tmp_path / "out")
     assert isinstance(before, ShiftResult)
     assert isinstance(after, ShiftResult)
     assert np.ptp(before.fine.error) > 0.024

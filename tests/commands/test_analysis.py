@@ -14,18 +14,19 @@ import pytest
 from cmm_uq.commands.analysis import Result, analyse, outcome_of
 from cmm_uq.errors import CmmUqError
 from tests.conftest import ROOT
+from tests.kinds.simulated import analysed
 
 EXAMPLES = ROOT / "examples"
 
 
 @pytest.fixture(scope="module")
 def uncompensated() -> Result:
-    return analyse(EXAMPLES / "iota-1102-20C")
+    return analysed("iota-1102-20C")
 
 
 @pytest.fixture(scope="module")
 def compensated() -> Result:
-    return analyse(EXAMPLES / "iota-1102-20C-compensated")
+    return analysed("iota-1102-20C-compensated")
 
 
 @pytest.mark.parametrize("name", ["iota-1102-20C", "iota-1102-20C-compensated"])

@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.commands.analysis import Result, analyse, outcome_of
+from cmm_uq.commands.analysis import Result, outcome_of
 from cmm_uq.documents.document import Document
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.as_found import AsFound
-from tests.conftest import ROOT
 from tests.jobs.test_as_found import FOUND
 from tests.kinds.reading import tables
 from tests.kinds.simulated import analysed
@@ -25,7 +24,7 @@ def adjusted(found: Any, before: dict[str, Any]) -> Outcome:
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    found = analyse(ROOT / "examples" / "iota-1102-20C")
+    found = analysed("iota-1102-20C")
     assert isinstance(found, Result)
     return adjusted(found, FOUND)
 

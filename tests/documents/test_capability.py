@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from cmm_uq.commands.analysis import Result, analyse, outcome_of
+from cmm_uq.commands.analysis import Result, outcome_of
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.laboratory import Capability, LengthCapability
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import unit
-from tests.conftest import ROOT
 from tests.documents.test_completeness import changed
 from tests.kinds.reading import number, tables
 from tests.kinds.simulated import analysed
@@ -19,7 +18,7 @@ from tests.kinds.simulated import analysed
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    found = analyse(ROOT / "examples" / "iota-1102-20C")
+    found = analysed("iota-1102-20C")
     assert isinstance(found, Result)
     return found
 

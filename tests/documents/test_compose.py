@@ -14,14 +14,13 @@ from cmm_uq.documents.certificate import STATEMENTS
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.document import Decision, Document, Facts, Table
 from cmm_uq.documents.html import render_html
-from tests.conftest import ROOT
 from tests.documents.test_completeness import changed
 from tests.kinds.simulated import analysed
 
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    return analyse(ROOT / "examples" / "iota-1102-20C")
+    return analysed("iota-1102-20C")
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +30,7 @@ def document(result: Result) -> Document:
 
 @pytest.fixture(scope="module")
 def uncalibrated() -> Result:
-    return analyse(ROOT / "examples" / "iota-1102-20C-compensated")
+    return analysed("iota-1102-20C-compensated")
 
 
 def table(document: Document, caption: str) -> Table:

@@ -16,6 +16,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from pypdf import PdfReader
 
+from cmm_uq.commands.reading import read_job
 from cmm_uq.documents.budget_page import budget_document
 from cmm_uq.documents.certificate import STATEMENTS
 from cmm_uq.documents.document import Block, Document, Facts, Plot, Section, Table
@@ -27,7 +28,7 @@ from tests.conftest import ROOT
 from tests.documents.samples import ballbar_certificate
 from tests.documents.test_html_layout import CONTRASTS, LABELS_COLLIDING, OVERLAPS, WIDER_THAN_PAPER
 from tests.documents.test_translatable import MODEL
-from tests.kinds.simulated import analysed, diagnosed, document, planned
+from tests.kinds.simulated import diagnosed, document, planned
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -39,7 +40,7 @@ REPORTED = sorted(
 
 
 def report(name: str) -> Document:
-    return marked(document(name), analysed(name).job)
+    return marked(document(name), read_job(ROOT / "examples" / name))
 
 
 def budget(folder: str) -> Document:
@@ -65,6 +66,16 @@ def made(name: str, folder: str) -> Document:
     return OTHERS[name](folder) if name in OTHERS else report(name)
 
 
+@cache
+def html(name: str, folder: str) -> str:
+    return render_html(made(name, folder))
+
+
+@cache
+def pdf(name: str, folder: str) -> bytes:
+    return render_pdf(made(name, folder), {})
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(tmp_path_factory.mktemp("layout"))
@@ -77,9 +88,9 @@ def page(browser: Browser) -> Iterator[Page]:
     context.close()
 
 
-def shown(page: Page, document: Document, folder: Path) -> None:
+def shown(page: Page, document: str, folder: Path) -> None:
     path = folder / "document.html"
-    path.write_text(render_html(document), encoding="utf-8")
+    path.write_text(document, encoding="utf-8")
     page.goto(path.as_uri())
 
 
@@ -113,7 +124,7 @@ def test_no_column_is_off_the_screen_and_no_label_is_cut(
     page: Page, name: str, folder: str, width: int, tmp_path: Path
 ) -> None:
     page.set_viewport_size({"width": width, "height": 800})
-    shown(page, made(name, folder), tmp_path)
+    shown(page, html(name, folder), tmp_path)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.evaluate(HIDDEN_COLUMNS) == []
     assert page.evaluate(HEADS_RUN_TOGETHER) == []
@@ -127,7 +138,7 @@ def test_on_a_narrow_screen_every_figure_of_a_listed_table_has_its_heading_and_u
     page: Page, name: str, folder: str, tmp_path: Path
 ) -> None:
     page.set_viewport_size({"width": 360, "height": 800})
-    shown(page, made(name, folder), tmp_path)
+    shown(page, html(name, folder), tmp_path)
     labelled = page.evaluate("""() => [...document.querySelectorAll('table.wide td')]
       .filter(cell => cell.textContent).map(cell => getComputedStyle(cell, '::before').content.slice(1, -1))""")
     wide = page.evaluate("""() => [...document.querySelectorAll('table.wide tr')].slice(1).flatMap(row => [...row.cells])
@@ -144,7 +155,7 @@ def test_on_a_narrow_screen_every_figure_of_a_listed_table_has_its_heading_and_u
 def test_axe_finds_nothing(page: Page, name: str, folder: str, tmp_path: Path) -> None:
     """axe-core with all its rules, which hold WCAG 2.2 A and AA; and the contrast of every text by itself."""
     page.set_viewport_size({"width": 1280, "height": 800})
-    shown(page, made(name, folder), tmp_path)
+    shown(page, html(name, folder), tmp_path)
     found: list[dict[str, Any]] = Axe().run(page).response["violations"]
     assert [(one["id"], [node["html"][:80] for node in one["nodes"]]) for one in found] == []
     assert min(page.evaluate(CONTRASTS)) >= 4.5
@@ -163,7 +174,7 @@ def test_printed_from_the_browser_nothing_is_wider_than_the_page_nor_split_nor_a
 ) -> None:
     document = made(name, folder)
     page.set_viewport_size({"width": 643, "height": 900})  # 170 mm at 96 px an inch
-    shown(page, document, tmp_path)
+    shown(page, html(name, folder), tmp_path)
     page.emulate_media(media="print")
     assert page.evaluate(WIDER_THAN_PAPER) == []
     assert page.evaluate(HEADS_RUN_TOGETHER) == []
@@ -173,7 +184,7 @@ def test_printed_from_the_browser_nothing_is_wider_than_the_page_nor_split_nor_a
 @pytest.mark.parametrize("name", NAMES)
 def test_in_the_pdf_nothing_is_split_nor_alone(name: str, folder: str) -> None:
     document = made(name, folder)
-    together(document, texts(render_pdf(document, {})))
+    together(document, texts(pdf(name, folder)))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -182,7 +193,7 @@ def test_the_pages_of_the_pdf_as_pictures_have_clean_margins_and_are_not_empty(
 ) -> None:
     if shutil.which("pdftoppm") is None:
         pytest.skip("no pdftoppm is installed")
-    (tmp_path / "document.pdf").write_bytes(render_pdf(made(name, folder), {}))
+    (tmp_path / "document.pdf").write_bytes(pdf(name, folder))
     subprocess.run(["pdftoppm", "-r", "50", "-gray", "document.pdf", "page"], cwd=tmp_path, check=True)
     pictures = [picture(path) for path in sorted(tmp_path.glob("page*.pgm"))]
     for dark in pictures:
@@ -199,7 +210,7 @@ def test_the_heads_of_a_table_do_not_run_together_in_the_pdf(name: str, folder: 
     if shutil.which("pdftotext") is None:
         pytest.skip("no pdftotext is installed")
     document = made(name, folder)
-    (tmp_path / "document.pdf").write_bytes(render_pdf(document, {}))
+    (tmp_path / "document.pdf").write_bytes(pdf(name, folder))
     subprocess.run(["pdftotext", "-layout", "document.pdf", "text.txt"], cwd=tmp_path, check=True)
     printed = (tmp_path / "text.txt").read_text(encoding="utf-8")
     heads = [[column.heading for column in block.columns if column.heading]

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.commands.analysis import analyse
 from cmm_uq.documents.results_file import as_json, results
 from cmm_uq.errors import CmmUqError
 from tests.conftest import ROOT
+from tests.kinds.simulated import analysed
 
 
 @pytest.fixture(scope="module", params=["iota-1102-20C", "iota-1102-20C-compensated"])
 def data(request: pytest.FixtureRequest) -> dict[str, Any]:
-    return dict(json.loads(as_json(results(analyse(ROOT / "examples" / request.param)))))
+    return dict(json.loads(as_json(results(analysed(request.param)))))
 
 
 def test_every_estimate_has_value_uncertainty_and_interval(data: dict[str, Any]) -> None:
@@ -99,7 +99,7 @@ def test_a_statement_has_all_that_was_decided_and_all_that_is_missing(data: dict
 
 def test_every_length_is_in_the_table_of_errors_with_its_own_limit() -> None:
     """Limits 4 + L/100; u of 0.4 µm at 820 mm, in proportion."""
-    (found,) = json.loads(as_json(results(analyse(ROOT / "examples" / "step-gauge-simulated"))))["conformity"]
+    (found,) = json.loads(as_json(results(analysed("step-gauge-simulated"))))["conformity"]
     assert found["characteristic"] == "E0"
     rows = np.genfromtxt(ROOT / "examples" / "step-gauge-simulated" / "recording.csv", delimiter=",", names=True)
     assert len(found["errors"]) == np.sum(rows["reference_mm"] > 0)
@@ -121,7 +121,7 @@ def test_the_contract_accepts_an_incomplete_statement(tmp_path: Path) -> None:
     if not checker.exists():
         pytest.skip("the contract is not here")
     file = tmp_path / "results.json"
-    file.write_bytes(as_json(results(analyse(ROOT / "examples" / "gauge-blocks-simulated"))))
+    file.write_bytes(as_json(results(analysed("gauge-blocks-simulated"))))
     (found,) = json.loads(file.read_bytes())["conformity"]
     assert (found["decision"], found["scope"]) == ("incomplete", "partial")
     assert subprocess.run([sys.executable, checker, file], check=False).returncode == 0

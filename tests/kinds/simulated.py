@@ -1,8 +1,15 @@
-"""The simulated example jobs, analysed once, with the errors that were put into them."""
+"""The simulated example jobs, analysed once, with the errors that were put into them.
+
+Their documents are made once for all processes of a run of the tests, in its temporary folder.
+"""
 
 from __future__ import annotations
 
+import os
+import pickle
+from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 from cmm_uq.commands.analysis import Result, analyse, outcome_of
 from cmm_uq.commands.plan import plan_outcome
@@ -16,6 +23,26 @@ SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}
 SQUARE = {"squareness_xy": 12.0, "squareness_yz": -7.5, "squareness_zx": 4.0}
 
 
+def kept(make: Callable[[str], Document]) -> Callable[[str], Document]:
+    """Documents as another process of this run may have made them already; two at once make the same."""
+
+    @cache
+    def found(job: str) -> Document:
+        folder = os.environ.get("CMM_UQ_TESTS_SHARE")
+        if folder is None:
+            return make(job)
+        path = Path(folder) / f"{make.__name__}-{job}.pickle"
+        if not path.exists():
+            own = path.with_suffix(f".{os.getpid()}")
+            own.write_bytes(pickle.dumps(make(job)))
+            own.replace(path)
+        document = pickle.loads(path.read_bytes())
+        assert isinstance(document, Document)
+        return document
+
+    return found
+
+
 @cache
 def analysed(job: str) -> Result:
     return analyse(ROOT / "examples" / job)
@@ -26,16 +53,17 @@ def outcome(job: str) -> Outcome:
     return outcome_of(analysed(job))
 
 
+@kept
 def document(job: str) -> Document:
     return outcome(job).document
 
 
-@cache
+@kept
 def diagnosed(job: str) -> Document:
     return diagnosis_outcome(read_job(ROOT / "examples" / job)).document
 
 
-@cache
+@kept
 def planned(job: str) -> Document:
     return plan_outcome(read_job(ROOT / "examples" / job, recorded=False), power=False).document
 

@@ -119,7 +119,7 @@ def test_columns_are_derivatives_of_the_errors_and_scales_add_up_to_the_place() 
                            {"periodic_scale_z": (40.0,)})  # fmt: skip
     true = replace(true, columns={**true.columns, "approach_y": np.ones(7)})
     values = np.array([0, 0, 0, 1500.0, -900.0, 700.0, 30.0, 0, 0, 0, 0])
-    columns = acting.derivatives(true, values)
+    columns = acting.derivatives(acting.about(true, values))
     np.testing.assert_allclose(1e6 * columns[:, :, :3].sum(axis=2), true.xyz, atol=1e-8)
     indicated = true.xyz.copy()
     for _ in range(50):
@@ -132,12 +132,16 @@ def test_columns_are_derivatives_of_the_errors_and_scales_add_up_to_the_place() 
 def test_an_effect_beside_others_acts_as_if_it_were_one_of_them() -> None:
     true, values = somewhere(), np.array([0, 0, 0, 1500.0, -900.0, 700.0])
     six, more = effects(SIX), effects(("rotation_y_x", "scale_curvature_z"))
-    together = Superposition((*six, *more)).derivatives(true, np.append(values, [0.0, 0.0]))
+    both = Superposition((*six, *more))
+    together, about = (
+        both.derivatives(both.about(true, np.append(values, [0.0, 0.0]))),
+        Superposition(six).about(true, values),
+    )
     for i, effect in enumerate(more):
-        beside = Superposition(six).beside(effect, (), true, values)
+        beside = about.columns(effect)
         np.testing.assert_array_equal(beside, together[:, :, 6 + i : 7 + i])
         assert np.abs(beside - effect.basis(true)).max() > 1e-3 * np.abs(beside).max()
-    np.testing.assert_array_equal(Superposition(six).beside(more[0], (), true, 0 * values), more[0].basis(true))
+    np.testing.assert_array_equal(Superposition(six).about(true, 0 * values).columns(more[0]), more[0].basis(true))
 
 
 def test_the_largest_lean_of_a_plane_sums_what_acts_in_it() -> None:

@@ -25,7 +25,8 @@ from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.model.display import Display
 from cmm_uq.points import Floats
 
-_BLOCK, _COLUMNS = 1_500_000, 500
+_BLOCK, _COLUMNS = 150_000, 500
+"""Numbers of a block that a processor's cache holds; columns weighed at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +242,7 @@ class Comparison:
         """
         total = np.full((len(self.explanations), 1 if left is None else left.shape[1]), -np.inf)
         for group, each in self.each(left, given, among):
-            gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight[:, None]
+            gains = _log_sum(each, 1) - np.log(AMPLITUDES) + group.weight[:, None]
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
         return self.log_evidence_of(given, left), total
@@ -254,7 +255,7 @@ class Comparison:
         most, best = total.copy(), {}
         for group, cube in self.each(None, given, among):
             each = cube[:, :, 0]
-            gains = special.logsumexp(each, axis=1) - np.log(AMPLITUDES) + group.weight
+            gains = _log_sum(each, 1) - np.log(AMPLITUDES) + group.weight
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
             largest = each.max(axis=1) + group.weight
@@ -284,7 +285,7 @@ class Comparison:
         """Log evidence (b,) of what is given, at its size, for data (m, b)."""
         known = self._beside(left, given)
         every = self.over_sigma(known.squares) + known.log[:, None]
-        return np.asarray(special.logsumexp(every, axis=0), dtype=np.float64)
+        return _log_sum(every, 0)
 
     def noise_probability(self, given: Sequence[Version]) -> Floats:
         """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
@@ -363,6 +364,18 @@ class Comparison:
         if key not in self._weighed:
             self._weighed[key] = self._by_noise(self._columns(version))
         return self._weighed[key]
+
+
+def _log_sum(log: Floats, axis: int) -> Floats:
+    """Logarithm of sums of what has these finite logarithms, in the steps of ``scipy.special.logsumexp``.
+
+    A search asks for thousands of small ones, and what scipy does beside these steps takes thrice their time.
+    """
+    largest = log.max(axis=axis, keepdims=True)
+    most = log == largest
+    count = most.sum(axis=axis, keepdims=True, dtype=np.float64)
+    others = np.exp(np.where(most, -np.inf, log) - largest).sum(axis=axis, keepdims=True)
+    return np.asarray((np.log1p(others / count) + np.log(count) + largest).squeeze(axis), dtype=np.float64)
 
 
 def _log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:

@@ -107,8 +107,13 @@ class ByCoefficients(Marginal):
         every = np.hstack([sd, np.broadcast_to(self.column_sd, (len(sd), len(self.column_sd)))])
         r = (growth - 1)[:, None, None]
         scaled = every / sigma[:, None]
-        precision = scaled[:, :, None] * (even + r * (cross + r * ends)) * scaled[:, None, :]
-        precision += np.eye(every.shape[1])
+        precision = r * ends  # in place from here on: a sampler spends its time in these matrices
+        precision += cross
+        precision *= r
+        precision += even
+        precision *= scaled[:, :, None]
+        precision *= scaled[:, None, :]
+        np.einsum("wii->wi", precision)[:] += 1.0
         return every, precision, scaled / sigma[:, None] * (right_even + r[:, :, 0] * right_ends)
 
     def _log_density(self, sd: Floats, growth: Floats, sigma: Floats) -> Floats:

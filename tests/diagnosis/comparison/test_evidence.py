@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.diagnosis.comparison.evidence import Comparison
+from cmm_uq.diagnosis.comparison.evidence import Comparison, _log_sum
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation, Member
 from cmm_uq.diagnosis.comparison.lack_of_fit import tail_probability
 from cmm_uq.diagnosis.noise import TAILS, shape_of, sigma_grid, tails
@@ -257,3 +257,11 @@ def test_the_shapes_that_are_kept_stand_for_all(slow: float) -> None:
         total.append(float(nothing[0]))
     assert odds[0] == pytest.approx(odds[1], abs=0.7)
     assert total[0] == pytest.approx(total[1], abs=1.0)  # of heavy tails a factor of e is no news
+
+
+@pytest.mark.parametrize(("shape", "axis"), [((650, 7, 1), 1), ((133, 7, 20), 1), ((8, 20), 0), ((1, 1), 0)])
+def test_sums_of_logarithms_are_scipys_to_the_last_bit(shape: tuple[int, ...], axis: int) -> None:
+    random = np.random.default_rng(1)
+    log = random.normal(-50, 20, shape)
+    for values in (log, np.round(log), np.zeros(shape)):  # the largest once, now and then several times, always
+        np.testing.assert_array_equal(_log_sum(values, axis), special.logsumexp(values, axis=axis))

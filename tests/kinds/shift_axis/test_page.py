@@ -16,13 +16,14 @@ from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shift_axis.results import shift_results
 from tests.conftest import ROOT
 from tests.kinds.reading import number, tables
+from tests.kinds.simulated import analysed
 
 EXAMPLE = ROOT / "examples" / "shift-simulated"
 
 
 @pytest.fixture(scope="module")
 def result() -> ShiftResult:
-    found = analyse(EXAMPLE)
+    found = analysed(EXAMPLE.name)
     assert isinstance(found, ShiftResult)
     return found
 

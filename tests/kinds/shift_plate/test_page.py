@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from cmm_uq.commands.analysis import analyse, outcome_of
+from cmm_uq.commands.analysis import outcome_of
 from cmm_uq.documents.document import Document, Paragraph, Plot, Table
 from cmm_uq.documents.results_file import as_json
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
@@ -17,6 +17,7 @@ from cmm_uq.kinds.shift_plate.plane import estimate_plane
 from cmm_uq.kinds.shift_plate.results import plane_shift_results
 from tests.conftest import ROOT
 from tests.kinds.reading import number, tables
+from tests.kinds.simulated import analysed
 
 EXAMPLE = ROOT / "examples" / "shift-plate-simulated"
 
@@ -30,7 +31,7 @@ def error(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def result() -> PlaneShiftResult:
-    found = analyse(EXAMPLE)
+    found = analysed(EXAMPLE.name)
     assert isinstance(found, PlaneShiftResult)
     return found
 
