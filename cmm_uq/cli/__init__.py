@@ -6,7 +6,6 @@ Exit codes: 0 done; 2 bad input; 3 output impossible; 4 done, and not conforming
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
 import sys
