@@ -73,12 +73,14 @@ def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
 def tail_probability(draws: Floats, value: float) -> float:
     """Probability of reaching a value of log odds, from draws; beyond their upper fifth with an exponential tail.
 
-    Log odds have a floor, near which draws may crowd; but however they do, the odds of what is not there exceed their mean,
-    which is one, a thousand times in no more than a thousandth of all cases (Markov's inequality). So the tail is
-    never steeper than that.
+    Log odds have a floor, near which draws may crowd. Beyond the largest draw the tail is no steeper than Markov's inequality
+    has it: the odds of what is not there have a mean of one, and so reach e^x in no more than e^−x of all cases.
     """
-    start = float(np.quantile(draws, _TAIL))
+    start, largest = float(np.quantile(draws, _TAIL)), float(draws.max())
     if value <= start:
         return float((np.sum(draws >= value) + 1) / (len(draws) + 1))
-    beyond = draws[draws > start] - start
-    return float((1 - _TAIL) * np.exp(-(value - start) / max(float(beyond.mean()), _STEEPEST)))
+    excess = float((draws[draws > start] - start).mean())
+    shown = (1 - _TAIL) * np.exp(-(min(value, largest) - start) / excess)
+    if value <= largest:
+        return float(shown)
+    return float(max(shown, 1 / (len(draws) + 1)) * np.exp(-(value - largest) / max(excess, _STEEPEST)))
