@@ -20,6 +20,10 @@ def command(
     out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>/diagnosis]")] = None,
     seed: Seed = 0,
     alpha: Annotated[float, typer.Option(help="Rate of false alarms.")] = 0.01,
+    against: Annotated[
+        Path | None,
+        typer.Option(help="Coordinates or lengths that a simulation predicts, in place of the job's model."),
+    ] = None,
     force: Force = False,
     strict: Strict = False,
     quiet: Quiet = False,
@@ -29,7 +33,7 @@ def command(
     with shown(quiet=quiet or json) as stage:
         from cmm_uq.commands.report import write_diagnosis
 
-        written = write_diagnosis(job, out, seed=seed, alpha=alpha, force=force, stage=stage)
+        written = write_diagnosis(job, out, seed=seed, alpha=alpha, against=against, force=force, stage=stage)
     conclude(written, _summarise, json=json, quiet=quiet, strict=strict)
 
 

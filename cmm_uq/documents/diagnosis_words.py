@@ -6,9 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.against import VERDICTS as AGAINST
+from cmm_uq.documents.against import contained
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.wording import expanded, probability
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, say, together
+from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, names, say, together
 from cmm_uq.screening.finding import Finding
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import unit
@@ -38,10 +40,22 @@ VERDICTS_IN_SHORT: Mapping[str, Text] = {
 """The same, to begin a summary with."""
 
 
+def verdict_of(found: Diagnosed) -> Text:
+    """The verdict in a sentence."""
+    told = VERDICTS if found.simulated is None else AGAINST
+    return told[found.diagnosis.verdict]
+
+
+def sentences_of(found: Diagnosed) -> list[Text]:
+    """A sentence or two on each effect that was left out."""
+    d = found.diagnosis
+    return [after(sentence(item, d.improvement), contained(found.simulated, item.effect)) for item in d.effects]
+
+
 def lines(found: Diagnosed) -> list[Text]:
     """Verdict and everything that follows from it, a sentence or two each."""
     d = found.diagnosis
-    said = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
+    said = [verdict_of(found), *sentences_of(found)]
     said += [
         say("Cannot be told apart by this recording: {effects}.", effects=commas(names(group)))
         for group in d.indistinguishable

@@ -22,7 +22,9 @@ from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.prediction import Prediction
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
+from cmm_uq.jobs.simulation import SimulationFacts
 from cmm_uq.jobs.table import (
     Limit,
     Names,
@@ -124,6 +126,7 @@ class JobFile(Table):
     artefact: ArtefactFacts
     recording: RecordingFacts
     short_gauge: ShortGaugeFacts | None = None
+    simulation: SimulationFacts | None = None
     probe: ProbeFacts = ProbeFacts()
     test_uncertainty: TestUncertainty = TestUncertainty()
     rated_conditions: RatedConditions = RatedConditions()
@@ -203,6 +206,8 @@ class Job:
     planned : whether the recording holds the nominal coordinates of a plan.
     as_found : what the machine showed before it was adjusted, where the job names it.
     short_gauge : recorded beside the artefact, where the job names one.
+    prediction : of a simulation, where the job names a file of it.
+    beside : files that it was read from and that lie outside its folder.
     """
 
     folder: Path
@@ -213,6 +218,8 @@ class Job:
     planned: bool = False
     as_found: AsFound | None = None
     short_gauge: ShortGauge | None = None
+    prediction: Prediction | None = None
+    beside: tuple[Path, ...] = ()
 
     @property
     def circumstances(self) -> Circumstances:
@@ -227,7 +234,7 @@ class Job:
     @property
     def paths(self) -> tuple[Path, ...]:
         """Every file that it was read from."""
-        return tuple(self.folder / name for name in self.inputs)
+        return (*(self.folder / name for name in self.inputs), *self.beside)
 
     @property
     def recording_path(self) -> str:
