@@ -149,13 +149,25 @@ def against(job: Job, content: bytes, name: str, path: Path | None = None) -> Jo
     facts = job.facts.model_copy(update={"simulation": simulation})
     where = str(path or name)
     _refuse_beside_a_simulation(facts, where)
-    if job.inputs.get(name, content) != content:
+    inputs = _without_the_simulation(job)
+    if inputs.get(name, content) != content:
         raise CmmUqError(f"the job has another file {name!r}", where=where, fix="Rename the prediction")
     prediction = read_prediction(content, where, simulation)
     beside = () if path is None else (path,)
     return replace(
-        job, facts=facts, inputs={**job.inputs, name: content}, prediction=prediction, beside=(*job.beside, *beside)
+        job, facts=facts, inputs={**inputs, name: content}, prediction=prediction, beside=(*job.beside, *beside)
     )
+
+
+def _without_the_simulation(job: Job) -> dict[str, bytes]:
+    """Inputs of a job but those that only its ``[simulation]`` names."""
+    simulation = job.facts.simulation
+    if simulation is None:
+        return dict(job.inputs)
+    own = {simulation.file, *(given.file for given in simulation.map)} - {
+        given.file for given in job.facts.machine.error_map
+    }
+    return {name: content for name, content in job.inputs.items() if name not in own}
 
 
 def _prediction(facts: SimulationFacts | None, inputs: Mapping[str, bytes], folder: Path) -> Prediction | None:
