@@ -8,7 +8,15 @@ import numpy as np
 
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.documents.against import corrections, simulation_section
-from cmm_uq.documents.diagnosis_words import VERDICT_WORDS, lines, noise_words, sentences_of, summary_rows, verdict_of
+from cmm_uq.documents.diagnosis_words import (
+    VERDICT_WORDS,
+    lines,
+    noise_words,
+    sentences_of,
+    stated_um,
+    summary_rows,
+    verdict_of,
+)
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.improvement_table import improvement_table
 from cmm_uq.documents.origin import came_about
@@ -73,7 +81,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
 
 def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
     """What a diagnosis says, as sections of any document."""
-    noise = noise_words(found.diagnosis, found.job.facts.recording.u_coordinate_um)
+    noise = noise_words(found.diagnosis, stated_um(found))
     sections = (
         Section(say("What was left out"), _left_out(found)),
         *_simulation(found),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
@@ -63,7 +64,13 @@ def lines(found: Diagnosed) -> list[Text]:
     said += [
         say("To part {effects}: {what}", effects=together(names(s.separates)), what=s.what) for s in found.suggestions
     ]
-    return said + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
+    return said + list(noise_words(d, stated_um(found)))
+
+
+def stated_um(found: Diagnosed) -> float | None:
+    """Standard uncertainty of a coordinate, µm, that the job states; with that of the prediction that it is compared with."""
+    stated = found.job.facts.recording.u_coordinate_um
+    return stated if stated is None or found.simulated is None else math.hypot(stated, found.simulated.u_um)
 
 
 def sentence(item: LeftOut, gain: Improvement) -> Text:
