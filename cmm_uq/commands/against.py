@@ -85,8 +85,9 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
             fix="Name the file that the simulation wrote, and the recording that the machine made",
         )  # fmt: skip
     stated = job.facts.recording.u_coordinate_um
-    u = float(np.sqrt(np.mean(found.u**2)))
-    ratio = _ratios(plain, found.u, u, stated)
+    every = np.hypot(found.u, found.turned)
+    u = float(np.sqrt(np.mean(every**2)))
+    ratio = _ratios(plain, every, u, stated)
     weighed = _weighing(observe, points, ratio, facts.u_common_um * MICROMETRE)
     # repeats share what is predicted wrongly: their mean is no better known
     least = u * float(
@@ -118,7 +119,8 @@ def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedError
     except CmmUqError as error:
         at = ", ".join(part for part in (job.recording_path, error.where) if part)
         raise CmmUqError(error.problem, where=at, fix=error.fix) from error
-    return PredictedErrors(errors, np.full(len(points), facts.u_um * MICROMETRE), SAME, 0.0, 0)
+    exact = np.zeros(len(points))
+    return PredictedErrors(errors, exact + facts.u_um * MICROMETRE, exact, SAME, 0.0, 0)
 
 
 def _ratios(model: MeasurementModel, u: Floats, usual: float, stated_um: float | None) -> Floats:
@@ -165,8 +167,9 @@ def _odd(found: PredictedErrors) -> list[Finding]:
             angle=float(np.degrees(found.frame.angle)), x=float(x), y=float(y), z=float(z),
         ))  # fmt: skip
     if found.apart > _FAR:
+        turned = float(found.turned.max()) / MICROMETRE
         told.append(say(
-            "points were recorded up to {apart:.1f} mm from where they are predicted: predicted errors hold where the "
-            "artefact was taken to stand", apart=found.apart,
+            "points were recorded up to {apart:.1f} mm from where they are predicted; that the artefact was turned counts "
+            "as a standard uncertainty of up to {turned:.2g} µm", apart=found.apart, turned=turned,
         ))  # fmt: skip
     return [Finding("simulation", (), (), text) for text in told]

@@ -70,7 +70,11 @@ def lines(found: Diagnosed) -> list[Text]:
 def stated_um(found: Diagnosed) -> float | None:
     """Standard uncertainty of a coordinate, µm, that the job states; with that of the prediction that it is compared with."""
     stated = found.job.facts.recording.u_coordinate_um
-    return stated if stated is None or found.simulated is None else math.hypot(stated, found.simulated.u_um)
+    return (
+        stated
+        if stated is None or found.simulated is None
+        else math.hypot(stated, found.simulated.u_um, found.simulated.u_turned_um)
+    )
 
 
 def sentence(item: LeftOut, gain: Improvement) -> Text:

@@ -14,6 +14,7 @@ from cmm_uq.jobs.simulation import SimulationFacts
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.predicted_errors import PredictedErrors
 from cmm_uq.physics.effect import Effect
+from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
 
 
@@ -26,7 +27,8 @@ class Simulated:
     files : with their SHA-256.
     program : that made it, in the user's words.
     maps : whether it is error maps.
-    u_um, u_common_um : of a predicted coordinate, root mean square, and of the artefact's size.
+    u_um, u_common_um : of a predicted coordinate, root mean square, and of the artefact's size, as stated.
+    u_turned_um : what there is besides because the artefact was taken to lie in another direction, root mean square.
     contains : effects that it contains.
     refitted : those that were estimated anew.
     shift_mm, turn_deg : of its frame against the recording's.
@@ -39,6 +41,7 @@ class Simulated:
     maps: bool
     u_um: float
     u_common_um: float
+    u_turned_um: float
     contains: tuple[str, ...]
     refitted: tuple[str, ...]
     shift_mm: tuple[float, ...]
@@ -66,9 +69,9 @@ class Simulated:
         shown = model.artefact.project(model.artefact.points.xyz, found.errors[:, :, None])[model.used, 0]
         return cls(
             {name: hashes[name] for name in files}, facts.program, bool(facts.map),
-            float(np.sqrt(np.mean(found.u**2))) / MICROMETRE, facts.u_common_um, contains,
+            _rms_um(found.u), facts.u_common_um, _rms_um(found.turned), contains,
             contains if facts.refit else (), tuple(float(v) for v in found.frame.shift),
-            float(np.degrees(found.frame.angle)), found.apart, float(np.sqrt(np.mean(shown**2))) / MICROMETRE,
+            float(np.degrees(found.frame.angle)), found.apart, _rms_um(shown),
         )  # fmt: skip
 
     def data(self, corrections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
@@ -80,7 +83,12 @@ class Simulated:
         """
         return {
             "files_sha256": dict(self.files), "program": self.program, "kind": "map" if self.maps else "prediction",
-            "u_um": self.u_um, "u_common_um": self.u_common_um, "effects": list(self.contains),
+            "u_um": self.u_um, "u_common_um": self.u_common_um, "u_turned_um": self.u_turned_um,
+            "effects": list(self.contains),
             "refitted": dict(corrections), "frame": {"shift_mm": list(self.shift_mm), "turn_deg": self.turn_deg},
             "farthest_mm": self.farthest_mm, "rms_predicted_um": self.rms_predicted_um,
         }  # fmt: skip
+
+
+def _rms_um(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2))) / MICROMETRE

@@ -20,6 +20,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.prediction import Prediction
 from cmm_uq.jobs.simulation import KEY
 from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.placings import Placings
 from cmm_uq.points import Floats, Ints, Points
 
 NEAR = 30.0
@@ -28,6 +29,9 @@ by less than their own size over it."""
 
 LARGEST_ERROR = 5.0
 """mm: beyond, no machine's errors are predicted, but another artefact, or points numbered otherwise."""
+
+_REACH = 0.5
+"""Part of the artefact's size, from its middle, at which errors say by how much they stretch."""
 
 _SAME = 1e-7
 """mm, by which a prediction differs from a recording that it is a copy of: the digits of a file."""
@@ -71,7 +75,8 @@ class PredictedErrors:
     Parameters
     ----------
     errors : (n, 3) indicated minus true, mm.
-    u : (n,) standard uncertainty of a predicted coordinate, mm.
+    u : (n,) standard uncertainty of a predicted coordinate, mm, as it is stated.
+    turned : (n,) what there is besides because the artefact was taken to lie in another direction than it did, mm.
     frame : of the prediction.
     apart : largest distance of a predicted point from where it was recorded, mm; 0 of lengths.
     unused : rows of the prediction that the recording has no point for.
@@ -79,6 +84,7 @@ class PredictedErrors:
 
     errors: Floats
     u: Floats
+    turned: Floats
     frame: Frame
     apart: float
     unused: int
@@ -104,7 +110,8 @@ def predicted_errors(
     rows, unused = _matched(artefact.points, prediction, where)
     sizes = _sizes(artefact, length_mm)
     if prediction.of_lengths:
-        return PredictedErrors(*_of_lengths(artefact, prediction, rows, sizes), SAME, 0.0, unused)
+        errors, u = _of_lengths(artefact, prediction, rows, sizes)
+        return PredictedErrors(errors, u, np.zeros_like(u), SAME, 0.0, unused)
     recorded = artefact.points.xyz
     frame = _frame(prediction, rows, recorded)
     predicted = frame.of(prediction.xyz[rows])
@@ -114,7 +121,8 @@ def predicted_errors(
         raise _copied(prediction)
     errors = predicted - artefact.fit(predicted, sizes)
     _refuse_absurd(errors, prediction, rows)
-    return PredictedErrors(errors, prediction.u[rows], frame, apart, unused)
+    turned = _of_turning(artefact.points, predicted, errors)
+    return PredictedErrors(errors, prediction.u[rows], turned, frame, apart, unused)
 
 
 def _sizes(artefact: Artefact, length_mm: float | None) -> Floats:
@@ -173,6 +181,20 @@ def _of_lengths(artefact: Artefact, prediction: Prediction, rows: Ints, sizes: F
     each[ends.ravel()] = np.repeat(u / np.sqrt(2.0), 2)
     _refuse_absurd(errors, prediction, rows)
     return errors, each
+
+
+def _of_turning(points: Points, predicted: Floats, errors: Floats) -> Floats:
+    """Uncertainty (n,), mm, of errors predicted for an artefact that lay in another direction by up to a degree or so.
+
+    Errors that stretch by e along some direction, turned by θ against it, differ at a distance L by up to 2·e·θ·L; and θ·L is
+    how far a point lies from where it was predicted once the middle of its placing does not.
+    """
+    placings = Placings.of(points.measurement)
+    aside = points.xyz - predicted
+    turned, reach = (np.linalg.norm(v - placings.means(v), axis=1) for v in (aside, points.xyz))
+    own = np.linalg.norm(errors - placings.means(errors), axis=1)
+    far = reach > _REACH * reach.max(initial=0.0)
+    return np.asarray(2 * float((own[far] / reach[far]).max(initial=0.0)) * turned)
 
 
 def _frame(prediction: Prediction, rows: Ints, recorded: Floats) -> Frame:
