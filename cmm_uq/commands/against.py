@@ -37,6 +37,10 @@ _LEAST_WEIGHT = 0.05
 """Least noise of a point over that of all together: nothing is known without limit."""
 
 
+_STEP = 0.05
+"""Of the logarithm of that ratio: points that are about as uncertain are taken as equally so, and are sampled together."""
+
+
 @dataclass(frozen=True, eq=False)
 class Against:
     """What is left of a recording once its simulation is taken off.
@@ -129,7 +133,8 @@ def _ratios(model: MeasurementModel, u: Floats, usual: float, stated_um: float |
         return np.ones(len(u))
     residual = model.estimate().least_squares.sigma_of_residuals
     own = np.sqrt(max(residual**2 - usual**2, 0.0)) if stated_um is None else stated_um * MICROMETRE
-    return np.asarray(np.maximum(np.hypot(own, u) / np.hypot(own, usual), _LEAST_WEIGHT))
+    ratio = np.maximum(np.hypot(own, u) / np.hypot(own, usual), _LEAST_WEIGHT)
+    return np.asarray(np.exp(_STEP * np.round(np.log(ratio) / _STEP)))
 
 
 def _weighing(observe: Observe, points: Points, ratio: Floats, u_common: float) -> Observe:

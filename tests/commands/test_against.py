@@ -345,6 +345,12 @@ def test_columns_and_units_of_another_program_can_be_named() -> None:
     assert "no column 'w'" in refused(RECORDED, inches, columns={**names, "x_mm": "w"}).problem.replace("there is ", "")
 
 
+def test_what_is_simulated_or_compensated_has_no_simulation_any_more() -> None:
+    drawn = cmm_uq.simulate(job(RECORDED, COMPLETE), {"seed": 1})
+    assert drawn.facts.simulation is None
+    assert drawn.prediction is None
+
+
 # ---- every kind
 
 
