@@ -27,6 +27,8 @@ COORDINATES = ("x_mm", "y_mm", "z_mm")
 LENGTH, UNCERTAINTY = "length_mm", "u_um"
 KNOWN = (*WHOLE, *COORDINATES, LENGTH, UNCERTAINTY)
 
+_OF_A_MAP = ("axis", "position_mm")
+
 _FIX = "Save it as CSV in UTF-8"
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d*([eEdD][+-]?\d+)?")
 _FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))[dD]([+-]?\d+)")
@@ -98,8 +100,19 @@ def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Predi
     return found
 
 
+def is_error_map(content: bytes, where: str) -> bool:
+    """Whether a file is no prediction but an error map as CSV.
+
+    Raises
+    ------
+    CmmUqError : it is no text.
+    """
+    names = [name.strip() for name in _header(text_of(content, where, _FIX)).split(",")]
+    return set(_OF_A_MAP) <= set(names)
+
+
 def _table(content: bytes, where: str) -> Cells:
-    delimiter = _delimiter(text_of(content, where, _FIX))
+    delimiter = _delimiter(_header(text_of(content, where, _FIX)))
     cells = cells_of(content, where, _FIX, delimiter=delimiter)
     if not cells.rows:
         raise CmmUqError("has no rows", where=where, fix="The first line names the columns, then one row a point")
@@ -112,9 +125,13 @@ def _table(content: bytes, where: str) -> Cells:
     return Cells(header, cells.header_line, rows, cells.lines)
 
 
-def _delimiter(text: str) -> str:
+def _header(text: str) -> str:
+    """The line that names the columns."""
+    return next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
+
+
+def _delimiter(header: str) -> str:
     """What separates the names of the columns."""
-    header = next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
     return ";" if ";" in header else "\t" if "\t" in header else ","
 
 
@@ -131,7 +148,7 @@ def _places(cells: Cells, where: str, facts: SimulationFacts) -> dict[str, int]:
     if unknown := next((name for name in facts.columns if name not in KNOWN), None):
         raise CmmUqError(f"a prediction has no {unknown!r}", where=f"job.toml {KEY} columns",
                          fix=suggestion(unknown, KNOWN))  # fmt: skip
-    if "axis" in header and "position_mm" in header:
+    if set(_OF_A_MAP) <= set(header):
         raise CmmUqError("is an error map", where=at, fix=f"Name it as map in job.toml {KEY}, not as file")
     found: dict[str, int] = {}
     for name in KNOWN:

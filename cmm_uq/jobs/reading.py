@@ -24,13 +24,13 @@ from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
-from cmm_uq.jobs.prediction import Prediction, read_prediction
+from cmm_uq.jobs.prediction import Prediction, is_error_map, read_prediction
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
 from cmm_uq.jobs.short_gauge import ShortGauge, short_gauge_of
 from cmm_uq.jobs.simulation import KEY as SIMULATION
-from cmm_uq.jobs.simulation import SimulationFacts
+from cmm_uq.jobs.simulation import NOMINAL_C, SimulationFacts
 from cmm_uq.jobs.source import InFolder, InMemory, Source
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
@@ -137,7 +137,7 @@ def against(job: Job, content: bytes, name: str, path: Path | None = None) -> Jo
     Parameters
     ----------
     job : that was read, with its recording.
-    content : the prediction's bytes.
+    content : the bytes of the prediction, or of an error map.
     name : of its file.
     path : where that lies, if anywhere.
 
@@ -145,14 +145,15 @@ def against(job: Job, content: bytes, name: str, path: Path | None = None) -> Jo
     ------
     CmmUqError : it is no prediction, or has the name of another input of the job.
     """
-    simulation = SimulationFacts(file=name)
+    where, is_map = str(path or name), is_error_map(content, str(path or name))
+    predicted = {"file": name, "temperature_c": NOMINAL_C}
+    simulation = SimulationFacts.model_validate({"map": predicted} if is_map else {"file": name})
     facts = job.facts.model_copy(update={"simulation": simulation})
-    where = str(path or name)
     _refuse_beside_a_simulation(facts, where)
     inputs = _without_the_simulation(job)
     if inputs.get(name, content) != content:
         raise CmmUqError(f"the job has another file {name!r}", where=where, fix="Rename the prediction")
-    prediction = read_prediction(content, where, simulation)
+    prediction = None if is_map else read_prediction(content, where, simulation)
     beside = () if path is None else (path,)
     return replace(
         job, facts=facts, inputs={**inputs, name: content}, prediction=prediction, beside=(*job.beside, *beside)

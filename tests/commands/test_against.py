@@ -390,6 +390,19 @@ def test_an_error_map_predicts_by_its_displacements_at_the_recorded_places() -> 
     assert abs(value - 25.0) < 3 * u
     assert u < 1.0
     assert found.simulated.maps
+    told = compared(compared_with_frame(job(RECORDED), pd.DataFrame(rows)))
+    assert squareness(told) == pytest.approx((value, u), rel=1e-9)
+    assert told.simulated.maps
+
+
+def test_a_point_beyond_the_map_is_refused_with_its_line() -> None:
+    short = pd.DataFrame([
+        {"axis": axis, "position_mm": p, "dx_um": 0, "dy_um": 0, "dz_um": 0, "rx_arcsec": 0, "ry_arcsec": 0, "rz_arcsec": 0}
+        for axis in "xyz" for p in (0.0, 300.0)
+    ])  # fmt: skip
+    with pytest.raises(CmmUqError) as caught:
+        compared(compared_with_frame(job(RECORDED), short))
+    assert "300" in str(caught.value)
 
 
 def test_predictions_and_maps_of_a_self_calibration_are_refused() -> None:
