@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from cmm_uq.points import Floats
 
-SIDE = 7
-"""Readings on each side that a reading is judged by: nearly half of them may be spikes themselves."""
+SIDE, NEAR = 7, 3
+"""Readings on each side that a reading is judged by: nearly half of the former may be spikes themselves, and the latter follow
+a course that wanders."""
 
 WIDEST = 2
 """Readings in a row that are a spike; more are a part of the travel where the map differs."""
@@ -60,7 +61,7 @@ def spikes(positions: Floats, values: Floats, unit: float) -> NDArray[np.bool_]:
     found, left = np.zeros(values.shape, dtype=bool), values.copy()
     if values.shape[1] < _FEWEST:
         return found
-    beside, finest = _Beside.of(positions), _finest(values, unit)
+    beside, finest = (_Beside.of(positions, SIDE), _Beside.of(positions, NEAR)), _finest(values, unit)
     for _ in range(_ROUNDS):
         off, new = _round(beside, left, finest)
         new &= ~found
@@ -71,16 +72,20 @@ def spikes(positions: Floats, values: Floats, unit: float) -> NDArray[np.bool_]:
     return found
 
 
-def _round(beside: _Beside, values: Floats, finest: float) -> tuple[Floats, NDArray[np.bool_]]:
+def _round(beside: tuple[_Beside, _Beside], values: Floats, finest: float) -> tuple[Floats, NDArray[np.bool_]]:
     """How far the readings are off, and which of them are spikes, (k, p) each."""
     off, alike, courses = (np.zeros(values.shape) for _ in range(3))
     shown = np.zeros(values.shape, dtype=bool)
+    wide, near = beside
     for k, own in enumerate(values):
-        off[k], alike[k] = beside.off(own - np.median(np.delete(values, k, axis=0), axis=0))
-        courses[k], jump = beside.off(own)
-        between, along = (max(1.4826 * float(np.median(np.abs(some))), finest) for some in (off[k], courses[k]))
+        against = own - np.median(np.delete(values, k, axis=0), axis=0)
+        off[k], alike[k] = wide.off(against)
+        courses[k], jump = wide.off(own)
+        closely, beside_it = near.off(against)
+        scales = (max(1.4826 * float(np.median(np.abs(some))), finest) for some in (off[k], courses[k], closely))
+        between, along, close = scales
         # against the others it is followed best, but where these are the noisy ones, the map's own course says more
-        sure = alike[k] > _FAR * between
+        sure = (alike[k] > _FAR * between) | ((beside_it > _FAR * close) & (alike[k] > _OWN * beside_it))
         sure |= (jump > _FAR * along) & (off[k] * np.sign(courses[k]) > np.maximum(_OWN * jump, _SEEN * between))
         alike[k] = np.where(sure, np.maximum(alike[k], _OWN * jump), alike[k])
         shown[k] = sure & _narrow(alike[k] * np.sign(off[k]))
@@ -101,7 +106,7 @@ def _finest(values: Floats, unit: float) -> float:
 class _Beside:
     """The readings beside each of p readings.
 
-    ``index`` (p, 2·SIDE) says which, those before first; ``there`` whether they are; ``slopes`` (p, 2·SIDE) which
+    ``index`` (p, 2·side) says which, those before first; ``there`` whether they are; ``slopes`` (p, 2·side) which
     of the p − 1 steps lie about the reading, ``steps`` whether they are there.
     """
 
@@ -112,12 +117,12 @@ class _Beside:
     steps: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, positions: Floats) -> _Beside:
-        """At these positions."""
+    def of(cls, positions: Floats, side: int) -> _Beside:
+        """So many on either side of these positions."""
         p = len(positions)
-        about = np.concatenate([np.arange(-SIDE, 0), np.arange(1, SIDE + 1)])
+        about = np.concatenate([np.arange(-side, 0), np.arange(1, side + 1)])
         index = np.arange(p)[:, None] + about
-        slopes = np.arange(p)[:, None] + np.arange(-SIDE, SIDE)
+        slopes = np.arange(p)[:, None] + np.arange(-side, side)
         return cls(
             positions, np.clip(index, 0, p - 1), (index >= 0) & (index < p), np.clip(slopes, 0, p - 2),
             (slopes >= 0) & (slopes < p - 1),
@@ -132,7 +137,8 @@ class _Beside:
         apart = self.positions[:, None] - self.positions[self.index]
         gap = values[:, None] - values[self.index] - slope[:, None] * apart
         off, alike = _median(gap, self.there), np.full(len(values), np.inf)
-        for side in (slice(None, SIDE), slice(SIDE, None)):
+        half = self.index.shape[1] // 2
+        for side in (slice(None, half), slice(half, None)):
             there = self.there[:, side]
             own = _median(gap[:, side], there) * np.sign(off)
             alike = np.where(there.any(axis=1), np.minimum(alike, np.maximum(own, 0.0)), alike)
