@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.api.outcomes import Diagnosis, Plan, Report
-from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.reading import compared_with, read_job
 from cmm_uq.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.errors import CmmUqError
@@ -122,7 +122,13 @@ def report(job: Job | str | Path, *, seed: int = 0) -> Report:
     return Report(report_outcome(_job(job), seed=seed))
 
 
-def diagnose(job: Job | str | Path, *, seed: int = 0, alpha: float = FALSE_ALARMS) -> Diagnosis:
+def diagnose(
+    job: Job | str | Path,
+    *,
+    seed: int = 0,
+    alpha: float = FALSE_ALARMS,
+    against: pd.DataFrame | str | Path | None = None,
+) -> Diagnosis:
     """Say where recording and model differ, and what was left out.
 
     Parameters
@@ -130,12 +136,23 @@ def diagnose(job: Job | str | Path, *, seed: int = 0, alpha: float = FALSE_ALARM
     job : a job, or its folder.
     seed : of everything random.
     alpha : rate of false alarms.
+    against : what a simulation predicts for the recording, as a file or a DataFrame with the columns of one: the recording is
+        then compared with that, whatever the job names.
 
     Raises
     ------
-    CmmUqError : the job cannot be diagnosed as it stands.
+    CmmUqError : the job cannot be diagnosed as it stands, or the prediction is none of its recording.
     """
-    return Diagnosis(diagnosis_outcome(_job(job), seed=seed, alpha=alpha))
+    read = _job(job)
+    if against is not None:
+        from cmm_uq.commands.frames import compared_with_frame
+
+        read = (
+            compared_with(read, Path(against))
+            if isinstance(against, str | Path)
+            else compared_with_frame(read, against)
+        )
+    return Diagnosis(diagnosis_outcome(read, seed=seed, alpha=alpha))
 
 
 def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0) -> Plan:

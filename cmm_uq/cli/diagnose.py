@@ -21,6 +21,12 @@ def command(
     alpha: Annotated[
         float, typer.Option(help="Rate of false alarms, a probability from 0.000001 to 0.5.", metavar="P")
     ] = 0.01,
+    against: Annotated[
+        Path | None,
+        typer.Option(
+            help="Coordinates or lengths that a simulation predicts, in place of the job's model.", metavar="FILE"
+        ),
+    ] = None,
     force: Force = False,
     strict: Strict = False,
     quiet: Quiet = False,
@@ -31,5 +37,5 @@ def command(
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.report import write_diagnosis
 
-        written = write_diagnosis(job, out, seed=seed, alpha=alpha, force=force, stage=stage)
+        written = write_diagnosis(job, out, seed=seed, alpha=alpha, against=against, force=force, stage=stage)
     conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)

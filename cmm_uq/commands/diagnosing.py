@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+from cmm_uq.commands.against import Against, against_simulation
 from cmm_uq.commands.estimation import without_outliers
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recipe import recipe_of
@@ -18,6 +19,7 @@ from cmm_uq.documents.result import Diagnosed
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import NoisyPosterior, Progress
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.simulation import KEY
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Kind
@@ -67,8 +69,24 @@ def _check_rate(alpha: float) -> None:
 def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> Diagnosed:
     refuse_planned(job)
     kind_of(job).observing("diagnosed as a recording of an artefact")
+    simulation = job.facts.simulation
+    if simulation is not None:
+        return _against(job, against_simulation(job, simulation), seed=seed, alpha=alpha, progress=progress)
     model, findings = screened_model(job)
     return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
+
+
+def _against(job: Job, compared: Against, *, seed: int, alpha: float, progress: Progress | None) -> Diagnosed:
+    """Diagnose what a simulation leaves of a recording. Figures and decisions are the recording's own: none is corrected."""
+    kind, facts = kind_of(job), job.facts.artefact
+    model, outliers = without_outliers(compared.model)
+    made = partial(compared.observe, facts, where=job.recording_path)
+    diagnosis = diagnose(
+        model, stated_um=compared.stated_um, alpha=alpha, seed=seed, progress=progress, observe=made
+    )  # fmt: skip
+    next_ones = suggestions(diagnosis, facts, compared.observe, kind.offers("plan", Planning), job.facts.plan)
+    findings = (*compared.findings, *outliers)
+    return Diagnosed(job, findings, diagnosis, next_ones, simulated=compared.simulated)
 
 
 def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
@@ -112,7 +130,15 @@ def outcome_of(found: Found, seed: int = 0) -> Outcome:
 
 
 def _recipe(job: Job) -> Recipe:
-    """How a job is diagnosed; see :func:`~cmm_uq.commands.recipe.recipe_of`."""
+    """How a job is diagnosed; see :func:`~cmm_uq.commands.recipe.recipe_of`.
+
+    Raises
+    ------
+    CmmUqError : it cannot be, or names a simulation though its kind compares in a way of its own.
+    """
+    if job.facts.simulation is not None and kind_of(job).observe is None:
+        raise CmmUqError(f"a job of kind {job.facts.artefact.kind!r} is compared with no simulation: its analysis is its own",
+                         where=f"job.toml {KEY}", fix="Leave the simulation out")  # fmt: skip
     return recipe_of(job, lambda own: own.diagnose, _usual, "diagnosed as a recording of an artefact")
 
 

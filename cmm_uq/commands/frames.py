@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.commands.reading import job_of
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.reading import against
 from cmm_uq.jobs.toml_file import as_toml
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RECORDING = "recording.csv"
+RECORDING, PREDICTION = "recording.csv", "predicted.csv"
 NO_DATE = dt.date(1970, 1, 1)
 """Of a job that says none: the clock is never read."""
 
@@ -52,6 +53,16 @@ def job_from_frames(
     if recording:
         whole["recording"] = recording
     return job_of({"job.toml": as_toml(whole, "job.toml"), **contents}, recorded=points is not None)
+
+
+def compared_with_frame(job: Job, prediction: pd.DataFrame) -> Job:
+    """A job that was read, to be compared with what a simulation predicts.
+
+    Raises
+    ------
+    CmmUqError : it is no prediction.
+    """
+    return against(job, as_csv(prediction, PREDICTION), PREDICTION)
 
 
 def as_csv(frame: pd.DataFrame, name: str) -> bytes:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from cmm_uq.conformity.standards import names as standard_names
 from cmm_uq.conformity.standards import standard_named
+from cmm_uq.files.content import content_of
+from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.jobs import reading
 from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.job import Job
@@ -54,3 +56,14 @@ def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
     CmmUqError : a file is missing, or says something unknown or contradictory.
     """
     return reading.job_of(files, NAMEABLE, recorded=recorded)
+
+
+def compared_with(job: Job, prediction: Path) -> Job:
+    """A job that was read, to be compared with a simulation's prediction in a file that may lie anywhere.
+
+    Raises
+    ------
+    CmmUqError : the file is missing or no prediction.
+    """
+    content = content_of(prediction, TABLE_BYTES, "Give the file that the simulation wrote")
+    return reading.against(job, content, prediction.name, prediction)

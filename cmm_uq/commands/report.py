@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cmm_uq.commands import analysis, diagnosing
-from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.reading import compared_with, read_job
 from cmm_uq.commands.written import Form, Stage, Written, silent
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.documents.outcome import Outcome
@@ -95,6 +95,7 @@ def write_diagnosis(
     *,
     seed: int = 0,
     alpha: float = FALSE_ALARMS,
+    against: Path | None = None,
     force: bool = False,
     stage: Stage | None = None,
 ) -> Written:
@@ -106,6 +107,7 @@ def write_diagnosis(
     out : where to write; ``reports/<job id>/diagnosis`` by default.
     seed : of everything random.
     alpha : rate of false alarms.
+    against : file of a simulation's prediction that the recording is compared with, whatever the job names.
     force : keep what stands in the way as ``NAME.previous`` instead of refusing.
     stage : told of progress.
 
@@ -115,6 +117,8 @@ def write_diagnosis(
     OutputError : the folder cannot be written to.
     """
     read, tell = read_job(job), stage or silent
+    if against is not None:
+        read = compared_with(read, against)
     return DIAGNOSE.write(
         read, lambda: diagnosis_outcome(read, seed=seed, alpha=alpha, stage=tell), out, force=force, stage=tell
     )

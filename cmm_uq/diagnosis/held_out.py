@@ -65,7 +65,7 @@ def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float
     """
     estimate = model.estimate()
     linear = estimate.linear
-    sigma = max(estimate.least_squares.sigma_of_residuals, 1e-7)
+    sigma = max(estimate.least_squares.sigma_of_residuals, model.least_noise, 1e-7)
     errors, counts, densities = [], [], []
     scale = linear.noise_scale[:, None]
     every = np.hstack([linear.observed[:, None], linear.design]) / scale

@@ -47,7 +47,8 @@ def joint_posterior(
     progress : told the part done.
     known : posterior of the job's own model, which it stays where nothing is found.
     """
-    model, components = found.model, noise_of(found.model)
+    model = found.model
+    components = replace(noise_of(model), known=model.least_noise)
     if known is not None and not found.effects:
         return Joint(known, components, {})
     estimate = model.estimate()

@@ -99,7 +99,7 @@ def tails(residual: Floats) -> Kind:
     return Kind("tails", whitening, log_whitening, TAILS, log_factor=float(np.sum(log_t - normal)))
 
 
-def sigma_grid(stated: float | None, residual: float) -> tuple[Floats, Floats]:
+def sigma_grid(stated: float | None, residual: float, least: float = 0.0) -> tuple[Floats, Floats]:
     """Values (s,) of the noise, mm, and their log probabilities beforehand.
 
     A stated value is mostly good to a fifth, and now and then simply wrong; without one, the logarithm is uniform.
@@ -108,17 +108,24 @@ def sigma_grid(stated: float | None, residual: float) -> tuple[Floats, Floats]:
     ----------
     stated : as the job states it.
     residual : standard deviation of what the baseline leaves.
+    least : of the noise, whatever the residuals say; 0 where there is none.
     """
-    centre = np.log(residual)
+    centre = np.log(max(residual, least))
     grid = np.linspace(centre - 4.0, centre + 1.5, _POINTS)
+    grid, log_weight = _grid(stated, grid)
+    return np.exp(grid), np.where(np.exp(grid) >= least, log_weight, -np.inf) if least else log_weight
+
+
+def _grid(stated: float | None, grid: Floats) -> tuple[Floats, Floats]:
+    """Logarithms (s,) of the noise and their log probabilities, on a grid that holds a stated value too."""
     if stated is None:
-        return np.exp(grid), np.full(_POINTS, -np.log(_POINTS))
+        return grid, np.full(_POINTS, -np.log(_POINTS))
     at = np.log(stated)
     grid = np.unique(np.concatenate([grid, np.linspace(at - 5 * _STATED_SPREAD, at + 5 * _STATED_SPREAD, 60)]))
     right = np.exp(-0.5 * ((grid - at) / _STATED_SPREAD) ** 2) / _STATED_SPREAD
     wrong = np.exp(-0.5 * (grid - at) ** 2)
     weight = _STATED_IS_RIGHT * right + (1 - _STATED_IS_RIGHT) * wrong
-    return np.exp(grid), np.log(weight * np.gradient(grid) / np.sqrt(2 * np.pi))
+    return grid, np.log(weight * np.gradient(grid) / np.sqrt(2 * np.pi))
 
 
 def named(kinds: Sequence[Kind], weight: Floats) -> dict[str, float]:

@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.conformity.accuracy import TITLES, UNITS
-from cmm_uq.documents.diagnosis_words import VERDICT_WORDS, VERDICTS, lines, noise_words, sentence, summary_of
+from cmm_uq.documents.against import corrections, simulation_section
+from cmm_uq.documents.diagnosis_words import (
+    VERDICT_WORDS,
+    lines,
+    noise_words,
+    sentences_of,
+    stated_um,
+    summary_of,
+    verdict_of,
+)
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.improvement_table import improvement_table
 from cmm_uq.documents.origin import came_about
@@ -55,7 +64,7 @@ def diagnosis_document(found: Diagnosed) -> Document:
                 (
                     (say("Machine"), Verbatim(facts.machine.name)),
                     (say("Artefact"), d.before.artefact.title),
-                    (say("Effects that the job names"), (commas(names(facts.model.effects)) or say("none"))),
+                    _explained_by(found),
                 )
             ),
         ),
@@ -72,9 +81,10 @@ def diagnosis_document(found: Diagnosed) -> Document:
 
 def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
     """What a diagnosis says, as sections of any document."""
-    noise = noise_words(found.diagnosis, found.job.facts.recording.u_coordinate_um)
+    noise = noise_words(found.diagnosis, stated_um(found))
     sections = (
         Section(say("What was left out"), _left_out(found)),
+        *_simulation(found),
         Section(say("Before and after"), _before_after(found)),
         Section(say("What a correction would change"), _consequences(found)),
         Section(say("Where the mismatch lives"), _where(found)),
@@ -87,10 +97,24 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
     return tuple(section for section in sections if section.blocks)
 
 
+def _explained_by(found: Diagnosed) -> tuple[Text, Text]:
+    """What the recording is compared with, in short."""
+    if found.simulated is None:
+        return say("Effects that the job names"), commas(names(found.job.facts.model.effects)) or say("none")
+    return say("Compared with the simulation"), commas(names(found.simulated.files))
+
+
+def _simulation(found: Diagnosed) -> tuple[Section, ...]:
+    if found.simulated is None:
+        return ()
+    d = found.diagnosis
+    return (simulation_section(found.simulated, corrections(found.simulated, d.after, d.posterior)),)
+
+
 def _left_out(found: Diagnosed) -> tuple[Block, ...]:
     d = found.diagnosis
-    blocks: list[Block] = [Paragraph(VERDICTS[d.verdict])]
-    blocks += [Paragraph(sentence(item, d.improvement)) for item in d.effects]
+    blocks: list[Block] = [Paragraph(verdict_of(found))]
+    blocks += [Paragraph(text) for text in sentences_of(found)]
     blocks += [
         Paragraph(say("This recording cannot tell apart: {effects}.", effects=commas(names(group))), tone="warning")
         for group in d.indistinguishable
@@ -115,7 +139,9 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
         expanded_after_um=expanded,
         reference=say("no residual"),
         flagged=np.isin(d.before.artefact.measurement, list(odd)),
-        before_label=say("Residuals of the job's model"),
+        before_label=say("Residuals of the job's model")
+        if found.simulated is None
+        else say("Recorded minus predicted"),
         after_label=say("With what was left out"),
         caption=say(
             "Residual of each observation before and after, with U (k = {k}) from the noise.", k=number(k, ".2f")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.against import VERDICTS as AGAINST
+from cmm_uq.documents.against import contained
 from cmm_uq.documents.in_short import Standing, Summary, Verdict
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.wording import expanded, probability
 from cmm_uq.jobs.job import JobFile
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, together
+from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, day, names, say, together
 from cmm_uq.screening.finding import Finding
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import unit
@@ -44,10 +47,22 @@ _STANDING: Mapping[str, Standing] = {
 }  # fmt: skip
 
 
+def verdict_of(found: Diagnosed) -> Text:
+    """The verdict in a sentence."""
+    told = VERDICTS if found.simulated is None else AGAINST
+    return told[found.diagnosis.verdict]
+
+
+def sentences_of(found: Diagnosed) -> list[Text]:
+    """A sentence or two on each effect that was left out."""
+    d = found.diagnosis
+    return [after(sentence(item, d.improvement), contained(found.simulated, item.effect)) for item in d.effects]
+
+
 def lines(found: Diagnosed) -> list[Text]:
     """Verdict and everything that follows from it, a sentence or two each."""
     d = found.diagnosis
-    said = [VERDICTS[d.verdict], *(sentence(item, d.improvement) for item in d.effects)]
+    said = [verdict_of(found), *sentences_of(found)]
     said += [
         say("Cannot be told apart by this recording: {effects}.", effects=commas(names(group)))
         for group in d.indistinguishable
@@ -55,7 +70,17 @@ def lines(found: Diagnosed) -> list[Text]:
     said += [
         say("To part {effects}: {what}", effects=together(names(s.separates)), what=s.what) for s in found.suggestions
     ]
-    return said + list(noise_words(d, found.job.facts.recording.u_coordinate_um))
+    return said + list(noise_words(d, stated_um(found)))
+
+
+def stated_um(found: Diagnosed) -> float | None:
+    """Standard uncertainty of a coordinate, µm, that the job states; with that of the prediction that it is compared with."""
+    stated = found.job.facts.recording.u_coordinate_um
+    return (
+        stated
+        if stated is None or found.simulated is None
+        else math.hypot(stated, found.simulated.u_um, found.simulated.u_turned_um)
+    )
 
 
 def sentence(item: LeftOut, gain: Improvement) -> Text:

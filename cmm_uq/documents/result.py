@@ -13,6 +13,7 @@ from cmm_uq.conformity.consequences import Consequences
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.conformity.tolerances import Judged
 from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.documents.simulated import Simulated
 from cmm_uq.documents.stating import Stating
 from cmm_uq.inference.draws import Draws
 from cmm_uq.inference.least_squares import LeastSquares
@@ -89,6 +90,7 @@ class Diagnosed:
     diagnosis : what is missing.
     suggestions : what to measure next.
     consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
+    simulated : the simulation that the recording was compared with, if it was with one.
     """
 
     job: Job
@@ -96,6 +98,7 @@ class Diagnosed:
     diagnosis: Diagnosis
     suggestions: tuple[Suggestion, ...]
     consequences: Consequences | None = None
+    simulated: Simulated | None = None
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,13 @@ import numpy as np
 
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.statement import Decided, Statement
-from cmm_uq.diagnosis.diagnosis import LeftOut
+from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.against import corrections
 from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.program import software
 from cmm_uq.documents.result import Diagnosed, Result
+from cmm_uq.documents.simulated import Simulated
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
@@ -99,6 +101,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
     """The ``diagnosis`` part."""
     d, changes = found.diagnosis, found.consequences
     return {
+        **({} if found.simulated is None else {"simulation": _simulation(found.simulated, d)}),
         "verdict": d.verdict,
         "p_value": d.p_value,
         "where": [
@@ -129,6 +132,12 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
             "conformity": [{"before": _statement(a), "after": _statement(b)} for a, b in changes.statements],
         },
     }  # fmt: skip
+
+
+def _simulation(simulated: Simulated, diagnosis: Diagnosis) -> dict[str, Any]:
+    """What the recording was compared with, and what of it was estimated anew."""
+    found = corrections(simulated, diagnosis.after, diagnosis.posterior)
+    return simulated.data({owner: _quantities(values) for owner, values in found.items()})
 
 
 def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:

@@ -34,7 +34,7 @@ class Cells:
     lines: list[int]
 
 
-def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS) -> Cells:
+def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS, delimiter: str = ",") -> Cells:
     """Cells of a CSV file, without the blanks around them; rows may still differ in length.
 
     Empty rows, and those whose first cell begins with #, are passed over.
@@ -45,12 +45,13 @@ def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS) -
     where : its name, for messages.
     fix : how to save it, for messages.
     most_rows : limit on its rows.
+    delimiter : between cells.
 
     Raises
     ------
     CmmUqError : it is no text, or goes beyond the limits of a table.
     """
-    reader = csv.reader(_lines(text_of(content, where, fix), where), skipinitialspace=True)
+    reader = csv.reader(_lines(text_of(content, where, fix), where), delimiter=delimiter, skipinitialspace=True)
     found: list[list[str]] = []
     lines: list[int] = []
     count = 0

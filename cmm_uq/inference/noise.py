@@ -115,6 +115,7 @@ class Components:
     gap : typical time between neighbouring readings, over the duration of the recording.
     display : step in which coordinates are displayed, mm; 0 where it is too fine to matter.
     time : (m,) of the unturned observations, from 0 to 1; (0,) where none is recorded.
+    known : what is not known of a coordinate in any case, mm: the reading noise is not taken for less.
     """
 
     turn: sparse.csr_array
@@ -126,6 +127,7 @@ class Components:
     gap: float = 0.0
     display: float = 0.0
     time: Floats = field(default_factory=lambda: np.zeros(0))
+    known: float = 0.0
     names: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -140,8 +142,8 @@ class Components:
 
     @property
     def least(self) -> float:
-        """Reading noise, mm, below which a smaller one would show no other readings."""
-        return self.display / 20
+        """Reading noise, mm, below which a smaller one would show no other readings, or is not believed."""
+        return max(self.display / 20, self.known)
 
     @property
     def dimension(self) -> int:

@@ -20,7 +20,7 @@ PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100
 OF_THE_CERTIFICATE = ("number", "issued", "recalibration_agreed", "as_found")
 """Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
-OF_THE_RECORDED_MACHINE = ("short_gauge",)
+OF_THE_RECORDED_MACHINE = ("short_gauge", "simulation")
 """Tables that speak of the machine as it was recorded, not of one simulated or compensated."""
 IN_THE_RECORDING = ("temperature_log",)
 """Keys of ``[machine]`` whose figures stand in every recording that a command writes."""

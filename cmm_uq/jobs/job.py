@@ -22,7 +22,9 @@ from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.prediction import Prediction
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
+from cmm_uq.jobs.simulation import SimulationFacts
 from cmm_uq.jobs.table import (
     Limit,
     Names,
@@ -154,6 +156,8 @@ class JobFile(Table):
     """What was recorded, and in which file."""
     short_gauge: ShortGaugeFacts | None = None
     """A short gauge met from both sides, recorded beside lengths that are not bidirectional by themselves."""
+    simulation: SimulationFacts | None = None
+    """A prediction of another program, or an error map, that the recording is diagnosed against."""
     probe: ProbeFacts = ProbeFacts()
     """With what the recording was made."""
     test_uncertainty: TestUncertainty = TestUncertainty()
@@ -239,6 +243,8 @@ class Job:
     planned : whether the recording holds the nominal coordinates of a plan.
     as_found : what the machine showed before it was adjusted, where the job names it.
     short_gauge : recorded beside the artefact, where the job names one.
+    prediction : of a simulation, where the job names a file of it.
+    beside : files that it was read from and that lie outside its folder.
     """
 
     folder: Path
@@ -249,6 +255,8 @@ class Job:
     planned: bool = False
     as_found: AsFound | None = None
     short_gauge: ShortGauge | None = None
+    prediction: Prediction | None = None
+    beside: tuple[Path, ...] = ()
 
     @property
     def circumstances(self) -> Circumstances:
@@ -263,7 +271,7 @@ class Job:
     @property
     def paths(self) -> tuple[Path, ...]:
         """Every file that it was read from."""
-        return tuple(self.folder / name for name in self.inputs)
+        return (*(self.folder / name for name in self.inputs), *self.beside)
 
     @property
     def recording_path(self) -> str:

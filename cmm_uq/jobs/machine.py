@@ -10,6 +10,12 @@ from pydantic import AfterValidator, Field, model_validator
 from cmm_uq.files.limits import COLUMNS, LISTED, MAPS
 from cmm_uq.jobs.table import Column, Number, Range, Table, Temperature, Triple, at_least
 
+HOTTEST_C = 100.0
+"""°C at which a machine may be mapped: far beyond any, and far below any temperature in kelvin."""
+
+ZERO_C = 273.15
+"""K."""
+
 SHORTEST_TRAVEL_MM = 1e-3
 """Positions are divided by the travel."""
 
@@ -55,12 +61,19 @@ class SquarenessFacts(Table):
     """Squareness of z to x: e_x = −S·z."""
 
 
+def _of_a_workshop(celsius: float) -> float:
+    if celsius > HOTTEST_C:
+        kelvin = f": {celsius:g} K are {celsius - ZERO_C:g} °C" if ZERO_C - 50 <= celsius <= ZERO_C + HOTTEST_C else ""
+        raise ValueError(f"no machine is mapped at {celsius:g} °C{kelvin}. Give the temperature in °C")
+    return celsius
+
+
 class ErrorMapFile(Table):
     """One error map, the temperature it was taken at, and the squareness of the axes at that temperature."""
 
     file: str
     """CSV of the map: axis, position_mm, three translations in µm and three rotations in ″."""
-    temperature_c: Temperature
+    temperature_c: Annotated[Temperature, AfterValidator(_of_a_workshop)]
     """Temperature of the scales at which the map was taken."""
     squareness_arcsec: SquarenessFacts | None = None
     """Squareness of the axes at that temperature."""

@@ -79,6 +79,8 @@ class MeasurementModel:
     shapes : nonlinear parameters, held, of the effects that have some, by the effect's name.
     within : a model of the same recording with effects more, where these turn out to be so large that they bend it: the linear
         model is then taken about the estimate of that one.
+    least_noise : mm, what is not known of a coordinate however little the residuals scatter, as of a prediction that the
+        recording is compared with.
 
     Raises
     ------
@@ -91,6 +93,7 @@ class MeasurementModel:
     used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
     within: MeasurementModel | None = None
+    least_noise: float = 0.0
 
     def __post_init__(self) -> None:
         if not len(self.used):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -109,3 +111,22 @@ def test_a_recording_that_is_explained_to_the_last_digit_still_has_a_density() -
     )
     found = Marginal(exact, noise, solve(exact)).log_density(np.zeros((3, noise.dimension)) + np.log(1e-3))
     assert np.all(np.isfinite(found))
+
+
+@pytest.mark.parametrize("times", [0.2, 5.0])
+def test_the_noise_is_not_sampled_below_what_is_known_of_it(times: float) -> None:
+    """Far below the residuals' scatter it changes nothing; far above, the noise is that, and the slope as uncertain: its
+    variance is 1/(Σx²/σ² + 1/3²), for the other column is orthogonal to it."""
+    noise = replace(components(), possible=())
+    linear = model(noise)
+    estimate = solve(linear)
+    known = times * estimate.sigma
+    drawn = sample_with_noise(linear, replace(noise, known=known), estimate, 0)
+    assert drawn.sizes.coordinate.min() >= 0.999 * known
+    if times < 1:
+        assert np.array_equal(drawn.draws, sample_with_noise(linear, noise, estimate, 0).draws)
+    else:
+        assert drawn.converged
+        assert np.median(drawn.sizes.coordinate) < 1.2 * known
+        precision = np.sum(linear.design[:, 0] ** 2) / drawn.sizes.coordinate**2 + 1 / 9
+        assert drawn.draws[:, 0].std() == pytest.approx(np.sqrt(np.mean(1 / precision)), rel=0.05)

@@ -242,13 +242,14 @@ def comparison_of(model: MeasurementModel, stated: float | None, candidates: Seq
     estimate = model.estimate()
     linear = estimate.linear
     sigma_left = max(estimate.least_squares.sigma_of_residuals, 1e-6)
-    sigma, log_sigma = sigma_grid(stated, sigma_left)
+    sigma, log_sigma = sigma_grid(stated, sigma_left, model.least_noise)
     held = _held(model)
     rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
     return Comparison(
         rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.freedoms.dense()]) / linear.noise_scale[:, None],
         noise_kinds(model, candidates), sigma, log_sigma, candidates, linear.noise_scale,
-        stated or sigma_left / _MISFIT, _certified(model, sigma_left), display_of(model),
+        max(stated or sigma_left / _MISFIT, model.least_noise), _certified(model, max(sigma_left, model.least_noise)),
+        display_of(model),
     )  # fmt: skip
 
 

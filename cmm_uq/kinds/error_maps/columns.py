@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cmm_uq.kinds.error_maps.copies import copies
+from cmm_uq.kinds.error_maps.spikes import DAMAGED, spikes
 from cmm_uq.messages import Text, Verbatim, commas, listed, number, say
 from cmm_uq.physics.error_map import COLUMNS, ErrorMap
 from cmm_uq.points import AXES, Floats
@@ -18,16 +20,6 @@ from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, Unit, unit
 
 LEAST_POSITIONS = 4
 """Positions that the maps of a column must share."""
-
-_STRAY = 8.0
-"""Of its robust standard deviations, by which a reading off its neighbours is an outlier."""
-
-_MOST_STRAY = 0.1
-_FINEST = 0.3
-"""Part of the last digit that no reading is better than."""
-
-_LAST_DIGIT = 1e-9
-"""mm."""
 
 _TURNED = 0.3
 """Part of the misfit that is left when a column with the wrong sign is turned."""
@@ -85,8 +77,26 @@ def title_of(axis: str, component: int) -> Text:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Looked:
+    """One error of one carriage as it stands in all maps: what of it can be compared, and what is odd.
+
+    ``column`` is ``None`` where too little is left; ``copied`` are the groups of maps with the same figures.
+    """
+
+    title: Text
+    column: MapColumn | None
+    copied: tuple[tuple[int, ...], ...]
+    findings: tuple[Finding, ...]
+    measured: bool
+
+
 def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]]:
-    """Errors that at least two maps give with figures of their own, and all that is odd; stray readings are left out."""
+    """Errors that at least two maps give with figures of their own, and all that is odd; spikes are left out.
+
+    Where several maps have one column's figures, they are counted once; of a scale not at all, for at which of the
+    temperatures it was measured decides how it expands, and nobody knows.
+    """
     columns: list[MapColumn] = []
     findings: list[Finding] = []
     same: dict[tuple[float, ...], list[Text]] = {}
@@ -94,26 +104,12 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
     for axis, carriage in enumerate(AXES):
         shared = _shared([m.axes[axis].positions for m in maps])
         for component in range(6):
-            title, size = title_of(carriage, component), MICROMETRE if component < 3 else ARCSECOND * METRE
-            lever = 1.0 if component < 3 else METRE
-            values = np.array([
-                lever * m.axes[axis].errors[np.isin(m.axes[axis].positions, shared), component] for m in maps
-            ])  # fmt: skip
-            measured = [k for k in range(len(maps)) if np.any(values[k])]
-            own = [k for k in measured if not any(_same(values[k], values[j]) for j in measured if j < k)]
-            if not measured:
-                unmeasured.append(title)
-            elif len(own) < len(measured):
-                copied = tuple(maps[k].temperature for k in measured if _copied(values, k, measured))
-                same.setdefault(copied, []).append(title)
-            if len(own) < 2 or len(shared) < LEAST_POSITIONS:
-                continue
-            kept, stray = _without_stray(shared, values[own], size)
-            temperatures = np.array([maps[k].temperature for k in own])
-            columns.append(MapColumn(carriage, component, shared[kept], values[own][:, kept], temperatures))
-            findings += [
-                _stray(title, shared[i], maps[own[k]], values[own][k, i] / size, COLUMNS[component]) for k, i in stray
-            ]
+            looked = _looked_at(maps, axis, component, shared)
+            for group in looked.copied:
+                same.setdefault(tuple(maps[k].temperature for k in group), []).append(looked.title)
+            unmeasured += [] if looked.measured else [looked.title]
+            columns += [] if looked.column is None else [looked.column]
+            findings += looked.findings
         if len(shared) < LEAST_POSITIONS:
             why = say(
                 "the maps share {count} positions of axis {carriage}: they are not compared. Map the same positions",
@@ -122,6 +118,33 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
             )
             findings.append(Finding("positions", (), (), why))
     return columns, [*_alike(same, unmeasured), *findings]
+
+
+def _looked_at(maps: Sequence[ErrorMap], axis: int, component: int, shared: Floats) -> _Looked:
+    carriage, size = AXES[axis], MICROMETRE if component < 3 else ARCSECOND * METRE
+    title, lever = title_of(carriage, component), 1.0 if component < 3 else METRE
+    values = np.array([
+        lever * m.axes[axis].errors[np.isin(m.axes[axis].positions, shared), component] for m in maps
+    ]).reshape(len(maps), -1)  # fmt: skip
+    measured = [k for k in range(len(maps)) if np.any(values[k])]
+    copied = tuple(copies(values, size))
+    again = {k for group in copied for k in (group if component == axis else group[1:])}
+    own = np.array([k for k in measured if k not in again], dtype=np.int64)
+    if len(own) < 2 or len(shared) < LEAST_POSITIONS:
+        return _Looked(title, None, copied, (), bool(measured))
+    found = spikes(shared, values[own], size)
+    damaged = found.mean(axis=1) > DAMAGED
+    findings = [_damaged(title, maps[k]) for k in own[damaged]]
+    findings += [
+        _stray(title, shared[i], maps[own[k]], values[own[k], i] / size, COLUMNS[component])
+        for k, i in zip(*np.nonzero(found & ~damaged[:, None]), strict=True)
+    ]
+    kept, left = ~found[~damaged].any(axis=0), own[~damaged]
+    column = None
+    if len(left) > 1 and kept.sum() >= LEAST_POSITIONS:
+        temperatures = np.array([maps[k].temperature for k in left])
+        column = MapColumn(carriage, component, shared[kept], values[left][:, kept], temperatures)
+    return _Looked(title, column, copied, tuple(findings), bool(measured))
 
 
 def turned(column: MapColumn, k: int) -> bool:
@@ -145,45 +168,26 @@ def _shared(positions: Sequence[Floats]) -> Floats:
     return shared
 
 
-def _copied(values: Floats, k: int, measured: Sequence[int]) -> bool:
-    return any(j != k and _same(values[k], values[j]) for j in measured)
-
-
-def _same(one: Floats, other: Floats) -> bool:
-    """Whether two courses are one, wherever they begin."""
-    return bool(np.allclose(one - one[0], other - other[0], rtol=0, atol=_LAST_DIGIT))
-
-
-def _without_stray(positions: Floats, values: Floats, unit: float) -> tuple[Floats, list[tuple[int, int]]]:
-    """Which positions to keep, and the stray readings (map, position): far off what its neighbours and the other maps say."""
-    steps = np.abs(np.diff(np.unique(np.round(values / unit, 6))))
-    finest = _FINEST * float(steps.min()) * unit if len(steps) else 0.0
-    kept = np.ones(len(positions), dtype=bool)
-    stray: list[tuple[int, int]] = []
-    while len(stray) < _MOST_STRAY * len(positions):
-        at = np.flatnonzero(kept)
-        off = values[:, at] - (np.median(values[:, at], axis=0) if len(values) > 2 else values[:, at].mean(axis=0))
-        between = (positions[at][1:-1] - positions[at][:-2]) / (positions[at][2:] - positions[at][:-2])
-        bend = off[:, 1:-1] - (1 - between) * off[:, :-2] - between * off[:, 2:]
-        scale = max(1.4826 * float(np.median(np.abs(bend))), finest)
-        k, i = np.unravel_index(int(np.argmax(np.abs(bend))), bend.shape)
-        if scale == 0 or abs(bend[k, i]) < _STRAY * scale:
-            break
-        stray.append((int(k), int(at[i + 1])))
-        kept[at[i + 1]] = False
-    return kept, stray
-
-
 def _stray(title: Text, position: float, error_map: ErrorMap, value: float, column: str) -> Finding:
     why = say(
-        "the {title} at {position:g} mm in the map at {temperature:g} °C, {value:.4g}, is far off "
-        "its neighbours and the other maps; the position is left out. Measure it again",
+        "the {title} at {position:g} mm in the map at {temperature:g} °C, {value:.4g}, jumps off its neighbours and off the "
+        "other maps; the position is left out. Measure it again",
         title=title,
         position=position,
         temperature=error_map.temperature,
         value=value,
     )
     return Finding("outlier", (), (), why, column=column, set_aside=True)
+
+
+def _damaged(title: Text, error_map: ErrorMap) -> Finding:
+    why = say(
+        "the {title} jumps in more than a quarter of its readings in the map at {temperature:g} °C; that map's is left out. "
+        "Measure it again",
+        title=title,
+        temperature=error_map.temperature,
+    )
+    return Finding("outlier", (), (), why, set_aside=True)
 
 
 def _alike(same: dict[tuple[float, ...], list[Text]], unmeasured: list[Text]) -> Iterator[Finding]:

@@ -269,3 +269,19 @@ def test_sums_of_logarithms_are_scipys_to_the_last_bit(shape: tuple[int, ...], a
     log = random.normal(-50, 20, shape)
     for values in (log, np.round(log), np.zeros(shape)):  # the largest once, now and then several times, always
         np.testing.assert_array_equal(_log_sum(values, axis), special.logsumexp(values, axis=axis))
+
+
+@pytest.mark.parametrize("least", [0.04, 0.3])
+@pytest.mark.parametrize("stated", [None, 0.1])
+def test_a_least_noise_cuts_the_integral_off_below_it(least: float, stated: float | None) -> None:
+    """Above it nothing changes; 0.3 is six times what the observations show."""
+    whole = sigma_grid(stated, 0.08)
+    sigma, log_sigma = sigma_grid(stated, 0.08, least)
+    assert np.all(np.isneginf(log_sigma[sigma < least]))
+    assert np.exp(log_sigma[sigma >= least]).sum() > 0
+    if least < 0.08:
+        assert np.array_equal(sigma, whole[0])
+        assert np.array_equal(log_sigma[sigma >= least], whole[1][sigma >= least])
+    c = replace(comparison(), sigma=sigma[sigma >= least], log_sigma=log_sigma[sigma >= least])
+    cut = replace(comparison(), sigma=sigma, log_sigma=log_sigma)
+    assert cut.log_evidence()[0][0] == pytest.approx(direct(c, None), abs=0.02)
