@@ -1,0 +1,98 @@
+"""The documentation as a site: ``python3 start.py docs`` writes it to build/site, to be read without a network.
+
+Sources are the Markdown files as they stand, README and CHANGELOG among them, so that every link works here and where the files are
+read as text. Which pages belong together is said in ``CONTENTS`` alone.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from cmm_uq import __version__  # noqa: E402
+
+CONTENTS: dict[str, list[str]] = {
+    "Start here": ["tutorial", "gallery"],
+    "How to": ["howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*", "import/*"],
+    "Reference": ["running", "api", "reference/*", "uncertainty/model-file", "machine/effects", "limits"],
+    "How it works": [
+        "certificate", "standards", "noise", "screening", "diagnosis", "planning", "selfcalibration", "artefacts/index",
+        "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
+        "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
+    ],
+    "What it rests on": [
+        "validation", "coverage-study", "noise-ranks", "diagnosis-study", "mutation-study", "hostile-study",
+        "uncertainty/validation", "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks", "peers", "sources",
+        "machine/source-errors", "uncertainty/harris-2004",
+    ],
+    "The project": ["/README", "/CHANGELOG", "/CONTRIBUTING", "layout"],
+}  # fmt: skip
+root_doc = "docs/index"
+
+project = "cmm_uq"
+author = copyright = "The cmm_uq maintainers"
+version = release = __version__
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**"]
+exclude_patterns = [".*", "build", "dist", "cmm_uq", "benchmarks", "examples", "reports", "templates", "tests",
+                    "**/.ipynb_checkpoints"]  # fmt: skip
+myst_enable_extensions = ["html_image"]
+myst_heading_anchors = 4
+nb_execution_mode = "off"  # the notebooks hold what the tests found
+nb_merge_streams = True
+highlight_language = "text"
+
+autodoc_typehints = "none"  # the docstrings have the types
+autodoc_member_order = "bysource"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+
+html_theme = "furo"  # fonts of the reader's own system; no page asks for anything from elsewhere
+html_title = f"cmm_uq {__version__}"
+html_static_path = ["site/site.css"]
+html_css_files = ["site.css"]
+html_extra_path = ["site/index.html"]
+html_copy_source = False
+html_show_sourcelink = False
+pygments_style = "a11y-high-contrast-light"
+pygments_dark_style = "a11y-high-contrast-dark"
+
+ACCESSIBLE = {  # what the theme and Sphinx leave out for readers who hear the page or have no mouse
+    '<p class="caption" role="heading">': '<p class="caption" role="heading" aria-level="2">',
+    '<aside class="sidebar-drawer">': '<aside class="sidebar-drawer" aria-label="All pages">',
+    '<aside class="toc-drawer">': '<aside class="toc-drawer" aria-label="On this page">',
+    '<aside class="toc-drawer no-toc">': '<aside class="toc-drawer no-toc" aria-label="On this page">',
+    "<pre>": '<pre tabindex="0">',
+    '<th class="head"><p></p></th>': "<td></td>",
+    '<div id="search-results"></div>': '<h1>Search</h1>\n<div id="search-results"></div>',
+}
+
+
+def add_contents(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Put the table of contents on the first page as it is read; the file itself stays plain Markdown."""
+    if docname == root_doc:
+        for caption, pages in CONTENTS.items():
+            entries = "\n".join(page if page.startswith("/") else f"/docs/{page}" for page in pages)
+            source[0] += f"\n```{{toctree}}\n:hidden:\n:glob:\n:caption: {caption}\n\n{entries}\n```\n"
+
+
+def make_accessible(app: Sphinx, exception: Exception | None) -> None:
+    """Complete the written pages; tests hold every one of them to axe-core's rules."""
+    if exception is None and app.builder.format == "html":
+        for page in Path(app.outdir).rglob("*.html"):
+            text = page.read_text(encoding="utf-8")
+            for found, instead in ACCESSIBLE.items():
+                text = text.replace(found, instead)
+            page.write_text(text, encoding="utf-8")
+
+
+def setup(app: Sphinx) -> None:
+    """Register both with Sphinx."""
+    app.connect("source-read", add_contents)
+    app.connect("build-finished", make_accessible)
