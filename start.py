@@ -21,6 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
 ENVIRONMENT = Path(os.environ.get("CMM_UQ_ENV") or ROOT / ".venv")
+SITE = ("--fail-on-warning", "--keep-going", "--quiet", "--conf-dir", "docs")  # a link that leads nowhere is an error
 SCRIPTS = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
 
 
@@ -70,8 +71,8 @@ def test(arguments: list[str]) -> int:
 
 
 def docs() -> int:
-    """The site; a warning, such as a link that leads nowhere, is an error."""
-    return run("sphinx-build", "--fail-on-warning", "--keep-going", "--quiet", "-c", "docs", ".", "build/site")
+    """The site, from all pages anew."""
+    return run("sphinx-build", *SITE, "--fresh-env", ".", "build/site")
 
 
 def run(command: str, *arguments: str) -> int:

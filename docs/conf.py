@@ -1,7 +1,7 @@
 """The documentation as a site: ``python3 start.py docs`` writes it to build/site, to be read without a network.
 
-Sources are the Markdown files as they stand, README and CHANGELOG among them, so that every link works here and where the files are
-read as text. Which pages belong together is said in ``CONTENTS`` alone.
+Sources are the Markdown files as they stand, README and CHANGELOG among them, so that every link works here and where
+the files are read as text. Which pages belong together is said in ``CONTENTS`` alone.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from cmm_uq import __version__  # noqa: E402
 
 CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "gallery"],
-    "How to": ["howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*", "import/*"],
+    "How to": [
+        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*", "import/*",
+    ],
     "Reference": ["running", "api", "reference/*", "uncertainty/model-file", "machine/effects", "limits"],
     "How it works": [
         "certificate", "standards", "noise", "screening", "diagnosis", "planning", "selfcalibration", "artefacts/index",
@@ -35,7 +37,8 @@ CONTENTS: dict[str, list[str]] = {
 root_doc = "docs/index"
 
 project = "cmm_uq"
-author = copyright = "The cmm_uq maintainers"
+author = "The cmm_uq maintainers"
+project_copyright = author
 version = release = __version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
@@ -70,6 +73,8 @@ ACCESSIBLE = {  # what the theme and Sphinx leave out for readers who hear the p
     '<aside class="toc-drawer no-toc">': '<aside class="toc-drawer no-toc" aria-label="On this page">',
     "<pre>": '<pre tabindex="0">',
     '<th class="head"><p></p></th>': "<td></td>",
+    "<th></th>": "<td></td>",
+    '<div class="table-wrapper ': '<div tabindex="0" class="table-wrapper ',
     '<div id="search-results"></div>': '<h1>Search</h1>\n<div id="search-results"></div>',
 }
 

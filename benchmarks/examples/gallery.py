@@ -63,10 +63,14 @@ def placings(kind: str, folder: Path) -> None:
             name for name in names if name.endswith(".csv")
         ])  # fmt: skip
         text = (job / "job.toml").read_text(encoding="utf-8")
-        (job / "job.toml").write_text(text.replace('origin = "simulated"\n', "") + LENGTHS.get(kind, ""), encoding="utf-8")
+        (job / "job.toml").write_text(
+            text.replace('origin = "simulated"\n', "") + LENGTHS.get(kind, ""), encoding="utf-8"
+        )
         page = cmm_uq.plan(job, power=False).write(folder / "plan")["plan.html"]
     drawn = re.findall(r"<svg.*?</svg>", page.read_text(encoding="utf-8"), re.DOTALL)[0]
-    paper = re.sub(r"(<svg.*?>)", r'\1<rect width="100%" height="100%" fill="#fff"/>', drawn, count=1)  # for dark screens
+    paper = re.sub(
+        r"(<svg.*?>)", r'\1<rect width="100%" height="100%" fill="#fff"/>', drawn, count=1
+    )  # for dark screens
     (PICTURES / f"{kind}.svg").write_text(paper + "\n", encoding="utf-8")
 
 

@@ -1,0 +1,131 @@
+"""The documentation as a site: every link leads somewhere, nothing comes from elsewhere, everybody can read and search it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+ELSEWHERE = {
+    "arxiv.org", "doi.org", "github.com", "openturns.github.io", "pradyunsg.me", "pypi.org", "python.arviz.org",
+    "uncertainty.nist.gov", "www.scielo.br", "www.sphinx-doc.org",
+}  # fmt: skip
+"""Where links of the documentation lead outside; looked at by eye when one is added, since tests fetch nothing."""
+
+
+class Read(HTMLParser):
+    """What one page links to, what it loads, and which places in it can be linked to."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.loads: list[str] = []
+        self.places: set[str] = {""}
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = {name: value or "" for name, value in attrs}
+        if "id" in given:
+            self.places.add(given["id"])
+        if tag == "a" and "href" in given:
+            self.links.append(given["href"])
+        if tag in ("script", "img", "iframe", "source") and "src" in given:
+            self.loads.append(given["src"])
+        if tag == "link" and given.get("rel") not in ("author", "canonical"):
+            self.loads.append(given["href"])
+
+
+@pytest.fixture(scope="module")
+def read(site: Path) -> dict[Path, Read]:
+    return {path.resolve(): Read(path) for path in sorted(site.rglob("*.html")) if "_static" not in path.parts}
+
+
+FIRST = "site/index.html"
+"""Leads on to the first page of the documentation at once, so that a browser cannot look at it."""
+
+ALIKE = """() => {
+  const further = {'tbody': 10, 'pre': 60, 'article ul': 20, '.sidebar-tree ul': 4, '.toc-tree ul': 8};
+  for (const [of, kept] of Object.entries(further))
+    for (const one of document.querySelectorAll(of)) [...one.children].slice(kept).forEach(child => child.remove());
+}"""
+"""Takes away what is like what stands before it: further rows of a long table, words of long code, items of long lists."""
+
+
+@pytest.fixture
+def shown(read: dict[Path, Read]) -> list[Path]:
+    return [path for path in read if not path.as_posix().endswith(FIRST)]
+
+
+def test_every_link_leads_to_a_page_and_a_place_in_it(read: dict[Path, Read]) -> None:
+    broken = []
+    for path, page in read.items():
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            if not target.is_file() or (target in read and unquote(parts.fragment) not in read[target].places):
+                broken.append((path.name, link))
+    assert broken == []
+
+
+def test_links_that_lead_outside_are_known(read: dict[Path, Read]) -> None:
+    outside = {urlsplit(link).netloc for page in read.values() for link in page.links if urlsplit(link).scheme}
+    assert outside <= ELSEWHERE, outside - ELSEWHERE
+
+
+def test_no_page_loads_anything_from_elsewhere(read: dict[Path, Read], site: Path) -> None:
+    for page in read.values():
+        assert [load for load in page.loads if urlsplit(load).netloc] == []
+    for style in (site / "_static").rglob("*.css"):
+        assert "url(http" not in style.read_text(encoding="utf-8").replace('"', "").replace("'", "")
+
+
+@pytest.fixture
+def tab(browser: Browser) -> Iterator[Page]:
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    yield context.new_page()
+    context.close()
+
+
+def test_axe_finds_nothing_on_any_page(shown: list[Path], tab: Page) -> None:
+    """axe-core with all its rules, which hold WCAG 2.2 A and AA."""
+    found = {}
+    for path in shown:
+        tab.goto(path.as_uri())
+        tab.evaluate(ALIKE)
+        wrong = Axe().run(tab, options={"resultTypes": ["violations"]}).response["violations"]
+        if wrong:
+            found[path.name] = [(one["id"], [node["html"][:90] for node in one["nodes"]][:2]) for one in wrong]
+    assert found == {}
+
+
+def test_on_a_telephone_no_page_is_wider_than_the_screen(shown: list[Path], tab: Page) -> None:
+    tab.set_viewport_size({"width": 360, "height": 800})
+    wide = []
+    for path in shown:
+        tab.goto(path.as_uri(), wait_until="domcontentloaded")
+        if tab.evaluate("document.documentElement.scrollWidth") > 360:
+            wide.append(path.name)
+    assert wide == []
+
+
+def test_the_search_works_without_a_network(site: Path, tab: Page) -> None:
+    tab.context.set_offline(True)
+    tab.goto((site / "search.html").as_uri() + "?q=hysteresis")
+    tab.wait_for_selector("#search-results li a", timeout=10_000)
+    assert "effects.html" in " ".join(tab.eval_on_selector_all("#search-results li a", "all => all.map(a => a.href)"))
+
+
+def test_the_first_address_leads_to_the_documentation(site: Path, tab: Page) -> None:
+    tab.goto((site / "index.html").as_uri())
+    tab.wait_for_url("**/docs/index.html*")
+    assert tab.inner_text("h1").startswith("The documentation of cmm_uq")
