@@ -27,11 +27,18 @@ class TestUncertainty(Table):
     __test__ = False  # no test of pytest's
 
     u_cte_per_k: Annotated[float, Field(ge=0, le=1e-3)] = 0.0
+    """Standard uncertainty of the artefact's coefficient of expansion, 1/K."""
     u_temperature_k: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """Standard uncertainty of the artefact's temperature."""
     u_alignment_um: Uncertainty = 0.0
+    """Standard uncertainty of a length by misalignment of the artefact."""
     u_fixturing_um: Uncertainty = 0.0
+    """Standard uncertainty of a length by what the clamping does to it."""
     u_form_um: Uncertainty = 0.0
+    """Standard uncertainty of the calibrated form deviation of a test sphere."""
     u_repeat_um: Uncertainty = 0.0
+    """Standard uncertainty of a range or difference of repeated readings, by what of the artefact changed between
+    them."""
 
 
 TEST_KEYS = tuple(TestUncertainty.model_fields)
@@ -52,10 +59,15 @@ class RatedConditions(Table):
     """
 
     temperature_c: Limits | None = None
+    """Lowest and highest temperature."""
     change_k_per_h: Kelvins | None = None
+    """Largest change of temperature in an hour."""
     difference_k: Kelvins | None = None
+    """Largest difference of temperature between places at one time."""
     probe: str | None = None
+    """Probe for which the limits hold, as `[probe]` names it."""
     stylus: str | None = None
+    """Stylus for which the limits hold, as `[probe]` names it."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -68,8 +80,11 @@ class ProbeFacts(Table):
     """``[probe]``: with what the recording was made; ``sensing`` says whether it touches."""
 
     sensing: Literal["contacting", "optical"] | None = None
+    """Whether the probe touches; standards are for one or the other."""
     name: str = ""
+    """Name of the probe."""
     stylus: str = ""
+    """Name of the stylus."""
 
 
 @dataclass(frozen=True)

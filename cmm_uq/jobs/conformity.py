@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, Protocol, Self
+from typing import Annotated, Any, Literal, Protocol, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cmm_uq.errors import suggestion
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import TEST_KEYS, TestUncertainty
+from cmm_uq.jobs.mpe_text import mpe_of
 from cmm_uq.jobs.table import LARGEST_UM, Limit, Table, Uncertainty, at_least
 
 
@@ -18,8 +19,11 @@ class MaximumPermissibleError(Table):
     """``mpe`` in one of three forms: A + L/K, min(A + L/K, B), or B; L in mm, A, B and the result in µm."""
 
     a_um: Uncertainty | None = None
+    """A of A + L/K."""
     k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
+    """K of A + L/K, with L in mm and the result in µm."""
     b_um: Limit | None = None
+    """Limit that does not grow with the length, or at which A + L/K stops growing."""
 
     @model_validator(mode="after")
     def _one_of_three_forms(self) -> Self:
@@ -30,34 +34,50 @@ class MaximumPermissibleError(Table):
         return self
 
 
+def _as_table(given: Any) -> Any:
+    """An error that is written as a formula, as the table that says the same."""
+    return mpe_of(given) if isinstance(given, str) else given
+
+
+Permissible = Annotated[
+    MaximumPermissibleError, BeforeValidator(_as_table, json_schema_input_type=MaximumPermissibleError | str)
+]
+"""``mpe``, as a formula or as a table."""
+
+
 class GuardBand(Table):
     """A guard band of so many expanded uncertainties; between acceptance and rejection lies *undecided*."""
 
     guard_band: Annotated[float, Field(ge=0, le=100)]
+    """Width of the guard band in expanded uncertainties."""
 
 
 class FalseAccept(Table):
     """Accept only when the probability of not conforming is at most this."""
 
     max_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-12)]
+    """Largest probability of not conforming at which a value is accepted."""
 
 
 class UncertaintyRatio(Table):
     """Simple acceptance where the zone of the specification is so many times as wide as the uncertainty interval."""
 
     uncertainty_ratio: Annotated[float, Field(gt=0, le=1e6)]
+    """Least width of the specification's zone over that of the uncertainty interval."""
 
 
 class PosteriorProbability(Table):
     """Accept when the probability of conforming, with what the prior says, is at least this (JCGM 106:2012, 8.3)."""
 
     posterior_probability: Annotated[float, Field(gt=0.5, lt=1)]
+    """Least probability of conforming, with what the prior says, at which a value is accepted."""
 
 
 class UnconditionalRisk(Table):
     """Accept so that of all items tested at most this share is wrongly accepted (JCGM 106:2012, 9.5.3)."""
 
     max_unconditional_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-6)]
+    """Largest share of all items tested that may be wrongly accepted."""
 
 
 class Prior(Table):
@@ -70,8 +90,11 @@ class Prior(Table):
     """
 
     sd_um: Limit | None = None
+    """Standard deviation of the errors of such machines."""
     share_of_limit: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
+    """The same over the limit of each error."""
     mean_um: Annotated[float, Field(ge=-LARGEST_UM, le=LARGEST_UM)] = 0.0
+    """Mean of the errors of such machines."""
 
     @model_validator(mode="after")
     def _one_width(self) -> Self:
@@ -101,11 +124,18 @@ class ConformityFacts(Table):
     """One ``[[conformity]]``: a standard, a limit and a decision rule; ``prior`` for rules and risks that go by one."""
 
     standard: str
+    """Standard by which it is decided, with its edition."""
     characteristic: str | None = None
+    """Which of the standard's characteristics, where it has several: E0, R0, E150, P_FTU …; the first where it is
+    left out."""
     limit_um: Limit | None = None
-    mpe: MaximumPermissibleError | None = None
+    """Limit of the quantity."""
+    mpe: Permissible | None = None
+    """Maximum permissible error: `"3 + L/300"` (L in mm, the error in µm), or a table of `a_um`, `k`, `b_um`."""
     rule: Rule = "ISO 14253-1"
+    """Decision rule, by name or by its figure."""
     prior: Prior | None = None
+    """What is known of such machines beforehand, for rules and risks that go by it (JCGM 106:2012, 7.2)."""
 
     @field_validator("standard")
     @classmethod
@@ -118,7 +148,7 @@ class ConformityFacts(Table):
     @model_validator(mode="after")
     def _one_limit(self) -> Self:
         if (self.limit_um is None) == (self.mpe is None):
-            raise ValueError("give either limit_um or mpe = { a_um = …, k = … }")
+            raise ValueError('give either limit_um, or mpe = "3 + L/300" with L in mm and the error in µm')
         return self
 
     @model_validator(mode="after")

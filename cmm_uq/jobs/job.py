@@ -48,22 +48,39 @@ class JobFacts(Table):
     """
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=100)]
+    """Name of the job and of the folder its reports go to: letters, digits, `.`, `_` and `-`."""
     date: dt.date
+    """Date of the measurement."""
     number: str = ""
+    """Number of the certificate; the id where it is left out."""
     issued: dt.date | None = None
+    """Date on which the certificate is issued (ISO/IEC 17025:2017, 7.8.2.1 j)."""
     customer: str = ""
+    """Name of the customer (7.8.2.1 e)."""
     address: str = ""
+    """How to reach the customer (7.8.2.1 e)."""
     place: str = ""
+    """Where the measurement was made (7.8.2.1 c)."""
     operator: str = ""
+    """Who measured."""
     procedure: str = ""
+    """The method of the measurement (7.8.2.1 f)."""
     order: str = ""
+    """Number of the customer's order."""
     conditions: str = ""
+    """Conditions that influence the results, in words (7.8.4.1 b)."""
     remarks: str = ""
+    """Free text of the certificate."""
     diagnosis_on_certificate: bool = False
+    """Whether the whole diagnosis is printed in the certificate's annex."""
     recalibration_agreed: dt.date | None = None
+    """Date of the next calibration, where the customer agreed to be told one (7.8.4.3); no other is printed."""
     as_found: str | None = None
+    """`results.json`, or the folder with it inside the job's, of the machine before it was adjusted (7.8.4.1 d)."""
     origin: Origin = MEASURED
+    """Where the recording comes from; all that is made from a recording that was not measured says so."""
     derived_from: DerivedFrom | None = None
+    """Written by the commands that make a recording out of another: of what job, by what, and hashes."""
 
     @model_validator(mode="after")
     def _derived(self) -> Self:
@@ -90,10 +107,15 @@ class RecordingFacts(Table):
     """
 
     file: str
+    """The recording, a CSV beside job.toml with one row a point."""
     earlier: str | None = None
+    """Recording of the same artefact in the same placings at an earlier date: what changed between is estimated."""
     earlier_date: dt.date | None = None
+    """Date of the earlier recording."""
     u_coordinate_um: Limit | None = None
+    """Stated standard uncertainty of one recorded coordinate; left out, it is estimated from repeats and residuals."""
     set_aside: Numbers = []
+    """Numbers of measurements that stay on the certificate but are not used for estimates."""
 
 
 class ModelFacts(Table):
@@ -103,7 +125,9 @@ class ModelFacts(Table):
     """
 
     effects: Names
+    """The physics that the simulation is told about: names of effects; what is not named is left out of it."""
     tolerances: Annotated[dict[str, Tolerance], Field(max_length=EFFECTS.most)] = {}
+    """Largest permissible size of an effect's first parameter, by the effect's name and in its unit."""
 
     @model_validator(mode="after")
     def _tolerances_of_effects(self) -> Self:
@@ -119,17 +143,29 @@ class JobFile(Table):
     """All of job.toml. A job of a kind without a recording has no ``[recording]``."""
 
     job: JobFacts
+    """Identification, and free text for the certificate."""
     laboratory: Laboratory = Laboratory()
+    """Who answers for the certificate."""
     machine: MachineFacts
+    """The machine that was measured."""
     artefact: ArtefactFacts
+    """The artefact that it was measured with, or the kind of measurement."""
     recording: RecordingFacts
+    """What was recorded, and in which file."""
     short_gauge: ShortGaugeFacts | None = None
+    """A short gauge met from both sides, recorded beside lengths that are not bidirectional by themselves."""
     probe: ProbeFacts = ProbeFacts()
+    """With what the recording was made."""
     test_uncertainty: TestUncertainty = TestUncertainty()
+    """What a test value is uncertain by beside the calibration of the artefact (ISO/TS 23165)."""
     rated_conditions: RatedConditions = RatedConditions()
+    """Conditions under which the limits of the machine hold, by its data sheet."""
     model: ModelFacts
+    """The physics that the simulation is told about."""
     conformity: Annotated[list[ConformityFacts], Field(max_length=CONFORMITY.most)] = []
+    """Statements of conformity: a standard, a limit and a rule each."""
     plan: PlanFacts = PlanFacts()
+    """What may be measured, where, and what it should tell; read by `cmm-uq plan`."""
 
     @field_validator("conformity")
     @classmethod

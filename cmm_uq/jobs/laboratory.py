@@ -18,7 +18,9 @@ class LengthCapability(Table):
     """U = A + L/K of a length, L in mm and U in µm; without ``k`` the same for every length."""
 
     a_um: Limit
+    """A of U = A + L/K."""
     k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
+    """K of U = A + L/K, with L in mm and U in µm; without it U is the same for every length."""
 
 
 class Capability(Table):
@@ -32,8 +34,11 @@ class Capability(Table):
     """
 
     length: LengthCapability | None = None
+    """Least U of what is stated in mm or µm."""
     scale_ppm: Limit | None = None
+    """Least U of what is stated in ppm or µm/m."""
     angle_arcsec: Limit | None = None
+    """Least U of what is stated in ″."""
 
     def least(self, unit: str, length_mm: float) -> float:
         """The least U of a quantity in its own unit; 0 where none is given for it.
@@ -55,8 +60,14 @@ class Laboratory(Table):
     """``[laboratory]``: who answers for the certificate."""
 
     name: str = ""
+    """Name of the laboratory (7.8.2.1 b)."""
     address: str = ""
+    """Address of the laboratory (7.8.2.1 b)."""
     accreditation: str = ""
+    """Accreditation as it is printed, with its number."""
     signatory: str = ""
+    """Who authorises the certificate (7.8.2.1 o)."""
     signatory_role: str = ""
+    """Function of who authorises it."""
     cmc: Capability | None = None
+    """Calibration and measurement capability: the least U (95 %, k = 2) that a certificate may state."""

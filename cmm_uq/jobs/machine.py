@@ -27,8 +27,11 @@ class Travel(Table):
     """``travel_mm``: lowest and highest scale reading of each axis."""
 
     x: Range | None = None
+    """Lowest and highest scale reading of x."""
     y: Range | None = None
+    """Lowest and highest scale reading of y."""
     z: Range | None = None
+    """Lowest and highest scale reading of z."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -45,16 +48,22 @@ class SquarenessFacts(Table):
     """``squareness_arcsec``: beside an error map."""
 
     xy: Angle = 0.0
+    """Squareness of y to x: e_x = −S·y."""
     yz: Angle = 0.0
+    """Squareness of z to y: e_y = −S·z."""
     zx: Angle = 0.0
+    """Squareness of z to x: e_x = −S·z."""
 
 
 class ErrorMapFile(Table):
     """One error map, the temperature it was taken at, and the squareness of the axes at that temperature."""
 
     file: str
+    """CSV of the map: axis, position_mm, three translations in µm and three rotations in ″."""
     temperature_c: Temperature
+    """Temperature of the scales at which the map was taken."""
     squareness_arcsec: SquarenessFacts | None = None
+    """Squareness of the axes at that temperature."""
 
 
 def _squareness_of_all_or_none(maps: list[ErrorMapFile]) -> list[ErrorMapFile]:
@@ -71,8 +80,11 @@ class ScaleColumns(Table):
     """``columns`` of a temperature log: the thermocouples on each scale, by the names of their columns."""
 
     x: Sensors
+    """Columns of the thermocouples on the scale of x."""
     y: Sensors
+    """Columns of the thermocouples on the scale of y."""
     z: Sensors
+    """Columns of the thermocouples on the scale of z."""
 
 
 class TemperatureLogFile(Table):
@@ -86,18 +98,26 @@ class TemperatureLogFile(Table):
     """
 
     file: str
+    """CSV of the log: `time_s` or `time`, and the temperatures."""
     start: dt.datetime | None = None
+    """Moment at which the recording's `time_s` was 0, for a log that gives dates."""
     columns: ScaleColumns | None = None
+    """Columns of the thermocouples on each scale, where their names do not say so."""
     max_gap_s: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
+    """Longest interval of the log that is interpolated over."""
 
 
 class Pose(Table):
     """Attitude of a digitizer in one index of the wrist: Euler angles 3-1-3 (Harris 2004 eq. 7)."""
 
     pose: Number = 1
+    """Number of the pose, as the cloud or the recording gives it."""
     alpha_deg: Turn
+    """First Euler angle (3-1-3)."""
     beta_deg: Turn
+    """Second Euler angle."""
     gamma_deg: Turn
+    """Third Euler angle."""
 
 
 class DigitizerFacts(Table):
@@ -112,8 +132,11 @@ class DigitizerFacts(Table):
     """
 
     offset_mm: Triple | None = None
+    """[U1, V1, W1]: the mount in the digitizer's frame."""
     poses: Annotated[list[Pose], Field(max_length=LISTED.most)] = []
+    """Attitudes of the digitizer."""
     calibration: Annotated[str, Field(min_length=1)] | None = None
+    """In place of both: `results.json` of the digitizer's calibration, or the folder with it, inside the job's."""
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -136,19 +159,31 @@ class MachineFacts(Table):
     """``[machine]``."""
 
     name: str
+    """Name of the machine."""
     manufacturer: str = ""
+    """Manufacturer of the machine."""
     model: str = ""
+    """Model or type of the machine."""
     serial: str = ""
+    """Serial number of the machine (7.8.2.1 g)."""
     owner: str = ""
+    """Owner of the machine."""
     chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
+    """Carriages from the table to the ram, with F for the frame where the workpiece moves."""
     travel_mm: Travel = Travel()
+    """Lowest and highest scale reading of each axis."""
     origin_mm: Triple = [0.0, 0.0, 0.0]
+    """Scale reading of the recording's origin: scale reading = recorded coordinate + origin."""
     error_map: Annotated[
         list[ErrorMapFile], Field(max_length=MAPS.most), AfterValidator(_squareness_of_all_or_none)
     ] = []
+    """Error maps of the machine; several are interpolated by the temperature of the scales."""
     squareness_arcsec: SquarenessFacts | None = None
+    """Squareness of the axes beside an error map."""
     temperature_log: TemperatureLogFile | None = None
+    """What the scales' thermocouples showed while the recording was made."""
     digitizer: DigitizerFacts | None = None
+    """A laser digitizer on the ram."""
 
     @model_validator(mode="after")
     def _squareness_once(self) -> Self:

@@ -42,10 +42,15 @@ class DerivedFrom(BaseModel):
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
     job: str
+    """Id of the job that the recording was made from."""
     by: Literal["simulate", "compensate"]
+    """Command that made it."""
     program: str
+    """Program and version that made it."""
     inputs: dict[str, Digest]
+    """SHA-256 of each file of that job."""
     files: dict[str, Digest]
+    """SHA-256 of each file that was written with the recording."""
 
 
 def first_line(by: str, program: str, how: str) -> str:

@@ -26,7 +26,10 @@ class FixtureFacts(Table):
     """
 
     directions: Annotated[list[Direction], Field(max_length=LISTED.most)] = []
+    """Directions in which a bar or gauge can be held, either way along it, or normals of a plate or triangle; any
+    without them."""
     heights_mm: Range | None = None
+    """Lowest and highest z reading of the artefact's middle."""
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -48,27 +51,49 @@ class PlanFacts(Table):
     """
 
     ready: str | None = None
+    """Name of the ready plan to start from; the usual one of the kind where it is left out."""
     volume_mm: dict[Literal["x", "y", "z"], Range] = {}
+    """Scale readings that points may have; the machine's travel, else the recorded range."""
     margin_mm: Annotated[float, Field(ge=0, le=1e6)] = 10.0
+    """Kept free at each end of that range."""
     fixtures: FixtureFacts = FixtureFacts()
+    """How the artefact may stand."""
     length_mm: Length | None = None
+    """Length of an artefact that is not certified, roughly."""
     lengths_mm: Annotated[list[Length], Field(max_length=LISTED.most)] = []
+    """Distances of a gauge's faces from the first, or lengths of blocks."""
     pitch_mm: Length | None = None
+    """Distance of neighbouring faces of a gauge (20 mm by default) or balls of a plate."""
     grid: Annotated[list[Annotated[int, Field(ge=2, le=100)]], Field(min_length=2, max_length=2)] = [5, 5]
+    """Balls of a plate, or points on a surface, along each side."""
     both_ways: bool | None = None
+    """Whether faces of a gauge are met on the way back too; the ready plan of ISO 10360-2 does so by default."""
     repeats: Annotated[int, Field(ge=1, le=20)] = 3
+    """How often each point is measured."""
     rivals: Names | None = None
+    """Effects that may act and are not named in the model; by default all linear ones that these columns could show."""
     columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
+    """Further columns of the recording at a constant value, such as temperatures."""
     criterion: Criterion | None = None
+    """What a better plan is searched by: that effects can be told apart, or the volume, mean or worst variance."""
     number: Annotated[int, Field(ge=1, le=200)] | None = None
+    """Placings of the better plan; as many as the ready plan by default."""
     more: Annotated[int, Field(ge=1, le=50)] | None = None
+    """Placings to be added to those that there are."""
     candidates: Annotated[int, Field(ge=1, le=2000)] = 300
+    """Placings that a better plan is chosen from."""
     minutes_per_placing: Duration = 5.0
+    """Time to set up the artefact once, min."""
     seconds_per_point: Duration = 10.0
+    """Time to measure one point."""
     noise_from: str | None = None
+    """`results.json` of an earlier recording, or the folder with it inside the job's, whose noise is expected again."""
     placing_um: Uncertainty | None = None
+    """Standard deviation of a set-up offset, instead."""
     growth_um: Uncertainty | None = None
+    """Standard deviation of what grows with the length, at the longest, instead."""
     budget_min: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
+    """Time that there is, min; unlimited by default."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

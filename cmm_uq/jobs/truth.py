@@ -26,8 +26,11 @@ class ByAxis(Table):
     """One number for each axis."""
 
     x: Uncertainty
+    """Along x."""
     y: Uncertainty
+    """Along y."""
     z: Uncertainty
+    """Along z."""
 
 
 class NoiseFacts(Table):
@@ -40,12 +43,20 @@ class NoiseFacts(Table):
     """
 
     coordinate_um: Uncertainty | ByAxis = 0.0
+    """Standard deviation of each reading, of every coordinate or by axis."""
     placing_um: Uncertainty = 0.0
+    """Standard deviation of the offset of each point of each placing, which its repeats share."""
     growth_um: Uncertainty = 0.0
+    """Standard deviation of what is added at the longest distance in a placing, in proportion to the distance."""
     slow_um: Uncertainty = 0.0
+    """Standard deviation of slow noise; needs `time_s` in the recording."""
     slow_time_s: Annotated[float, Field(gt=0, le=1e9)] = 600.0
+    """Time over which slow noise forgets."""
     tails_dof: Annotated[float, Field(gt=2, le=1000)] | None = None
+    """Degrees of freedom of readings with Student's t distribution of the same standard deviation; normal by
+    default."""
     resolution_um: Uncertainty = 0.0
+    """Step of the display."""
 
     @property
     def coordinates_um(self) -> tuple[float, float, float]:
@@ -62,10 +73,15 @@ class Truth(Table):
     """
 
     effects: Annotated[dict[str, dict[str, AnyFloat]], Field(max_length=EFFECTS.most)] = {}
+    """True parameters of each effect that acts, by the effect's name, whatever the job's model names."""
     artefact: dict[str, AnyFloat] = {}
+    """True sizes of the artefact, by name, such as `length_mm`; as certified by default."""
     noise: NoiseFacts = NoiseFacts()
+    """Noise of the simulated readings."""
     columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
+    """Columns of the recording at a value that holds for every row, such as temperatures."""
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    """Seed of the random numbers."""
 
     @field_validator("columns")
     @classmethod

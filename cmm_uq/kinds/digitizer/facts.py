@@ -27,5 +27,9 @@ class AlignmentFacts(ArtefactFacts):
     carries_probe: ClassVar[bool] = True
 
     offset_mm: Triple | None = None
+    """[U1, V1, W1] by the drawing, to hold the result against and to plan by; it is not taken as known."""
     u_attitude_arcsec: Annotated[float, Field(ge=0, le=36_000)] = 0.0
+    """Standard uncertainty of the attitude in one measurement, about each axis of the machine."""
     u_centre_um: Uncertainties = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    """Standard uncertainties along x, y, z of what shifts the sphere's centre as a whole in one measurement: form,
+    digitizer, scales."""

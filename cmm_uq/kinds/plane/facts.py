@@ -17,5 +17,8 @@ class PlaneFacts(ArtefactFacts):
     """
 
     probe_offset_mm: Length | None = None
+    """Effective radius of the probe, by which the plane of its centres is moved to the surface."""
     u_probe_offset_um: Uncertainty = 0.0
+    """Standard uncertainty of the probe's effective radius."""
     acceptance_deg: Annotated[float, Field(ge=0.01, le=89.99)] = 60.0
+    """Largest angle between the normal and the direction of approach at which the radius is believed."""

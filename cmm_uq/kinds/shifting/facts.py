@@ -16,19 +16,28 @@ class KnownLength(Table):
     """A known length between two points of a shifted artefact."""
 
     from_point: Annotated[Number, Field(alias="from")]
+    """Point from which the known length goes."""
     to_point: Annotated[Number, Field(alias="to")]
+    """Point to which it goes."""
     length_mm: Length
+    """The known length."""
     u_um: Uncertainty
+    """Standard uncertainty (k = 1) of the known length."""
 
 
 class ShiftFacts(ArtefactFacts):
     """A shifted artefact lies along an ``axis`` or, a plate, in a ``plane``."""
 
     axis: Literal["x", "y", "z"] | None = None
+    """Axis along which the artefact is shifted."""
     plane: Literal["xy", "yz", "zx"] | None = None
+    """Plane in which a plate is shifted and turned, in place of `axis` and `shifts_mm`."""
     shifts_mm: Annotated[list[Position], Field(max_length=LISTED.most)] = Field(default_factory=list)
+    """Nominal shift of each series along the axis."""
     u_shift_um: Uncertainty = 0.0
+    """Standard uncertainty of the shifts; where it is not 0 they are estimated."""
     known: KnownLength | None = None
+    """A known length between two points of the artefact, for the mean scale of the axis."""
 
     @model_validator(mode="after")
     def _axis_or_plane(self) -> Self:

@@ -14,3 +14,4 @@ class SphereFacts(ArtefactFacts):
     form_key: ClassVar[str | None] = "form_um"
 
     form_um: Uncertainty | None = None
+    """Form deviation of the sphere by its certificate."""

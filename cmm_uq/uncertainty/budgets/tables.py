@@ -52,6 +52,7 @@ class BudgetTable(Table):
 
     meaning: ClassVar[Text] = NOTHING
     title: str = ""
+    """Title of the page; the file's name where it is left out."""
 
     @abstractmethod
     def budgets(self) -> Mapping[str, Budget]:
@@ -72,13 +73,21 @@ class CalibratedWorkpiece(BudgetTable):
     meaning = say("ISO 15530-3:2011: uncertainty of measuring workpieces, from readings of a calibrated one.")
 
     method: Literal["ISO 15530-3"]
+    """Name of the ready budget."""
     readings_mm: Readings
+    """Readings of the calibrated workpiece."""
     calibrated_mm: Length
+    """Calibrated value of the workpiece."""
     u_calibration_um: Uncertainty
+    """Standard uncertainty of the calibrated value."""
     temperature_c: Temperature = REFERENCE_TEMPERATURE
+    """Temperature of the workpiece during the readings."""
     u_cte_calibrated_per_k: Coefficient = 0.0
+    """Standard uncertainty of the calibrated workpiece's coefficient of expansion, 1/K."""
     u_cte_workpieces_per_k: Coefficient = 0.0
+    """Standard uncertainty of the coefficient of expansion of the workpieces to be measured, 1/K."""
     u_form_um: Uncertainty = 0.0
+    """Standard uncertainty by form and roughness of the workpieces to be measured."""
 
     def budgets(self) -> Mapping[str, Budget]:
         """Of the systematic error b, by which results are corrected."""
@@ -99,8 +108,11 @@ class NotSimulated(Table):
     """A contribution that a simulation leaves out."""
 
     name: Annotated[str, Field(min_length=1)]
+    """What it is, in words."""
     u_um: Uncertainty
+    """Its standard uncertainty."""
     source: str = JUDGEMENT
+    """Where the figure comes from."""
 
 
 class SimulatedTask(BudgetTable):
@@ -109,8 +121,11 @@ class SimulatedTask(BudgetTable):
     meaning = say("ISO/TS 15530-4:2008: uncertainty of a measurement task, from simulated measurements of it.")
 
     method: Literal["ISO 15530-4"]
+    """Name of the ready budget."""
     simulated_errors_um: Annotated[list[float], Field(max_length=LISTED.most)]
+    """Errors of the simulated measurements of the task."""
     not_simulated: Annotated[list[NotSimulated], Field(max_length=LISTED.most)] = Field(default_factory=list)
+    """Contributions that the simulation leaves out."""
 
     def budgets(self) -> Mapping[str, Budget]:
         """Of the error that the simulation found."""
@@ -131,6 +146,7 @@ class MachineTest(BudgetTable):
     symbol: ClassVar[str]
 
     error_um: float
+    """Error that the test found."""
 
     @abstractmethod
     def uncertainty(self) -> Budget:
@@ -148,14 +164,23 @@ class LengthTest(MachineTest):
     symbol = "E"
 
     method: Literal["ISO/TS 23165 length"]
+    """Name of the ready budget."""
     length_mm: Length
+    """Calibrated length of the artefact."""
     u_calibration_um: Uncertainty
+    """Standard uncertainty of that length."""
     temperature_c: Temperature = REFERENCE_TEMPERATURE
+    """Temperature of the artefact during the test."""
     cte_per_k: Coefficient = 0.0
+    """Coefficient of thermal expansion of the artefact, 1/K."""
     u_cte_per_k: Coefficient = 0.0
+    """Standard uncertainty of that coefficient, 1/K."""
     u_temperature_k: Kelvin = 0.0
+    """Standard uncertainty of the artefact's temperature."""
     u_alignment_um: Uncertainty = 0.0
+    """Standard uncertainty of the length by misalignment."""
     u_fixturing_um: Uncertainty = 0.0
+    """Standard uncertainty of the length by the clamping."""
 
     def uncertainty(self) -> Budget:
         """See :meth:`MachineTest.uncertainty`."""
@@ -173,8 +198,11 @@ class ProbingTest(MachineTest):
     symbol = "P"
 
     method: Literal["ISO/TS 23165 probing"]
+    """Name of the ready budget."""
     form_um: Uncertainty
+    """Form deviation of the test sphere by its certificate."""
     u_form_um: Uncertainty
+    """Standard uncertainty of that form deviation."""
 
     def uncertainty(self) -> Budget:
         """See :meth:`MachineTest.uncertainty`."""
@@ -187,19 +215,31 @@ class Ballbar(BudgetTable):
     meaning = say("Length of a ballbar from one position of it, or from the mean of several.")
 
     method: Literal["ballbar length"]
+    """Name of the ready budget."""
     length_mm: Length
+    """Length of the bar."""
     direction: Triple
+    """Direction of the bar, of any length."""
     u_centre_um: Three
+    """Standard uncertainties along x, y, z of the centre of a ball."""
     form_shift_um: Uncertainty = 0.0
+    """Largest shift of a centre by the form of its ball."""
     probe_um: Uncertainty = 0.0
+    """Largest systematic shift of a ball by the probe."""
     probe_common: Annotated[float, Field(ge=-1, le=1)] = 0.0
+    """Correlation of that shift between the two balls: 1 where both are seen the same way."""
     scale_um: Three = Field(default_factory=_none)
+    """Largest errors of the scales over the bar along x, y, z."""
     u_squareness_arcsec: Annotated[
         list[Annotated[float, Field(ge=0, le=36_000)]], Field(min_length=3, max_length=3)
     ] = Field(default_factory=_none)
+    """Standard uncertainties of the squareness xy, yz, zx."""
     u_temperature_k: Kelvin = 0.0
+    """Standard uncertainty of the bar's temperature."""
     cte_per_k: Coefficient = 0.0
+    """Coefficient of thermal expansion of the bar, 1/K."""
     repetitions: Annotated[int, Field(ge=1, le=10_000)] = 1
+    """Number of positions whose mean is stated."""
 
     @model_validator(mode="after")
     def _points_somewhere(self) -> Self:
@@ -230,12 +270,19 @@ class FittedSphere(BudgetTable):
     )
 
     method: Literal["sphere fit"]
+    """Name of the ready budget."""
     centre_mm: Triple
+    """Centre of the sphere."""
     radius_mm: Length
+    """Radius of the sphere."""
     points: Annotated[int, Field(ge=4, le=1_000_000)]
+    """Number of points, spread evenly."""
     cap_deg: Annotated[float, Field(gt=0, le=180)]
+    """Angle from +z to the edge of the cap that the points cover: 90 for a hemisphere."""
     u_point_um: Uncertainty
+    """Standard uncertainty of a point along its normal."""
     sphericity_um: Uncertainty = 0.0
+    """Form deviation of the ball."""
 
     def budgets(self) -> Mapping[str, Budget]:
         """Of x, y, z and radius; the ball's axis may point anywhere."""
