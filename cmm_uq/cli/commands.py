@@ -6,7 +6,7 @@ import os
 
 import typer
 
-from cmm_uq.cli import budget, compensate, diagnose, plan, report, selftest, simulate
+from cmm_uq.cli import budget, compensate, diagnose, new, plan, report, schema, selftest, simulate
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError
 
@@ -20,12 +20,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.command("new")(new.command)
 app.command("report")(report.command)
 app.command("diagnose")(diagnose.command)
 app.command("plan")(plan.command)
 app.command("simulate")(simulate.command)
 app.command("compensate")(compensate.command)
 app.command("budget")(budget.command)
+app.command("schema")(schema.command)
 app.command("selftest")(selftest.command)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.commands.estimation import model_of
+from cmm_uq.commands.modelled import model_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
 from cmm_uq.messages import Verbatim, say

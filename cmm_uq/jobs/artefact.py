@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import model_validator
 
+from cmm_uq.jobs.expanded import ExpandedUncertainty, with_standard_uncertainty
 from cmm_uq.jobs.table import AnyFloat, Length, Table, Uncertainty
 
 
@@ -44,8 +45,10 @@ class ArtefactFacts(Table):
     with_earlier : whether two recordings of it at two dates can be compared.
     carries_probe : whether its recording itself says how far from the end of the ram each point was, as tip offsets do.
     form_key : key of the form deviation by its certificate, for a kind that has a form to be compared.
+    instead : tables whose keys may stand in place of others.
     """
 
+    instead: ClassVar[tuple[type[Table], ...]] = (ExpandedUncertainty,)
     with_references: ClassVar[bool] = False
     with_recording: ClassVar[bool] = True
     with_earlier: ClassVar[bool] = False
@@ -71,17 +74,7 @@ class ArtefactFacts(Table):
     @model_validator(mode="before")
     @classmethod
     def _expanded(cls, data: Any) -> Any:
-        """``U_um`` with its ``k`` in place of ``u_um``, as certificates state it."""
-        if not (isinstance(data, dict) and ("U_um" in data or "k" in data)):
-            return data
-        given = {key: data[key] for key in ("U_um", "k") if key in data}
-        if len(given) < 2 or "u_um" in data:
-            raise ValueError("give u_um, or U_um together with its coverage factor k")
-        expanded, factor = given["U_um"], given["k"]
-        numbers = all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in (expanded, factor))
-        if not numbers or not 1 <= factor <= 10:
-            raise ValueError("give U_um as a number in µm, and k as one from 1 to 10")
-        return {**{key: value for key, value in data.items() if key not in given}, "u_um": expanded / factor}
+        return with_standard_uncertainty(data)
 
     @model_validator(mode="after")
     def _uncertainty_of_something(self) -> Self:

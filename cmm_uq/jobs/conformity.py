@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, Protocol, Self
+from typing import Annotated, Any, Literal, Protocol, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cmm_uq.errors import suggestion
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import TEST_KEYS, TestUncertainty
+from cmm_uq.jobs.mpe_text import mpe_of
 from cmm_uq.jobs.table import LARGEST_UM, Limit, Table, Uncertainty, at_least
 
 
@@ -31,6 +32,17 @@ class MaximumPermissibleError(Table):
         if self.a_um is None and self.b_um is None:
             raise ValueError("give mpe = { a_um = …, k = … }, the same with b_um = …, or { b_um = … }")
         return self
+
+
+def _as_table(given: Any) -> Any:
+    """An error that is written as a formula, as the table that says the same."""
+    return mpe_of(given) if isinstance(given, str) else given
+
+
+Permissible = Annotated[
+    MaximumPermissibleError, BeforeValidator(_as_table, json_schema_input_type=MaximumPermissibleError | str)
+]
+"""``mpe``, as a formula or as a table."""
 
 
 class GuardBand(Table):
@@ -118,7 +130,7 @@ class ConformityFacts(Table):
     left out."""
     limit_um: Limit | None = None
     """Limit of the quantity."""
-    mpe: MaximumPermissibleError | None = None
+    mpe: Permissible | None = None
     """Maximum permissible error: `"3 + L/300"` (L in mm, the error in µm), or a table of `a_um`, `k`, `b_um`."""
     rule: Rule = "ISO 14253-1"
     """Decision rule, by name or by its figure."""
@@ -136,7 +148,7 @@ class ConformityFacts(Table):
     @model_validator(mode="after")
     def _one_limit(self) -> Self:
         if (self.limit_um is None) == (self.mpe is None):
-            raise ValueError("give either limit_um or mpe = { a_um = …, k = … }")
+            raise ValueError('give either limit_um, or mpe = "3 + L/300" with L in mm and the error in µm')
         return self
 
     @model_validator(mode="after")

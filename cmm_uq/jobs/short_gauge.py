@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.expanded import ExpandedUncertainty, with_standard_uncertainty
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.table import AnyFloat, Length, Limit, Table
 from cmm_uq.points import AXES, Floats, Ints, Machine, Points
@@ -31,6 +33,8 @@ class ShortGaugeFacts(Table):
     cte_per_k : of its expansion.
     """
 
+    instead: ClassVar[tuple[type[Table], ...]] = (ExpandedUncertainty,)
+
     file: str
     """Its recording: points 1 and 2, the middles of its two faces, in every measurement and repeat."""
     length_mm: Length
@@ -46,6 +50,11 @@ class ShortGaugeFacts(Table):
     """Serial number of the gauge."""
     certificate: Traceability | None = None
     """The gauge's own certificate."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _expanded(cls, data: Any) -> Any:
+        return with_standard_uncertainty(data)
 
     @field_validator("cte_per_k")
     @classmethod

@@ -7,13 +7,14 @@ when a command first asks for it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TypeVar
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Points
 
@@ -48,6 +49,8 @@ class Kind:
     screen : a :class:`~cmm_uq.screening.shape.Screening`.
     plan : a :class:`~cmm_uq.planning.setting.Planning`.
     page : a :class:`~cmm_uq.documents.outcome.Page`.
+    begin : a :class:`~cmm_uq.jobs.beginning.Beginning`: what a new job of the kind begins with.
+    begin_also : the same for a further way of it, by the name that it is asked for by.
     own : a :class:`~cmm_uq.documents.outcome.OwnAnalysis`, where its errors are no list of effects.
     tested : what of it a standard may be decided on: :data:`LENGTHS`, :data:`BARS`, :data:`FORMS`, or a word of its own.
     refusal, instead : why some command cannot serve it, with ``{}`` for what cannot be done, and what can be done.
@@ -59,6 +62,8 @@ class Kind:
     screen: object = None
     plan: object = None
     page: object = None
+    begin: object = None
+    begin_also: Mapping[str, str] = field(default_factory=dict, hash=False)
     own: object = None
     tested: tuple[str, ...] = ()
     refusal: str = ""
@@ -69,7 +74,7 @@ class Kind:
 
         Parameters
         ----------
-        facet : ``screen``, ``plan``, ``page`` or ``own``.
+        facet : ``screen``, ``plan``, ``page``, ``begin`` or ``own``.
         of : what it must be.
 
         Raises
@@ -97,6 +102,16 @@ class Kind:
         if found is None:
             raise self.refused(what)
         return found
+
+    def beginning(self, name: str) -> Beginning:
+        """What a new job begins with, of the kind's own name or of a further one.
+
+        Raises
+        ------
+        CmmUqError : it cannot be loaded: the package that it comes from is broken.
+        """
+        found = self._loaded(self.begin_also[name]) if name in self.begin_also else self.offers("begin", Beginning)
+        return found if isinstance(found, Beginning) else Beginning(self.name, "")
 
     def observing(self, what: str) -> Observe:
         """What makes an artefact of facts and points, for a command that cannot do without.

@@ -28,15 +28,13 @@ from cmm_uq.uncertainty.expression import Expression, name_problem, parse
 from cmm_uq.uncertainty.input_keys import DIFFERENCES, NUMERIC, distribution_from
 from cmm_uq.uncertainty.located import Located
 from cmm_uq.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.uncertainty.model_tables import MODEL, TEXTS, TOP
 from cmm_uq.uncertainty.ready_budget import KEY, ReadyBudget, read_ready_budget
 from cmm_uq.uncertainty.ready_model import READY, ready_model
 from cmm_uq.uncertainty.stated_units import derived_unit, number_in, unit_of
 from cmm_uq.uncertainty.type_a import simultaneous_readings
 
-_TOP = ("model", "inputs", "correlation")
-_MODEL = ("outputs", "ready", "coverage", "method", "digits", "seed", "title", "units")
 _SMALLEST, _LARGEST = 1e-70, 1e70
-_TEXTS = ("distribution", "unit", "source", "description", "simultaneous")
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,12 +105,12 @@ class _Reader:
     file: str
 
     def model_file(self, data: Mapping[str, Any], stem: str, content: bytes) -> ModelFile:
-        self._known(data, _TOP, "")
+        self._known(data, TOP, "")
         model, given = self._table(data, "model", ""), self._table(data, "inputs", "")
         correlation = self._correlation(data)
         if not given:
             raise CmmUqError("there are no inputs", where=self.file, fix="Describe each in a table [inputs.<name>]")
-        self._known(model, _MODEL, "[model]")
+        self._known(model, MODEL, "[model]")
         inputs = {name: self._input(name, keys) for name, keys in given.items()}
         inputs, within = self._simultaneous(inputs, given)
         for a, b in within:
@@ -194,8 +192,8 @@ class _Reader:
             raise CmmUqError(problem, where=self._where(key), fix="Choose another name")
         if not isinstance(keys, dict):
             raise CmmUqError(f"{name} is not a table", where=self._where("[inputs]"), fix=f"Write it as {key}")
-        self._known(keys, (*_TEXTS, *sorted(NUMERIC)), key)
-        for text in _TEXTS:
+        self._known(keys, (*TEXTS, *sorted(NUMERIC)), key)
+        for text in TEXTS:
             self._text(keys, text, key)
         if keys.get("unit"):
             unit_of(keys["unit"], self._where(f"{key} unit"))

@@ -10,5 +10,6 @@ KIND = Kind(
     screen="cmm_uq.kinds.ballbar.screen:SCREENING",
     plan="cmm_uq.kinds.ballbar.plan:PLANNING",
     page="cmm_uq.kinds.ballbar.page:PAGE",
+    begin="cmm_uq.kinds.ballbar.begin:BEGINNING",
     tested=(BARS, LENGTHS),
 )

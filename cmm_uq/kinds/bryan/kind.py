@@ -10,4 +10,5 @@ KIND = Kind(
     screen="cmm_uq.kinds.bryan.screen:SCREENING",
     plan="cmm_uq.kinds.bryan.plan:PLANNING",
     page="cmm_uq.kinds.bryan.page:PAGE",
+    begin="cmm_uq.kinds.bryan.begin:BEGINNING",
 )

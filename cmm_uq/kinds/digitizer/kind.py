@@ -12,4 +12,5 @@ KIND = Kind(
     screen="cmm_uq.kinds.digitizer.screen:SCREENING",
     plan="cmm_uq.kinds.digitizer.plan:PLANNING",
     page="cmm_uq.kinds.digitizer.page:PAGE",
+    begin="cmm_uq.kinds.digitizer.begin:BEGINNING",
 )

@@ -8,6 +8,7 @@ from cmm_uq.model.kind import Kind
 KIND = Kind(
     name="error_map",
     table=ErrorMapFacts,
+    begin="cmm_uq.kinds.error_maps.begin:BEGINNING",
     own="cmm_uq.kinds.error_maps.outcome:OWN",
     refusal="error maps cannot be {}: they are free functions, no points of an artefact",
     instead="cmm-uq diagnose JOB compares them with each other",

@@ -12,4 +12,5 @@ KIND = Kind(
     screen="cmm_uq.kinds.plane.screen:SCREENING",
     plan="cmm_uq.kinds.plane.plan:PLANNING",
     page="cmm_uq.kinds.plane.page:PAGE",
+    begin="cmm_uq.kinds.plane.begin:BEGINNING",
 )

@@ -12,5 +12,6 @@ KIND = Kind(
     screen="cmm_uq.kinds.plate.screen:SCREENING",
     plan="cmm_uq.kinds.plate.plan:PLANNING",
     page="cmm_uq.kinds.plate.page:PAGE",
+    begin="cmm_uq.kinds.plate.begin:BEGINNING",
     tested=(LENGTHS,),
 )

@@ -12,5 +12,6 @@ KIND = Kind(
     screen="cmm_uq.kinds.sphere.screen:SCREENING",
     plan="cmm_uq.kinds.sphere.plan:PLANNING",
     page="cmm_uq.kinds.sphere.page:PAGE",
+    begin="cmm_uq.kinds.sphere.begin:BEGINNING",
     tested=(FORMS,),
 )

@@ -12,5 +12,6 @@ KIND = Kind(
     screen="cmm_uq.kinds.gauge_lines.screen:SCREENING",
     plan="cmm_uq.kinds.step_gauge.plan:PLANNING",
     page="cmm_uq.kinds.gauge_lines.page:PAGE",
+    begin="cmm_uq.kinds.step_gauge.begin:BEGINNING",
     tested=(LENGTHS,),
 )

@@ -12,4 +12,5 @@ KIND = Kind(
     screen="cmm_uq.kinds.triangle.screen:SCREENING",
     plan="cmm_uq.kinds.triangle.plan:PLANNING",
     page="cmm_uq.kinds.triangle.page:PAGE",
+    begin="cmm_uq.kinds.triangle.begin:BEGINNING",
 )

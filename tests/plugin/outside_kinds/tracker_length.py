@@ -30,9 +30,10 @@ COLUMN = "tracker_mm"
 
 
 class TrackerFacts(ReferencedFacts):
-    """``u_um_per_m`` is the standard uncertainty of the tracker's wavelength, µm/m, on top of ``u_um``."""
+    """The tracker's wavelength adds to ``u_um``; editors and pages show the sentence below the key."""
 
     u_um_per_m: Uncertainty = 0.0
+    """Standard uncertainty of the tracker's wavelength."""
 
 
 class TrackerLength(Artefact):

@@ -1,0 +1,86 @@
+"""``cmm-uq new KIND [FOLDER]``: a job folder that can be reported at once, to be filled with the laboratory's own figures."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cmm_uq.cli.deferred import defer_scipy
+from cmm_uq.cli.options import Quiet
+from cmm_uq.cli.printing import say
+from cmm_uq.errors import CmmUqError
+
+
+def command(
+    kind: Annotated[
+        str, typer.Argument(help="Kind of measurement, shift_plate, plan or budget; without it they are listed.")
+    ] = "",
+    folder: Annotated[Path | None, typer.Argument(help="New folder.  [default: the kind's name]")] = None,
+    machine: Annotated[str, typer.Option(help="Name of the machine.")] = "",
+    serial: Annotated[str, typer.Option(help="Serial number of the machine.")] = "",
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help='Any key of job.toml: artefact.length_mm=500, job.customer="A Ltd".'),
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Begin a job: job.toml with every key explained, and a simulated recording to be replaced by your own.
+
+    On a terminal it asks for machine, artefact and limits, unless one of the options gives something.
+    """
+    defer_scipy()
+    from cmm_uq.commands.new import BUDGET, check_empty, known, titles, write_new
+
+    if not kind:
+        for name, title in titles().items():
+            say(f"{name}  {title}")
+        return
+    target = folder or Path(kind)
+    check_empty(target)
+    given = _given(machine, serial, settings or [])
+    if not given and not quiet and kind != BUDGET and kind in known() and _asked_on_a_terminal():
+        from cmm_uq.cli.asking import answers
+
+        given = answers(kind)
+    files = write_new(kind, target, given)
+    if not quiet:
+        say(f"{target}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
+        say(
+            (target / "README.md")
+            .read_text(encoding="utf-8")
+            .split("\n\n")[1]
+            .replace(" .` in this folder", f" {target}`")
+        )
+
+
+def _asked_on_a_terminal() -> bool:
+    return sys.stdin is not None and sys.stdin.isatty() and sys.stdout is not None and sys.stdout.isatty()
+
+
+def _given(machine: str, serial: str, settings: list[str]) -> dict[str, dict[str, Any]]:
+    """What the options say, by table and key."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, value in (("name", machine), ("serial", serial)):
+        if value:
+            found.setdefault("machine", {})[name] = value
+    for setting in settings:
+        place, equals, text = setting.partition("=")
+        table, dot, key = place.strip().partition(".")
+        if not (equals and dot and key):
+            raise CmmUqError(
+                f"{setting!r} names no key of a table", where="--set", fix="Write it as artefact.length_mm=500"
+            )
+        found.setdefault(table, {})[key] = value_of(text.strip())
+    return found
+
+
+def value_of(text: str) -> Any:
+    """A value as TOML has it; a text without quotes as it is."""
+    try:
+        return tomllib.loads(f"x = {text}")["x"]
+    except tomllib.TOMLDecodeError:
+        return text

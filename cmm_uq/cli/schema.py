@@ -1,0 +1,20 @@
+"""``cmm-uq schema NAME``: JSON Schema of a file, for editors that complete and explain."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cmm_uq.cli.deferred import defer_scipy
+from cmm_uq.cli.printing import put
+
+
+def command(
+    name: Annotated[str, typer.Argument(help="job (with its plan), budget or truth.")] = "job",
+) -> None:
+    """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""
+    defer_scipy()
+    from cmm_uq.commands.schemas import as_text, schema_named
+
+    put(as_text(schema_named(name)))

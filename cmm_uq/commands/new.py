@@ -1,0 +1,353 @@
+"""A new job: a folder that can be reported at once, with a simulated recording to be replaced by the laboratory's own.
+
+The set-ups are those of the kind's usual plan in the machine's volume, the readings are drawn from the model that the job
+names, and everything that is made of them says that they are simulated.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.commands.reading import job_of
+from cmm_uq.commands.schemas import shipped
+from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.jobs.beginning import MACHINE, Beginning
+from cmm_uq.jobs.derived_job import PROGRAM
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import MEASURED, SIMULATED, Origin, first_line
+from cmm_uq.jobs.recording import REQUIRED
+from cmm_uq.jobs.toml_file import as_toml
+from cmm_uq.jobs.toml_text import commented
+from cmm_uq.jobs.truth import Truth
+from cmm_uq.kinds import kind_named, names
+from cmm_uq.model.kind import Kind
+from cmm_uq.plugins import naming_package
+from cmm_uq.points import Points
+from cmm_uq.units import MICROMETRE
+from cmm_uq.writing import Owner, staged
+
+RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
+PLAN, BUDGET = "plan", "budget"
+"""Names beside those of kinds."""
+
+SEED = 1
+Tables = Mapping[str, Mapping[str, Any]]
+
+
+def known() -> dict[str, str]:
+    """The kind of each name that a new job can be asked for by."""
+    found: dict[str, str] = {}
+    for name in names():
+        kind = kind_named(name)
+        if kind is not None:
+            found |= {name: name, **dict.fromkeys(kind.begin_also, name)}
+    return found
+
+
+def titles() -> dict[str, str]:
+    """What a new job can be asked for by, each with what it is."""
+    kinds = {name: _kind(kind).beginning(name).title for name, kind in known().items()}
+    return {
+        **kinds,
+        PLAN: "A job that is only planned (--set artefact.kind=…)",
+        BUDGET: "A measurement model of one's own",
+    }
+
+
+def usual(name: str) -> dict[str, Any]:
+    """What job.toml of a new job says where nothing is given."""
+    kind, begin = _begun(name)
+    return _tables(kind, begin, {}, name)
+
+
+@naming_package()
+def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
+    """Contents of every file of a new job, by name.
+
+    Parameters
+    ----------
+    name : of the kind, or of a further way of it, such as ``shift_plate``.
+    given : what job.toml is to say, by table and key, in place of what the kind begins with.
+    id : of the job.
+
+    Raises
+    ------
+    CmmUqError : no such kind, or what is given is refused by the readers of a job.
+    """
+    kind, begin = _begun(name)
+    tables = _tables(kind, begin, given, id)
+    if begin.files is not None:
+        bare = {**tables, "machine": {k: v for k, v in tables["machine"].items() if k not in begin.machine}}
+        machine = _read(kind, bare, {}).points.machine
+        return job_files(kind.name, tables, begin.files(machine))
+    planned = _read(kind, {**tables, "plan": {**begin.plan, **tables.get("plan", {})}}, {})
+    points = _drawn(planned, kind, begin)
+    from cmm_uq.commands.simulate import recording
+
+    content = first_line("simulate", f"{PROGRAM} new", ": put in your own readings, and take this line away").encode()
+    return job_files(kind.name, tables, {RECORDING: content + recording(points)})
+
+
+def job_files(kind: str, tables: Tables, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """A job's folder around a recording: job.toml with every other key as a comment, its schema, and what to do next.
+
+    Parameters
+    ----------
+    kind : of measurement.
+    tables : what job.toml says.
+    files : the recording that it names, and other files.
+
+    Raises
+    ------
+    CmmUqError : the readers of a job refuse it.
+    """
+    found = _kind(kind)
+    job = _read(found, tables, files)
+    begin = found.beginning(kind)
+    return {
+        "job.toml": _toml(found, tables), **files, README: _readme(job, begin).encode(), SCHEMA: shipped("job").encode(),
+    }  # fmt: skip
+
+
+def job_of_rows(
+    kind: str, columns: Sequence[str], rows: Iterable[Sequence[object]], tables: Tables, *, id: str  # noqa: A002
+) -> dict[str, bytes]:  # fmt: skip
+    """A new job of a recording that was measured: the kind's usual keys around it.
+
+    Parameters
+    ----------
+    kind : of measurement.
+    columns, rows : of the recording, named as a recording names them.
+    tables : what job.toml is to say beside what follows from the kind.
+    id : of the job.
+
+    Raises
+    ------
+    CmmUqError : the readers of a job refuse it.
+    """
+    found = _kind(kind)
+    lines = [",".join(columns), *(",".join(str(cell) for cell in row) for row in rows)]
+    whole = _tables(found, found.beginning(kind), tables, id, origin=MEASURED)
+    return job_files(kind, whole, {RECORDING: ("\n".join(lines) + "\n").encode()})
+
+
+@naming_package()
+def new_plan(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
+    """Contents of every file of a job that is only planned: nothing is recorded.
+
+    Parameters
+    ----------
+    given : what job.toml is to say; its kind is ``artefact.kind``, a ballbar by default.
+    id : of the job.
+
+    Raises
+    ------
+    CmmUqError : no such kind, or what is given is refused by the readers of a job.
+    """
+    name = str(given.get("artefact", {}).get("kind", "ballbar"))
+    kind, begin = _begun(name)
+    if kind.plan is None:
+        raise kind.refused("planned")
+    tables = _tables(kind, begin, given, id, origin=MEASURED)
+    length = {} if "length_mm" in tables["artefact"] or "pitch_mm" in begin.plan else {"length_mm": 600.0}
+    tables["plan"] = {**length, **begin.plan, **tables.get("plan", {})}
+    job = _read(kind, tables, {})
+    return {
+        "job.toml": _toml(kind, tables), README: _readme(job, replace(begin, command=PLAN)).encode(),
+        SCHEMA: shipped("job").encode(),
+    }  # fmt: skip
+
+
+def write_new(name: str, folder: Path, given: Tables) -> dict[str, Path]:
+    """Write the folder of a new job, or of a new budget; never over anything.
+
+    Parameters
+    ----------
+    name : see :func:`known`, or :data:`PLAN` or :data:`BUDGET`.
+    folder : that does not exist, or is empty.
+    given : see :func:`new_job`.
+
+    Returns
+    -------
+    path of each file.
+
+    Raises
+    ------
+    CmmUqError : the folder is not empty, no such kind, or what is given is refused.
+    OutputError : the folder cannot be written to.
+    """
+    check_empty(folder)
+    id = str(given.get("job", {}).get("id", "")) or _id_of(folder.resolve().name or name)  # noqa: A001
+    if name == BUDGET:
+        from cmm_uq.commands.new_budget import budget_files
+
+        if given:
+            raise CmmUqError("a new budget has no machine, artefact or job", where="--set", fix="Leave it out")
+        files, origin = budget_files(), MEASURED
+    elif name == PLAN:
+        files, origin = new_plan(given, id=id), MEASURED
+    else:
+        files, origin = new_job(name, given, id=id), SIMULATED
+    with staged(folder, Owner("new", id, origin), expected=files) as place:
+        check_empty(folder, but=".unfinished-")
+        return place.write(files)
+
+
+def check_empty(folder: Path, but: str = "") -> None:
+    """Refuse a folder that something lies in.
+
+    Raises
+    ------
+    CmmUqError : it does, or it is a file.
+    """
+    try:
+        there = sorted(path.name for path in folder.iterdir() if not (but and path.name.startswith(but)))
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise CmmUqError(f"cannot be a new folder: {error.strerror}", where=str(folder),
+                         fix="Name another one") from None  # fmt: skip
+    if there:
+        raise CmmUqError(f"is not empty: {there[0]!r} lies in it", where=str(folder),
+                         fix="Name a folder that does not exist yet; nothing is overwritten")  # fmt: skip
+
+
+def _begun(name: str) -> tuple[Kind, Beginning]:
+    kind = kind_named(name)
+    if kind is None:
+        kinds = known()
+        if name not in kinds:
+            raise CmmUqError(f"there is no kind {name!r}", fix=suggestion(name, (*kinds, PLAN, BUDGET)))
+        kind = _kind(kinds[name])
+    return kind, kind.beginning(name)
+
+
+def _kind(name: str) -> Kind:
+    found = kind_named(name)
+    if found is None:
+        raise CmmUqError(f"there is no kind {name!r}", fix=suggestion(name, names()))
+    return found
+
+
+def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin = SIMULATED) -> dict[str, Any]:  # noqa: A002
+    """What job.toml says: what the kind begins with, and over it what is given."""
+    recorded = kind.table.with_recording
+    whole: dict[str, Any] = {
+        "job": {
+            "id": id,
+            "date": dt.datetime.now(tz=dt.UTC).date(),
+            **({} if origin == MEASURED else {"origin": origin}),
+        },
+        "machine": {**MACHINE, **begin.machine},
+        "artefact": {"kind": kind.name, **begin.artefact},
+        **({"recording": {"file": RECORDING}} if recorded else {}),
+        "model": {"effects": list(begin.effects)},
+        **({"conformity": [dict(begin.conformity)]} if begin.conformity else {}),
+    }
+    for table, keys in given.items():
+        if table == "conformity":
+            whole[table] = [{**(whole.get(table) or [{}])[0], **keys}]
+        else:
+            whole[table] = {**whole.get(table, {}), **keys}
+    artefact = whole["artefact"]
+    if "U_um" in given.get("artefact", {}):
+        artefact.pop("u_um", None)
+    conformity = given.get("conformity", {})
+    for one, other in (("limit_um", "mpe"), ("mpe", "limit_um")):
+        if one in conformity and other not in conformity:
+            whole["conformity"][0].pop(other, None)
+    return whole
+
+
+def _read(kind: Kind, tables: Tables, files: Mapping[str, bytes]) -> Job:
+    """The job as any command reads it."""
+    return job_of(
+        {"job.toml": as_toml(tables, "job.toml"), **files}, recorded=bool(files) or not kind.table.with_recording
+    )
+
+
+def _drawn(job: Job, kind: Kind, begin: Beginning) -> Points:
+    """Readings at the kind's set-ups: noise alone, of a machine without errors."""
+    from cmm_uq.planning.placing import joined
+    from cmm_uq.planning.ready import ready_plan
+    from cmm_uq.planning.setting import Setting
+
+    if begin.points is not None:
+        points = begin.points(job.points.machine)
+    else:
+        points = joined(ready_plan(Setting.of(job, kind))[1])
+        wanted = {name: values for name, values in points.columns.items() if name != "time_s"}
+        points = replace(points, columns=wanted)
+    if kind.observe is None:
+        noise = np.random.default_rng(SEED).normal(0.0, begin.noise_um * MICROMETRE, points.xyz.shape)
+        return points.at(points.xyz + noise)
+    from cmm_uq.commands.simulate import simulate
+
+    truth = Truth.model_validate({"seed": SEED, "noise": {"coordinate_um": begin.noise_um}})
+    return simulate(replace(job, points=points, planned=True), truth)
+
+
+def _toml(kind: Kind, tables: Tables) -> bytes:
+    """job.toml with a comment for whatever else a job of this kind may say."""
+    begin = kind.beginning(kind.name)
+    out = {"job.derived_from", *(f"job.{key}" for key in ("as_found",) if SIMULATED in tables["job"].values())}
+    if not kind.tested:
+        out |= {"conformity", "short_gauge", "test_uncertainty", "rated_conditions"} - set(tables)
+    if kind.plan is None:
+        out |= {"plan"}
+    if not kind.table.with_recording:
+        out |= {"recording"}
+    if not kind.table.with_earlier:
+        out |= {"recording.earlier", "recording.earlier_date"}
+    head = [
+        f"#:schema ./{SCHEMA}",
+        f"# {begin.title}. What stands behind # is the default, or what may be said besides.",
+    ]
+    if tables["job"].get("origin") == SIMULATED:
+        head.append(
+            "# THE FIGURES ARE SIMULATED: put in your own readings, then take away their first line and origin below."
+        )
+    body = commented(json.loads(shipped("job")), tables, out, kind.name)
+    return ("\n".join(head) + "\n\n" + body).encode()
+
+
+def _readme(job: Job, begin: Beginning) -> str:
+    """What lies here, and what to do next, in ten lines or so."""
+    facts = job.facts
+    columns = ", ".join(f"`{name}`" for name in (*REQUIRED, *begin.columns))
+    further = ", ".join(f"`{name}`" for name in ("repeat", *begin.further))
+    simulated = facts.job.origin == SIMULATED
+    lines = [
+        f"# {begin.title}", "",
+        f"`cmm-uq {begin.command} .` in this folder makes the pages; `cmm-uq check .` says what is missing or wrong.", "",
+        f"- `job.toml`: machine, artefact and limits. Editors that know TOML schemas explain every key (`{SCHEMA}`).",
+    ]  # fmt: skip
+    if facts.recording.file:
+        lines += [
+            f"- `{facts.recording.file}`: one row a point. {begin.numbering}",
+            f"- Its columns: {columns}; it may have {further} and temperatures besides.",
+        ]
+    if simulated:
+        lines.append(
+            "- **The figures are simulated**, and all that is made of them says so. Put in your own, then take away their "
+            'first line and `origin = "simulated"` in job.toml.'
+        )
+    if begin.command == PLAN:
+        lines.append(
+            f"- Nothing is recorded yet: the plan writes `plan.csv`, to be filled in as `{facts.recording.file}`."
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _id_of(name: str) -> str:
+    """A job's id from the name of a folder."""
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.")[:100]
+    return plain or "job"

@@ -1,0 +1,181 @@
+"""JSON Schema of the TOML files that are read, from the very tables that check them, for editors that complete and explain.
+
+References are written out and ``null``, which TOML has not, is left out: the editors' libraries know draft 7 at most, and some
+show nothing of a key whose schema is a reference. What a check of several keys together asks for is not in it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema
+
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.job import JobFile
+from cmm_uq.jobs.sentences import sentences, unit_of
+
+Schema = dict[str, Any]
+
+DRAFT = "http://json-schema.org/draft-07/schema#"
+
+_REFERENCE = "#/$defs/"
+
+
+class _Described(GenerateJsonSchema):
+    """With the sentence of each key, and what its table says may stand for others."""
+
+    def encode_default(self, dft: Any) -> Any:
+        """As a file says it: a message as its text."""
+        return str(dft) if isinstance(dft, str) else super().encode_default(dft)
+
+    def model_schema(self, schema: Any) -> Any:
+        """One table."""
+        found, table = super().model_schema(schema), schema["cls"]
+        told = sentences(table)
+        for name, key in found.get("properties", {}).items():
+            key["description"] = told.get(name, "")
+        for other in getattr(table, "instead", ()):
+            found["properties"] |= schema_of(other)["properties"]
+        found["description"] = re.sub(r"\s+", " ", (table.__doc__ or "").split("\n\n")[0]).replace("``", "`").strip()
+        return found
+
+
+def schema_of(table: type[BaseModel], title: str = "") -> Schema:
+    """Schema of a table, with everything in it written out.
+
+    Parameters
+    ----------
+    table : that checks a file, or a part of it.
+    title : of the file.
+    """
+    whole = table.model_json_schema(schema_generator=_Described, mode="validation")
+    inside = whole.pop("$defs", {})
+    found: Schema = _written_out(whole, inside)
+    found.pop("description", None)
+    return ({"$schema": DRAFT, "title": title} if title else {}) | found
+
+
+def job_schema(
+    tables: Mapping[str, type[ArtefactFacts]], effects: Mapping[str, str], standards: Iterable[str]
+) -> Schema:  # fmt: skip
+    """Schema of job.toml for every kind of measurement.
+
+    Parameters
+    ----------
+    tables : of ``[artefact]``, by the name of the kind.
+    effects : what each effect is, by its name.
+    standards : names.
+    """
+    found = schema_of(JobFile, "job.toml of cmm-uq")
+    keys = found["properties"]
+    each = {kind: schema_of(table) for kind, table in tables.items()}
+    keys["artefact"] = {"description": keys["artefact"]["description"], **chosen_by("kind", each, "Kinds")}
+    keys["model"]["properties"]["effects"]["items"] = {
+        "enum": list(effects), "x-taplo": {"docs": {"enumValues": list(effects.values())}},
+    }  # fmt: skip
+    keys["conformity"]["items"]["properties"]["standard"]["examples"] = list(standards)
+    without = [name for name, table in tables.items() if not table.with_recording]
+    found["required"] = [name for name in found["required"] if name != "recording"]
+    found["if"] = {"properties": {"artefact": {"properties": {"kind": {"not": {"enum": without}}}}}}
+    found["then"] = {"required": ["recording"]}
+    return found
+
+
+def chosen_by(key: str, each: Mapping[str, Schema], word: str) -> Schema:
+    """Schema of a table whose other keys depend on one: those of all its values, each with the values that have it.
+
+    Parameters
+    ----------
+    key : on which the others depend.
+    each : schema of the table by the key's value.
+    word : for these values, as ``Kinds``.
+    """
+    keys: dict[str, Schema] = {}
+    for value, found in each.items():
+        for name, item in found["properties"].items():
+            if name not in keys:
+                keys[name] = {**item, "x-for": [value]}
+            else:
+                keys[name]["x-for"].append(value)
+                _widen(keys[name], item)
+    for item in keys.values():
+        if len(item["x-for"]) < len(each):
+            item["description"] = f"{item['description']} {word}: {', '.join(item['x-for'])}."
+        else:
+            del item["x-for"]
+    keys[key] = {name: item for name, item in keys[key].items() if name != "anyOf"} | {
+        "type": "string",
+        "enum": list(each),
+    }
+    return {
+        "type": "object", "properties": keys, "required": [key], "additionalProperties": False,
+        "allOf": [_of_one(key, value, found, keys) for value, found in each.items()],
+    }  # fmt: skip
+
+
+def _widen(known: Schema, other: Schema) -> None:
+    """Let a key be what either of two kinds takes; which of them it is in one kind, its own table checks."""
+    said = ("description", "x-for", "x-unit", "default")
+    one, two = ({name: item for name, item in key.items() if name not in said} for key in (known, other))
+    if one != two and two not in known.get("anyOf", ()):
+        for name in one:
+            del known[name]
+        known["anyOf"] = [*one.get("anyOf", [one]), two]
+
+
+def _of_one(key: str, value: str, found: Schema, keys: Mapping[str, Schema]) -> Schema:
+    foreign = {name: False for name in keys if name not in found["properties"]}
+    return {
+        "if": {"properties": {key: {"enum": [value]}}, "required": [key]},
+        "then": {"required": found.get("required", [])} | ({"properties": foreign} if foreign else {}),
+    }
+
+
+def keys_of(schema: Mapping[str, Any], parent: str = "") -> Iterable[tuple[str, Schema]]:
+    """Every key in a schema with its dotted name; of a list of tables ``[]`` stands behind its name."""
+    for name, key in schema.get("properties", {}).items():
+        dotted = f"{parent}.{name}" if parent else name
+        yield dotted, key
+        for part in (key, *key.get("anyOf", ())):
+            yield from keys_of(part, dotted)
+            yield from keys_of(part.get("items", {}), f"{dotted}[]")
+            if isinstance(part.get("additionalProperties"), dict):
+                yield from keys_of(part["additionalProperties"], f"{dotted}.NAME")
+
+
+def _written_out(part: Any, inside: Mapping[str, Any]) -> Any:
+    if isinstance(part, list):
+        return [_written_out(item, inside) for item in part]
+    if not isinstance(part, dict):
+        return part
+    if "$ref" in part:
+        named = inside[part["$ref"].removeprefix(_REFERENCE)]
+        return _written_out({**named, **{key: item for key, item in part.items() if key != "$ref"}}, inside)
+    found = {key: _written_out(item, inside) for key, item in part.items() if key != "properties"}
+    if "properties" in part:
+        found["properties"] = {name: _key(name, _written_out(key, inside)) for name, key in part["properties"].items()}
+    choices = [choice for choice in found.get("anyOf", ()) if choice != {"type": "null"}]
+    if len(choices) == 1:
+        found = {**choices[0], **{key: item for key, item in found.items() if key != "anyOf"}}
+    elif choices:
+        found["anyOf"] = choices
+    if found.get("default", 0) is None or isinstance(found.get("default"), dict):
+        del found["default"]
+    if "const" in found:
+        found["enum"] = [found.pop("const")]
+    found.pop("title", None)
+    return found
+
+
+def _key(name: str, key: Schema) -> Schema:
+    """With its unit at the end of its sentence."""
+    unit, told = unit_of(name), key.get("description", "")
+    if unit and unit not in told:
+        key["x-unit"] = unit
+        key["description"] = f"{told} Unit: {unit}."
+    elif unit:
+        key["x-unit"] = unit
+    return key

@@ -1,0 +1,16 @@
+"""A new job of gauge blocks: the seven lines of ISO 10360-2, five lengths each."""
+
+from __future__ import annotations
+
+from cmm_uq.jobs.beginning import SIX, Beginning
+
+BEGINNING = Beginning(
+    title="Gauge blocks on seven lines (ISO 10360-2)",
+    numbering="One measurement is one block in one place; points 1 and 2 are its outer faces.",
+    artefact={"name": "Gauge blocks", "u_um": 0.15, "cte_per_k": 11.5e-6},
+    effects=(*SIX, "probe_radius"),
+    conformity={"standard": "ISO 10360-2:2009", "mpe": "4 + L/100", "rule": "ISO 14253-1"},
+    plan={"length_mm": 600.0, "repeats": 3},
+    columns={"reference_mm": ""},
+    further=dict.fromkeys(("approach_x", "approach_y", "approach_z", "nx", "ny", "nz"), ""),
+)

@@ -1,0 +1,17 @@
+"""A new job of a test sphere: twenty-five points (ISO 10360-5)."""
+
+from __future__ import annotations
+
+from cmm_uq.jobs.beginning import Beginning
+
+BEGINNING = Beginning(
+    title="Test sphere, twenty-five points (ISO 10360-5)",
+    numbering="One measurement is one place of the sphere; its points are the points probed.",
+    artefact={"name": "Test sphere", "length_mm": 25.0, "u_um": 0.1, "form_um": 0.1},
+    effects=("probe_radius", "probe_lobing"),
+    conformity={"standard": "ISO 10360-5:2010", "limit_um": 4.0, "rule": "ISO 14253-1"},
+    plan={"repeats": 1},
+    columns=dict.fromkeys(("nx", "ny", "nz"), ""),
+    further=dict.fromkeys(("approach_x", "approach_y", "approach_z"), ""),
+    noise_um=0.3,
+)

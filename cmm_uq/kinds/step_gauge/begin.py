@@ -1,0 +1,16 @@
+"""A new job of a step gauge: the seven lines of ISO 10360-2, five lengths each."""
+
+from __future__ import annotations
+
+from cmm_uq.jobs.beginning import SIX, Beginning
+
+BEGINNING = Beginning(
+    title="Step gauge on seven lines (ISO 10360-2)",
+    numbering="One measurement is one line; its points are the faces, numbered as they are met, again where met again.",
+    artefact={"name": "Step gauge", "u_um": 0.4, "cte_per_k": 11.5e-6},
+    effects=(*SIX, "hysteresis_x", "hysteresis_y", "hysteresis_z"),
+    conformity={"standard": "ISO 10360-2:2009", "mpe": "4 + L/100", "rule": "ISO 14253-1"},
+    plan={"length_mm": 600.0, "repeats": 3},
+    columns={"reference_mm": ""},
+    further=dict.fromkeys(("approach_x", "approach_y", "approach_z"), ""),
+)
