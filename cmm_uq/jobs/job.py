@@ -18,6 +18,8 @@ from cmm_uq.jobs.as_found import AsFound
 from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, needed, probe_unfit, standards_in, uncertainty_missing
 from cmm_uq.jobs.file_names import device_name
+from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
@@ -99,15 +101,17 @@ class JobFacts(Table):
         return self
 
 
-class RecordingFacts(Table):
-    """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
+class RecordingFacts(ImportKeys):
+    """``[recording]``: the keys that import a file are those of :class:`~cmm_uq.jobs.importing.keys.ImportKeys`.
+
+    Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
 
     ``earlier`` names a recording of the same artefact in the same placings at an earlier date: what is estimated then is what
     changed between.
     """
 
     file: str
-    """The recording, a CSV beside job.toml with one row a point."""
+    """The recording, beside job.toml: a CSV with one row a point, or an export that is imported."""
     earlier: str | None = None
     """Recording of the same artefact in the same placings at an earlier date: what changed between is estimated."""
     earlier_date: dt.date | None = None
@@ -239,6 +243,7 @@ class Job:
     planned : whether the recording holds the nominal coordinates of a plan.
     as_found : what the machine showed before it was adjusted, where the job names it.
     short_gauge : recorded beside the artefact, where the job names one.
+    imported : how files in another format than the project's own were read.
     """
 
     folder: Path
@@ -249,6 +254,7 @@ class Job:
     planned: bool = False
     as_found: AsFound | None = None
     short_gauge: ShortGauge | None = None
+    imported: tuple[Recognised, ...] = ()
 
     @property
     def circumstances(self) -> Circumstances:

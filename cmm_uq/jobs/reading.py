@@ -24,7 +24,7 @@ from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
-from cmm_uq.jobs.recording import read_recording
+from cmm_uq.jobs.recording_file import read_recording_file
 from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
 from cmm_uq.jobs.short_gauge import ShortGauge, short_gauge_of
@@ -113,16 +113,19 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
         inputs |= _contents(source, others, TABLE_BYTES, written=True)
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
-    points = read_recording(inputs[facts.recording.file], where, machine)
+    points, recognised = read_recording_file(inputs[facts.recording.file], where, machine, facts.recording)
+    told = [recognised]
     planned = is_planned(inputs[facts.recording.file])
     if not planned:  # a plan has no times yet
         points = with_logged(points, log_of(facts.machine, inputs, folder), path, where)
     if earlier is not None:
-        then = read_recording(inputs[earlier], str(folder / earlier), machine)
+        then, recognised = read_recording_file(inputs[earlier], str(folder / earlier), machine, facts.recording)
+        told.append(recognised)
         points = against_earlier(points, then, facts.artefact.cte_per_k, where)
     found = as_found_of(before, inputs, folder, facts.job.origin, facts.machine.name, facts.machine.serial)
     gauge = _short_gauge(facts, inputs, folder, machine)
-    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge)
+    how = tuple(filter(None, told))
+    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, how)
 
 
 def _short_gauge(facts: JobFile, inputs: Mapping[str, bytes], folder: Path, machine: Machine) -> ShortGauge | None:

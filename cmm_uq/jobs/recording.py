@@ -63,7 +63,23 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
     def column_of(i: int) -> Floats:
         return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}")
 
-    table = {column: column_of(i) for i, column in enumerate(header)}
+    return points_of({column: column_of(i) for i, column in enumerate(header)}, lines, name, machine)
+
+
+def points_of(table: Mapping[str, Floats], lines: Sequence[int], name: str, machine: Machine) -> Points:
+    """Points of the columns of a recording.
+
+    Parameters
+    ----------
+    table : columns by name, each (n,), those of :data:`REQUIRED` among them.
+    lines : of each point in its file.
+    name : the file's name, for messages.
+    machine : that read them.
+
+    Raises
+    ------
+    CmmUqError : a number that is impossible in its column, a point that is there twice.
+    """
     for column, values in table.items():
         _check_size(values, column, lines, name)
     _check_normals(table, lines, name)
@@ -74,7 +90,7 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
         column = f"approach_{axis}"
         if column in table:
             _check_directions(table[column], column, lines, name)
-    number = {column: table.get(column, np.ones(len(rows))).astype(np.int64) for column in WHOLE}
+    number = {column: table.get(column, np.ones(len(lines))).astype(np.int64) for column in WHOLE}
     points = Points(
         np.column_stack([table["x_mm"], table["y_mm"], table["z_mm"]]),
         number["measurement"], number["point"], number["repeat"], machine,
