@@ -87,7 +87,8 @@ class Found:
 
     def _tables(self) -> list[str]:
         """Tables of HTML."""
-        return [html_table("Summary", (), self.outcome.summary)]
+        short = self.outcome.summary
+        return [html_table("Summary", (), short.rows), html_table("Details", (), short.details)]
 
     def _repr_html_(self) -> str:
         warned = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)

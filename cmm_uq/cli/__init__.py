@@ -6,11 +6,14 @@ Exit codes: 0 done; 2 bad input; 3 output impossible; 4 done, and not conforming
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
 import warnings
 from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cmm_uq.errors import CmmUqError
 
 BAD_INPUT = 2
 """Exit code of everything that the user can mend."""
@@ -27,6 +30,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 def main() -> None:
     """Run the command; whatever happens ends with one line and a documented exit code, never with a traceback."""
+    from cmm_uq.cli.encoding import any_character
     from cmm_uq.writing.interruption import done, watch
 
     watch()
@@ -35,15 +39,17 @@ def main() -> None:
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # what matters is an error or a warning of the report, not a line of a library
     _without_kde()
+    any_character()
     code = _ended()
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except (OSError, ValueError):
+        from cmm_uq.cli.ending import tell
         from cmm_uq.cli.printing import closed
 
         code = code or NO_OUTPUT
-        _say(str(closed()))
+        tell(closed(), code)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter would complain once more at its end
     done()
     sys.exit(code)
@@ -58,36 +64,35 @@ def _without_kde() -> None:
 
 def _ended() -> int:
     """Exit code of the subcommand."""
+    from cmm_uq.cli.ending import tell
     from cmm_uq.errors import CmmUqError, OutputError
 
+    code = NO_OUTPUT
     try:
         from cmm_uq.cli.commands import run
 
         return run()
-    except OutputError as error:
-        _say(str(error))
-        return NO_OUTPUT
     except CmmUqError as error:
-        _say(str(error))
-        return BAD_INPUT
+        told, code = error, NO_OUTPUT if isinstance(error, OutputError) else BAD_INPUT
     except MemoryError:
-        _say("the memory does not suffice for this input. Split it, or use a machine with more memory")
-        return NO_OUTPUT
+        told = CmmUqError(
+            "the memory does not suffice for this input", fix="Split it, or use a machine with more memory"
+        )
     except Exception as error:
-        from cmm_uq.plugins import told_with_package
-        from cmm_uq.writing.interruption import written
-
-        if (told := told_with_package(error)) is not None:
-            _say(str(told))
-            return BAD_INPUT
-        there = ", ".join(map(str, written()))
-        state = f"The files are written in {there}" if there else "Nothing was written"
-        _say(f"a fault of the program: {type(error).__name__}: {error}. {state}; please report it with the input")
-        return NO_OUTPUT
+        told, code = _of_a_fault(error)
+    tell(told, code)
+    return code
 
 
-def _say(text: str) -> None:
-    from cmm_uq.errors import LONGEST_MESSAGE, printable, shortened
+def _of_a_fault(error: Exception) -> tuple[CmmUqError, int]:
+    """A fault of another package or of this program, and the exit code."""
+    from cmm_uq.errors import CmmUqError
+    from cmm_uq.plugins import told_with_package
+    from cmm_uq.writing.interruption import written
 
-    with contextlib.suppress(OSError, ValueError, AttributeError):  # where nobody listens the exit code tells
-        print(f"cmm-uq: {shortened(printable(text), LONGEST_MESSAGE)}", file=sys.stderr, flush=True)  # noqa: T201
+    if (told := told_with_package(error)) is not None:
+        return told, BAD_INPUT
+    there = ", ".join(map(str, written()))
+    state = f"The files are written in {there}" if there else "Nothing was written"
+    problem = f"a fault of the program: {type(error).__name__}: {error}"
+    return CmmUqError(problem, fix=f"{state}; please report it with the input"), NO_OUTPUT

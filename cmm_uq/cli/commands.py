@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.cli import budget, compensate, diagnose, new, plan, report, schema, selftest, simulate
+from cmm_uq.cli import BAD_INPUT, budget, compensate, diagnose, new, plan, report, schema, selftest, simulate
+from cmm_uq.cli.options import examples
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError
 
@@ -14,30 +16,48 @@ app = typer.Typer(
     name="cmm-uq",
     help="Uncertainty of coordinate measuring machines, and the certificates that state it.",
     epilog="Exit codes: 0 done; 2 bad input; 3 output impossible; 4 with --strict: done, not conforming or inconsistent; "
-    "130, 143 interrupted.",
-    no_args_is_help=True,
-    add_completion=False,
+    "130, 143 interrupted.\n\n" + examples("report examples/iota-1102-20C", "report --help", "--install-completion"),
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # brackets of TOML stay as they are, and help is there at once
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("new")(new.command)
-app.command("report")(report.command)
-app.command("diagnose")(diagnose.command)
-app.command("plan")(plan.command)
-app.command("simulate")(simulate.command)
-app.command("compensate")(compensate.command)
-app.command("budget")(budget.command)
-app.command("schema")(schema.command)
-app.command("selftest")(selftest.command)
+for module, short in {
+    new: "A job folder that runs, every key explained.",
+    report: "The certificate of a recording: estimates, figures, decisions.",
+    diagnose: "What a recording shows that its model leaves out.",
+    plan: "What to measure, and what it will tell.",
+    simulate: "A recording drawn from known errors, as a job of its own.",
+    compensate: "A recording corrected by its machine's error maps.",
+    budget: "The uncertainty of any measurement model in a file.",
+    schema: "The JSON Schema of a file, for editors.",
+    selftest: "Published reference figures, computed here and compared.",
+}.items():
+    name = module.__name__.rpartition(".")[2]
+    app.command(name, short_help=short, epilog=getattr(module, "EXAMPLES", None))(module.command)
+
+OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
+and the calibration certificates that state it.
+
+  cmm-uq report JOB      the certificate of a recording
+  cmm-uq diagnose JOB    what the recording shows that its model leaves out
+  cmm-uq plan JOB        what to measure, and what it will tell
+
+JOB is a folder with a job.toml. cmm-uq --help lists all commands,
+cmm-uq COMMAND --help the options of one."""
 
 
 @app.callback(invoke_without_command=True)
-def _version(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
-    if version:
-        from cmm_uq import __version__
+def _alone(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+) -> None:
+    from cmm_uq import __version__
 
+    if version:
         say(f"cmm-uq {__version__}")
         raise typer.Exit
+    if context.invoked_subcommand is None:
+        say(OVERVIEW.format(version=__version__))
 
 
 def run() -> int:
@@ -55,14 +75,23 @@ def run() -> int:
         code = app(prog_name="cmm-uq", standalone_mode=False)
     except typer.Abort:
         raise CmmUqError("the answer did not come") from None
+    except SystemExit as ended:  # of completion, which has said why
+        return BAD_INPUT if ended.code else 0
     except Exception as error:
-        told = getattr(
-            error, "format_message", None
-        )  # an unknown option or a wrong value, from the command-line library
-        if told is None:
+        if not hasattr(error, "format_message"):
             raise
-        if type(error).__name__ == "NoArgsIsHelpError":
-            say(told())
-            return 0
-        raise CmmUqError(told().rstrip("."), fix="cmm-uq --help lists commands and options") from None
+        raise _misread(error) from None
     return code if isinstance(code, int) else 0
+
+
+def _misread(error: Any) -> CmmUqError:
+    """An unknown option or a wrong value, as the command-line library says it, with where to read on."""
+    problem, asks, hint = str(error.format_message()).partition("Did you mean")
+    if not asks:
+        problem, listed, hint = problem.partition(" (Possible options: ")
+        asks = "Did you mean " if listed else ""
+        hint = hint.replace(")", "?").replace(", ", " or ")
+    context = getattr(error, "ctx", None)
+    where = "cmm-uq" if context is None else context.command_path
+    more = f"{where} --help lists {'commands and options' if where == 'cmm-uq' else 'its options'}"
+    return CmmUqError(problem.rstrip(" ."), fix=f"{asks}{hint} {more}".strip())

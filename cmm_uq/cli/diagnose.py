@@ -3,38 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
-from cmm_uq.cli.printing import conclude, say
+from cmm_uq.cli.options import Force, Job, Json, Quiet, Seed, Strict, Verbose, examples, out
+from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
 
-if TYPE_CHECKING:
-    from cmm_uq.commands.written import Written
+EXAMPLES = examples("diagnose examples/iota-1102-20C", "diagnose JOB --alpha 0.05", "diagnose JOB --strict --quiet")
 
 
 def command(
-    job: Annotated[Path, typer.Argument(help="Job folder: job.toml and the recording that it names.")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>/diagnosis]")] = None,
+    job: Job,
+    out: Annotated[Path | None, out("reports/<job id>/diagnosis")] = None,
     seed: Seed = 0,
-    alpha: Annotated[float, typer.Option(help="Rate of false alarms.")] = 0.01,
+    alpha: Annotated[
+        float, typer.Option(help="Rate of false alarms, a probability from 0.000001 to 0.5.", metavar="P")
+    ] = 0.01,
     force: Force = False,
     strict: Strict = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
     json: Json = False,
 ) -> None:
     """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
-    with shown(quiet=quiet or json) as stage:
+    with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.report import write_diagnosis
 
         written = write_diagnosis(job, out, seed=seed, alpha=alpha, force=force, stage=stage)
-    conclude(written, _summarise, json=json, quiet=quiet, strict=strict)
-
-
-def _summarise(written: Written) -> None:
-    for row in written.summary:
-        say("  ".join(row))
-    for path in written.files.values():
-        say(str(path))
+    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)

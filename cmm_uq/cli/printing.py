@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
 from cmm_uq.cli import NOT_CONFORMING
+from cmm_uq.cli.encoding import json_for
 from cmm_uq.errors import OutputError
 from cmm_uq.writing.interruption import written
 
 if TYPE_CHECKING:
+    from cmm_uq.cli.layout import Layout, Line
     from cmm_uq.commands.written import Written
+    from cmm_uq.documents.in_short import Summary
+
+WIDEST = 120
+"""Columns that are used: longer lines are hard to read."""
+
+NARROWEST = 40
+"""Columns that are used even where there are fewer."""
 
 
 def say(text: str = "") -> None:
@@ -41,54 +54,101 @@ def put(text: str) -> None:
         raise closed() from None
 
 
+def put_json(text: str) -> None:
+    """JSON on standard output, whatever its encoding.
+
+    Raises
+    ------
+    OutputError : nobody takes it.
+    """
+    put(json_for(getattr(sys.stdout, "encoding", None), text))
+
+
+def put_data(data: Mapping[str, Any]) -> None:
+    """One JSON object on standard output, as :func:`put_json`."""
+    put_json(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
 def closed() -> OutputError:
     """Standard output is closed, or its disk is full."""
     there = ", ".join(map(str, written()))
     return OutputError("standard output cannot be written", fix=f"The files are written in {there}" if there else None)
 
 
-def table(
-    rows: Iterable[Sequence[str]], *headings: str, separator: str = "\t", title: str = "", bold: int = -1
+def on_terminal(stream: TextIO | None) -> bool:
+    """Whether somebody looks at it."""
+    return stream is not None and stream.isatty()
+
+
+def styled(stream: TextIO | None) -> bool:
+    """Whether it shows colours, and is to (https://no-color.org)."""
+    return on_terminal(stream) and not os.environ.get("NO_COLOR") and os.environ.get("TERM") not in ("dumb", "unknown")
+
+
+def columns() -> int:
+    """Of the terminal, as far as they are used."""
+    return min(WIDEST, max(NARROWEST, shutil.get_terminal_size().columns))
+
+
+def layout(*, verbose: bool) -> Layout:
+    """For standard output."""
+    from cmm_uq.cli.layout import Layout
+
+    return Layout(columns() if on_terminal(sys.stdout) else None, verbose)
+
+
+def show(lines: Iterable[Line]) -> None:
+    """Lines on standard output, in colour where it has any.
+
+    Raises
+    ------
+    OutputError : nobody takes them.
+    """
+    if not styled(sys.stdout):
+        for line in lines:
+            say("".join(text for text, _ in line).rstrip(" "))
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(highlight=False, soft_wrap=True)
+    try:
+        for line in lines:
+            console.print(Text.assemble(*line))
+    except OSError:
+        raise closed() from None
+
+
+def show_summary(
+    summary: Summary, files: Mapping[str, Path], *, verbose: bool, name: str = "", banner: str = ""
 ) -> None:
-    """Rows of text: with lines on a terminal, elsewhere a line each; with spaces between, empty cells are left out.
+    """A summary and the files that were written, on standard output.
 
     Raises
     ------
     OutputError : nobody takes it.
     """
-    cells = [tuple(row) for row in rows]
-    if sys.stdout is None or not sys.stdout.isatty():
-        for row in (headings, *cells) if headings else cells:
-            say(separator.join(cell for cell in row if cell or separator == "\t"))
-        return
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
+    from cmm_uq.cli.files_told import folder_of, told
 
-    shown = Table(title=escape(title) or None, show_header=bool(headings), title_justify="left")
-    for i in range(max(map(len, (headings, *cells)))):
-        style = "bold" if i == bold else None
-        shown.add_column(headings[i] if headings else "", overflow="fold", justify="left", style=style)
-    for row in cells:
-        shown.add_row(*(escape(cell) for cell in row))
-    try:
-        Console().print(shown)
-    except OSError:
-        raise closed() from None
+    rows, folder = told(files, whole=verbose), folder_of(files)
+    show(layout(verbose=verbose).screen(summary, name=name, banner=banner, files=rows, folder=folder))
 
 
-def conclude(
-    ended: Written, summarise: Callable[[Written], None], *, json: bool, quiet: bool, strict: bool
-) -> None:  # fmt: skip
+def conclude(ended: Written, *, json: bool, quiet: bool, strict: bool, verbose: bool) -> None:
     """How a command ends that wrote an outcome: results.json or a summary, unless it is to be quiet.
 
     Raises
     ------
     typer.Exit : with ``strict``, when not all is well.
+    OutputError : nobody takes what is said.
     """
     if json:
-        put(ended.results.decode())
+        put_json(ended.results.decode())
     elif not quiet:
-        summarise(ended)
+        from cmm_uq.documents.origin import BANNERS
+
+        job = ended.found.job
+        banner = BANNERS.get(job.origin, "")
+        show_summary(ended.summary, ended.files, verbose=verbose, name=job.facts.job.id, banner=banner)
     if strict and not ended.conforming:
         raise typer.Exit(NOT_CONFORMING)

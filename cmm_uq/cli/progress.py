@@ -1,4 +1,4 @@
-"""Progress of a command: a bar on a terminal, a line a stage elsewhere, nothing when quiet."""
+"""Progress of a command: a bar on a terminal; elsewhere a line a stage when asked for, else nothing."""
 
 from __future__ import annotations
 
@@ -7,32 +7,40 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-import typer
+from cmm_uq.cli.printing import columns, styled
 
 if TYPE_CHECKING:
     from cmm_uq.commands.written import Stage
 
 
 @contextmanager
-def shown(*, quiet: bool) -> Iterator[Stage | None]:
-    """A progress bar on a terminal, a line a stage elsewhere, nothing when quiet."""
+def shown(*, quiet: bool, verbose: bool) -> Iterator[Stage | None]:
+    """What is told of the stages of a command, on standard error.
+
+    A stage is what is being done, and after a colon what of it is counted, which changes while it lasts.
+    """
     if quiet:
         yield None
-    elif sys.stderr.isatty():
+    elif styled(sys.stderr):
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+        from rich.table import Column
 
-        columns = TextColumn("{task.description:<26}"), BarColumn(), TimeElapsedColumn()
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task("Starting", total=1.0)
-            yield lambda what, part: bar.update(task, description=what, completed=part)
-    else:
+        bar = BarColumn(bar_width=columns() // 4)
+        what = TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis"))
+        with Progress(what, bar, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+            task = progress.add_task("Starting", total=1.0)
+            yield lambda what, part: progress.update(task, description=what, completed=part)
+    elif verbose:
         said: set[str] = set()
 
         def tell(what: str, part: float) -> None:
-            if what not in said:
-                said.add(what)
-                with suppress(OSError):
-                    typer.echo(what, err=True)
+            stage, _, _ = what.partition(":")
+            if stage not in said:
+                said.add(stage)
+                with suppress(OSError, AttributeError):
+                    print(stage, file=sys.stderr, flush=True)  # noqa: T201
 
         yield tell
+    else:
+        yield None

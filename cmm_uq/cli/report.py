@@ -3,40 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import typer
-
-from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
-from cmm_uq.cli.printing import conclude, table
+from cmm_uq.cli.options import Force, Job, Json, Quiet, Seed, Strict, Verbose, examples, out
+from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
 
-if TYPE_CHECKING:
-    from cmm_uq.commands.written import Written
+EXAMPLES = examples(
+    "report examples/iota-1102-20C", "report JOB --out DIR --seed 3", "report JOB --json --strict > results.json"
+)
 
 
 def command(
-    job: Annotated[Path, typer.Argument(help="Job folder: job.toml and the recording that it names.")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write to.  [default: reports/<job id>]")] = None,
+    job: Job,
+    out: Annotated[Path | None, out("reports/<job id>")] = None,
     seed: Seed = 0,
     force: Force = False,
     strict: Strict = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
     json: Json = False,
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
-    with shown(quiet=quiet or json) as stage:
+    with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.report import write_report
 
         report = write_report(job, out, seed=seed, force=force, stage=stage)
-    conclude(report, _summarise, json=json, quiet=quiet, strict=strict)
-
-
-def _summarise(report: Written) -> None:
-    from cmm_uq.documents.origin import BANNERS
-    from cmm_uq.jobs.origin import MEASURED
-
-    job = report.found.job
-    derived = [] if job.origin == MEASURED else [(BANNERS[job.origin], "", "")]
-    rows = [*derived, *report.summary, *((name, str(path), "") for name, path in report.files.items())]
-    table(rows, separator="  ", title=job.facts.job.id, bold=1)
+    conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)

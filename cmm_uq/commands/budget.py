@@ -7,6 +7,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from cmm_uq.commands.written import Stage, silent
 from cmm_uq.errors import CmmUqError
 from cmm_uq.uncertainty.evaluation import Evaluation
 from cmm_uq.uncertainty.model_file import read_model_file
@@ -25,8 +26,8 @@ class WrittenBudget:
 
 
 def write_budget(
-    file: Path, out: Path | None = None, *, seed: int | None = None, force: bool = False
-) -> WrittenBudget:  # fmt: skip
+    file: Path, out: Path | None = None, *, seed: int | None = None, force: bool = False, stage: Stage = silent
+) -> WrittenBudget:
     """Evaluate a model file and write ``budget.html``, ``budget.pdf`` and ``results.json``, all or none.
 
     Parameters
@@ -35,6 +36,7 @@ def write_budget(
     out : where to write; ``reports/<name of the file>`` by default.
     seed : instead of the file's.
     force : keep what stands in the way instead of refusing.
+    stage : told of progress.
 
     Raises
     ------
@@ -47,7 +49,9 @@ def write_budget(
         raise CmmUqError("has the name of a file that this command writes", where=str(file), fix="Rename it")
     owner = Owner("budget", _identity(file))
     with staged(folder, owner, inputs=(file,), force=force, expected=FILES) as place:
+        stage("Propagating the uncertainty", 0.0)
         evaluation = model.evaluate(seed)
+        stage("Rendering", 0.7)
         from cmm_uq.documents.budget_page import budget_document
         from cmm_uq.documents.html import render_html
         from cmm_uq.documents.pdf import render_pdf

@@ -38,24 +38,16 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
     from cmm_uq.commands.planning import make_plan
 
     plan = make_plan(job, power=power, seed=seed, progress=stage)
-    from cmm_uq.commands.plan_page import placing_rows, plan_document, plan_results
+    from cmm_uq.commands.plan_page import plan_document, plan_results
+    from cmm_uq.commands.plan_summary import plan_summary
 
     stage("Drawing the placings", 0.95)
     document = plan_document(plan)
     return Outcome(
-        plan, document, plan_results(plan), tuple(placing_rows(plan)), document.warnings,
+        plan, document, plan_results(plan), plan_summary(plan), document.warnings,
         {TO_FILL_IN: _recording_to_be(plan)} if plan.to_measure else {},
         conforming=all(condition.met for condition in plan.conditions),
     )  # fmt: skip
-
-
-def plan_of(outcome: Outcome) -> Plan:
-    """The plan in its outcome."""
-    from cmm_uq.commands.planning import Plan
-
-    if not isinstance(outcome.found, Plan):
-        raise TypeError("an outcome of another command")
-    return outcome.found
 
 
 def write_plan(

@@ -106,7 +106,6 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
 def plan_document(plan: Plan) -> Document:
     """The page of a plan."""
     facts = plan.job.facts
-    total = sum(plan.minutes)
     return working_page(
         facts,
         say("Measurement plan"),
@@ -122,7 +121,7 @@ def plan_document(plan: Plan) -> Document:
             Facts(
                 (
                     (say("Start from"), base_name(plan)),
-                    (say("To be measured"), _to_measure(plan, total)),
+                    (say("To be measured"), to_measure_words(plan)),
                     *noise_facts(plan),
                 )
             ),
@@ -142,8 +141,9 @@ def _artefact(plan: Plan) -> Text:
     return Verbatim(facts.name) if facts.name else Verbatim(facts.kind.replace("_", " "))
 
 
-def _to_measure(plan: Plan, total: float) -> Text:
-    count = len(plan.to_measure)
+def to_measure_words(plan: Plan) -> Text:
+    """How many placings are still to be measured, and how long that takes."""
+    count, total = len(plan.to_measure), sum(plan.minutes)
     if not count:
         return say("nothing more: the placings are recorded")
     return plural(

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from cmm_uq.documents.in_short import Summary
 from cmm_uq.documents.outcome import Found, Outcome
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
@@ -42,8 +43,8 @@ class Written:
         return self.outcome.found
 
     @property
-    def summary(self) -> tuple[tuple[str, ...], ...]:
-        """Rows of what, figure and remark."""
+    def summary(self) -> Summary:
+        """For the end of the command."""
         return self.outcome.summary
 
     @property

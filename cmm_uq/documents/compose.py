@@ -44,7 +44,7 @@ def certified(result: Result, page: Page) -> Outcome:
     )
     passed = all(statement.outcome == "pass" for statement in result.statements)
     return Outcome(
-        result, document, page.with_further(result, data), tuple(summary(result, document.warnings)), document.warnings,
+        result, document, page.with_further(result, data), summary(result, document.warnings), document.warnings,
         {draws.name: draws.content} if draws else {}, draws=result.draws,
         conforming=passed and result.diagnosed.diagnosis.verdict == "consistent",
     )  # fmt: skip

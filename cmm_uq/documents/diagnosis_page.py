@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.conformity.accuracy import TITLES, UNITS
-from cmm_uq.documents.diagnosis_words import VERDICT_WORDS, VERDICTS, lines, noise_words, sentence, summary_rows
+from cmm_uq.documents.diagnosis_words import VERDICT_WORDS, VERDICTS, lines, noise_words, sentence, summary_of
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.improvement_table import improvement_table
 from cmm_uq.documents.origin import came_about
@@ -255,7 +255,7 @@ def _rivals(found: Diagnosed) -> Table:
 
 def diagnosed_outcome(found: Diagnosed) -> Outcome:
     """What there is to write of a diagnosis."""
-    rows = summary_rows(found.diagnosis.verdict, found.diagnosis.p_value, lines(found), found.findings)
+    short = summary_of(found.job.facts, found.diagnosis.verdict, found.diagnosis.p_value, lines(found), found.findings)
     document = diagnosis_document(found)
     consistent = found.diagnosis.verdict == "consistent"
-    return Outcome(found, document, diagnosis_results(found), rows, document.warnings, conforming=consistent)
+    return Outcome(found, document, diagnosis_results(found), short, document.warnings, conforming=consistent)

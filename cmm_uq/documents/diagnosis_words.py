@@ -6,9 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.in_short import Standing, Summary, Verdict
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.wording import expanded, probability
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, say, together
+from cmm_uq.jobs.job import JobFile
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, together
 from cmm_uq.screening.finding import Finding
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import unit
@@ -36,6 +38,10 @@ VERDICTS_IN_SHORT: Mapping[str, Text] = {
     "unexplained": say("UNEXPLAINED"),
 }  # fmt: skip
 """The same, to begin a summary with."""
+
+_STANDING: Mapping[str, Standing] = {
+    "consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad",
+}  # fmt: skip
 
 
 def lines(found: Diagnosed) -> list[Text]:
@@ -115,11 +121,20 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ..
     return tuple(texts)
 
 
-def summary_rows(
-    verdict: str, p_value: float, told: Sequence[Text], findings: Iterable[Finding]
-) -> tuple[tuple[Text], ...]:
-    """Verdict and everything that follows from it, and what the screening found, for the end of a command."""
-    first = say(
-        "{verdict} (p = {p_value:.2g}). {told}", verdict=VERDICTS_IN_SHORT[verdict], p_value=p_value, told=told[0]
-    )
-    return ((first,), *((text,) for text in (*told[1:], *(say("{why:capital}.", why=f.why) for f in findings))))
+def summary_of(
+    facts: JobFile, verdict: str, p_value: float, told: Sequence[Text], findings: Iterable[Finding]
+) -> Summary:
+    """Verdict and everything that follows from it, and what the screening found, for the end of a command.
+
+    Parameters
+    ----------
+    facts : of the job.
+    verdict, p_value : of the diagnosis.
+    told : the verdict in a sentence, and what follows from it.
+    findings : of the screening.
+    """
+    subject = say("p = {p_value:.2g}. {told}", p_value=p_value, told=told[0])
+    first = Verdict(VERDICTS_IN_SHORT[verdict], _STANDING[verdict], subject, ())
+    warned = tuple(say("{why:capital}.", why=finding.why) for finding in findings)
+    machine = Verbatim(facts.machine.name)
+    return Summary(machine, day(facts.job.date), (first,), remarks=tuple(told[1:]), warnings=warned)

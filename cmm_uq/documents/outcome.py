@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from cmm_uq.documents.document import Document, Section
+from cmm_uq.documents.in_short import Summary
 from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
@@ -33,7 +34,7 @@ class Outcome:
     found : in the kind's own terms.
     document : certificate, or page of a diagnosis.
     results : contents of results.json.
-    summary : rows of text for the end of a command.
+    summary : for the end of a command.
     warnings : what the reader must know before using a figure.
     files : further ones, by name.
     conforming : whether every statement of conformity is a pass, and the recording agrees with the model that the job names.
@@ -43,7 +44,7 @@ class Outcome:
     found: Found
     document: Document
     results: Mapping[str, Any]
-    summary: tuple[tuple[str, ...], ...]
+    summary: Summary
     warnings: tuple[Text, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
     conforming: bool = True

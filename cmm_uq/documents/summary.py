@@ -2,39 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.statement import Statement
+from cmm_uq.documents.in_short import Standing, Summary, Verdict, figure_row
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, measured, probability, title_of
-from cmm_uq.messages import Text, Verbatim, lines, say
+from cmm_uq.documents.wording import OUTCOME_WORDS, measured, probability, title_of
+from cmm_uq.messages import Text, Verbatim, commas, day, lines, number, say, semicolons
+from cmm_uq.uncertainty.rounding import significant
+
+_STANDING: Mapping[str, Standing] = {"pass": "good", "conditional fail": "bad", "fail": "bad"}
+"""Of an outcome; all others leave something open."""
 
 
-def summary(result: Result, warnings: Iterable[str]) -> list[tuple[str, str, str]]:
-    """Rows of what, figure and remark: what was measured, the figures, the decisions, the warnings."""
+def summary(result: Result, warnings: Iterable[Text]) -> Summary:
+    """What was measured, the decisions, the figures, the warnings."""
     facts, free = result.job.facts, {key for combination in result.undetermined for key in combination}
-    rows = [(
-        "Measured", f"{facts.machine.name}, {result.artefact.title.lower()}, {len(result.residuals)} observations",
-        facts.job.date.isoformat(),
-    )]  # fmt: skip
-    for name, quantity in result.accuracy.items():
-        value, U, k = expanded(quantity)
-        rows.append((TITLES[name], f"{value} ± {U} {quantity.unit}", f"k = {k}"))
-    for size in result.artefact.sizes:
-        if size.role == "sought":
-            value, U, k = expanded(result.sizes[size.name])
-            rows.append((size.title, f"{value} ± {U} {size.unit}", f"k = {k}"))
+    subject = say(
+        "{machine}, {artefact:small}, {count} observations",
+        machine=Verbatim(facts.machine.name), artefact=result.artefact.title, count=len(result.residuals),
+    )  # fmt: skip
+    figures = [figure_row(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
+    figures += [
+        figure_row(size.title, result.sizes[size.name]) for size in result.artefact.sizes if size.role == "sought"
+    ]
     for effect in result.model.effects:
         for name, quantity in result.parameters[effect.name].items():
-            value, U, k = expanded(quantity)
-            known = (effect.name, name) not in free
-            rows.append((
-                title_of((effect.name, name), result), f"{value} ± {U} {quantity.unit}" if known else "not determined",
-                f"k = {k}" if known else "",
-            ))  # fmt: skip
-    rows += [(each.facts.standard, each.outcome.upper(), _remark(each)) for each in result.statements]
-    return rows + [("Warning", text, "") for text in warnings]
+            key = (effect.name, name)
+            figures.append(figure_row(title_of(key, result), quantity, known=key not in free))
+    decided = tuple(_verdict(each) for each in result.statements)
+    return Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
 
 
 def in_short(result: Result) -> Text:
@@ -46,19 +44,29 @@ def in_short(result: Result) -> Text:
     )  # fmt: skip
 
 
-def _remark(statement: Statement) -> str:
-    """Value, limit and probability of a statement; what its test lacks."""
+def _verdict(statement: Statement) -> Verdict:
+    outcome = statement.outcome
+    subject = say(
+        "{standard}, {what}", standard=Verbatim(statement.facts.standard), what=Verbatim(statement.characteristic)
+    )
+    return Verdict(outcome.upper(), _STANDING.get(outcome, "open"), subject, tuple(_remarks(statement)))
+
+
+def _remarks(statement: Statement) -> list[Text]:
+    """Value, limit, uncertainty and probability of a statement; what its test lacks."""
     value, _ = measured(statement)
     chance = statement.decision.probability_conforming
-    told = [f"{value} µm against {statement.limit_um:.4g} µm"]
+    told: list[Text] = [say("{value} µm against {limit} µm", value=value, limit=number(statement.limit_um, ".4g"))]
+    if statement.u_um > 0:
+        told.append(say("test uncertainty U = {u} µm (k = 2)", u=significant(2 * statement.u_um)))
     if chance is not None:
-        told.append(f"conforming with {_chance(chance)}")
+        told.append(say("conforming with {chance}", chance=_chance(chance)))
     if statement.outcome == "incomplete":
-        told = [f"the {statement.measured} measured conform ({', '.join(told)})"]
+        told = [say("the {measured} measured conform ({figures})", measured=statement.measured, figures=commas(told))]
     if statement.missing:
-        told.append(f"missing: {'; '.join(statement.missing)}")
-    return "; ".join(told)
+        told.append(say("missing: {what}", what=semicolons(statement.missing)))
+    return told
 
 
-def _chance(p: float) -> str:
-    return probability(p).replace("<", "less than").replace(">", "more than")
+def _chance(p: float) -> Text:
+    return Verbatim(probability(p).replace("<", "less than").replace(">", "more than"))

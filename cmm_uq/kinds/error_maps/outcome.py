@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.documents.diagnosis_words import summary_rows
+from cmm_uq.documents.diagnosis_words import summary_of
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.kinds.error_maps import words
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed, diagnose_error_maps
@@ -11,10 +11,11 @@ from cmm_uq.kinds.error_maps.page import maps_document, maps_results
 
 def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
     """What there is to write of it."""
-    rows = summary_rows(found.diagnosis.verdict, found.diagnosis.p_value, words.lines(found), found.findings)
+    verdict, p_value = found.diagnosis.verdict, found.diagnosis.p_value
+    short = summary_of(found.job.facts, verdict, p_value, words.lines(found), found.findings)
     document = maps_document(found, seed)
-    consistent = found.diagnosis.verdict == "consistent"
-    return Outcome(found, document, maps_results(found, seed), rows, document.warnings, conforming=consistent)
+    consistent = verdict == "consistent"
+    return Outcome(found, document, maps_results(found, seed), short, document.warnings, conforming=consistent)
 
 
 OWN = OwnAnalysis(diagnose=Recipe(diagnose_error_maps, outcome))

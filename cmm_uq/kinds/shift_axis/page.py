@@ -6,12 +6,13 @@ from collections.abc import Iterable
 
 from cmm_uq.documents.as_found_section import Left
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.in_short import Summary
 from cmm_uq.documents.plots import curve_with_band
 from cmm_uq.documents.warning import not_converged
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shift_axis.curve_page import MOST_ROWS, beside_integrations, curve_section, residuals_section
 from cmm_uq.kinds.shifting.facts import shift_facts
-from cmm_uq.kinds.shifting.page import artefact_section, figures_section, method_section, summary_rows
+from cmm_uq.kinds.shifting.page import artefact_section, figures_section, method_section, summary_of
 from cmm_uq.messages import Number, Text, Verbatim, commas, number, plural, say
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.uncertainty.rounding import rounded
@@ -56,8 +57,8 @@ def warnings(result: ShiftResult) -> tuple[Text, ...]:
     return tuple(found)
 
 
-def summary(result: ShiftResult, warnings: Iterable[Text]) -> list[tuple[Text, Text, Text]]:
-    """Rows of what, figure and remark, for the end of a command."""
+def summary(result: ShiftResult, warnings: Iterable[Text]) -> Summary:
+    """For the end of a command."""
     series = result.estimate.series
     measured = say(
         "{name}, axis {axis}, {points} points in {placings} placings",
@@ -66,7 +67,7 @@ def summary(result: ShiftResult, warnings: Iterable[Text]) -> list[tuple[Text, T
         points=len(series.numbers),
         placings=len(series.shifts),
     )
-    return summary_rows(result.job, measured, quantities(result), warnings)
+    return summary_of(result.job, measured, quantities(result), warnings)
 
 
 def quantities(result: ShiftResult) -> list[Left]:

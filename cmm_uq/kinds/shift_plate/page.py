@@ -6,11 +6,12 @@ from collections.abc import Iterable
 
 from cmm_uq.documents.as_found_section import Left
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.in_short import Summary
 from cmm_uq.documents.warning import not_converged
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.kinds.shift_plate.curves_page import curves_section, residuals_section
 from cmm_uq.kinds.shift_plate.undetermined import title
-from cmm_uq.kinds.shifting.page import artefact_section, figures_section, method_section, summary_rows
+from cmm_uq.kinds.shifting.page import artefact_section, figures_section, method_section, summary_of
 from cmm_uq.messages import Number, Text, Verbatim, after, commas, listed, number, plural, say, sentences, signed
 from cmm_uq.points import AXES
 from cmm_uq.uncertainty.rounding import rounded
@@ -46,8 +47,8 @@ def _with_each_other(names: tuple[str, ...]) -> Text:
     return together
 
 
-def summary(result: PlaneShiftResult, warnings: Iterable[Text]) -> list[tuple[Text, Text, Text]]:
-    """Rows of what, figure and remark, for the end of a command."""
+def summary(result: PlaneShiftResult, warnings: Iterable[Text]) -> Summary:
+    """For the end of a command."""
     plate = result.estimate.plate
     measured = say(
         "{name}, plane {plane}, {balls} balls in {placings} placings",
@@ -56,7 +57,7 @@ def summary(result: PlaneShiftResult, warnings: Iterable[Text]) -> list[tuple[Te
         balls=len(plate.numbers),
         placings=len(plate.placings),
     )
-    return summary_rows(result.job, measured, quantities(result), warnings)
+    return summary_of(result.job, measured, quantities(result), warnings)
 
 
 def quantities(result: PlaneShiftResult) -> list[Left]:

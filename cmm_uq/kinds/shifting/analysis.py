@@ -54,10 +54,10 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
     )
     document = certificate_of(found.job, sections, told, produced_by, (Verbatim(table), Verbatim(draws.name)))
     told = document.warnings
-    rows = axis_page.summary(found, told) if isinstance(found, ShiftResult) else plane_page.summary(found, told)
+    short = axis_page.summary(found, told) if isinstance(found, ShiftResult) else plane_page.summary(found, told)
     files = {table: table_text(found.table), draws.name: draws.content}
     results["posterior"] = draws.entry
-    return Outcome(found, document, results, tuple(rows), told, files, draws=found.draws)
+    return Outcome(found, document, results, short, told, files, draws=found.draws)
 
 
 OWN = OwnAnalysis(report=Recipe(analyse, outcome))

@@ -6,14 +6,14 @@ from collections.abc import Iterable, Sequence
 
 from cmm_uq.documents.as_found_section import Left
 from cmm_uq.documents.document import Block, Facts, Paragraph, Section
+from cmm_uq.documents.in_short import Summary, figure_row
 from cmm_uq.documents.origin import file_name
 from cmm_uq.documents.stated import SIGN, stated_table
 from cmm_uq.documents.traceability_section import artefact_rows, certificate_rows, traceability_section
-from cmm_uq.documents.wording import expanded
 from cmm_uq.inference.ensembles import Chains
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.shifting.facts import shift_facts
-from cmm_uq.messages import NOTHING, Text, Verbatim, day, number, say
+from cmm_uq.messages import Text, Verbatim, day, number, say
 
 Named = Sequence[Left]
 """Quantities that are stated, each with its place in results.json and its name."""
@@ -44,13 +44,10 @@ def figures_section(caption: Text, named: Named, meaning: Text) -> Section:
     )
 
 
-def summary_rows(job: Job, what: Text, named: Named, warnings: Iterable[Text]) -> list[tuple[Text, Text, Text]]:
-    """Rows of what, figure and remark, for the end of a command."""
-    rows: list[tuple[Text, Text, Text]] = [(say("Measured"), what, day(job.facts.job.date))]
-    for _, _, name, quantity in named:
-        value, U, k = expanded(quantity)
-        rows.append((name, say("{value} ± {u} {unit}", value=value, u=U, unit=quantity.unit), say("k = {k}", k=k)))
-    return rows + [(say("Warning"), text, NOTHING) for text in warnings]
+def summary_of(job: Job, what: Text, named: Named, warnings: Iterable[Text]) -> Summary:
+    """What was measured, its figures and warnings, for the end of a command."""
+    figures = tuple(figure_row(name, quantity) for _, _, name, quantity in named)
+    return Summary(what, day(job.facts.job.date), figures=figures, warnings=tuple(warnings))
 
 
 def artefact_section(

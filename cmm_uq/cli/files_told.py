@@ -1,0 +1,58 @@
+"""What each file is that a command has written, in a few words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+
+from cmm_uq.jobs.origin import COMPENSATED, SIMULATED
+from cmm_uq.writing import MANIFEST
+
+_WHAT = {
+    "certificate.html": "the certificate",
+    "certificate.pdf": "the certificate",
+    "diagnosis.html": "the diagnosis, with its plots",
+    "plan.html": "the plan, with a picture of each placing",
+    "plan.csv": "the placings, to be filled in as the recording",
+    "budget.html": "the budget",
+    "budget.pdf": "the budget",
+    "results.json": "every figure, for other programs",
+    "posterior.npz": "draws of the posterior, for other programs",
+    "correction_table.csv": "correction table, for compensate",
+    "job.toml": "the job",
+    "truth.toml": "what it was drawn from",
+    "compensation.json": "how the coordinates came about",
+    MANIFEST: "name, size and hash of each file",
+}
+
+
+def told(files: Mapping[str, Path], *, whole: bool) -> list[tuple[str, str]]:
+    """Rows of what was written and what it is; files that are the same thing on one row.
+
+    Parameters
+    ----------
+    files : by name.
+    whole : whether each file has a row of its own, with its path.
+    """
+    if whole:
+        return [(str(path), _what(name)) for name, path in files.items()]
+    by_what: dict[str, list[str]] = {}
+    for name in files:
+        if name == MANIFEST:
+            continue  # a list of the others
+        by_what.setdefault(_what(name), []).append(name)
+    return [(", ".join(names), what) for what, names in by_what.items()]
+
+
+def _what(name: str) -> str:
+    path = PurePosixPath(name)
+    plain = path.stem
+    for origin in (SIMULATED, COMPENSATED):
+        plain = plain.removesuffix(f"-{origin}")
+    what = _WHAT.get(plain + path.suffix, "of the job")
+    return what.replace("certificate", "evaluation, not a certificate") if plain != path.stem else what
+
+
+def folder_of(files: Mapping[str, Path]) -> str:
+    """Folder that they were written to."""
+    return next((str(path.parent) for name, path in files.items() if "/" not in name), "")
