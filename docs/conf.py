@@ -17,11 +17,11 @@ sys.path.insert(0, str(ROOT))
 from cmm_uq import __version__  # noqa: E402
 
 CONTENTS: dict[str, list[str]] = {
-    "Start here": ["tutorial", "gallery"],
+    "Start here": ["tutorial", "overview", "gallery"],
     "How to": [
         "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*", "import/*",
     ],
-    "Reference": ["running", "api", "reference/*", "uncertainty/model-file", "machine/effects", "limits"],
+    "Reference": ["running", "words", "api", "reference/*", "uncertainty/model-file", "machine/effects", "limits"],
     "How it works": [
         "certificate", "standards", "noise", "screening", "diagnosis", "planning", "selfcalibration", "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",

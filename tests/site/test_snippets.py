@@ -92,6 +92,8 @@ def test_a_whole_toml_file_is_read(page: Path, project: Path) -> None:
             assert cmm_uq.read(project).facts.job.id == keys["job"]["id"]
         elif "outputs" in keys.get("model", {}):
             assert read_model_file(path).evaluate().stated
+        elif "effects" in keys:
+            assert cmm_uq.simulate(ROOT / "examples" / "iota-1102-20C", path).origin == "simulated"
         else:
             assert set(keys) == {"project"}, f"{snippet}: mark it as an excerpt"  # run by test_contributing.py
 
