@@ -6,7 +6,7 @@ import os
 
 import typer
 
-from cmm_uq.cli import budget, compensate, diagnose, new, plan, report, schema, selftest, simulate
+from cmm_uq.cli import budget, compensate, diagnose, importing, new, plan, report, schema, selftest, simulate
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError
 
@@ -21,6 +21,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("new")(new.command)
+app.command("import")(importing.command)
 app.command("report")(report.command)
 app.command("diagnose")(diagnose.command)
 app.command("plan")(plan.command)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmm_uq.cli.importing import show_imported
 from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
 from cmm_uq.cli.printing import conclude, say
 from cmm_uq.cli.progress import shown
@@ -29,7 +30,15 @@ def command(
     with shown(quiet=quiet or json) as stage:
         from cmm_uq.commands.report import write_diagnosis
 
-        written = write_diagnosis(job, out, seed=seed, alpha=alpha, force=force, stage=stage)
+        written = write_diagnosis(
+            job,
+            out,
+            seed=seed,
+            alpha=alpha,
+            force=force,
+            stage=stage,
+            told=None if quiet or json else show_imported,
+        )
     conclude(written, _summarise, json=json, quiet=quiet, strict=strict)
 
 

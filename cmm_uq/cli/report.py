@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmm_uq.cli.importing import show_imported
 from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict
 from cmm_uq.cli.printing import conclude, table
 from cmm_uq.cli.progress import shown
@@ -28,7 +29,14 @@ def command(
     with shown(quiet=quiet or json) as stage:
         from cmm_uq.commands.report import write_report
 
-        report = write_report(job, out, seed=seed, force=force, stage=stage)
+        report = write_report(
+            job,
+            out,
+            seed=seed,
+            force=force,
+            stage=stage,
+            told=None if quiet or json else show_imported,
+        )
     conclude(report, _summarise, json=json, quiet=quiet, strict=strict)
 
 
