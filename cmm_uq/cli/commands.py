@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.cli import BAD_INPUT, budget, compensate, diagnose, new, plan, report, schema, selftest, simulate
+from cmm_uq.cli import BAD_INPUT, budget, compensate, diagnose, importing, new, plan, report, schema, selftest, simulate
 from cmm_uq.cli.options import examples
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError
@@ -23,6 +23,7 @@ app = typer.Typer(
 )
 for module, short in {
     new: "A job folder that runs, every key explained.",
+    importing: "What is recognised of a laboratory's export.",
     report: "The certificate of a recording: estimates, figures, decisions.",
     diagnose: "What a recording shows that its model leaves out.",
     plan: "What to measure, and what it will tell.",
@@ -32,7 +33,7 @@ for module, short in {
     schema: "The JSON Schema of a file, for editors.",
     selftest: "Published reference figures, computed here and compared.",
 }.items():
-    name = module.__name__.rpartition(".")[2]
+    name = "import" if module is importing else module.__name__.rpartition(".")[2]
     app.command(name, short_help=short, epilog=getattr(module, "EXAMPLES", None))(module.command)
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),

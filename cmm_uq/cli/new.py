@@ -5,14 +5,18 @@ from __future__ import annotations
 import sys
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cmm_uq.cli.deferred import defer_scipy
+from cmm_uq.cli.importing import Columns, Keys, keys_of, show
 from cmm_uq.cli.options import Quiet
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError
+
+if TYPE_CHECKING:
+    from cmm_uq.jobs.importing.keys import ImportKeys
 
 
 def command(
@@ -26,6 +30,12 @@ def command(
         list[str] | None,
         typer.Option("--set", help='Any key of job.toml: artefact.length_mm=500, job.customer="A Ltd".'),
     ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option("--from", help="Begin from a laboratory's export; needs --machine. See cmm-uq import."),
+    ] = None,
+    column: Columns = None,
+    key: Keys = None,
     quiet: Quiet = False,
 ) -> None:
     """Begin a job: job.toml with every key explained, and a simulated recording to be replaced by your own.
@@ -42,6 +52,9 @@ def command(
     target = folder or Path(kind)
     check_empty(target)
     given = _given(machine, serial, settings or [])
+    if export is not None:
+        _of_export(kind, export, target, given, keys_of(column, key), quiet=quiet)
+        return
     if not given and not quiet and kind != BUDGET and kind in known() and _asked_on_a_terminal():
         from cmm_uq.cli.asking import answers
 
@@ -55,6 +68,20 @@ def command(
             .split("\n\n")[1]
             .replace(" .` in this folder", f" {target}`")
         )
+
+
+def _of_export(
+    kind: str, export: Path, folder: Path, given: dict[str, dict[str, Any]], keys: ImportKeys, *, quiet: bool
+) -> None:  # fmt: skip
+    """Show what is recognised of an export, then write the job around it."""
+    from cmm_uq.commands.importing import read_export, write_job_of_export
+
+    recognised = read_export(export, keys).recognised
+    if not quiet:
+        show(recognised)
+    files = write_job_of_export(kind, export, folder, given, keys)
+    if not quiet:
+        say(f"{folder}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
 
 
 def _asked_on_a_terminal() -> bool:

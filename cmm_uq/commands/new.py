@@ -9,7 +9,7 @@ from __future__ import annotations
 import datetime as dt
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -117,26 +117,25 @@ def job_files(kind: str, tables: Tables, files: Mapping[str, bytes]) -> dict[str
     }  # fmt: skip
 
 
-def job_of_rows(
-    kind: str, columns: Sequence[str], rows: Iterable[Sequence[object]], tables: Tables, *, id: str  # noqa: A002
-) -> dict[str, bytes]:  # fmt: skip
-    """A new job of a recording that was measured: the kind's usual keys around it.
+def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: str) -> dict[str, bytes]:  # noqa: A002
+    """A new job of a recording that was measured: nothing of machine, artefact and limits but what is given.
 
     Parameters
     ----------
-    kind : of measurement.
-    columns, rows : of the recording, named as a recording names them.
-    tables : what job.toml is to say beside what follows from the kind.
+    kind : of measurement, or a further name of it.
+    given : what job.toml is to say, by table and key.
+    files : the recording that it names, and other files.
     id : of the job.
 
     Raises
     ------
     CmmUqError : the readers of a job refuse it.
     """
-    found = _kind(kind)
-    lines = [",".join(columns), *(",".join(str(cell) for cell in row) for row in rows)]
-    whole = _tables(found, found.beginning(kind), tables, id, origin=MEASURED)
-    return job_files(kind, whole, {RECORDING: ("\n".join(lines) + "\n").encode()})
+    found, begin = _begun(kind)
+    bare = replace(begin, artefact={}, machine={}, conformity=None)
+    whole = _tables(found, bare, given, id, origin=MEASURED)
+    whole["machine"] = dict(given["machine"])
+    return job_files(found.name, whole, files)
 
 
 @naming_package()
@@ -185,7 +184,7 @@ def write_new(name: str, folder: Path, given: Tables) -> dict[str, Path]:
     OutputError : the folder cannot be written to.
     """
     check_empty(folder)
-    id = str(given.get("job", {}).get("id", "")) or _id_of(folder.resolve().name or name)  # noqa: A001
+    id = job_id(folder, given, name)  # noqa: A001
     if name == BUDGET:
         from cmm_uq.commands.new_budget import budget_files
 
@@ -199,6 +198,11 @@ def write_new(name: str, folder: Path, given: Tables) -> dict[str, Path]:
     with staged(folder, Owner("new", id, origin), expected=files) as place:
         check_empty(folder, but=".unfinished-")
         return place.write(files)
+
+
+def job_id(folder: Path, given: Tables, otherwise: str = "job") -> str:
+    """Id of a new job: as given, or by its folder's name."""
+    return str(given.get("job", {}).get("id", "")) or _id_of(folder.resolve().name or otherwise)
 
 
 def check_empty(folder: Path, but: str = "") -> None:

@@ -13,6 +13,8 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq import __version__
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import DERIVING, MEASURED, SIMULATED
 
@@ -22,8 +24,32 @@ OF_THE_CERTIFICATE = ("number", "issued", "recalibration_agreed", "as_found")
 """Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
 OF_THE_RECORDED_MACHINE = ("short_gauge",)
 """Tables that speak of the machine as it was recorded, not of one simulated or compensated."""
+DERIVED_RECORDING = "recording.csv"
+"""Name of a recording that was made from one in another format."""
 IN_THE_RECORDING = ("temperature_log",)
 """Keys of ``[machine]`` whose figures stand in every recording that a command writes."""
+
+
+def recording_name(job: Job) -> str:
+    """Name of the recording that a command makes from a job's: its own, or another where that one was imported.
+
+    Raises
+    ------
+    CmmUqError : an earlier recording was imported too, which the derived job could no longer read.
+    """
+    if not job.imported:
+        return job.facts.recording.file
+    if job.facts.recording.earlier is not None:
+        raise CmmUqError("an imported recording that is compared with an earlier one cannot be simulated",
+                         where=f"{job.folder / 'job.toml'} [recording] earlier",
+                         fix="Write both in the project's own format first: cmm-uq import FILE --out recording.csv")  # fmt: skip
+    return DERIVED_RECORDING
+
+
+def kept_inputs(job: Job) -> dict[str, bytes]:
+    """Inputs of a job that one derived from it has too: not its job.toml, nor a recording that was imported."""
+    left = {"job.toml", *([job.facts.recording.file] if job.imported else [])}
+    return {name: content for name, content in job.inputs.items() if name not in left}
 
 
 def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tuple[str, ...] = ()) -> bytes:
@@ -49,9 +75,10 @@ def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tupl
             "job": job.facts.job.id, "by": by, "program": PROGRAM, "inputs": _hashes(job.inputs), "files": written,
         },
     }  # fmt: skip
-    wanted = _changed(tomllib.loads(text), changes, without)
+    file = recording_name(job) if job.imported else None
+    wanted = _changed(tomllib.loads(text), changes, without, file)
     try:
-        document = _changed(tomlkit.parse(text), changes, without)
+        document = _changed(tomlkit.parse(text), changes, without, file)
         kept = tomlkit.dumps(document)
         if tomllib.loads(kept) == wanted:
             return kept.encode()
@@ -60,7 +87,7 @@ def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tupl
     return tomlkit.dumps(wanted).encode()
 
 
-def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...]) -> Any:
+def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...], file: str | None) -> Any:
     table = document["job"]
     for key in (*OF_THE_CERTIFICATE, *changes):
         if key in table:
@@ -73,6 +100,11 @@ def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...]
     for key in without:
         if key in document["machine"]:
             del document["machine"][key]
+    if file is not None:
+        document["recording"]["file"] = file
+        for key in ImportKeys.model_fields:
+            if key in document["recording"]:
+                del document["recording"][key]
     return document
 
 

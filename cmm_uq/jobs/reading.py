@@ -25,6 +25,7 @@ from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_mark, is_planned
 from cmm_uq.jobs.recording_file import read_recording_file
+from cmm_uq.jobs.reference_file import reference_file, with_references
 from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
 from cmm_uq.jobs.short_gauge import ShortGauge, short_gauge_of
@@ -92,9 +93,10 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
                          where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
     machine = _machine(facts.machine)
     maps, logs, calibrations = _of_the_machine(facts.machine)
+    certificate = reference_file(facts.artefact)
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
     recordings += [facts.short_gauge.file] if facts.short_gauge else []
-    check_distinct([*recordings, *maps, *logs, *calibrations], str(path))
+    check_distinct([*recordings, *maps, *logs, *calibrations, *certificate], str(path))
     before = results_named(facts.job.as_found)
     others = calibrations if before is None else [*calibrations, before]
     inputs |= _contents(source, others, TABLE_BYTES, written=True)
@@ -107,7 +109,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     if not recorded and not source.has(facts.recording.file):
         return Job(folder, facts, _no_points(machine), inputs)
     derived = facts.job.derived_from
-    inputs |= _contents(source, [*recordings, *logs], TABLE_BYTES) | _contents(source, maps, MAP_BYTES)
+    inputs |= _contents(source, [*recordings, *logs, *certificate], TABLE_BYTES) | _contents(source, maps, MAP_BYTES)
     if derived is not None:
         others = [name for name in derived.files if name not in inputs]
         inputs |= _contents(source, others, TABLE_BYTES, written=True)
@@ -115,6 +117,9 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     points, recognised = read_recording_file(inputs[facts.recording.file], where, machine, facts.recording)
     told = [recognised]
+    if certificate:
+        points, recognised = with_references(points, facts.artefact, inputs, folder, where)
+        told.append(recognised)
     planned = is_planned(inputs[facts.recording.file])
     if not planned:  # a plan has no times yet
         points = with_logged(points, log_of(facts.machine, inputs, folder), path, where)

@@ -15,6 +15,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.cells import cells_of, column_problem
 from cmm_uq.files.numbers import LARGEST, numbers
+from cmm_uq.jobs.other_units import conversion
 from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.points import Floats, Machine, Points
 
@@ -130,7 +131,7 @@ def _check_header(header: Sequence[str], name: str) -> None:
         known = QUANTITIES.get(OTHER_UNITS.sub("", column))
         if known and column not in (*REQUIRED, *OPTIONAL):
             raise CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where,
-                             fix=f"Convert it and name it {known}")  # fmt: skip
+                             fix=conversion(column, [known]) or f"Convert it and name it {known}, or say unit under [recording]")  # fmt: skip
     for column in REQUIRED:
         if column not in header:
             unread = " (of an axis that nobody reads, give one number in all rows)" * column.endswith("_mm")

@@ -17,6 +17,7 @@ from tomlkit.exceptions import TOMLKitError
 from cmm_uq.errors import CmmUqError, shortened, suggestion
 from cmm_uq.files.content import text_of
 from cmm_uq.files.toml import toml_of
+from cmm_uq.jobs.other_units import conversion
 
 Facts = TypeVar("Facts", bound=BaseModel)
 
@@ -94,7 +95,8 @@ def _located(error: ErrorDetails, text: str, path: Path, model: type[BaseModel])
     if error["type"] == "missing":
         return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}")
     if error["type"] == "extra_forbidden":
-        return CmmUqError("unknown key", where=where, fix=suggestion(named[-1], _known_keys(named[:-1], model)))
+        known = _known_keys(named[:-1], model)
+        return CmmUqError("unknown key", where=where, fix=conversion(named[-1], known) or suggestion(named[-1], known))
     message = error["msg"].removeprefix("Value error, ")
     tables = isinstance(error["input"], dict) or (
         isinstance(error["input"], list) and any(isinstance(item, dict) for item in error["input"])

@@ -87,8 +87,10 @@ def columns_of(
     values = {name: table.in_units(name, parts, unit) for name, parts in written.items() if parts}
     numbers, facts = table.numbers(sign)
     lines = np.repeat(np.array([sheet.lines[i] for i in rows.at], dtype=np.int64), header.points)
+    labels = table.labels()
+    if not points and POINT not in numbers and labels and all(label.isdecimal() for label in labels):
+        numbers[POINT] = np.array([float(label) for label in labels])
     if points:
-        labels = table.labels()
         numbers, further = completed(numbers, labels, len(lines), keys, table.start())
         facts += further
     left_out = [name for name, parts in written.items() if not parts]
@@ -237,9 +239,12 @@ def _rows(sheet: Sheet, header: Header, where: str) -> _Rows:
     ]
     at: Sequence[int] = range(first, first + len(body))
     after = 0
-    if set(map(len, body)) - {width} or any(not row[i] and row[i] == "" for row in body for i in needed[:1]):
-        at, after = _usable(sheet, header, needed, where)
-        body = [_exactly(sheet.rows[i], width) for i in at]
+    if not set(map(len, body)) - {width}:
+        columns = list(zip(*body, strict=True))
+        if columns and not any("" in columns[i] for i in needed):
+            return _Rows(columns, at, after)
+    at, after = _usable(sheet, header, needed, where)
+    body = [_exactly(sheet.rows[i], width) for i in at]
     if not body:
         raise CmmUqError("has a header and no rows of figures", where=sheet.at(where, header.row),
                          fix="Export the table with its figures")  # fmt: skip

@@ -33,6 +33,7 @@ _POINT_DECIMAL = re.compile(
 )
 """A point that can only be a decimal one."""
 
+_TWO_COMMAS = re.compile(r",\d*,")
 _POINT_GROUPS = re.compile(r"^[+-]?[1-9]\d{0,2}(?:\.\d{3}){2,}$", re.MULTILINE)
 _GROUPED = {
     sign: re.compile(rf"[+-]?\d{{1,3}}(?:(?:[{_BLANKS}]\d{{3}})+|(?:{group}\d{{3}})+)(?:{mark}\d*)?{_E}")
@@ -59,11 +60,13 @@ def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -
     """
     if asked is not None:
         return asked
-    texts = ["\n".join([cell if isinstance(cell, str) else "" for cell in column]) for column in columns]
+    texts = [_joined(column) for column in columns]
     if not any("," in text for text in texts):
         return "," if any(_POINT_GROUPS.search(text) for text in texts) else "."
-    comma = _first(texts, (_COMMA_DECIMAL, _POINT_GROUPS))
-    point = _first(texts, (_COMMA_GROUPS, _POINT_DECIMAL))
+    points = any("." in text for text in texts)
+    comma = _first(texts, (_COMMA_DECIMAL, _POINT_GROUPS) if points else (_COMMA_DECIMAL,))
+    groups = (_COMMA_GROUPS,) if any(_TWO_COMMAS.search(text) for text in texts) or points else ()
+    point = _first(texts, (*groups, _POINT_DECIMAL) if points else groups)
     if comma and point:
         raise CmmUqError(
             f"{comma[2]!r} has a decimal comma, and {point[2]!r} ({at(*point[:2])}) has a decimal point",
@@ -76,6 +79,13 @@ def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -
     value = str(columns[i][row])
     raise CmmUqError(f"{value!r} can be {value.replace(',', '')} or {value.replace(',', '.')}, and no number of the file tells",
                      where=at(i, row), fix='Say decimal = "," or decimal = "."')  # fmt: skip
+
+
+def _joined(cells: Sequence[Cell]) -> str:
+    """The texts among the cells, each on its line."""
+    if set(map(type, cells)) <= {str}:
+        return "\n".join(cells)  # type: ignore[arg-type]
+    return "\n".join([cell if isinstance(cell, str) else "" for cell in cells])
 
 
 def _first(texts: Sequence[str], patterns: Sequence[re.Pattern[str]]) -> tuple[int, int, str] | None:
@@ -123,17 +133,20 @@ def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> Flo
     ------
     CmmUqError : a cell is no number.
     """
-    if not any(isinstance(cell, str) for cell in cells):
+    sorts = set(map(type, cells))
+    if str not in sorts:
         return _of_numbers(np.array(cells, dtype=np.float64), at)
-    if any(not isinstance(cell, str) for cell in cells):
+    if len(sorts) > 1:
         return np.array([values_of([cell], sign, lambda _, row=row: at(row))[0] for row, cell in enumerate(cells)])  # type: ignore[misc]
-    texts = [str(cell) for cell in cells]
+    texts: Sequence[str] = cells  # type: ignore[assignment]
     joined = "\n".join(texts)
     if "−" in joined:
         joined = joined.replace("−", "-")
         texts = joined.split("\n")
-    if "," in joined or any(blank in joined for blank in _BLANKS) or (sign == "," and "." in joined):
+    if (sign == "," and "." in joined) or (sign == "." and "," in joined) or any(blank in joined for blank in _BLANKS):
         texts = [_plain(text, sign, row, at) for row, text in enumerate(texts)]
+    elif sign == ",":
+        texts = joined.replace(",", ".").split("\n")
     return numbers(texts, at)
 
 

@@ -70,6 +70,7 @@ _NORMAL = _set("normal normale normala vector vektor vecteur vettore n")
 _TIP = _set("tip taster stylus tastkopf palpeur tastatore palpador offset")
 _SMALL = _set("no nr n number nummer numero num")
 
+_FIGURES = frozenset("0123456789+-−.,")
 _OWN = frozenset((*REQUIRED, *OPTIONAL))
 _IN_BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]*?)\s*[\])>}]\s*$")
 _AFTER_SIGN = re.compile(r"\s*(?:/|\bin\b|,|:)\s*([^\s/,:]+)\s*$", re.IGNORECASE)
@@ -100,6 +101,8 @@ def understood(heading: str) -> Heading:
     """What a heading says."""
     if heading in _OWN:
         return Heading(heading)
+    if heading[:1] in _FIGURES:
+        return Heading()
     text, unit, odd = _without_unit(heading)
     words = _words(text)
     indices = [int(word) for word in words if word.isdigit()]
