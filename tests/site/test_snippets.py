@@ -29,8 +29,9 @@ def having(*languages: str, excerpt: bool = False) -> list[object]:
 
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder with nothing but the examples, where a reader would stand."""
+    """A folder with nothing but the examples and the tutorial's workbook, where a reader would stand."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
+    shutil.copy(ROOT / "docs" / "tutorial" / "ballbar-export.xlsx", tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -54,7 +55,7 @@ def test_a_page_runs_from_its_top_to_its_end(page: Path, project: Path) -> None:
 
 def obeyed(snippet: Snippet, project: Path) -> None:
     """Run the lines after ``$``; what follows one is found in its output. A code other than 0 is shown by ``echo $?``."""
-    lines = snippet.text.splitlines()
+    lines = snippet.text.replace("\\\n", " ").splitlines()
     here, code, output = project, 0, ""
     for line, following in zip(lines, [*lines[1:], ""], strict=True):
         if line == "$ echo $?":
