@@ -6,7 +6,7 @@ import os
 
 import typer
 
-from cmm_uq.cli import budget, compensate, diagnose, importing, new, plan, report, schema, selftest, simulate
+from cmm_uq.cli import budget, check, compensate, diagnose, importing, new, plan, report, schema, selftest, simulate
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError
 
@@ -22,6 +22,7 @@ app = typer.Typer(
 )
 app.command("new")(new.command)
 app.command("import")(importing.command)
+app.command("check")(check.command)
 app.command("report")(report.command)
 app.command("diagnose")(diagnose.command)
 app.command("plan")(plan.command)
