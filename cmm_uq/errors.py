@@ -8,7 +8,8 @@ Whatever an input holds, its message is one line that a terminal shows as it is 
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 
 LONGEST_MESSAGE = 300 - len("cmm-uq: ")
@@ -16,6 +17,12 @@ LONGEST_MESSAGE = 300 - len("cmm-uq: ")
 
 _LISTED = 220
 """Characters of a list of known names; such a list is no longer read."""
+
+_FAMILY = 9
+"""Names that begin with the whole word, up to which all of them are suggested: three axes about three."""
+
+MOST_GATHERED = 50
+"""Problems that are said of one input."""
 
 _COMPARED = 100
 """Characters of a word that is compared with the known names: none of them is longer."""
@@ -33,10 +40,15 @@ class CmmUqError(Exception):
     problem : what is wrong, one sentence without a full stop.
     where : file, with line, key or column.
     fix : what to do about it.
+
+    Attributes
+    ----------
+    also : what else is wrong with the same input, where its reader went on.
     """
 
     def __init__(self, problem: str, *, where: str | None = None, fix: str | None = None) -> None:
         self.problem, self.where, self.fix = problem, where, fix
+        self.also: tuple[CmmUqError, ...] = ()
         super().__init__(str(self))
 
     def __str__(self) -> str:
@@ -79,9 +91,44 @@ class OutputError(CmmUqError):
     """The system refuses the output: a full disk, a missing permission, a closed pipe."""
 
 
+class Gathered:
+    """What is wrong with an input, one thing beside the other, until nothing more can be said of it."""
+
+    def __init__(self) -> None:
+        self.problems: list[CmmUqError] = []
+
+    @contextmanager
+    def going_on(self) -> Iterator[None]:
+        """Keep an error of this part, and go on behind it."""
+        try:
+            yield
+        except CmmUqError as error:
+            self.add(error)
+
+    def add(self, error: CmmUqError) -> None:
+        """Keep an error, with what was gathered in it."""
+        if len(self.problems) < MOST_GATHERED:
+            self.problems += [error, *error.also]
+
+    def refuse(self) -> None:
+        """Raise the first error with the others in it; nothing where there is none.
+
+        Raises
+        ------
+        CmmUqError : something was gathered.
+        """
+        if self.problems:
+            first, *others = self.problems
+            first.also = tuple(others[: MOST_GATHERED - 1])
+            raise first
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Answer to an unknown name: the nearest known one, else all of them, or as many as can be read."""
     names = sorted(known)
+    family = [name for name in names if name.startswith(f"{word}_")] if word not in names else []
+    if 1 < len(family) <= _FAMILY:
+        return f"Did you mean {', '.join(map(repr, family))}?"
     near = get_close_matches(word, names, n=1, cutoff=0.6) if len(word) <= _COMPARED else []
     if near:
         return f"Did you mean {near[0]!r}?"

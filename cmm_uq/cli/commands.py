@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.cli import BAD_INPUT, budget, compensate, diagnose, importing, new, plan, report, schema, selftest, simulate
+from cmm_uq.cli import BAD_INPUT, budget, check, compensate, diagnose, importing, new, plan, report, schema, selftest, simulate
 from cmm_uq.cli.options import examples
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError
@@ -24,6 +24,7 @@ app = typer.Typer(
 for module, short in {
     new: "A job folder that runs, every key explained.",
     importing: "What is recognised of a laboratory's export.",
+    check: "All that is wrong with jobs, without computing.",
     report: "The certificate of a recording: estimates, figures, decisions.",
     diagnose: "What a recording shows that its model leaves out.",
     plan: "What to measure, and what it will tell.",

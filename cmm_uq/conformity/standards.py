@@ -166,23 +166,42 @@ def statement(
     CmmUqError : there is no such standard, the recording is not what it is decided on, or the rule needs an uncertainty
         that is not stated.
     """
+    under = circumstances or Circumstances()
+    standard, characteristic = decidable(facts, artefact.kind, key, tested, under)
+    whole, beside = recorded or artefact, characteristic.beside
+    if beside is not None:
+        artefact, whole = beside(artefact, under.short_gauge), beside(whole, under.short_gauge)
+    return characteristic.statement(Test(standard, characteristic, facts, artefact, whole, accuracy, key, under))
+
+
+def decidable(
+    facts: ConformityFacts, kind: str, key: str, tested: Collection[str], under: Circumstances
+) -> tuple[Standard, Characteristic]:  # fmt: skip
+    """The standard that a job names, and its characteristic, where they can be decided on a kind of measurement.
+
+    Parameters
+    ----------
+    facts, key, tested : see :func:`statement`.
+    kind : of measurement.
+    under : circumstances of the test.
+
+    Raises
+    ------
+    CmmUqError : there is no such standard, or it is for other artefacts or probes.
+    """
     standard = standard_named(facts.standard)
     if standard is None:
         raise CmmUqError(f"no standard {facts.standard!r} is decided", where=f"job.toml {key} standard",
                          fix=suggestion(facts.standard, names()))  # fmt: skip
     characteristic = characteristic_of(standard, facts, key)
     if characteristic.observed not in tested:
-        raise CmmUqError(f"{facts.standard} is not decided on a {artefact.kind}", where=f"job.toml {key} standard",
+        raise CmmUqError(f"{facts.standard} is not decided on a {kind}", where=f"job.toml {key} standard",
                          fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
-    under = circumstances or Circumstances()
     if None not in (standard.sensing, under.probe.sensing) and standard.sensing != under.probe.sensing:
         raise CmmUqError(f"{facts.standard} is for {standard.sensing} probes, and the recording was made with one that is not",
                          where=f"job.toml {key} standard",
                          fix="State ISO 10360-8:2013 of optical probes, or leave the statement out")  # fmt: skip
-    whole, beside = recorded or artefact, characteristic.beside
-    if beside is not None:
-        artefact, whole = beside(artefact, under.short_gauge), beside(whole, under.short_gauge)
-    return characteristic.statement(Test(standard, characteristic, facts, artefact, whole, accuracy, key, under))
+    return standard, characteristic
 
 
 def standard_named(name: str) -> Standard | None:

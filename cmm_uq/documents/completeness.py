@@ -17,13 +17,17 @@ from cmm_uq.messages import Text, Verbatim, day, say, semicolons
 
 def formal_warnings(job: Job) -> tuple[Text, ...]:
     """What an assessor would hold against a certificate of this job, whatever was measured."""
-    if job.origin != MEASURED:
-        return ()
+    return (*contradictions(job), *_missing(job.facts)) if job.origin == MEASURED else ()
+
+
+def contradictions(job: Job) -> tuple[Text, ...]:
+    """Dates out of their order, and an artefact that was certified on the machine which it tests."""
     found = None if job.as_found is None else job.as_found.job.date
-    return (*_circular(job.facts), *_dates(job.facts, found), *_missing(job.facts))
+    return (*_circular(job.facts), *_dates(job.facts, found))
 
 
-def _missing(facts: JobFile) -> list[Text]:
+def unstated(facts: JobFile) -> list[tuple[Text, str]]:
+    """What the certificate should state and the job does not, each with the key that mends it."""
     wanted: tuple[tuple[object, Text, str], ...] = (
         (facts.laboratory.name, say("name of the laboratory (7.8.2.1 b)"), "[laboratory] name"),
         (facts.laboratory.address, say("address of the laboratory (7.8.2.1 b)"), "[laboratory] address"),
@@ -38,7 +42,11 @@ def _missing(facts: JobFile) -> list[Text]:
         *_of_the_artefact(facts),
         *_of_the_short_gauge(facts),
     )
-    missing = [say("{what}: {key}", what=what, key=Verbatim(key)) for given, what, key in wanted if not given]
+    return [(what, key) for given, what, key in wanted if not given]
+
+
+def _missing(facts: JobFile) -> list[Text]:
+    missing = [say("{what}: {key}", what=what, key=Verbatim(key)) for what, key in unstated(facts)]
     if not missing:
         return []
     return [say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=semicolons(missing))]

@@ -10,7 +10,7 @@ from math import isfinite
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.errors import CmmUqError, Gathered
 from cmm_uq.points import Floats
 
 SMALLEST, LARGEST = 1e-30, 1e15
@@ -61,7 +61,7 @@ def numbers(cells: Sequence[str], where: Callable[[int], str]) -> Floats:
 
     Raises
     ------
-    CmmUqError : a cell is no number, or one beyond :data:`SMALLEST` and :data:`LARGEST`.
+    CmmUqError : a cell is no number, or one beyond :data:`SMALLEST` and :data:`LARGEST`; every such cell.
     """
     try:
         values = np.array(list(map(float, cells)), dtype=np.float64)
@@ -72,7 +72,9 @@ def numbers(cells: Sequence[str], where: Callable[[int], str]) -> Floats:
         # a zero may be a number that is too small to be told from it
         beyond = np.flatnonzero(~((sizes >= SMALLEST) & (sizes <= LARGEST))).tolist()
         doubtful = [i for i in beyond if cells[i] != "0"] if _plain("".join(cells)) else range(len(cells))
+    wrong = Gathered()
     for i in doubtful:
         if problem := number_problem(cells[i]):
-            raise CmmUqError(problem[0], where=where(i), fix=problem[1])
+            wrong.add(CmmUqError(problem[0], where=where(i), fix=problem[1]))
+    wrong.refuse()
     return values

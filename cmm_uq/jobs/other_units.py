@@ -32,7 +32,7 @@ def conversion(given: str, known: Collection[str]) -> str | None:
     6.4.9).
     """
     if given.startswith("U_") and (standard := f"u_{given[2:]}") in known:
-        return f"It is an expanded uncertainty: {standard} = {given} / k, with the k of the certificate"
+        return f"Give {standard} = U/k, the standard uncertainty: U is k times as large"
     if given.casefold() in _FREEDOM and (standard := next((key for key in known if key.startswith("u_")), "")):
         return (
             f"Give {standard} = u · √(ν/(ν − 2)), the standard deviation of a t distribution with ν degrees of freedom"

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import create_model
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.errors import CmmUqError, Gathered
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.as_found import as_found_of
@@ -206,8 +206,12 @@ def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def _contents(source: Source, names: Sequence[str], limit: Limit, *, written: bool = False) -> dict[str, bytes]:
-    fix = f"Put it beside job.toml, or mend its name in {source.toml}"
-    return {name: source.content(name, limit, fix, written=written) for name in names}
+    fix, found, wrong = f"Put it beside job.toml, or mend its name in {source.toml}", dict[str, bytes](), Gathered()
+    for name in names:
+        with wrong.going_on():
+            found[name] = source.content(name, limit, fix, written=written)
+    wrong.refuse()
+    return found
 
 
 def _no_points(machine: Machine) -> Points:

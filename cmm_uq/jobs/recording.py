@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.files.cells import cells_of, column_problem
 from cmm_uq.files.numbers import LARGEST, numbers
 from cmm_uq.jobs.other_units import conversion
@@ -60,14 +60,20 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
     """
     header, rows, lines = _table(content, name)
     _check_header(header, name)
+    wrong, table = Gathered(), dict[str, Floats]()
 
     def column_of(i: int) -> Floats:
         return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}")
 
-    return points_of({column: column_of(i) for i, column in enumerate(header)}, lines, name, machine)
+    for i, column in enumerate(header):
+        with wrong.going_on():
+            table[column] = column_of(i)
+    return points_of(table, lines, name, machine, wrong)
 
 
-def points_of(table: Mapping[str, Floats], lines: Sequence[int], name: str, machine: Machine) -> Points:
+def points_of(
+    table: Mapping[str, Floats], lines: Sequence[int], name: str, machine: Machine, wrong: Gathered | None = None
+) -> Points:  # fmt: skip
     """Points of the columns of a recording.
 
     Parameters
@@ -76,21 +82,28 @@ def points_of(table: Mapping[str, Floats], lines: Sequence[int], name: str, mach
     lines : of each point in its file.
     name : the file's name, for messages.
     machine : that read them.
+    wrong : what is wrong with the recording already.
 
     Raises
     ------
     CmmUqError : a number that is impossible in its column, a point that is there twice.
     """
+    wrong = wrong or Gathered()
     for column, values in table.items():
-        _check_size(values, column, lines, name)
-    _check_normals(table, lines, name)
+        with wrong.going_on():
+            _check_size(values, column, lines, name)
+    with wrong.going_on():
+        _check_normals(table, lines, name)
     for column in WHOLE:
         if column in table:
-            _check_whole(table[column], column, lines, name)
+            with wrong.going_on():
+                _check_whole(table[column], column, lines, name)
     for axis in "xyz":
         column = f"approach_{axis}"
         if column in table:
-            _check_directions(table[column], column, lines, name)
+            with wrong.going_on():
+                _check_directions(table[column], column, lines, name)
+    wrong.refuse()
     number = {column: table.get(column, np.ones(len(lines))).astype(np.int64) for column in WHOLE}
     points = Points(
         np.column_stack([table["x_mm"], table["y_mm"], table["z_mm"]]),
@@ -103,13 +116,14 @@ def points_of(table: Mapping[str, Floats], lines: Sequence[int], name: str, mach
 
 
 def _table(content: bytes, name: str) -> tuple[list[str], list[list[str]], list[int]]:
-    cells = cells_of(content, name, "Save the recording as CSV in UTF-8")
+    cells, wrong = cells_of(content, name, "Save the recording as CSV in UTF-8"), Gathered()
     for row, line in zip(cells.rows, cells.lines, strict=True):
         if len(row) != len(cells.header):
-            raise CmmUqError(
+            wrong.add(CmmUqError(
                 f"has {len(row)} cells where the header has {len(cells.header)}", where=f"{name} line {line}",
                 fix="Complete the row; if it is the last one, the file was cut off: export it again",
-            )  # fmt: skip
+            ))  # fmt: skip
+    wrong.refuse()
     if not cells.rows:
         raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
     return cells.header, cells.rows, cells.lines
@@ -120,22 +134,24 @@ def _check_header(header: Sequence[str], name: str) -> None:
     if len(header) == 1 and ";" in header[0]:
         raise CmmUqError("cells are separated by semicolons", where=where,
                          fix="Separate them by commas, with a decimal point in numbers")  # fmt: skip
+    wrong = Gathered()
     for i, column in enumerate(header):
         if not column:
-            raise CmmUqError(f"column {i + 1} has no name", where=where, fix="Name it, or remove it")
-        if column in header[:i]:
-            raise CmmUqError(f"the column {column!r} is there twice", where=where, fix="Keep one")
-        if problem := column_problem(column):
-            raise CmmUqError(problem, where=where, fix="Name it with letters, digits and _")
+            wrong.add(CmmUqError(f"column {i + 1} has no name", where=where, fix="Name it, or remove it"))
+        elif column in header[:i]:
+            wrong.add(CmmUqError(f"the column {column!r} is there twice", where=where, fix="Keep one"))
+        elif problem := column_problem(column):
+            wrong.add(CmmUqError(problem, where=where, fix="Name it with letters, digits and _"))
     for column in header:
         known = QUANTITIES.get(OTHER_UNITS.sub("", column))
         if known and column not in (*REQUIRED, *OPTIONAL):
-            raise CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where,
-                             fix=conversion(column, [known]) or f"Convert it and name it {known}, or say unit under [recording]")  # fmt: skip
+            fix = conversion(column, [known]) or f"Convert it and name it {known}, or say unit under [recording]"
+            wrong.add(CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where, fix=fix))
     for column in REQUIRED:
         if column not in header:
             unread = " (of an axis that nobody reads, give one number in all rows)" * column.endswith("_mm")
-            raise CmmUqError(f"no column {column!r}", where=where, fix=f"{suggestion(column, header)}{unread}")
+            wrong.add(CmmUqError(f"no column {column!r}", where=where, fix=f"{suggestion(column, header)}{unread}"))
+    wrong.refuse()
 
 
 def largest(column: str) -> float:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from tomlkit.exceptions import TOMLKitError
 
-from cmm_uq.errors import CmmUqError, shortened, suggestion
+from cmm_uq.errors import MOST_GATHERED, CmmUqError, shortened, suggestion
 from cmm_uq.files.content import text_of
 from cmm_uq.files.toml import toml_of
 from cmm_uq.jobs.other_units import conversion
@@ -23,6 +23,8 @@ Facts = TypeVar("Facts", bound=BaseModel)
 
 _CHOICE = re.compile("GuardBand|FalseAccept|UncertaintyRatio|PosteriorProbability|UnconditionalRisk|literal")
 """Of the names that stand in a location for one of several tables that a key may have, none of which the user wrote."""
+
+_ONE_MEANT = re.compile(r"Did you mean '([^']*)'\?")
 
 _SHOWN = 60
 """Characters of a key or a value in a message."""
@@ -54,7 +56,9 @@ def checked(
     try:
         return wanted.model_validate(data, context=context)
     except ValidationError as error:
-        raise _located(error.errors(include_url=False)[0], text, path, wanted) from None
+        first, *others = _all_located(error, text, path, wanted)
+        first.also = tuple(others)
+        raise first from None
 
 
 def as_toml(data: Mapping[str, Any], where: str) -> bytes:
@@ -85,34 +89,89 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
-def _located(error: ErrorDetails, text: str, path: Path, model: type[BaseModel]) -> CmmUqError:
-    """The first validation error, with line and key."""
-    keys = [str(part) for part in error["loc"] if not (isinstance(part, str) and "[" in part)]
-    named = [key for key in keys if not _CHOICE.match(key)] or [str(error["loc"][0])]
-    line = _line_of(named, text)
+def _all_located(error: ValidationError, text: str, path: Path, model: type[BaseModel]) -> list[CmmUqError]:
+    """Every validation error, with line and key; of a key that may be several things, what is wrong as the first of them."""
+    found: dict[tuple[str, ...], CmmUqError] = {}
+    for one in error.errors(include_url=False):
+        named = _named(one)
+        if tuple(named) not in found:
+            found[tuple(named)] = _located(one, named, text, path, model)
+    return list(found.values())[:MOST_GATHERED]
+
+
+def _named(error: ErrorDetails) -> list[str]:
+    """Keys that the user wrote, of the location of an error."""
+    keys = [str(part) for part in error["loc"] if not (isinstance(part, str) and ("[" in part or "(" in part))]
+    return [key for key in keys if not _CHOICE.match(key)] or [str(error["loc"][0])]
+
+
+def _located(error: ErrorDetails, named: list[str], text: str, path: Path, model: type[BaseModel]) -> CmmUqError:
+    """A validation error, with line and key."""
+    line = line_of(named, text)
+    table, word = _table_of(named[:-1], model), named[-1]
     named = [shortened(key, _SHOWN) for key in named]
     where = f"{path}{f' line {line}' if line else ''}: [{named[0]}]{' ' + '.'.join(named[1:]) if named[1:] else ''}"
     if error["type"] == "missing":
-        return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}")
+        return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}{_explained(word, table)}")
     if error["type"] == "extra_forbidden":
-        known = _known_keys(named[:-1], model)
-        return CmmUqError("unknown key", where=where, fix=conversion(named[-1], known) or suggestion(named[-1], known))
+        return CmmUqError("unknown key", where=where, fix=_meant(shortened(word, _SHOWN), table))
     message = error["msg"].removeprefix("Value error, ")
+    if error["type"] == "model_type":
+        message = "must be a table of keys"
     tables = isinstance(error["input"], dict) or (
         isinstance(error["input"], list) and any(isinstance(item, dict) for item in error["input"])
     )
     given = "" if tables else f" (it says {shortened(repr(error['input']), _SHOWN)})"
-    return CmmUqError(f"{message[0].lower()}{message[1:]}{given}", where=where)
+    return CmmUqError(f"{message[0].lower()}{message[1:]}{given}", where=where, fix=_near(error))
 
 
-def _known_keys(parents: list[str], top: type[BaseModel]) -> list[str]:
+def _meant(word: str, table: type[BaseModel] | None) -> str:
+    """The key that an unknown one may stand for, with its sentence."""
+    known = _known_keys(table)
+    if converted := conversion(word, known):
+        return converted
+    meant = suggestion(word, known)
+    found = _ONE_MEANT.fullmatch(meant)
+    return f"{meant}{_explained(found[1], table)}" if found else meant
+
+
+def _explained(key: str, table: type[BaseModel] | None) -> str:
+    """The sentence of a key, to follow another; nothing where there is none."""
+    from cmm_uq.jobs.sentences import sentences  # reads source code, which only a mistake is worth
+
+    told = sentences(table).get(key, "") if table is not None else ""
+    return f" {told.rstrip('.')}" if told else ""
+
+
+def _near(error: ErrorDetails) -> str | None:
+    """Of the words that a key may have, the one that a wrong word is near to."""
+    given = error["input"]
+    if error["type"] != "literal_error" or not isinstance(given, str):
+        return None
+    words = re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", "")))
+    meant = suggestion(given, words)
+    return meant if _ONE_MEANT.fullmatch(meant) else None
+
+
+def _table_of(parents: list[str], top: type[BaseModel]) -> type[BaseModel] | None:
+    """The class of the table that these keys lead to."""
     model: object = top
     for parent in parents:
-        if parent.isdigit() or not isinstance(model, type):
+        if parent.isdigit():
             continue
-        model = _model_inside(model.model_fields[parent].annotation) if hasattr(model, "model_fields") else model
-    fields = getattr(model, "model_fields", {})
-    return [field.alias or name for name, field in fields.items()]
+        fields = getattr(model, "model_fields", {})
+        if parent not in fields:
+            return None
+        model = _model_inside(fields[parent].annotation)
+    return model if isinstance(model, type) and issubclass(model, BaseModel) else None
+
+
+def _known_keys(table: type[BaseModel] | None) -> list[str]:
+    """Keys of a table, and those that may stand in place of some of them."""
+    if table is None:
+        return []
+    tables = (table, *getattr(table, "instead", ()))
+    return [field.alias or name for one in tables for name, field in one.model_fields.items()]
 
 
 def _model_inside(annotation: object) -> object:
@@ -123,7 +182,7 @@ def _model_inside(annotation: object) -> object:
     return annotation
 
 
-def _line_of(keys: list[str], text: str) -> int | None:
+def line_of(keys: list[str], text: str) -> int | None:
     """Line of the deepest of ``keys`` that stands in its table; the table's own line when none does."""
     table, found, count = "", None, -1
     wanted = int(keys[1]) if len(keys) > 1 and keys[1].isdigit() else None

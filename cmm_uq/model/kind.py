@@ -51,6 +51,7 @@ class Kind:
     page : a :class:`~cmm_uq.documents.outcome.Page`.
     begin : a :class:`~cmm_uq.jobs.beginning.Beginning`: what a new job of the kind begins with.
     begin_also : the same for a further way of it, by the name that it is asked for by.
+    check : ``(job)``: what its own analysis refuses, before anything is estimated.
     own : a :class:`~cmm_uq.documents.outcome.OwnAnalysis`, where its errors are no list of effects.
     tested : what of it a standard may be decided on: :data:`LENGTHS`, :data:`BARS`, :data:`FORMS`, or a word of its own.
     refusal, instead : why some command cannot serve it, with ``{}`` for what cannot be done, and what can be done.
@@ -64,6 +65,7 @@ class Kind:
     page: object = None
     begin: object = None
     begin_also: Mapping[str, str] = field(default_factory=dict, hash=False)
+    check: object = None
     own: object = None
     tested: tuple[str, ...] = ()
     refusal: str = ""
@@ -102,6 +104,17 @@ class Kind:
         if found is None:
             raise self.refused(what)
         return found
+
+    def refuse_unfit(self, job: object) -> None:
+        """Refuse a job that its own analysis would; nothing where it has none.
+
+        Raises
+        ------
+        CmmUqError : as the analysis would.
+        """
+        check = self._loaded(self.check)
+        if callable(check):
+            check(job)
 
     def beginning(self, name: str) -> Beginning:
         """What a new job begins with, of the kind's own name or of a further one.

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 
-from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.physics import drives, probing, reversal, rigid_body, scales, scanning, stylus, thermal, warming
 from cmm_uq.physics.effect import Effect
 from cmm_uq.physics.plugins import EffectPlugin, outside_effects
@@ -51,13 +51,15 @@ def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, 
     ------
     CmmUqError : a name is unknown, stands twice or is offered twice, or the effect is broken.
     """
-    outside, found = _outside(tuple(sys.path)), list[Effect]()
+    outside, found, wrong = _outside(tuple(sys.path)), list[Effect](), Gathered()
     for i, name in enumerate(names):
-        if name not in EVERY and name not in outside:
-            raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, {*EVERY, *outside}))
-        if name in names[:i]:
-            raise CmmUqError(f"the effect {name!r} is named twice", where=where, fix="Name it once")
-        found.append(EVERY[name] if name in EVERY else outside[name].effect)
+        with wrong.going_on():
+            if name not in EVERY and name not in outside:
+                raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, {*EVERY, *outside}))
+            if name in names[:i]:
+                raise CmmUqError(f"the effect {name!r} is named twice", where=where, fix="Name it once")
+            found.append(EVERY[name] if name in EVERY else outside[name].effect)
+    wrong.refuse()
     return tuple(found)
 
 

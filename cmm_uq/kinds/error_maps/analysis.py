@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.posterior import Progress
 from cmm_uq.jobs.job import Job
-from cmm_uq.kinds.error_maps.columns import columns_of
+from cmm_uq.kinds.error_maps.columns import MapColumn, columns_of
 from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
 from cmm_uq.kinds.error_maps.squareness import squareness_findings
 from cmm_uq.model.machine_maps import WHERE, maps_of
@@ -49,12 +49,24 @@ def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress
     ------
     CmmUqError : fewer than two maps, maps that have nothing in common, or what such a job cannot have.
     """
+    maps, columns, findings = compared_maps(job)
+    findings += squareness_findings(maps)
+    found = diagnose_maps(columns, job.facts.model.effects, alpha=alpha, seed=seed, progress=progress)
+    return MapsDiagnosed(job, tuple(maps), tuple(findings), found)
+
+
+def compared_maps(job: Job) -> tuple[tuple[ErrorMap, ...], list[MapColumn], list[Finding]]:
+    """Error maps of a job, what they have in common, and what is odd among that.
+
+    Raises
+    ------
+    CmmUqError : fewer than two maps, maps that have nothing in common, or what such a job cannot have.
+    """
     maps = maps_of(job)
     if len(maps) < 2:
         raise CmmUqError("one error map has nothing to be compared with", where=WHERE,
                          fix="Name two or more maps of the machine; with three it shows which of them differs")  # fmt: skip
-    acting = effects(job.facts.model.effects, where="job.toml [model] effects")
-    for effect in acting:
+    for effect in effects(job.facts.model.effects, where="job.toml [model] effects"):
         if effect.columns and not isinstance(effect, ThermalScale):
             raise CmmUqError(f"{effect.name} needs {', '.join(effect.columns)}, which error maps do not have",
                              where="job.toml [model] effects", fix="Leave it out")  # fmt: skip
@@ -66,7 +78,9 @@ def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress
         why = "; ".join(finding.why for finding in findings)
         raise CmmUqError(f"the error maps have nothing in common to compare: {why}", where=WHERE,
                          fix="Map the same errors at the same positions each time")  # fmt: skip
-    findings += squareness_findings(maps)
-    named = [effect.name for effect in acting]
-    found = diagnose_maps(columns, named, alpha=alpha, seed=seed, progress=progress)
-    return MapsDiagnosed(job, tuple(maps), tuple(findings), found)
+    return tuple(maps), columns, findings
+
+
+def refuse_unfit(job: Job) -> None:
+    """Refuse error maps that cannot be compared; see :func:`compared_maps`."""
+    compared_maps(job)

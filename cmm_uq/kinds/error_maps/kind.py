@@ -9,6 +9,7 @@ KIND = Kind(
     name="error_map",
     table=ErrorMapFacts,
     begin="cmm_uq.kinds.error_maps.begin:BEGINNING",
+    check="cmm_uq.kinds.error_maps.analysis:refuse_unfit",
     own="cmm_uq.kinds.error_maps.outcome:OWN",
     refusal="error maps cannot be {}: they are free functions, no points of an artefact",
     instead="cmm-uq diagnose JOB compares them with each other",

@@ -126,16 +126,27 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
     ------
     CmmUqError : the job cannot be analysed as it stands.
     """
-    check_facts(job)
-    facts, stated = shift_facts(job), job.facts.recording.u_coordinate_um
-    series = recorded_series(facts, job.points, job.recording_path)
-    known = None if facts.known is None else _known(facts.known, series)
+    stated = job.facts.recording.u_coordinate_um
+    series, known = checked_series(job)
     estimate = estimate_curve(
         series, known, sigma=None if stated is None else stated * MICROMETRE, seed=seed, progress=progress
     )
     return ShiftResult(
         job, estimate, undetermined(series, scale_known=estimate.scale_known), _integrated(series, estimate, known)
     )
+
+
+def checked_series(job: Job) -> tuple[ShiftedSeries, KnownSpan | None]:
+    """Series of a shift job along an axis, and the length that is known of the artefact.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be analysed as it stands.
+    """
+    check_facts(job)
+    facts = shift_facts(job)
+    series = recorded_series(facts, job.points, job.recording_path)
+    return series, None if facts.known is None else _known(facts.known, series)
 
 
 def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSeries:

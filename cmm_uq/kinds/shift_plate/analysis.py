@@ -128,14 +128,25 @@ def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) 
 
     ``[artefact] plane`` says which plane; all else as :func:`~cmm_uq.kinds.shift_axis.analysis.analyse_shift`.
     """
-    check_facts(job)
-    facts, stated = shift_facts(job), job.facts.recording.u_coordinate_um
-    plate = placed_plate(job.points, str(facts.plane), job.recording_path)
-    known = None if facts.known is None else _known(facts.known, plate)
+    stated = job.facts.recording.u_coordinate_um
+    plate, known = checked_plate(job)
     sigma = None if stated is None else stated * MICROMETRE
     return PlaneShiftResult(
         job, estimate_plane(plate, known, chain=job.facts.machine.chain, sigma=sigma, seed=seed, progress=progress)
     )
+
+
+def checked_plate(job: Job) -> tuple[PlacedPlate, KnownSpan | None]:
+    """The plate of a shift job in a plane, and the length that is known of it.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be analysed as it stands.
+    """
+    check_facts(job)
+    facts = shift_facts(job)
+    plate = placed_plate(job.points, str(facts.plane), job.recording_path)
+    return plate, None if facts.known is None else _known(facts.known, plate)
 
 
 def _known(given: KnownLength, plate: PlacedPlate) -> KnownSpan:

@@ -11,6 +11,7 @@ KIND = Kind(
     plan="cmm_uq.kinds.shift_axis.plan:PLANNING",
     begin="cmm_uq.kinds.shifting.begin:AXIS",
     begin_also={"shift_plate": "cmm_uq.kinds.shifting.begin:PLANE"},
+    check="cmm_uq.kinds.shifting.check:refuse_unfit",
     own="cmm_uq.kinds.shifting.analysis:OWN",
     refusal="a shift job cannot be {}: its machine error is a free function, no list of effects",
     instead="cmm-uq report JOB estimates it",

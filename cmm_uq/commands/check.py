@@ -1,0 +1,235 @@
+"""All that is wrong with a job, without computing: what its readers and its model refuse, and what an assessor would miss.
+
+The rules are those of the commands: the same readers are asked, and go on behind a problem where they can.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.recorded import recorded_model
+from cmm_uq.commands.refusals import refuse_planned
+from cmm_uq.conformity.standards import decidable
+from cmm_uq.documents.completeness import contradictions, unstated
+from cmm_uq.errors import CmmUqError, Gathered
+from cmm_uq.files.content import content_of
+from cmm_uq.files.limits import JOB_BYTES, TABLE_BYTES
+from cmm_uq.jobs.file_names import inside
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.recording import read_recording
+from cmm_uq.kinds import kind_of
+from cmm_uq.notebook import html_table
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.plugins import naming_package
+from cmm_uq.points import Machine
+
+_PLACE = re.compile(
+    r"(?P<file>.*?)(?: lines? (?P<line>\d+)(?: and \d+)?)?(?:: ?(?P<key>\[.*))?(?:, column (?P<column>.+))?", re.DOTALL
+)
+_KEY_BEHIND = re.compile(r"(?P<file>\S.*?\.toml) (?P<key>\[.*)", re.DOTALL)
+"""Where a message names the key behind the file without a colon."""
+
+_TABLE_KEY = re.compile(r"\[+([^\]]+)\]+ ?([\w.]*)")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something that is wrong with a job, or that should be known.
+
+    Parameters
+    ----------
+    problem : what it is.
+    file : where it stands, if in a file.
+    line : of the file, from 1.
+    key : of job.toml, as ``[artefact] u_um``, or column of a recording.
+    fix : how to mend it.
+    """
+
+    problem: str
+    file: str = ""
+    line: int | None = None
+    key: str = ""
+    fix: str = ""
+
+    @classmethod
+    def of(cls, error: CmmUqError) -> Problem:
+        """What an error says."""
+        where = error.where or ""
+        found = _KEY_BEHIND.fullmatch(where) or _PLACE.fullmatch(where)
+        told = {} if found is None else {name: value or "" for name, value in found.groupdict().items()}
+        line = told.get("line", "")
+        key = told.get("key", "") or told.get("column", "")
+        return cls(error.problem, told.get("file", where), int(line) if line else None, key, error.fix or "")
+
+    def __str__(self) -> str:
+        line = f" line {self.line}" if self.line else ""
+        place = ": ".join(filter(None, (f"{self.file}{line}", self.key, self.problem)))
+        return f"{place}. {self.fix}" if self.fix else place
+
+    def as_data(self) -> dict[str, Any]:
+        """For results in JSON."""
+        return {"file": self.file, "line": self.line, "key": self.key, "problem": self.problem, "fix": self.fix}
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What there is to say of a job before it is computed.
+
+    Parameters
+    ----------
+    job : its folder, or its job.toml.
+    problems : that would stop ``report``.
+    warnings : that the certificate would state, or that what stands there is not a measurement.
+    """
+
+    job: str
+    problems: tuple[Problem, ...]
+    warnings: tuple[Problem, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing would stop ``report``."""
+        return not self.problems
+
+    def as_data(self) -> dict[str, Any]:
+        """For results in JSON."""
+        return {
+            "job": self.job, "sound": self.sound, "problems": [one.as_data() for one in self.problems],
+            "warnings": [one.as_data() for one in self.warnings],
+        }  # fmt: skip
+
+    def __repr__(self) -> str:
+        return f"<Checked {self.job}: {len(self.problems)} problems, {len(self.warnings)} warnings>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (what, str(one)) for what, each in (("problem", self.problems), ("warning", self.warnings)) for one in each
+        ]
+        return html_table("Check", (), rows or [("", "nothing is wrong")])
+
+
+@naming_package()
+def check_job(folder: Path) -> Checked:
+    """Check a job.
+
+    Parameters
+    ----------
+    folder : the job folder, or its job.toml.
+    """
+    wrong, path = Gathered(), folder if folder.suffix == ".toml" else folder / "job.toml"
+    job, warnings = None, []
+    with wrong.going_on():
+        job = read_job(folder)
+    if job is None:
+        with wrong.going_on():
+            _recording_by_itself(path)
+    else:
+        with wrong.going_on():
+            warnings += _unfit(job, wrong)
+        warnings += _to_be_known(job, path)
+    return Checked(str(folder), _once(Problem.of(_placed(error, path)) for error in wrong.problems), _once(warnings))
+
+
+def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
+    """Gather what the model and the standards refuse of a job that was read; what the screening found."""
+    kind, facts = kind_of(job), job.facts
+    refuse_planned(job)
+    acting = None
+    with wrong.going_on():
+        acting = effects(facts.model.effects, where="job.toml [model] effects")
+    for i, wish in enumerate(facts.conformity, 1):
+        with wrong.going_on():
+            decidable(wish, kind.name, f"[[conformity]] {i}", kind.tested, job.circumstances)
+    if kind.own is not None:
+        kind.refuse_unfit(job)
+        return []
+    kind.observing("reported")
+    for effect in acting or ():
+        if missing := [column for column in effect.columns if column not in job.points.columns]:
+            wrong.add(CmmUqError(
+                f"{effect.name} needs {'the columns' if len(missing) > 1 else 'the column'} {', '.join(missing)}, which "
+                f"{facts.recording.file} has not", where="job.toml [model] effects", fix="Record it, or leave out the effect",
+            ))  # fmt: skip
+    if wrong.problems:
+        return []
+    _, findings = recorded_model(job)
+    return [
+        Problem(str(one.why), job.recording_path, one.lines[0] if one.lines else None, one.column or "")
+        for one in findings
+    ]
+
+
+def _to_be_known(job: Job, path: Path) -> list[Problem]:
+    """What the certificate would warn of, whatever was measured."""
+    if job.origin != MEASURED:
+        said = f"the recording is {job.origin}, and all that is made of it says so"
+        return [Problem(said, str(path), key="[job] origin", fix="Put in your own readings for a certificate")]
+    content = job.inputs["job.toml"].decode("utf-8-sig")
+    missing = [
+        Problem(
+            f"not stated: {what}, which ISO/IEC 17025:2017 asks for",
+            str(path),
+            _line_of(key, content),
+            key,
+            f"Give {key}",
+        )
+        for what, key in unstated(job.facts)
+    ]
+    return [*(Problem(str(text), str(path)) for text in contradictions(job)), *missing]
+
+
+def _recording_by_itself(path: Path) -> None:
+    """Read the recording of a job whose job.toml, or another of its files, was refused.
+
+    Raises
+    ------
+    CmmUqError : it is refused as well.
+    """
+    try:
+        data = tomllib.loads(content_of(path, JOB_BYTES, "").decode("utf-8-sig"))
+    except (CmmUqError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
+        return
+    table = data.get("recording")
+    name = table.get("file") if isinstance(table, dict) else None
+    if isinstance(name, str) and name:
+        found = inside(path.parent, name, str(path))
+        content = content_of(found, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
+        read_recording(content, str(path.parent / name), Machine())
+
+
+def _placed(error: CmmUqError, path: Path) -> CmmUqError:
+    """With the job's own path and the key's line, where a message says ``job.toml`` alone."""
+    where = error.where or ""
+    if not where.startswith("job.toml"):
+        return error
+    rest = where.removeprefix("job.toml").lstrip(": ")
+    try:
+        line = _line_of(rest, path.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError):
+        line = None
+    return CmmUqError(error.problem, where=f"{path}{f' line {line}' if line else ''}: {rest}" if rest else str(path),
+                      fix=error.fix)  # fmt: skip
+
+
+def _line_of(key: str, text: str) -> int | None:
+    """Line of a key such as ``[artefact] u_um``, or of its table."""
+    from cmm_uq.jobs.toml_file import line_of
+
+    found = _TABLE_KEY.match(key)
+    if found is None:
+        return None
+    number = re.match(r"\[\[\w+\]\] (\d+) ?(\w*)", key)
+    if number:
+        return line_of([found[1], str(int(number[1]) - 1), number[2]], text)
+    return line_of([*found[1].split("."), *found[2].split(".")], text)
+
+
+def _once(problems: Iterable[Problem]) -> tuple[Problem, ...]:
+    return tuple(dict.fromkeys(problems))
