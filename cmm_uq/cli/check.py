@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cmm_uq.cli import BAD_INPUT
+from cmm_uq.cli.completion import job_folders
 from cmm_uq.cli.deferred import defer_scipy
-from cmm_uq.cli.options import Quiet
-from cmm_uq.cli.printing import put, say
+from cmm_uq.cli.options import Json, Quiet, examples
+from cmm_uq.cli.printing import layout, put_data, show
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.check import Checked
+    from cmm_uq.documents.in_short import Summary
+
+EXAMPLES = examples("check JOB", "check jobs/a jobs/b", "check JOB --json")
+SCHEMA = "cmm-uq/check/1"
 
 
 def command(
-    jobs: Annotated[list[Path], typer.Argument(help="Job folders.")],
-    json: Annotated[bool, typer.Option("--json", help="Print problems and warnings as JSON.")] = False,
+    jobs: Annotated[list[Path], typer.Argument(help="Job folders.", metavar="JOB...", autocompletion=job_folders)],
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Say all that is wrong with each job at once: file, line, key, fix. Exit code 2 when something would stop report."""
     defer_scipy()
@@ -24,15 +32,25 @@ def command(
 
     found = [check_job(job) for job in jobs]
     if json:
-        from json import dumps
-
-        put(dumps([one.as_data() for one in found], indent=1, ensure_ascii=False) + "\n")
+        put_data({"schema": SCHEMA, "jobs": [one.as_data() for one in found]})
     elif not quiet:
         for one in found:
-            for word, each in (("problem", one.problems), ("warning", one.warnings)):
-                for said in each:
-                    say(f"{word}: {said}")
-            counted = f"{len(one.problems)} problems" if one.problems else "nothing would stop report"
-            say(f"{one.job}: {counted}, {len(one.warnings)} warnings")
+            show(layout(verbose=True).screen(_summary(one)))
     if not all(one.sound for one in found):
         raise typer.Exit(BAD_INPUT)
+
+
+def _summary(found: Checked) -> Summary:
+    """Whether anything would stop report, and all that is wrong."""
+    from cmm_uq.documents.in_short import Summary, Verdict
+    from cmm_uq.messages import Verbatim, plural, say
+
+    count = len(found.problems)
+    stops = plural(count, one=say("1 problem"), many=say("{count} problems", count=count))
+    verdict = (
+        Verdict("SOUND", "good", Verbatim(found.job), (say("nothing would stop report"),))
+        if found.sound
+        else Verdict("STOPS", "bad", Verbatim(found.job), (stops,))
+    )
+    problems, warned = (tuple(Verbatim(each) for each in some) for some in (found.problems, found.warnings))
+    return Summary(verdicts=(verdict,), remarks=problems, warnings=warned)

@@ -22,7 +22,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for module, short in {
-    new: "A job folder that runs, every key explained.",
+    new: "A job folder that runs at once, to be filled with your own figures.",
     importing: "What is recognised of a laboratory's export.",
     check: "All that is wrong with jobs, without computing.",
     report: "The certificate of a recording: estimates, figures, decisions.",
@@ -31,7 +31,7 @@ for module, short in {
     simulate: "A recording drawn from known errors, as a job of its own.",
     compensate: "A recording corrected by its machine's error maps.",
     budget: "The uncertainty of any measurement model in a file.",
-    schema: "The JSON Schema of a file, for editors.",
+    schema: "JSON Schema of a file, for editors that complete and explain.",
     selftest: "Published reference figures, computed here and compared.",
 }.items():
     name = "import" if module is importing else module.__name__.rpartition(".")[2]
@@ -40,12 +40,12 @@ for module, short in {
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
 and the calibration certificates that state it.
 
-  cmm-uq report JOB      the certificate of a recording
-  cmm-uq diagnose JOB    what the recording shows that its model leaves out
-  cmm-uq plan JOB        what to measure, and what it will tell
+  cmm-uq new KIND FOLDER   a job that runs at once, to be filled with your own
+  cmm-uq report JOB        the certificate of a recording
+  cmm-uq diagnose JOB      what the recording shows that its model leaves out
 
-JOB is a folder with a job.toml. cmm-uq --help lists all commands,
-cmm-uq COMMAND --help the options of one."""
+KIND is one of those that cmm-uq new lists, JOB a folder with a job.toml.
+cmm-uq --help lists all commands, cmm-uq COMMAND --help the options of one."""
 
 
 @app.callback(invoke_without_command=True)

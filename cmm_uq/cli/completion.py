@@ -1,4 +1,4 @@
-"""What a shell completes: job folders and model files, looked for a few folders deep; nothing is read."""
+"""What a shell completes: job folders and model files a few folders deep, none of which is read, and kinds of new jobs."""
 
 from __future__ import annotations
 
@@ -23,6 +23,16 @@ def toml_files(incomplete: str) -> list[str]:
     """Files in TOML that begin as typed and are no job."""
     found = (os.path.join(folder, name) for folder, name in _files(incomplete) if name.endswith(".toml"))  # noqa: PTH118
     return sorted(path for path in found if path.startswith(incomplete) and not path.endswith(JOB_FILE))
+
+
+def kinds(incomplete: str) -> list[str]:
+    """What a new job can be, those of other packages too."""
+    from cmm_uq.cli.deferred import defer_scipy
+
+    defer_scipy()
+    from cmm_uq.commands.new import BUDGET, PLAN, known
+
+    return [name for name in (*known(), PLAN, BUDGET) if name.startswith(incomplete)]
 
 
 def _files(incomplete: str) -> Iterator[tuple[str, str]]:

@@ -6,8 +6,8 @@ import json as json_text
 from collections.abc import Mapping
 from pathlib import Path
 
-from cmm_uq.cli.files_told import folder_of
 from cmm_uq.cli.printing import put_data, show_summary
+from cmm_uq.writing import MANIFEST
 
 
 def conclude_derived(
@@ -25,13 +25,25 @@ def conclude_derived(
     ------
     OutputError : nobody takes what is said.
     """
-    folder = folder_of(files)
     if json:
-        manifest = json_text.loads(files["manifest.json"].read_bytes())
-        put_data({**manifest, "folder": folder})
+        put_manifest(files)
     elif not quiet:
+        from cmm_uq.cli.files_told import folder_of
         from cmm_uq.documents.in_short import Summary
         from cmm_uq.messages import Verbatim, say
 
+        folder = folder_of(files)
         further = (say("Next: cmm-uq report {folder}", folder=Verbatim(folder)),) if is_job else ()
         show_summary(Summary(Verbatim(what), remarks=further), files, verbose=verbose)
+
+
+def put_manifest(files: Mapping[str, Path]) -> None:
+    """The manifest of what was written, and the folder, as JSON.
+
+    Raises
+    ------
+    OutputError : nobody takes it.
+    """
+    from cmm_uq.cli.files_told import folder_of
+
+    put_data({**json_text.loads(files[MANIFEST].read_bytes()), "folder": folder_of(files)})

@@ -6,7 +6,7 @@ import codecs
 import json
 import sys
 
-_ASCII = {
+NEAREST = {
     "±": "+/-", "−": "-", "–": "-", "—": "-", "·": "*", "×": "x", "→": "->", "…": "...", "″": '"', "′": "'", "µ": "u",
     "μ": "u", "°": "deg", "α": "alpha", "β": "beta", "γ": "gamma", "ε": "epsilon", "λ": "lambda", "ν": "nu", "σ": "sigma",
     "φ": "phi", "√": "sqrt", "≤": "<=", "≥": ">=", "⁻": "^-", "²": "2", "³": "3", "⁶": "6", "\u00a0": " ", "\u202f": " ",
@@ -30,7 +30,7 @@ def _nearest(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     written = (
-        _ASCII.get(c) or c.encode("ascii", "backslashreplace").decode() for c in error.object[error.start : error.end]
+        NEAREST.get(c) or c.encode("ascii", "backslashreplace").decode() for c in error.object[error.start : error.end]
     )
     return "".join(written), error.end
 

@@ -49,7 +49,7 @@ def _what(name: str) -> str:
     plain = path.stem
     for origin in (SIMULATED, COMPENSATED):
         plain = plain.removesuffix(f"-{origin}")
-    what = _WHAT.get(plain + path.suffix, "of the job")
+    what = _WHAT.get(plain + path.suffix, "input of the job")
     return what.replace("certificate", "evaluation, not a certificate") if plain != path.stem else what
 
 

@@ -4,31 +4,53 @@ from __future__ import annotations
 
 import sys
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cmm_uq.cli.completion import kinds
 from cmm_uq.cli.deferred import defer_scipy
+from cmm_uq.cli.derived import put_manifest
 from cmm_uq.cli.importing import Columns, Keys, keys_of, show
-from cmm_uq.cli.options import Quiet
-from cmm_uq.cli.printing import say
+from cmm_uq.cli.options import Json, Quiet, examples
+from cmm_uq.cli.printing import put_data, say
 from cmm_uq.errors import CmmUqError
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.importing.keys import ImportKeys
 
+EXAMPLES = examples("new", "new step_gauge my-gauge", "new ballbar --machine 'CMM 3' --set artefact.length_mm=500")
+
 
 def command(
     kind: Annotated[
-        str, typer.Argument(help="Kind of measurement, shift_plate, plan or budget; without it they are listed.")
+        str,
+        typer.Argument(
+            help="Kind of measurement, shift_plate, plan or budget; without it they are listed.",
+            metavar="KIND",
+            autocompletion=kinds,
+        ),
     ] = "",
-    folder: Annotated[Path | None, typer.Argument(help="New folder.  [default: the kind's name]")] = None,
-    machine: Annotated[str, typer.Option(help="Name of the machine.")] = "",
-    serial: Annotated[str, typer.Option(help="Serial number of the machine.")] = "",
+    folder: Annotated[
+        Path | None, typer.Argument(help="New folder.", metavar="FOLDER", show_default="the kind's name")
+    ] = None,
+    machine: Annotated[
+        str,
+        typer.Option(help="Name of the machine.", metavar="TEXT", show_default="asked for, or a name to be replaced"),
+    ] = "",
+    serial: Annotated[
+        str, typer.Option(help="Serial number of the machine.", metavar="TEXT", show_default="asked for, or none")
+    ] = "",
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", help='Any key of job.toml: artefact.length_mm=500, job.customer="A Ltd".'),
+        typer.Option(
+            "--set",
+            help='Any key of job.toml: artefact.length_mm=500, job.customer="A Ltd".',
+            metavar="KEY=VALUE",
+            show_default="none",
+        ),
     ] = None,
     export: Annotated[
         Path | None,
@@ -37,6 +59,7 @@ def command(
     column: Columns = None,
     key: Keys = None,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Begin a job: job.toml with every key explained, and a simulated recording to be replaced by your own.
 
@@ -46,6 +69,9 @@ def command(
     from cmm_uq.commands.new import BUDGET, check_empty, known, titles, write_new
 
     if not kind:
+        if json:
+            put_data({"kinds": titles()})
+            return
         for name, title in titles().items():
             say(f"{name}  {title}")
         return
@@ -53,14 +79,18 @@ def command(
     check_empty(target)
     given = _given(machine, serial, settings or [])
     if export is not None:
-        _of_export(kind, export, target, given, keys_of(column, key), quiet=quiet)
+        files = _of_export(kind, export, target, given, keys_of(column, key), quiet=quiet or json)
+        if json:
+            put_manifest(files)
         return
-    if not given and not quiet and kind != BUDGET and kind in known() and _asked_on_a_terminal():
+    if not given and not (quiet or json) and kind != BUDGET and kind in known() and _asked_on_a_terminal():
         from cmm_uq.cli.asking import answers
 
         given = answers(kind)
     files = write_new(kind, target, given)
-    if not quiet:
+    if json:
+        put_manifest(files)
+    elif not quiet:
         say(f"{target}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
         say(
             (target / "README.md")
@@ -72,7 +102,7 @@ def command(
 
 def _of_export(
     kind: str, export: Path, folder: Path, given: dict[str, dict[str, Any]], keys: ImportKeys, *, quiet: bool
-) -> None:  # fmt: skip
+) -> Mapping[str, Path]:  # fmt: skip
     """Show what is recognised of an export, then write the job around it."""
     from cmm_uq.commands.importing import read_export, write_job_of_export
 
@@ -82,6 +112,7 @@ def _of_export(
     files = write_job_of_export(kind, export, folder, given, keys)
     if not quiet:
         say(f"{folder}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
+    return files
 
 
 def _asked_on_a_terminal() -> bool:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import StringIO
 from typing import TYPE_CHECKING
 
 from cmm_uq.cli.printing import columns, styled
+from cmm_uq.writing.interruption import speaking
 
 if TYPE_CHECKING:
     from cmm_uq.commands.written import Stage
@@ -26,9 +28,17 @@ def shown(*, quiet: bool, verbose: bool) -> Iterator[Stage | None]:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
         from rich.table import Column
 
-        bar = BarColumn(bar_width=columns() // 4)
-        what = TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis"))
-        with Progress(what, bar, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+        width = columns() // 6
+        told = Column(no_wrap=True, overflow="ellipsis", max_width=columns() - width - len(" 0:00:00 "))
+        what, bar = TextColumn("{task.description}", markup=False, table_column=told), BarColumn(bar_width=width)
+        console = Console(stderr=True)
+
+        def hush() -> None:
+            console.file = StringIO()
+
+        bars = Progress(what, bar, TimeElapsedColumn(), console=console, transient=True, redirect_stdout=False,
+                        redirect_stderr=False)  # fmt: skip
+        with speaking(hush), bars as progress:
             task = progress.add_task("Starting", total=1.0)
             yield lambda what, part: progress.update(task, description=what, completed=part)
     elif verbose:

@@ -7,14 +7,17 @@ from typing import Annotated
 import typer
 
 from cmm_uq.cli.deferred import defer_scipy
-from cmm_uq.cli.printing import put
+from cmm_uq.cli.options import examples
+from cmm_uq.cli.printing import put_json
+
+EXAMPLES = examples("schema job > job.schema.json", "schema budget", "schema truth")
 
 
 def command(
-    name: Annotated[str, typer.Argument(help="job (with its plan), budget or truth.")] = "job",
+    name: Annotated[str, typer.Argument(help="job (with its plan), budget or truth.", metavar="NAME")] = "job",
 ) -> None:
     """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""
     defer_scipy()
     from cmm_uq.commands.schemas import as_text, schema_named
 
-    put(as_text(schema_named(name)))
+    put_json(as_text(schema_named(name)))

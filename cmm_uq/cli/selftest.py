@@ -32,9 +32,9 @@ def command(
     from cmm_uq.uncertainty.selftest import run
 
     outcomes = run()
-    passed = sum(outcome.passed for outcome in outcomes)
+    passed = int(sum(outcome.passed for outcome in outcomes))
     if json:
-        figures = [asdict(outcome) for outcome in outcomes]
+        figures = [{**asdict(one), "got": float(one.got), "passed": bool(one.passed)} for one in outcomes]
         put_data({"schema": SCHEMA, "program": f"cmm-uq {__version__}", "passed": passed, "figures": figures})
     else:
         show(layout(verbose=verbose).screen(_summary(outcomes, quiet=quiet, verbose=verbose)))

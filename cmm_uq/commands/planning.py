@@ -136,7 +136,7 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     CmmUqError : the plan is impossible: no room, no fixture, no effect, no time.
     """
     tell = progress or (lambda what, part: None)
-    tell("Reading what the placings determine", 0.05)
+    tell("Finding what the placings determine", 0.05)
     refuse_planned(job)
     setting = Setting.of(job, kind_of(job))
     refuse_unfit(job)
@@ -179,8 +179,9 @@ def _with_noise(setting: Setting, name: Text, points: Points) -> Setting:
     return replace(setting, noise=setting.noise.over(model, values))
 
 
-def _part(tell: Progress, low: float, high: float) -> Callable[[float], None]:
-    return lambda part: tell("Predicting what the diagnosis would find", low + (high - low) * part)
+def _part(tell: Progress, low: float, high: float) -> Callable[[int, int], None]:
+    what = "Predicting the diagnosis: effect"
+    return lambda count, total: tell(f"{what} {count} of {total}", low + (high - low) * count / total)
 
 
 def _start(job: Job, setting: Setting) -> tuple[Text, tuple[Placing, ...], Points]:
@@ -218,7 +219,7 @@ def _after(setting: Setting, recorded: Points, added: Sequence[Placing]) -> Poin
 
 def _outlook(
     setting: Setting, placings: tuple[Placing, ...], points: Points, rivals: tuple[Effect, ...], power: bool, seed: int,
-    tell: Callable[[float], None],
+    tell: Callable[[int, int], None],
 ) -> Outlook:  # fmt: skip
     model = setting.model(points)
     found = identifiability(model, rivals, setting.noise)
@@ -233,7 +234,7 @@ def _outlook(
         )  # fmt: skip
         for i, each in enumerate(asked):
             predicted.append(each)
-            tell((i + 1) / len(rivals))
+            tell(i + 1, len(rivals))
     return Outlook(placings, points, found, tuple(predicted))
 
 

@@ -32,7 +32,7 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent) -> Outcome
     CmmUqError : the job cannot be analysed.
     """
     found = analysis.analyse_job(
-        job, seed=seed, progress=lambda part: stage("Sampling the posterior", 0.1 + 0.4 * part)
+        job, seed=seed, progress=lambda part: stage(_sampled("Sampling the posterior", part), 0.1 + 0.4 * part)
     )
     stage("Composing the certificate", 0.5)
     return analysis.outcome_of(found, seed)
@@ -84,9 +84,10 @@ def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, s
     ------
     CmmUqError : the job cannot be diagnosed.
     """
-    stage("Searching for what was left out", 0.0)
+    readings = f": {len(job.points)} readings" if job.facts.artefact.with_recording else ""
+    stage(f"Searching for what was left out{readings}", 0.0)
     found = diagnosing.diagnose_read(
-        job, seed=seed, alpha=alpha, progress=lambda part: stage("Sampling", 0.7 + 0.2 * part)
+        job, seed=seed, alpha=alpha, progress=lambda part: stage(_sampled("Sampling", part), 0.7 + 0.2 * part)
     )
     stage("Composing the page", 0.9)
     return diagnosing.outcome_of(found, seed)
@@ -125,3 +126,8 @@ def write_diagnosis(
     return DIAGNOSE.write(
         read, lambda: diagnosis_outcome(read, seed=seed, alpha=alpha, stage=tell), out, force=force, stage=tell
     )
+
+
+def _sampled(what: str, part: float) -> str:
+    """A stage with how much of the draws that are needed is there."""
+    return f"{what}: {part:.0%} of the draws"

@@ -13,7 +13,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.writing import Owner, staged
 
 Stage = Callable[[str, float], None]
-"""Told what is being done, and the part of the whole that is done."""
+"""Told what is being done, after a colon what of it is counted, and the part of the whole that is done."""
 
 Told = Callable[[Job], None]
 """Told of the job as it was read, before anything is computed of it."""
@@ -103,7 +103,7 @@ class Form:
         with staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place:
             found = outcome()
             contents = self.contents(found, stage)
-            stage("Writing", 0.95)
+            stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             files = place.write(contents)
         stage("Done", 1.0)
         return Written(found, contents[RESULTS], files)
@@ -121,8 +121,8 @@ class Form:
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
         rendered = {}
-        stage("Rendering", 0.8)
         for name in self._names(job):
+            stage(f"Rendering: {name}", 0.8)
             pdf = name.endswith(".pdf")
             rendered[name] = (
                 render_pdf(document, {**job.inputs, RESULTS: data, **outcome.files})

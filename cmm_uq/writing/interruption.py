@@ -12,7 +12,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -28,6 +28,7 @@ _stages: list[Staged] = []
 _written: list[Path] = []
 _going_in: list[Path] = []
 _signalled: list[int] = []
+_speaking: list[Callable[[], None]] = []
 
 
 @contextlib.contextmanager
@@ -50,6 +51,16 @@ def placing(folder: Path) -> Iterator[None]:
             _written.append(folder)
     finally:
         _going_in.remove(folder)
+
+
+@contextlib.contextmanager
+def speaking(hush: Callable[[], None]) -> Iterator[None]:
+    """While somebody writes to the terminal by itself, a signal calls ``hush`` before it says anything."""
+    _speaking.append(hush)
+    try:
+        yield
+    finally:
+        _speaking.remove(hush)
 
 
 def written() -> tuple[Path, ...]:
@@ -113,6 +124,8 @@ def _end(number: int) -> None:
     else:
         where = ", ".join(map(str, _going_in))
         said = f"interrupted while files were put in place; the next command in {where} completes it or takes it back"
+    for hush in _speaking.copy():
+        hush()
     with contextlib.suppress(OSError, ValueError, AttributeError):
         if sys.stderr.isatty():
             sys.stderr.write("\r\x1b[2K\x1b[?25h")  # a progress bar hides the cursor

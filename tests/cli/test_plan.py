@@ -27,9 +27,10 @@ def job(tmp_path: Path) -> Path:
 
 def test_a_job_without_recording_gets_its_placings_as_table_page_and_recording_to_be(job: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    done = run(job, "--out", out, "--no-power")
+    done = run(job, "--out", out, "--no-power", "--verbose")
     assert done.returncode == 0, done.stderr
     assert "along +X +Y" in done.stdout
+    assert "Searching for better placings" in done.stderr
     assert "Squareness X–Y" in done.stdout
     assert sorted(path.name for path in out.iterdir()) == ["manifest.json", "plan.csv", "plan.html", "results.json"]
     data = json.loads((out / "results.json").read_bytes())

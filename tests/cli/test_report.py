@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import pikepdf
 import pytest
 
 from tests.cli.process import COMMAND, run
+from tests.cli.terminal import everything, on_terminal, until
 
 FILES = ["certificate.html", "certificate.pdf", "manifest.json", "posterior.npz", "results.json"]
 
@@ -22,7 +24,7 @@ FILES = ["certificate.html", "certificate.pdf", "manifest.json", "posterior.npz"
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
     folder = tmp_path_factory.mktemp("empty")
     example = Path(__file__).parents[2] / "examples" / "iota-1102-20C"
-    return folder, run("report", example, cwd=folder)
+    return folder, run("report", example, "--verbose", cwd=folder)
 
 
 def test_it_writes_its_files_and_their_manifest_below_reports(
@@ -38,6 +40,7 @@ def test_it_ends_with_a_summary_in_plain_lines(done: tuple[Path, subprocess.Comp
     assert "404.2051" in process.stdout
     assert "FAIL" in process.stdout
     assert "certificate.pdf" in process.stdout
+    assert process.stdout.startswith("FAIL  ASME B89.4.1-1997, volumetric performance: 339.9 µm against 60 µm; ")
     assert "\x1b" not in process.stdout + process.stderr
     assert "Sampling the posterior" in process.stderr
 
@@ -113,7 +116,7 @@ def test_a_file_where_the_folder_should_be_is_refused(iota: Path, tmp_path: Path
 def test_an_interruption_leaves_no_half_report(iota: Path, tmp_path: Path, number: signal.Signals) -> None:
     out = tmp_path / "out"
     with subprocess.Popen(
-        [*COMMAND, "report", str(iota), "--out", str(out)], stderr=subprocess.PIPE, text=True
+        [*COMMAND, "report", str(iota), "--out", str(out), "--verbose"], stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stderr is not None
         for line in process.stderr:
@@ -149,26 +152,29 @@ def test_the_version_is_printed() -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals of POSIX")
-def test_on_a_terminal_there_is_a_table_and_progress(iota: Path, tmp_path: Path) -> None:
+def test_on_a_terminal_there_are_progress_and_a_decision_in_colour(iota: Path, tmp_path: Path) -> None:
+    code, shown = on_terminal("report", iota, "--out", tmp_path / "out", columns=60)
+    assert code == 0
+    assert re.search(r"Sampling the posterior: \d+% of the", shown)
+    _, _, result = shown.rpartition("\x1b[2K")  # the bar is wiped away before the result is printed
+    assert re.search(r"\x1b\[1;31mFAIL *\x1b\[0m", result)
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", result).split("\n")
+    assert max(len(line) for line in lines if not line.startswith("Written to")) <= 60
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_ctrl_c_wipes_the_bar_away_and_leaves_one_line(iota: Path, tmp_path: Path) -> None:
     import pty
 
     master, slave = pty.openpty()
-    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100"}
-    process = subprocess.Popen([*COMMAND, "report", str(iota), "--out", str(tmp_path / "out")], stdout=slave, stderr=slave,
-                               env=environment, close_fds=True)  # fmt: skip
-    os.close(slave)
-    shown = b""
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline:
-        try:
-            chunk = os.read(master, 65536)
-        except OSError:
-            break
-        if not chunk:
-            break
-        shown += chunk
-    assert process.wait() == 0
-    text = shown.decode()
-    assert "\x1b[" in text
-    assert "Sampling the posterior" in text
-    assert "┏" in text or "│" in text
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "60"}
+    with subprocess.Popen([*COMMAND, "report", iota, "--out", tmp_path / "out"], stdin=slave, stdout=slave, stderr=slave,
+                          env=environment, start_new_session=True) as process:  # fmt: skip
+        os.close(slave)
+        assert "Sampling" in until(master, "Sampling", time.monotonic() + 60)
+        process.send_signal(signal.SIGINT)
+        shown = everything(master, time.monotonic() + 30)
+    os.close(master)
+    assert process.returncode == 130
+    assert shown.rpartition("\x1b[?25h")[2] == "cmm-uq: interrupted; nothing was written\r\n"
+    assert not (tmp_path / "out").exists()

@@ -288,7 +288,7 @@ def test_a_pose_that_is_described_twice_is_refused(tmp_path: Path) -> None:
 
 def test_the_command_line_does_it_too(tmp_path: Path) -> None:
     job, cloud = square(tmp_path), write_csv(tmp_path / "cloud.csv", scanned())
-    process = run("compensate", job, "--cloud", cloud, "--out", tmp_path / "out")
+    process = run("compensate", job, "--cloud", cloud, "--out", tmp_path / "out", "--verbose")
     assert process.returncode == 0, process.stderr
     assert "cloud-compensated.csv" in process.stdout
     assert "Compensating" in process.stderr

@@ -160,7 +160,7 @@ def test_a_consistent_recording_prints_no_diagnosis_unless_asked(document: Docum
 
 
 def test_the_summary_carries_the_certificates_figures(result: Result, document: Document) -> None:
-    lines = [" ".join(row) for row in outcome_of(result).summary]
+    lines = [" ".join(row) for row in outcome_of(result).summary.rows]
     for row in table(document, "Figures of performance").rows:
         assert any(f"{row[1]} ± {row[2]}" in line for line in lines)
     assert any("FAIL" in line for line in lines)

@@ -7,21 +7,23 @@ from pathlib import Path
 
 from cmm_uq.commands.analysis import analyse, outcome_of
 from cmm_uq.documents.document import Decision
+from cmm_uq.documents.in_short import Verdict
 from cmm_uq.documents.summary import summary
 from tests.conftest import ROOT
 from tests.kinds.simulated import analysed, blocks
 
 
-def said(job: str, standard: str) -> tuple[str, str]:
-    (row,) = [row for row in summary(analysed(job), ()) if row[0] == standard]
-    return row[1:]
+def said(job: str) -> Verdict:
+    (verdict,) = summary(analysed(job), ()).verdicts
+    return verdict
 
 
 def test_an_incomplete_test_is_no_pass_and_says_what_it_lacks() -> None:
-    outcome, remark = said("gauge-blocks-simulated", "VDI/VDE 2617")
-    assert outcome == "INCOMPLETE"
-    assert remark.startswith("the lengths measured conform (8.98 µm against 13 µm, ")
-    assert "; missing: space diagonal +X +Y +Z; " in remark
+    verdict = said("gauge-blocks-simulated")
+    assert (verdict.word, verdict.standing) == ("INCOMPLETE", "open")
+    assert verdict.subject.startswith("VDI/VDE 2617, ")
+    assert verdict.remarks[0].startswith("the lengths measured conform (8.98 µm against 13 µm, ")
+    assert verdict.remarks[1].startswith("missing: space diagonal +X +Y +Z; ")
     (block,) = [block for block in blocks("gauge-blocks-simulated") if isinstance(block, Decision)]
     assert block.outcome == "incomplete"
     assert "parallel to Z" in block.missing
@@ -30,17 +32,21 @@ def test_an_incomplete_test_is_no_pass_and_says_what_it_lacks() -> None:
 
 
 def test_a_failed_test_says_what_it_lacks_after_its_figures() -> None:
-    outcome, remark = said("iota-1102-20C", "ASME B89.4.1-1997")
-    assert outcome == "FAIL"
-    assert remark.startswith(
-        "339.9 µm against 60 µm; conforming with less than\u00a00.01\u00a0%; missing: 1 of 20 positions"
-    )
+    """U is twice the standard uncertainty that results.json states of the value, 7.071 µm."""
+    verdict = said("iota-1102-20C")
+    assert (verdict.word, verdict.standing) == ("FAIL", "bad")
+    assert verdict.subject == "ASME B89.4.1-1997, volumetric performance"
+    value, u, chance, missing = verdict.remarks
+    assert value == "339.9 µm against 60 µm"
+    assert u == "test uncertainty U = 14 µm (k = 2)"
+    assert chance == "conforming with less than\u00a00.01\u00a0%"
+    assert missing.startswith("missing: 1 of 20 positions")
 
 
 def test_a_complete_test_passes_with_nothing_missing() -> None:
-    outcome, remark = said("sphere-simulated", "ISO 10360-5:2010")
-    assert outcome == "PASS"
-    assert "missing" not in remark
+    verdict = said("sphere-simulated")
+    assert (verdict.word, verdict.standing) == ("PASS", "good")
+    assert not any("missing" in remark for remark in verdict.remarks)
 
 
 def test_without_an_uncertainty_no_probability_is_printed(tmp_path: Path) -> None:
@@ -50,8 +56,8 @@ def test_without_an_uncertainty_no_probability_is_printed(tmp_path: Path) -> Non
     text = text.replace("u_um = 0.15\n", "").replace("[[conformity]]\n", '[[conformity]]\nrule = "simple"\n')
     (job / "job.toml").write_text(text, encoding="utf-8")
     result = analyse(job)
-    (row,) = [row for row in summary(result, ()) if row[0] == "VDI/VDE 2617"]
-    assert row[2].startswith("the lengths measured conform (2.47 µm against 4.25 µm); missing: ")
+    (verdict,) = summary(result, ()).verdicts
+    assert verdict.remarks[0] == "the lengths measured conform (2.47 µm against 4.25 µm)"
     (block,) = [
         b for section in outcome_of(result).document.sections for b in section.blocks if isinstance(b, Decision)
     ]

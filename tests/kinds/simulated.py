@@ -9,6 +9,7 @@ from cmm_uq.commands.plan import plan_outcome
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.report import diagnosis_outcome
 from cmm_uq.documents.document import Block, Document, Table
+from cmm_uq.documents.outcome import Outcome
 from tests.conftest import ROOT
 
 SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}
@@ -21,8 +22,12 @@ def analysed(job: str) -> Result:
 
 
 @cache
+def outcome(job: str) -> Outcome:
+    return outcome_of(analysed(job))
+
+
 def document(job: str) -> Document:
-    return outcome_of(analysed(job)).document
+    return outcome(job).document
 
 
 @cache

@@ -134,7 +134,7 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
         assert results["schema"] == "cmm-uq/results/1"
         page, pdf = (file_name(document, read_job(job).origin) for document in CERTIFICATE)
         assert {page, pdf, "results.json"} <= set(report.files)
-        assert report.summary[0][0] == "Measured"
+        assert report.summary.rows[0][0] == "Measured"
         assert results["software"].get("plugins", {}) == PLUGINS.get(name, {})
         assert ("with outside-kinds 0.1.0" in report.files[page].read_text(encoding="utf-8")) == (name == OUTSIDE)
         if name == OUTSIDE:

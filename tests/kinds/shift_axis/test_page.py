@@ -108,7 +108,7 @@ def test_what_is_left_with_the_curve_is_the_repeatability(result: ShiftResult) -
 
 
 def test_the_command_ends_with_figures_and_warnings(result: ShiftResult) -> None:
-    said = [row[0] for row in outcome_of(result).summary]
+    said = [row[0] for row in outcome_of(result).summary.rows]
     assert said[:4] == ["Measured", "Linearity error, peak to valley", "Mean sensitivity error of axis x",
                         "Repeatability (one reading)"]  # fmt: skip
     assert "Warning" in said

@@ -121,4 +121,4 @@ def test_a_plate_that_is_only_shifted_states_no_scale_and_no_squareness(only_shi
 
 
 def test_the_command_ends_with_figures(result: PlaneShiftResult) -> None:
-    assert [row[0] for row in outcome_of(result).summary][:3] == ["Measured", "Squareness X–Y", "Scale of X"]
+    assert [row[0] for row in outcome_of(result).summary.rows][:3] == ["Measured", "Squareness X–Y", "Scale of X"]
