@@ -43,15 +43,20 @@ NOT_PLANNED = ("plate_two_dates", "shift_plate", "error_map")
 
 
 def first_page(kind: str, folder: Path) -> None:
-    """The first page of what the example's job writes, as a small picture in grey."""
+    """Write what the example's job gives, and draw the first page of its certificate."""
     if kind == "error_map":
         cmm_uq.diagnose(ROOT / "examples" / EXAMPLES[kind]).write(folder)
         return
     cmm_uq.report(ROOT / "examples" / EXAMPLES[kind]).write(folder)
     (pdf,) = folder.glob("certificate*.pdf")
+    first_page_of(pdf, PICTURES / f"{kind}.png")
+
+
+def first_page_of(pdf: Path, target: Path) -> None:
+    """As a small picture in sixteen greys."""
     picture = ["-r", str(DOTS_PER_INCH), "-f", "1", "-l", "1", "-gray", "-png", "-singlefile"]
-    subprocess.run(["pdftoppm", *picture, str(pdf), str(folder / "page")], check=True)
-    Image.open(folder / "page.png").quantize(16).save(PICTURES / f"{kind}.png", optimize=True)
+    subprocess.run(["pdftoppm", *picture, str(pdf), str(target.with_suffix(""))], check=True)
+    Image.open(target).quantize(16).save(target, optimize=True)
 
 
 def placings(kind: str, folder: Path) -> None:

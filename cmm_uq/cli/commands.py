@@ -7,7 +7,20 @@ from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.cli import BAD_INPUT, budget, check, compensate, diagnose, importing, new, plan, report, schema, selftest, simulate
+from cmm_uq.cli import (
+    BAD_INPUT,
+    budget,
+    check,
+    compensate,
+    diagnose,
+    importing,
+    new,
+    plan,
+    report,
+    schema,
+    selftest,
+    simulate,
+)
 from cmm_uq.cli.options import examples
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import cmm_uq
+from benchmarks.examples.screens import PAGE, complete
 from cmm_uq.uncertainty.model_file import read_model_file
 from tests.conftest import ROOT
 from tests.site.pages import PAGES, Snippet, snippets
@@ -107,7 +108,19 @@ def test_an_excerpt_of_toml_keeps_to_its_form(page: Path) -> None:
 
 @pytest.mark.parametrize("page", having("console", excerpt=True))
 def test_an_excerpt_of_commands_names_commands_that_exist(page: Path) -> None:
-    names = {"report", "diagnose", "plan", "simulate", "compensate", "budget", "selftest", "new", "check", "schema"}
+    names = {
+        "report",
+        "diagnose",
+        "plan",
+        "simulate",
+        "compensate",
+        "budget",
+        "selftest",
+        "new",
+        "check",
+        "schema",
+        "import",
+    }
     for snippet in snippets(page, "console", excerpt=True):
         for line in snippet.text.splitlines():
             words = line.removeprefix("$ ").split()
@@ -119,3 +132,13 @@ def test_every_block_that_could_run_says_so_in_its_language() -> None:
     for page in PAGES:
         for block in snippets(page, "text", "sh", "bash", "py", "pycon", "shell"):
             assert not block.text.startswith(("$ ", ">>> ", "import ", "from ")), block
+
+
+def test_what_the_tutorial_adds_completes_the_certificate(project: Path) -> None:
+    """Of ISO/IEC 17025:2017, 7.8 nothing is missing any more, and nothing is wrong."""
+    obeyed(snippets(PAGE, "console")[1], project)
+    assert "17025" in run(["cmm-uq", "check", "iota"], project).stdout
+    complete(project / "iota" / "job.toml")
+    checked = run(["cmm-uq", "check", "iota"], project)
+    assert checked.returncode == 0
+    assert "17025" not in checked.stdout
