@@ -6,6 +6,7 @@ the files are read as text. Which pages belong together is said in ``CONTENTS`` 
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -41,7 +42,7 @@ author = "The cmm_uq maintainers"
 project_copyright = author
 version = release = __version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_nb", "sphinx.ext.autodoc"]
 include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**"]
 exclude_patterns = [".*", "build", "dist", "cmm_uq", "benchmarks", "examples", "reports", "templates", "tests",
                     "**/.ipynb_checkpoints"]  # fmt: skip
@@ -53,8 +54,6 @@ highlight_language = "text"
 
 autodoc_typehints = "none"  # the docstrings have the types
 autodoc_member_order = "bysource"
-napoleon_google_docstring = False
-napoleon_use_rtype = False
 
 html_theme = "furo"  # fonts of the reader's own system; no page asks for anything from elsewhere
 html_title = f"cmm_uq {__version__}"
@@ -65,6 +64,8 @@ html_copy_source = False
 html_show_sourcelink = False
 pygments_style = "a11y-high-contrast-light"
 pygments_dark_style = "a11y-high-contrast-dark"
+
+FIELDS = {"Parameters": "param", "Attributes": "ivar", "Raises": "raises", "Returns": "returns"}
 
 ACCESSIBLE = {  # what the theme and Sphinx leave out for readers who hear the page or have no mouse
     '<p class="caption" role="heading">': '<p class="caption" role="heading" aria-level="2">',
@@ -87,6 +88,20 @@ def add_contents(app: Sphinx, docname: str, source: list[str]) -> None:
             source[0] += f"\n```{{toctree}}\n:hidden:\n:glob:\n:caption: {caption}\n\n{entries}\n```\n"
 
 
+def read_docstring(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Turn the sections of a docstring (``name : what it is``, below ``Parameters`` and the like) into Sphinx's fields."""
+    told: list[str] = []
+    section = ""
+    for line, following in zip(lines, [*lines[1:], ""], strict=True):
+        if following and set(following) == {"-"}:
+            section = line
+            told += ["", f"**{line}**", ""] if section not in FIELDS else [""]
+        elif not line or set(line) != {"-"}:
+            named = re.match(r"([\w`*., ]+) : (.+)", line) if section in FIELDS else None
+            told.append(f":{FIELDS[section]} {named[1].replace(', ', ',')}: {named[2]}" if named else line)
+    lines[:] = told
+
+
 def make_accessible(app: Sphinx, exception: Exception | None) -> None:
     """Complete the written pages; tests hold every one of them to axe-core's rules."""
     if exception is None and app.builder.format == "html":
@@ -98,6 +113,7 @@ def make_accessible(app: Sphinx, exception: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> None:
-    """Register both with Sphinx."""
+    """Register all of them with Sphinx."""
+    app.connect("autodoc-process-docstring", read_docstring)
     app.connect("source-read", add_contents)
     app.connect("build-finished", make_accessible)

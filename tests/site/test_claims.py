@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import cmm_uq
 from cmm_uq.kinds import BUILT_IN
 from tests.conftest import ROOT
 from tests.site.pages import snippets
@@ -59,3 +60,9 @@ def test_a_picture_is_small_and_shown(picture: Path) -> None:
     assert picture.stat().st_size <= (60_000 if picture.parent.name in ("gallery", "tutorial") else 120_000)
     pages = [*DOCS.rglob("*.md"), ROOT / "README.md"]
     assert any(picture.name in page.read_text(encoding="utf-8") for page in pages)
+
+
+def test_every_public_name_has_its_place_in_the_reference() -> None:
+    page = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"\.\. auto(?:function|exception):: cmm_uq\.(\w+)$", page, re.MULTILINE))
+    assert named == set(cmm_uq.__all__) - {"__version__"}
