@@ -12,13 +12,15 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # typing alone would cost ten times as much as all of this
 if TYPE_CHECKING:
+    from cmm_uq.api.beginning import check, new
     from cmm_uq.api.calls import budget, compensate, diagnose, job, plan, read, report, simulate
     from cmm_uq.errors import CmmUqError
 
 __version__ = "0.3.0"
 
 __all__ = [
-    "CmmUqError", "__version__", "budget", "compensate", "diagnose", "job", "plan", "read", "report", "simulate",
+    "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "job", "new", "plan", "read", "report",
+    "simulate",
 ]  # fmt: skip
 
 
@@ -27,7 +29,8 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    found = getattr(import_module("cmm_uq.errors" if name == "CmmUqError" else "cmm_uq.api.calls"), name)
+    places = {"CmmUqError": "cmm_uq.errors", "check": "cmm_uq.api.beginning", "new": "cmm_uq.api.beginning"}
+    found = getattr(import_module(places.get(name, "cmm_uq.api.calls")), name)
     globals()[name] = found
     return found
 

@@ -127,6 +127,7 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     """Answer to an unknown name: the nearest known one, else all of them, or as many as can be read."""
     names = sorted(known)
     family = [name for name in names if name.startswith(f"{word}_")] if word not in names else []
+    family = [name for name in family if "_" not in name.removeprefix(f"{word}_")] or family
     if 1 < len(family) <= _FAMILY:
         return f"Did you mean {', '.join(map(repr, family))}?"
     near = get_close_matches(word, names, n=1, cutoff=0.6) if len(word) <= _COMPARED else []

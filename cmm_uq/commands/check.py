@@ -14,7 +14,7 @@ from typing import Any
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recorded import recorded_model
-from cmm_uq.commands.refusals import refuse_planned
+from cmm_uq.commands.refusals import refuse_unmeasured
 from cmm_uq.conformity.standards import decidable
 from cmm_uq.documents.completeness import contradictions, unstated
 from cmm_uq.errors import CmmUqError, Gathered
@@ -124,23 +124,38 @@ def check_job(folder: Path) -> Checked:
     folder : the job folder, or its job.toml.
     """
     wrong, path = Gathered(), folder if folder.suffix == ".toml" else folder / "job.toml"
-    job, warnings = None, []
+    job: Job | None = None
+    warnings: list[Problem] = []
     with wrong.going_on():
         job = read_job(folder)
     if job is None:
-        with wrong.going_on():
-            _recording_by_itself(path)
+        _parts_by_themselves(path, wrong)
     else:
-        with wrong.going_on():
-            warnings += _unfit(job, wrong)
-        warnings += _to_be_known(job, path)
+        warnings = _of_a_job(job, path, wrong)
     return Checked(str(folder), _once(Problem.of(_placed(error, path)) for error in wrong.problems), _once(warnings))
+
+
+@naming_package()
+def check_read(job: Job) -> Checked:
+    """Check a job that was read."""
+    wrong, path = Gathered(), job.folder / "job.toml"
+    warnings = _of_a_job(job, path, wrong)
+    problems = _once(Problem.of(_placed(error, path)) for error in wrong.problems)
+    return Checked(job.facts.job.id, problems, _once(warnings))
+
+
+def _of_a_job(job: Job, path: Path, wrong: Gathered) -> list[Problem]:
+    """Gather what is wrong with a job that was read; what should be known of it."""
+    found: list[Problem] = []
+    with wrong.going_on():
+        found += _unfit(job, wrong)
+    return found + _to_be_known(job, path)
 
 
 def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
     """Gather what the model and the standards refuse of a job that was read; what the screening found."""
     kind, facts = kind_of(job), job.facts
-    refuse_planned(job)
+    refuse_unmeasured(job)
     acting = None
     with wrong.going_on():
         acting = effects(facts.model.effects, where="job.toml [model] effects")
@@ -185,23 +200,26 @@ def _to_be_known(job: Job, path: Path) -> list[Problem]:
     return [*(Problem(str(text), str(path)) for text in contradictions(job)), *missing]
 
 
-def _recording_by_itself(path: Path) -> None:
-    """Read the recording of a job whose job.toml, or another of its files, was refused.
-
-    Raises
-    ------
-    CmmUqError : it is refused as well.
-    """
+def _parts_by_themselves(path: Path, wrong: Gathered) -> None:
+    """Gather what is wrong with recording and effects of a job whose job.toml, or another of its files, was refused."""
     try:
         data = tomllib.loads(content_of(path, JOB_BYTES, "").decode("utf-8-sig"))
     except (CmmUqError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
         return
-    table = data.get("recording")
-    name = table.get("file") if isinstance(table, dict) else None
+    named, name = _value(data, "model", "effects"), _value(data, "recording", "file")
+    if isinstance(named, list):
+        with wrong.going_on():
+            effects([name for name in named if isinstance(name, str)], where="job.toml [model] effects")
     if isinstance(name, str) and name:
-        found = inside(path.parent, name, str(path))
-        content = content_of(found, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
-        read_recording(content, str(path.parent / name), Machine())
+        with wrong.going_on():
+            found = inside(path.parent, name, str(path))
+            content = content_of(found, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
+            read_recording(content, str(path.parent / name), Machine())
+
+
+def _value(data: dict[str, Any], table: str, key: str) -> object:
+    found = data.get(table)
+    return found.get(key) if isinstance(found, dict) else None
 
 
 def _placed(error: CmmUqError, path: Path) -> CmmUqError:

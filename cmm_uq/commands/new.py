@@ -35,6 +35,9 @@ from cmm_uq.units import MICROMETRE
 from cmm_uq.writing import Owner, staged
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
+KEPT = (SCHEMA, README)
+"""Files beside those of the job itself."""
+
 PLAN, BUDGET = "plan", "budget"
 """Names beside those of kinds."""
 

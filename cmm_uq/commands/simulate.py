@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.physics.effect import Effect
 from cmm_uq.plugins import naming_package
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE
@@ -61,7 +62,8 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     refuse_unfit(job)
     artefact = observe(job.facts.artefact, points, where=job.recording_path)
     acting = effects(tuple(truth.effects), where=f"{truth_path} [effects]")
-    given = [effect.from_reported(truth.effects[effect.name]) for effect in acting]
+    _refuse_unrecorded(points, acting, truth, truth_path)
+    given = [_given(effect, truth, truth_path) for effect in acting]
     model = MeasurementModel(
         artefact, acting, shapes={effect.name: shape for effect, (_, shape) in zip(acting, given, strict=True)}
     )
@@ -73,6 +75,25 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     if not np.all(np.abs(drawn) <= LONGEST_MM):
         raise CmmUqError(f"the coordinates would go beyond {LONGEST_MM:g} mm", where=truth_path, fix=_FIX)
     return points.at(drawn)
+
+
+def _given(effect: Effect, truth: Truth, truth_path: str) -> tuple[Floats, tuple[float, ...]]:
+    """Coefficients and shape of an effect that acts."""
+    try:
+        return effect.from_reported(truth.effects[effect.name])
+    except CmmUqError as error:
+        where = f"{truth_path} [effects.{effect.name}]"
+        raise CmmUqError(error.problem, where=error.where or where, fix=error.fix) from None
+
+
+def _refuse_unrecorded(points: Points, acting: Sequence[Effect], truth: Truth, truth_path: str) -> None:
+    """Refuse effects and slow noise that go by columns which neither the recording nor the truth has."""
+    asked = [(f"[effects.{effect.name}]", effect.name, column) for effect in acting for column in effect.columns]
+    asked += [("[noise] slow_um", "slow noise", "time_s")] if truth.noise.slow_um else []
+    for key, what, column in asked:
+        if column not in points.columns:
+            raise CmmUqError(f"{what} needs the column {column}, which the recording has not", where=f"{truth_path} {key}",
+                             fix=f"Record {column}, give it in [columns], or leave this out")  # fmt: skip
 
 
 def write_simulation(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import compress
 from types import MappingProxyType
 
 import numpy as np
@@ -58,9 +59,12 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
     CmmUqError : a column is missing or twice there, a cell is no number of a possible size, a row is incomplete, a point is
         there twice.
     """
-    header, rows, lines = _table(content, name)
-    _check_header(header, name)
     wrong, table = Gathered(), dict[str, Floats]()
+    header, rows, lines = _table(content, name, wrong)
+    with wrong.going_on():
+        _check_header(header, name)
+    if not set(REQUIRED) <= set(header):
+        wrong.refuse()  # the cells of another table are another's
 
     def column_of(i: int) -> Floats:
         return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}")
@@ -115,18 +119,19 @@ def points_of(
     return points
 
 
-def _table(content: bytes, name: str) -> tuple[list[str], list[list[str]], list[int]]:
-    cells, wrong = cells_of(content, name, "Save the recording as CSV in UTF-8"), Gathered()
+def _table(content: bytes, name: str, wrong: Gathered) -> tuple[list[str], list[list[str]], list[int]]:
+    """Header, complete rows and their lines; rows of another length are gathered."""
+    cells = cells_of(content, name, "Save the recording as CSV in UTF-8")
+    whole = [len(row) == len(cells.header) for row in cells.rows]
     for row, line in zip(cells.rows, cells.lines, strict=True):
         if len(row) != len(cells.header):
             wrong.add(CmmUqError(
                 f"has {len(row)} cells where the header has {len(cells.header)}", where=f"{name} line {line}",
                 fix="Complete the row; if it is the last one, the file was cut off: export it again",
             ))  # fmt: skip
-    wrong.refuse()
     if not cells.rows:
         raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
-    return cells.header, cells.rows, cells.lines
+    return cells.header, list(compress(cells.rows, whole)), list(compress(cells.lines, whole))
 
 
 def _check_header(header: Sequence[str], name: str) -> None:

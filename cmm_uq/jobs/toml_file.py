@@ -112,7 +112,7 @@ def _located(error: ErrorDetails, named: list[str], text: str, path: Path, model
     named = [shortened(key, _SHOWN) for key in named]
     where = f"{path}{f' line {line}' if line else ''}: [{named[0]}]{' ' + '.'.join(named[1:]) if named[1:] else ''}"
     if error["type"] == "missing":
-        return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}{_explained(word, table)}")
+        return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}.{_explained(word, table)}".rstrip("."))
     if error["type"] == "extra_forbidden":
         return CmmUqError("unknown key", where=where, fix=_meant(shortened(word, _SHOWN), table))
     message = error["msg"].removeprefix("Value error, ")

@@ -66,7 +66,7 @@ def test_a_periodic_error_can_be_simulated(iota: Path) -> None:
     [
         ("[effects.scale_w]\nppm = 1.0", "unknown effect 'scale_w'"),
         ("[effects.scale_x]\narcsec = 1.0", "no parameter 'arcsec'"),
-        ("[effects.thermal_scale_x]\ncte_per_k = 1e-6", "no column 'temp_x_c'"),
+        ("[effects.thermal_scale_x]\ncte_per_k = 1e-6", "needs the column temp_x_c"),
         ("[artefact]\nwidth_mm = 1.0", "a ballbar has no size 'width_mm'"),
         ("[noise]\ncoordinate_um = -1.0", "greater than or equal to 0"),
         ("[nois]\ncoordinate_um = 1.0", "unknown key. Did you mean 'noise'"),

@@ -7,10 +7,10 @@ import numpy as np
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.points import AXES, Machine, Points
 
-SIDE, PITCH = 4, 100.0
+SIDE, PITCH = 3, 150.0
 """Balls along a side of the plate, and their distance, mm."""
 
-PLACINGS = ((0.0, 0.0, 0.0), (100.0, 0.0, 0.0), (0.0, 100.0, 0.0), (0.0, 0.0, 90.0), (50.0, 50.0, 180.0))
+PLACINGS = ((0.0, 0.0, 0.0), (150.0, 0.0, 0.0), (0.0, 150.0, 0.0), (0.0, 0.0, 90.0))
 """Shift of the plate's middle along x and y, mm, and turn, °: enough to part the plate from the machine."""
 
 AXIS = Beginning(
