@@ -2,17 +2,235 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any, get_type_hints
 
+from typer.models import ArgumentInfo, CommandInfo
+
+from cmm_uq.cli.commands import app
+from cmm_uq.commands.new import known
 from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
+from cmm_uq.jobs.beginning import Beginning
+from cmm_uq.jobs.columns import COLUMNS
+from cmm_uq.jobs.recording import REQUIRED
+from cmm_uq.jobs.schema import keys_of
+from cmm_uq.jobs.sentences import unit_of
+from cmm_uq.jobs.toml_text import without_place, written
+from cmm_uq.kinds import kind_named
+from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.uncertainty.budgets.tables import TABLES
+from cmm_uq.uncertainty.input_keys import KINDS as DISTRIBUTIONS
 from tests.conftest import ROOT
 
-SHIPPED = ROOT / "cmm_uq" / "schemas"
+SHIPPED, PAGES = ROOT / "cmm_uq" / "schemas", ROOT / "docs" / "reference"
+WRITTEN = "<!-- written by python -m tests.reference_pages from what the program reads: edit that instead -->"
+EDITORS = (
+    "The same as JSON Schema, for editors that complete and explain (Even Better TOML, taplo, Tombi): `cmm-uq schema {name}` "
+    "prints it with the kinds, effects and standards of other packages that are installed; a first line `#:schema ./FILE` names it."
+)
+ALL = "all"
 
 
 def files() -> dict[Path, str]:
     """Every generated file with what it must say."""
-    return {SHIPPED / f"{name}.schema.json": as_text(schema_named(name)) for name in SCHEMAS}
+    schemas = {SHIPPED / f"{name}.schema.json": as_text(schema_named(name)) for name in SCHEMAS}
+    pages = {
+        "job": job(),
+        "plan": plan(),
+        "truth": truth(),
+        "budget": budget(),
+        "columns": columns(),
+        "commands": commands(),
+    }
+    return schemas | {PAGES / f"{name}.md": text for name, text in pages.items()}
+
+
+def page(title: str, *parts: str) -> str:
+    """A page of parts."""
+    return "\n\n".join([f"# {title}", WRITTEN, *parts]) + "\n"
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table; a vertical line in a cell would end it."""
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def job() -> str:
+    """Every key of job.toml but ``[plan]``."""
+    schema = schema_named("job")
+    parts = [
+        "A job is a folder with a `job.toml` and the recording that it names. `cmm-uq new KIND` writes one that runs, with "
+        "every key explained; `cmm-uq check JOB` says all that is wrong with it. Numbers in brackets such as 7.8.2.1 e are "
+        "clauses of ISO/IEC 17025:2017.",
+        EDITORS.format(name="job"),
+        "Units stand at the end of a key's name. A standard uncertainty u has k = 1.",
+    ]
+    for name, one in schema["properties"].items():
+        if name != "plan":
+            parts += [
+                f"## `{header(name, one)}`",
+                one["description"],
+                keys_table(one, asked="kinds" * (name == "artefact")),
+            ]
+    parts += ["`[plan]` has [a page of its own](plan.md)."]
+    return page("job.toml, key by key", *parts)
+
+
+def plan() -> str:
+    """Every key of ``[plan]``."""
+    one = schema_named("job")["properties"]["plan"]
+    ready = [
+        (f"`{kind}`", ", ".join(f"`{plan}`" for plan in planning.ready))
+        for kind in dict.fromkeys(known().values())
+        if (found := kind_named(kind)) is not None and (planning := found._loaded(found.plan)) is not None
+    ]
+    return page(
+        "`[plan]` in job.toml, key by key",
+        "A plan is a job whose recording may still be missing: its `job.toml` has all that [a job](job.md) has, and `[plan]`. "
+        "`cmm-uq new plan` begins one. What a plan says and how it is made: [plans](../planning.md).",
+        EDITORS.format(name="job"), keys_table(one), "## Ready plans",
+        "The first of a kind is its usual one.", table(("kind", "`ready`"), ready),
+    )  # fmt: skip
+
+
+def truth() -> str:
+    """Every key of truth.toml."""
+    schema = schema_named("truth")
+    return page(
+        "truth.toml, key by key",
+        "What `cmm-uq simulate JOB --truth FILE` draws a recording from. Parameters of every effect: "
+        "[effects](../machine/effects.md).",
+        EDITORS.format(name="truth"), keys_table(schema),
+    )  # fmt: skip
+
+
+def budget() -> str:
+    """Every key of a budget's file."""
+    keys = schema_named("budget")["properties"]
+    ready = [(f"`{name}`", str(one.meaning)) for name, one in TABLES.items()]
+    own = [(f"`{name}`", ", ".join(f"`{key}`" for key in taken)) for name, (taken, _) in DISTRIBUTIONS.items()]
+    return page(
+        "Budgets, key by key",
+        "`cmm-uq budget FILE` evaluates a [model of one's own](../uncertainty/model-file.md) (`[model]`, `[inputs.NAME]`, "
+        "`[correlation]`) or a [ready budget](../uncertainty/budgets.md) (`[budget]`). `cmm-uq new budget` begins one.",
+        EDITORS.format(name="budget"),
+        "## `[model]`", keys["model"]["description"], keys_table(keys["model"]),
+        "## `[inputs.NAME]`", keys["inputs"]["description"], keys_table(keys["inputs"]["additionalProperties"]),
+        "Which keys a distribution takes:", table(("`distribution`", "keys"), own),
+        "## `[correlation]`", keys["correlation"]["description"],
+        "## `[budget]`", keys["budget"]["description"], table(("`method`", "what for"), ready),
+        keys_table(keys["budget"], asked="methods"),
+    )  # fmt: skip
+
+
+def columns() -> str:
+    """Every column of a recording."""
+    begun = {name: _beginning(name) for name in known()}
+    needed = {name: (*one.columns, *one.further) for name, one in begun.items()}
+    own = {name: told for one in begun.values() for name, told in {**one.columns, **one.further}.items() if told}
+    effects: dict[str, list[str]] = {}
+    for effect in EVERY.values():
+        for column in effect.columns:
+            effects.setdefault(column, []).append(effect.name)
+    rows = [
+        (
+            f"`{name}`", unit_of(name) or "–", told,
+            "all" if name in REQUIRED else ", ".join(f"`{k}`" for k, given in needed.items() if name in given) or "–",
+            ", ".join(f"`{effect}`" for effect in effects.get(name, ())) or "–",
+        )
+        for name, told in {**COLUMNS, **own}.items()
+    ]  # fmt: skip
+    kinds = [
+        (
+            f"`{name}`", one.numbering,
+            ", ".join(f"`{c}`" for c in one.columns) or "–", ", ".join(f"`{c}`" for c in one.further) or "–",
+        )
+        for name, one in begun.items()
+    ]  # fmt: skip
+    return page(
+        "The columns of a recording",
+        "A recording is a CSV in UTF-8 with one row a point; lines that begin with # are passed over. Any other numeric column "
+        "is a covariate: not used by the model, but searched when a mismatch is located.",
+        "## Kinds",
+        f"Every recording has {', '.join(f'`{name}`' for name in REQUIRED)}.",
+        table(("kind", "what the numbers mean", "needs besides", "may have"), kinds),
+        "## Columns", table(("column", "unit", "meaning", "kinds", "effects that go by it"), rows),
+    )  # fmt: skip
+
+
+def commands() -> str:
+    """Every command with its arguments and options, from the help that it prints."""
+    parts = [f"{app.info.help}", f"{app.info.epilog}", "`cmm-uq COMMAND --help` prints what stands here."]
+    for command in app.registered_commands:
+        rows = list(_parameters(command))
+        arguments = " ".join(name for name, _, _ in rows if not name.startswith("`-"))
+        usage = f"cmm-uq {command.name} {arguments.replace('`', '')}".strip()
+        told = " ".join((inspect.getdoc(command.callback) or "").split())
+        parts += [f"## `{usage}`", told, table(("argument or option", "meaning", "default"), rows)]
+    return page("Commands", *parts)
+
+
+def header(name: str, one: Mapping[str, Any]) -> str:
+    """Of a table, or of several of one name."""
+    return f"[[{name}]]" if one.get("type") == "array" else f"[{name}]"
+
+
+def keys_table(one: Mapping[str, Any], asked: str = "") -> str:
+    """Every key of a table, also of tables in it."""
+    whole = one["items"] if one.get("type") == "array" else one
+    given = {name: key["x-for"] for name, key in whole["properties"].items() if "x-for" in key}
+    rows = []
+    for name, key in keys_of(whole):
+        top = name.partition(".")[0].removesuffix("[]")
+        kinds = ", ".join(f"`{kind}`" for kind in given[top]) if top in given else ALL
+        told = without_place(key["description"])
+        choices = key.get("enum") or next((part["enum"] for part in key.get("anyOf", ()) if "enum" in part), ())
+        choices = [choice for choice in choices if choice != "" and len(choices) > 1]
+        told += f" One of {', '.join(f'`{choice}`' for choice in choices)}." if choices else ""
+        cells = [f"`{name}`", key.get("x-unit", "–"), _default(whole, name, key), told]
+        rows.append([*cells[:3], kinds, cells[3]] if asked else cells)
+    headings = ["key", "unit", "default", "meaning"]
+    return table([*headings[:3], asked, headings[3]] if asked else headings, rows)
+
+
+def _default(whole: Mapping[str, Any], name: str, key: Mapping[str, Any]) -> str:
+    if "default" in key:
+        return f"`{written(key['default'])}`" if key["default"] not in ("", [], {}) else "–"
+    inside: Any = whole
+    *parents, last = name.split(".")
+    for parent in parents:
+        found = inside.get("properties", {}).get(parent.removesuffix("[]"), {})
+        tables = (found, found.get("items", {}), *found.get("anyOf", ()), found.get("additionalProperties") or {})
+        inside = next((part for part in tables if isinstance(part, dict) and "properties" in part), {})
+    needed = set(inside.get("required", ())) or set()
+    return "needed" if last in needed else "–"
+
+
+def _beginning(name: str) -> Beginning:
+    kind = kind_named(known()[name])
+    assert kind is not None
+    return kind.beginning(name)
+
+
+def _parameters(command: CommandInfo) -> Iterable[tuple[str, str, str]]:
+    """Name, meaning and default of each argument and option."""
+    assert command.callback is not None
+    hints = get_type_hints(command.callback, include_extras=True)
+    for name, parameter in inspect.signature(command.callback).parameters.items():
+        info = next(iter(getattr(hints[name], "__metadata__", ())), None)
+        long = f"--{name.replace('_', '-')}"
+        switch = hints[name].__args__[0] if hasattr(hints[name], "__args__") else hints[name]
+        given = (getattr(info, "default", None), *(getattr(info, "param_decls", None) or ()))
+        names = [one for one in given if isinstance(one, str) and one.startswith("-")]
+        names = names or ([long, f"--no-{name}"] if parameter.default is True else [long])
+        shown = f"`{name.upper()}`" if isinstance(info, ArgumentInfo) else ", ".join(f"`{one}`" for one in names)
+        default = parameter.default
+        plain = isinstance(default, (int, float)) and switch is not bool
+        told = " ".join((getattr(info, "help", None) or "").split())
+        yield shown, told, f"`{default}`" if plain and default is not parameter.empty else "–"
 
 
 def main() -> None:

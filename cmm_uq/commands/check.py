@@ -14,7 +14,7 @@ from typing import Any
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recorded import recorded_model
-from cmm_uq.commands.refusals import refuse_planned
+from cmm_uq.commands.refusals import refuse_unmeasured
 from cmm_uq.conformity.standards import decidable
 from cmm_uq.documents.completeness import contradictions, unstated
 from cmm_uq.errors import CmmUqError, Gathered
@@ -155,7 +155,7 @@ def _of_a_job(job: Job, path: Path, wrong: Gathered) -> list[Problem]:
 def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
     """Gather what the model and the standards refuse of a job that was read; what the screening found."""
     kind, facts = kind_of(job), job.facts
-    refuse_planned(job)
+    refuse_unmeasured(job)
     acting = None
     with wrong.going_on():
         acting = effects(facts.model.effects, where="job.toml [model] effects")

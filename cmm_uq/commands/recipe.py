@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cmm_uq.commands.refusals import refuse_planned
+from cmm_uq.commands.refusals import refuse_unmeasured
 from cmm_uq.documents.outcome import OwnAnalysis, Recipe
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
@@ -26,7 +26,7 @@ def recipe_of(
     ------
     CmmUqError : the kind offers neither, or nothing is measured yet.
     """
-    refuse_planned(job)
+    refuse_unmeasured(job)
     kind = kind_of(job)
     offered = kind.offers("own", OwnAnalysis)
     recipe = None if offered is None else own(offered)

@@ -21,3 +21,16 @@ def refuse_planned(job: Job) -> None:
     if job.planned:
         raise CmmUqError("holds planned coordinates: nothing is measured", where=f"{job.recording_path} line 1",
                          fix="Put in what the machine indicated, then remove that line")  # fmt: skip
+
+
+def refuse_unmeasured(job: Job) -> None:
+    """Refuse a job of which nothing is measured: a plan's coordinates, or no recording at all where its kind has one.
+
+    Raises
+    ------
+    CmmUqError : nothing is.
+    """
+    refuse_planned(job)
+    if job.facts.artefact.with_recording and not len(job.points):
+        raise CmmUqError("is not there: nothing is measured", where=job.recording_path,
+                         fix="Record what the machine indicated; cmm-uq plan says where")  # fmt: skip

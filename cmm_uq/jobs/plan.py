@@ -85,7 +85,7 @@ class PlanFacts(Table):
     minutes_per_placing: Duration = 5.0
     """Time to set up the artefact once, min."""
     seconds_per_point: Duration = 10.0
-    """Time to measure one point."""
+    """Time to measure one point, s."""
     noise_from: str | None = None
     """`results.json` of an earlier recording, or the folder with it inside the job's, whose noise is expected again."""
     placing_um: Uncertainty | None = None

@@ -10,7 +10,7 @@ from typing import Any
 
 Schema = Mapping[str, Any]
 
-_WHERE = re.compile(r" (?:Unit|Kinds): [^.]*\.")
+_WHERE = re.compile(r" (?:Unit|Kinds|Methods): [^.]*\.")
 """Of a description, what the name of the key and the file itself say."""
 
 _EXAMPLES: Mapping[str, Any] = {
@@ -69,6 +69,11 @@ def written(value: Any) -> str:
     raise TypeError(f"TOML has no {type(value).__name__}")
 
 
+def without_place(description: str) -> str:
+    """The sentence of a key without what the schema puts behind it: unit, and kinds or methods that have the key."""
+    return _WHERE.sub("", description)
+
+
 def _said(given: Any, several: bool) -> list[Any]:
     if not given:
         return []
@@ -80,7 +85,7 @@ def _has(key: Schema, asked_by: str) -> bool:
 
 
 def _lines(keys: Mapping[str, Schema], given: Mapping[str, Any], comment: bool) -> list[str]:
-    told = {key: _WHERE.sub("", item["description"]) for key, item in keys.items()}
+    told = {key: without_place(item["description"]) for key, item in keys.items()}
     first = [f"{key} = {written(given[key])}  # {told[key]}" for key in keys if key in given]
     first += [f"{key} = {written(value)}" for key, value in given.items() if key not in keys]
     rest = [

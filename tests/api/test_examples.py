@@ -10,7 +10,7 @@ import pytest
 from tests.conftest import ROOT
 
 
-@pytest.mark.parametrize(("module", "least"), [("cmm_uq", 3), ("cmm_uq.api.calls", 10)])
+@pytest.mark.parametrize(("module", "least"), [("cmm_uq", 3), ("cmm_uq.api.calls", 10), ("cmm_uq.api.beginning", 4)])
 def test_the_examples_of_the_docstrings_hold(module: str, least: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     ran = doctest.testmod(import_module(module), raise_on_error=False)

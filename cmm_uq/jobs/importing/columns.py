@@ -272,12 +272,19 @@ def _usable(sheet: Sheet, header: Header, needed: Sequence[int], where: str) -> 
             raise CmmUqError("has no coordinates, and figures follow", where=sheet.at(where, text[0]),
                              fix="Remove the line, or complete it; two tables in one file are two exports")  # fmt: skip
         kept.append(i)
+    if sheet.unended and len(kept) > 1 and all(len(sheet.rows[i]) == width for i in kept[:-1]):
+        _refuse_cut(sheet, kept[-1], width, where)
     for i in text:
         if all(cell == "" or is_number(cell) for cell in sheet.rows[i]) and not sheet.spreadsheet:
-            filled = sum(cell != "" for cell in sheet.rows[i])
-            raise CmmUqError(f"the row ends after {filled} of {width} cells: the file was cut off", where=sheet.at(where, i),
-                             fix="Export it again")  # fmt: skip
+            _refuse_cut(sheet, i, width, where)
     return kept, len(text)
+
+
+def _refuse_cut(sheet: Sheet, i: int, width: int, where: str) -> None:
+    """Refuse a row that ends before the others do."""
+    if len(sheet.rows[i]) < width:
+        raise CmmUqError(f"the row ends after {len(sheet.rows[i])} of {width} cells: the file was cut off",
+                         where=sheet.at(where, i), fix="Export it again")  # fmt: skip
 
 
 def _refuse_another_length(sheet: Sheet, header: Header, i: int, needed: Sequence[int], where: str) -> None:

@@ -53,7 +53,7 @@ class Delimited(Format):
             Fact("encoding", say("Encoding"), Verbatim(encoding)),
             Fact("delimiter", say("Between cells"), _TITLES[delimiter]),
         )
-        return [Sheet("", rows, lines, facts=facts)]
+        return [Sheet("", rows, lines, unended=not text.endswith(("\n", "\r")), facts=facts)]
 
 
 def _delimiter(text: str, where: str, keys: ImportKeys) -> str:

@@ -20,7 +20,7 @@ from cmm_uq.messages import Verbatim, number, say
 
 _HEADING = re.compile(r"^\s*AX\s+(?=.*\bMEAS\b)", re.MULTILINE)
 _DIMENSION = re.compile(
-    r"^\s*(?:DIM\s+)?(?P<name>\S.*?)\s*=\s*(?P<what>[A-Z0-9 ]*?)\s*\bOF\s+(?P<sort>[A-Z]+)\s+(?P<of>.+?)"
+    r"^\s*(?:DIM\s+)?(?P<name>\S.*?)\s*=\s*(?P<what>[A-Z0-9 ]*?)\s*\bOF\s+(?P<sort>[A-Z]+)\s+(?P<of>\S+).*?"
     r"\s*UNITS\s*=\s*(?P<unit>\w+)",
     re.IGNORECASE,
 )
@@ -29,6 +29,7 @@ _FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+[-+\d.]", re.IGNORECASE)
 _NUMBER = re.compile(r"(?<!\S)[-+]?\d*[.,]?\d+(?!\S)")
 _WORD = re.compile(r"\S+")
 AXES = ("X", "Y", "Z")
+_PRINT_AGAIN = "Print the report again"
 
 
 @dataclass
@@ -52,7 +53,7 @@ class PcDmis(Format):
     def recognises(self, head: bytes) -> bool:
         """See :meth:`Format.recognises`: by the heading of its figures, and the lines that name dimensions."""
         text = head_text(head)
-        return _HEADING.search(text) is not None and re.search(r"UNITS\s*=\s*(MM|IN)", text) is not None
+        return _HEADING.search(text) is not None and re.search(r"^\s*DIM\s|UNITS\s*=", text, re.MULTILINE) is not None
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         """See :meth:`Format.read`."""
@@ -113,11 +114,22 @@ def _ends(content: str) -> Iterator[tuple[str, int]]:
 
 
 def _measured(content: str, ends: dict[str, int], place: str) -> str:
-    """The figure below MEAS."""
+    """The figure below MEAS, which differs from that below NOMINAL by that below DEV where these are printed."""
+    below: dict[str, str] = {}
     for found in _NUMBER.finditer(content):
-        nearest = min(ends, key=lambda word: abs(ends[word] - found.end()))
-        if nearest == "MEAS":
-            return found[0]
-    raise CmmUqError(
-        "no measured value stands below MEAS", where=place, fix="Print the report again: the line is damaged"
-    )
+        below.setdefault(min(ends, key=lambda word: abs(ends[word] - found.end())), found[0])
+    if "MEAS" not in below:
+        raise CmmUqError("no measured value stands below MEAS", where=place, fix=_PRINT_AGAIN)
+    if {"NOMINAL", "DEV"} <= set(ends) and not _agree(below):
+        raise CmmUqError(f"MEAS {below['MEAS']} is not NOMINAL and DEV together: the line is damaged", where=place,
+                         fix=_PRINT_AGAIN)  # fmt: skip
+    return below["MEAS"]
+
+
+def _agree(below: dict[str, str]) -> bool:
+    """Whether the deviation is what it must be, to the last printed digits of the three."""
+    if not {"NOMINAL", "DEV"} <= set(below):
+        return False
+    measured, nominal, deviation = (below[word].replace(",", ".") for word in ("MEAS", "NOMINAL", "DEV"))
+    last = max(10.0 ** -len(figure.partition(".")[2]) for figure in (measured, nominal, deviation))
+    return abs(float(measured) - float(nominal) - float(deviation)) <= 1.6 * last

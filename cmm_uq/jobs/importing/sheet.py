@@ -37,6 +37,7 @@ class Sheet:
     lines : of each row in the file.
     spreadsheet : whether places are named as in a spreadsheet.
     listed : whether the format made the table of a report of features: it has no header in the file.
+    unended : whether the last line of the file has no end, as where it was cut off.
     unit : of its lengths, where the format or the file says it.
     decimal : sign, where the format says it.
     facts : recognised so far.
@@ -47,6 +48,7 @@ class Sheet:
     lines: Sequence[int]
     spreadsheet: bool = False
     listed: bool = False
+    unended: bool = False
     unit: str | None = None
     decimal: str | None = None
     facts: tuple[Fact, ...] = ()

@@ -10,7 +10,7 @@ BEGINNING = Beginning(
     artefact={"name": "Gauge blocks", "u_um": 0.15, "cte_per_k": 11.5e-6},
     effects=(*SIX, "probe_radius"),
     conformity={"standard": "ISO 10360-2:2009", "mpe": "4 + L/100", "rule": "ISO 14253-1"},
-    plan={"lengths_mm": [100.0 * i for i in range(1, 10)], "repeats": 3},
+    plan={"lengths_mm": [20.0, *(100.0 * i for i in range(1, 10))], "repeats": 3},
     columns={"reference_mm": ""},
     further=dict.fromkeys(("approach_x", "approach_y", "approach_z", "nx", "ny", "nz"), ""),
 )

@@ -11,7 +11,6 @@ BEGINNING = Beginning(
     effects=("probe_radius", "probe_lobing"),
     conformity={"standard": "ISO 10360-5:2010", "limit_um": 4.0, "rule": "ISO 14253-1"},
     plan={"repeats": 1},
-    columns=dict.fromkeys(("nx", "ny", "nz"), ""),
-    further=dict.fromkeys(("approach_x", "approach_y", "approach_z"), ""),
+    further=dict.fromkeys(("nx", "ny", "nz", "approach_x", "approach_y", "approach_z"), ""),
     noise_um=0.3,
 )
