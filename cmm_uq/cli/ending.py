@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import sys
 
 from cmm_uq.cli.printing import columns, on_terminal, styled
@@ -40,6 +41,6 @@ def _in_words(text: str) -> None:
         from cmm_uq.cli.layout import folded
 
         text = "\n".join(folded(text, columns()))
-        if styled(sys.stderr):
+        if styled(sys.stderr) and os.name != "nt":  # old consoles of Windows would show the codes
             text = text.replace(NAME, f"\x1b[1;31m{NAME}\x1b[0m", 1)
     print(text, file=sys.stderr, flush=True)  # noqa: T201

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -110,7 +110,7 @@ def _located(error: ErrorDetails, named: list[str], text: str, path: Path, model
     line = line_of(named, text)
     table, word = _table_of(named[:-1], model), named[-1]
     named = [shortened(key, _SHOWN) for key in named]
-    where = f"{path}{f' line {line}' if line else ''}: [{named[0]}]{' ' + '.'.join(named[1:]) if named[1:] else ''}"
+    where = f"{path}{f' line {line}' if line else ''}: {_place(named)}"
     if error["type"] == "missing":
         return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}.{_explained(word, table)}".rstrip("."))
     if error["type"] == "extra_forbidden":
@@ -123,6 +123,28 @@ def _located(error: ErrorDetails, named: list[str], text: str, path: Path, model
     )
     given = "" if tables else f" (it says {shortened(repr(error['input']), _SHOWN)})"
     return CmmUqError(f"{message[0].lower()}{message[1:]}{given}", where=where, fix=_near(error))
+
+
+def _place(named: Sequence[str]) -> str:
+    """A key as its table is headed: ``[artefact] u_um``, or ``[[conformity]] 1 rule`` of the first of several."""
+    top, *keys = named
+    if keys and keys[0].isdigit():
+        return " ".join(filter(None, (f"[[{top}]] {int(keys[0]) + 1}", ".".join(keys[1:]))))
+    return " ".join(filter(None, (f"[{top}]", ".".join(keys))))
+
+
+_WRITTEN: Mapping[str, str] = {
+    "float_type": "Write a number without quotes, with a decimal point",
+    "int_type": "Write a whole number without quotes",
+    "int_from_float": "Write a whole number",
+    "bool_type": "Write true or false, without quotes",
+    "string_type": "Put it in quotes",
+    "date_type": "Write it as 2026-01-31, without quotes",
+    "date_from_datetime_parsing": "Write it as 2026-01-31, without quotes",
+    "list_type": "Put it in brackets: [ … ]",
+    "tuple_type": "Put it in brackets: [ … ]",
+}
+"""How a value of each type is written in TOML, by the reader's name of the mistake."""
 
 
 def _meant(word: str, table: type[BaseModel] | None) -> str:
@@ -144,10 +166,12 @@ def _explained(key: str, table: type[BaseModel] | None) -> str:
 
 
 def _near(error: ErrorDetails) -> str | None:
-    """Of the words that a key may have, the one that a wrong word is near to."""
+    """Of the words that a key may have, the one that a wrong word is near to; of other values, how they are written."""
     given = error["input"]
+    if error["type"] == "list_type" and isinstance(given, dict):
+        return f"Head it [[{'.'.join(_named(error))}]], in double brackets"
     if error["type"] != "literal_error" or not isinstance(given, str):
-        return None
+        return _WRITTEN.get(error["type"])
     words = re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", "")))
     meant = suggestion(given, words)
     return meant if _ONE_MEANT.fullmatch(meant) else None

@@ -13,6 +13,7 @@ from rich.cells import cell_len
 from cmm_uq.cli.layout import COLOURS, Layout, Line, folded
 from cmm_uq.documents.in_short import Summary, Verdict
 from cmm_uq.messages import Verbatim
+from tests.conftest import ROOT
 from tests.kinds.simulated import outcome
 
 FILES = [("certificate.html, certificate.pdf", "the certificate"), ("results.json", "every figure, for other programs")]
@@ -88,3 +89,11 @@ def test_words_that_steer_a_terminal_are_shown_as_escapes() -> None:
 
 def test_green_is_for_what_passes_alone() -> None:
     assert [name for name, style in COLOURS.items() if "green" in style] == ["good"]
+
+
+def test_the_screen_in_the_documentation_is_what_is_printed() -> None:
+    page = (ROOT / "docs" / "running.md").read_text(encoding="utf-8")
+    shown = page.partition("$ cmm-uq report examples/iota-1102-20C\n")[2].partition("  …\n")[0]
+    lines = [line.replace("\u00a0", " ") for line in text(screen("iota-1102-20C", 80))]
+    assert shown.splitlines() == lines[: shown.count("\n")]
+    assert shown.count("\n") > 5

@@ -93,7 +93,9 @@ def test_a_job_that_names_it_is_checked_by_it(installed: None, bar: Path) -> Non
 
 
 def test_without_the_package_it_is_unknown(bar: Path) -> None:
-    with pytest.raises(CmmUqError, match=r"\[conformity\] 1\.standard: no such standard is decided\. Known: ASME B89"):
+    with pytest.raises(
+        CmmUqError, match=r"\[\[conformity\]\] 2 standard: no such standard is decided\. Known: ASME B89"
+    ):
         cmm_uq.read(bar)
     with pytest.raises(CmmUqError, match=r"no standard 'QP 7\.2:2026' is decided"):
         statement(ConformityFacts(standard=NAME, limit_um=3.0), sphere(), {}, "[[conformity]] 1", [FORMS])
