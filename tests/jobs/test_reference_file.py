@@ -61,7 +61,8 @@ def test_places_of_a_plate_come_from_a_digital_certificate() -> None:
 @pytest.mark.parametrize(
     ("recording", "certificate", "kind", "message"),
     [
-        (GAUGE, CERTIFICATE.replace("4,60", "5,60"), "step_gauge", r"recording\.csv line 5: point 4 is not among the certified values"),
+        (GAUGE, CERTIFICATE.replace("4,60", "5,60"), "step_gauge",
+         r"recording\.csv line 5: point 4 is not among the certified values"),
         (GAUGE, CERTIFICATE.replace("4,60", "3,60"), "step_gauge", r"certificate\.csv line 5: point 3 is there twice"),
         (GAUGE, CERTIFICATE.replace("Face,", "Wert,"), "step_gauge", "does not number its values"),
         (GAUGE, CERTIFICATE.replace(" (mm)", ""), "step_gauge", 'may be in mm or in inch. Say unit = "mm"'),

@@ -71,7 +71,7 @@ def test_answers_without_their_requests_are_read_only_where_they_are_all_alike()
 def test_a_report_of_several_sorts_of_features_asks_which() -> None:
     text = (SAMPLES / "ballbar.dmo").read_text() + "FA(C1_1)=FEAT/CIRCLE,INNER,CART,1,2,3,0,0,1,10\n"
     with pytest.raises(
-        CmmUqError, match="holds 2 tables of points: 'spheres', 'circles'. Say which: sheet = \"spheres\""
+        CmmUqError, match=r"holds 2 tables of points: 'spheres', 'circles'\. Say which: sheet = .spheres."
     ):
         read(text)
     assert xyz(read(text, sheet="spheres")) == BARS
