@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 from tests.cli.process import run
@@ -35,6 +37,14 @@ def test_an_ambiguity_ends_with_the_key_that_settles_it_and_exit_code_2(tmp_path
     unknown = run("import", export, "--key", "dezimal=,")
     assert unknown.returncode == 2
     assert "--key dezimal" in unknown.stderr
+
+
+def test_a_text_table_is_read_without_the_libraries_of_workbooks() -> None:
+    code = (
+        "import sys; from pathlib import Path; from cmm_uq.commands.importing import read_export; "
+        f"read_export(Path({str(SAMPLE)!r})); print(sorted({{'pandas', 'openpyxl', 'defusedxml'}} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
 def test_new_from_an_export_shows_it_first(tmp_path: Path) -> None:

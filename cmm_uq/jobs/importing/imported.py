@@ -10,7 +10,6 @@ from pathlib import PurePath
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.jobs.importing.columns import columns_of
-from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.header import Header, header_of, no_header
 from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
 from cmm_uq.jobs.importing.recognised import Recognised
@@ -83,13 +82,9 @@ def _read(
     sheet = _with_unit(sheet, header)
     columns = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
     named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
-    told = Recognised(PurePath(where).name, form.name, _title(form), (*named, *sheet.facts, *columns.facts),
+    told = Recognised(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
                       columns.sources, len(columns.lines))  # fmt: skip
     return Imported(columns.values, columns.lines, told)
-
-
-def _title(form: Format) -> Verbatim:
-    return Verbatim(form.title)
 
 
 def _chosen(

@@ -62,6 +62,7 @@ REFUSED = {
     "a workbook that unpacks to gigabytes": (
         archive({"[Content_Types].xml": b"", "xl/workbook.xml": bytes(500_000_000)}), "once it is unpacked: 400000000 are",
     ),
+    "a letter of Word": (archive({"[Content_Types].xml": b"<x/>", "word/document.xml": b"<x/>"}), "is an Office document"),
     "a workbook without sheets": (archive({"[Content_Types].xml": b"<x/>", "xl/workbook.xml": b"<x/>"}), "damaged workbook"),
     "a row repeated a million times": (
         stored_first(ods(f'<table:table-row table:number-rows-repeated="1048576">{CELL.format("")}</table:table-row>')),

@@ -162,6 +162,16 @@ def test_columns_that_a_job_names_by_heading_or_number_win() -> None:
         assert xyz(found) == [[3.5, 2.5, 1.5], [6.5, 5.5, 4.5]]
 
 
+def test_columns_of_several_points_are_named_in_their_order_and_further_ones_by_any_name() -> None:
+    text = "Nr;XA;YA;ZA;XB;YB;ZB;Wind\n1;1,5;2;3;4;5;6;0,7\n"
+    columns = {"measurement": "Nr", "x_mm": ["XB", "XA"], "y_mm": ["YB", "YA"], "z_mm": [7, 4], "wind": "Wind"}
+    found = read(text, columns=columns, unit="mm")
+    assert xyz(found) == [[4.0, 5.0, 6.0], [1.5, 2.0, 3.0]]
+    assert found.columns["wind"].tolist() == [0.7, 0.7]
+    with pytest.raises(CmmUqError, match=r"no column is wind among"):
+        read(text, columns={**columns, "wind": "Wnd"}, unit="mm")
+
+
 def test_a_table_without_a_header_is_read_by_numbers_of_columns() -> None:
     found = read("1\t0.5\t1.5\n2\t0.25\t1.25\n", columns={"x_mm": 1, "y_mm": 2, "z_mm": 3}, unit="mm", delimiter="tab",
                  points_per_measurement="all")  # fmt: skip
