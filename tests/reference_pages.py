@@ -12,6 +12,7 @@ from typer.models import ArgumentInfo, CommandInfo
 from cmm_uq.cli.commands import app
 from cmm_uq.commands.new import known
 from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
+from cmm_uq.documents.results_keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
 from cmm_uq.jobs.recording import REQUIRED
@@ -28,7 +29,8 @@ SHIPPED, PAGES = ROOT / "cmm_uq" / "schemas", ROOT / "docs" / "reference"
 WRITTEN = "<!-- written by python -m tests.reference_pages from what the program reads: edit that instead -->"
 EDITORS = (
     "The same as JSON Schema, for editors that complete and explain (Even Better TOML, taplo, Tombi): `cmm-uq schema {name}` "
-    "prints it with the kinds, effects and standards of other packages that are installed; a first line `#:schema ./FILE` names it."
+    "prints it with the kinds, effects and standards of other packages that are installed; a first line "
+    "`#:schema ./FILE` names it."
 )
 ALL = "all"
 
@@ -152,12 +154,25 @@ def columns() -> str:
     ]  # fmt: skip
     return page(
         "The columns of a recording",
-        "A recording is a CSV in UTF-8 with one row a point; lines that begin with # are passed over. Any other numeric column "
-        "is a covariate: not used by the model, but searched when a mismatch is located.",
+        "A recording is a CSV in UTF-8 with one row a point; lines that begin with # are passed over. Any other numeric "
+        "column is a covariate: not used by the model, but searched when a mismatch is located.",
         "## Kinds",
         f"Every recording has {', '.join(f'`{name}`' for name in REQUIRED)}.",
         table(("kind", "what the numbers mean", "needs besides", "may have"), kinds),
         "## Columns", table(("column", "unit", "meaning", "kinds", "effects that go by it"), rows),
+    )  # fmt: skip
+
+
+def results() -> str:
+    """Every key of results.json that every kind with an artefact has."""
+    rows = [(f"`{name}`", unit_of(name) or "–", told) for name, told in RESULTS.items()]
+    return page(
+        "results.json of `cmm-uq report`, key by key",
+        "Schema `cmm-uq/results/1`. A part in capitals stands for any name, `[]` for each entry of a list. Numbers are "
+        "finite; what has no value is `null`. Kinds add keys of their own beside these, and a kind with an analysis of its "
+        "own (`shift`, `error_map`) has some of them only.",
+        "A *quantity* is a table of", table(("key", "meaning"), [(f"`{name}`", told) for name, told in QUANTITY.items()]),
+        "## Keys", table(("key", "unit", "meaning"), rows),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""``cmm-uq import FILE``: what is recognised of a laboratory's export, and the same as a recording of the project's own format."""
+"""``cmm-uq import FILE``: what is recognised of a laboratory's export, and the same in the project's own format."""
 
 from __future__ import annotations
 

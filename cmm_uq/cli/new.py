@@ -92,12 +92,7 @@ def command(
         put_manifest(files)
     elif not quiet:
         say(f"{target}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
-        say(
-            (target / "README.md")
-            .read_text(encoding="utf-8")
-            .split("\n\n")[1]
-            .replace(" .` in this folder", f" {target}`")
-        )
+        say(f"What to do next: {target / 'README.md'}. What is missing or wrong: cmm-uq check {target}")
 
 
 def _of_export(

@@ -1,4 +1,4 @@
-"""A laboratory's export read without a job: shown, written as a recording in the project's own format, or made the beginning of a job."""
+"""A laboratory's export read without a job: shown, written in the project's own format, or made the beginning of a job."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def read_export(path: Path, keys: ImportKeys | None = None) -> Imported:
 
 
 def own_format(found: Imported) -> bytes:
-    """The same as a recording in the project's own format: numbers with as many digits as they need to be read back the same."""
+    """The same in the project's own format: numbers with as many digits as they need to be read back the same."""
     names = [name for name in _FIRST if name in found.columns]
     names += [name for name in found.columns if name not in _FIRST]
     columns = [

@@ -9,7 +9,7 @@ from __future__ import annotations
 import datetime as dt
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.beginning import MACHINE, Beginning
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import MEASURED, SIMULATED, Origin, first_line
+from cmm_uq.jobs.origin import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
 from cmm_uq.jobs.recording import REQUIRED
 from cmm_uq.jobs.toml_file import as_toml
 from cmm_uq.jobs.toml_text import commented
@@ -90,16 +90,18 @@ def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: 
     if begin.files is not None:
         bare = {**tables, "machine": {k: v for k, v in tables["machine"].items() if k not in begin.machine}}
         machine = _read(kind, bare, {}).points.machine
-        return job_files(kind.name, tables, begin.files(machine))
+        return job_files(kind.name, tables, begin.files(machine), _examples(tables, given))
     planned = _read(kind, {**tables, "plan": {**begin.plan, **tables.get("plan", {})}}, {})
     points = _drawn(planned, kind, begin)
     from cmm_uq.commands.simulate import recording
 
     content = first_line("simulate", f"{PROGRAM} new", ": put in your own readings, and take this line away").encode()
-    return job_files(kind.name, tables, {RECORDING: content + recording(points)})
+    return job_files(kind.name, tables, {RECORDING: content + recording(points)}, _examples(tables, given))
 
 
-def job_files(kind: str, tables: Tables, files: Mapping[str, bytes]) -> dict[str, bytes]:
+def job_files(
+    kind: str, tables: Tables, files: Mapping[str, bytes], examples: Collection[str] = ()
+) -> dict[str, bytes]:  # fmt: skip
     """A job's folder around a recording: job.toml with every other key as a comment, its schema, and what to do next.
 
     Parameters
@@ -107,6 +109,7 @@ def job_files(kind: str, tables: Tables, files: Mapping[str, bytes]) -> dict[str
     kind : of measurement.
     tables : what job.toml says.
     files : the recording that it names, and other files.
+    examples : dotted keys whose figures are an example's; a measured recording is refused beside them.
 
     Raises
     ------
@@ -116,7 +119,8 @@ def job_files(kind: str, tables: Tables, files: Mapping[str, bytes]) -> dict[str
     job = _read(found, tables, files)
     begin = found.beginning(kind)
     return {
-        "job.toml": _toml(found, tables), **files, README: _readme(job, begin).encode(), SCHEMA: shipped("job").encode(),
+        "job.toml": _toml(found, tables, examples), **files, README: _readme(job, begin).encode(),
+        SCHEMA: shipped("job").encode(),
     }  # fmt: skip
 
 
@@ -132,12 +136,11 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
 
     Raises
     ------
-    CmmUqError : the readers of a job refuse it.
+    CmmUqError : the readers of a job refuse it, or a key that the kind needs is not given.
     """
     found, begin = _begun(kind)
-    bare = replace(begin, artefact={}, machine={}, conformity=None)
-    whole = _tables(found, bare, given, id, origin=MEASURED)
-    whole["machine"] = dict(given["machine"])
+    bare = replace(begin, artefact={}, conformity=None)
+    whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": dict(given.get("machine", {}))}
     return job_files(found.name, whole, files)
 
 
@@ -163,7 +166,7 @@ def new_plan(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     tables["plan"] = {**length, **begin.plan, **tables.get("plan", {})}
     job = _read(kind, tables, {})
     return {
-        "job.toml": _toml(kind, tables), README: _readme(job, replace(begin, command=PLAN)).encode(),
+        "job.toml": _toml(kind, tables, _examples(tables, given)), README: _readme(job, replace(begin, command=PLAN)).encode(),
         SCHEMA: shipped("job").encode(),
     }  # fmt: skip
 
@@ -244,6 +247,16 @@ def _kind(name: str) -> Kind:
     return found
 
 
+def _examples(tables: Mapping[str, Any], given: Tables) -> set[str]:
+    """Dotted keys of machine, artefact and limits that nobody gave."""
+    return {
+        f"{table}.{key}"
+        for table in ("machine", "artefact", "conformity")
+        for key in (tables[table][0] if table == "conformity" and table in tables else tables.get(table, {}))
+        if key not in (*given.get(table, ()), "kind", "error_map")
+    }
+
+
 def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin = SIMULATED) -> dict[str, Any]:  # noqa: A002
     """What job.toml says: what the kind begins with, and over it what is given."""
     recorded = kind.table.with_recording
@@ -302,7 +315,7 @@ def _drawn(job: Job, kind: Kind, begin: Beginning) -> Points:
     return simulate(replace(job, points=points, planned=True), truth)
 
 
-def _toml(kind: Kind, tables: Tables) -> bytes:
+def _toml(kind: Kind, tables: Tables, examples: Collection[str]) -> bytes:
     """job.toml with a comment for whatever else a job of this kind may say."""
     begin = kind.beginning(kind.name)
     out = {"job.derived_from", *(f"job.{key}" for key in ("as_found",) if SIMULATED in tables["job"].values())}
@@ -320,9 +333,10 @@ def _toml(kind: Kind, tables: Tables) -> bytes:
     ]
     if tables["job"].get("origin") == SIMULATED:
         head.append(
-            "# THE FIGURES ARE SIMULATED: put in your own readings, then take away their first line and origin below."
+            "# THE READINGS ARE SIMULATED: put in your own, then take away their first line and origin below. Figures marked "
+            f"{EXAMPLE} are nobody's."
         )
-    body = commented(json.loads(shipped("job")), tables, out, kind.name)
+    body = commented(json.loads(shipped("job")), tables, out, kind.name, examples=examples)
     return ("\n".join(head) + "\n\n" + body).encode()
 
 
@@ -345,7 +359,7 @@ def _readme(job: Job, begin: Beginning) -> str:
     if simulated:
         lines.append(
             "- **The figures are simulated**, and all that is made of them says so. Put in your own, then take away their "
-            'first line and `origin = "simulated"` in job.toml.'
+            f'first line and `origin = "simulated"` in job.toml, and state what is marked {EXAMPLE} there.'
         )
     if begin.command == PLAN:
         lines.append(

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 from pydantic import model_validator
 
 from cmm_uq.jobs.expanded import ExpandedUncertainty, with_standard_uncertainty
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.table import AnyFloat, Length, Table, Uncertainty
 
 
@@ -33,7 +33,7 @@ class Traceability(Table):
     """Date by which the artefact is to be calibrated again."""
 
 
-class CertificateFile(Traceability, ImportKeys):
+class CertificateFile(FileKeys, Traceability):
     """The artefact's own certificate, and the file that its certified values are read from."""
 
     file: str | None = None

@@ -42,7 +42,7 @@ def recording_name(job: Job) -> str:
     if job.facts.recording.earlier is not None:
         raise CmmUqError("an imported recording that is compared with an earlier one cannot be simulated",
                          where=f"{job.folder / 'job.toml'} [recording] earlier",
-                         fix="Write both in the project's own format first: cmm-uq import FILE --out recording.csv")  # fmt: skip
+                         fix="Write both in the own format first: cmm-uq import FILE --out recording.csv")  # fmt: skip
     return DERIVED_RECORDING
 
 
@@ -101,11 +101,16 @@ def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...]
         if key in document["machine"]:
             del document["machine"][key]
     if file is not None:
-        document["recording"]["file"] = file
-        for key in ImportKeys.model_fields:
-            if key in document["recording"]:
-                del document["recording"][key]
+        _name_recording(document["recording"], file)
     return document
+
+
+def _name_recording(table: Any, file: str) -> None:
+    """The recording in the project's own format, without the keys by which it was imported."""
+    table["file"] = file
+    for key in ImportKeys.model_fields:
+        if key in table:
+            del table[key]
 
 
 def _inline(value: Any) -> Any:

@@ -101,14 +101,8 @@ class JobFacts(Table):
         return self
 
 
-class RecordingFacts(ImportKeys):
-    """``[recording]``: the keys that import a file are those of :class:`~cmm_uq.jobs.importing.keys.ImportKeys`.
-
-    Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
-
-    ``earlier`` names a recording of the same artefact in the same placings at an earlier date: what is estimated then is what
-    changed between.
-    """
+class Recorded(Table):
+    """Which recording, and what is stated of it."""
 
     file: str
     """The recording, beside job.toml: a CSV with one row a point, or an export that is imported."""
@@ -120,6 +114,14 @@ class RecordingFacts(ImportKeys):
     """Stated standard uncertainty of one recorded coordinate; left out, it is estimated from repeats and residuals."""
     set_aside: Numbers = []
     """Numbers of measurements that stay on the certificate but are not used for estimates."""
+
+
+class RecordingFacts(ImportKeys, Recorded):
+    """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
+
+    ``earlier`` names a recording of the same artefact in the same placings at an earlier date: what is estimated then is what
+    changed between. The other keys are those of a file in another format than the project's own.
+    """
 
 
 class ModelFacts(Table):

@@ -14,7 +14,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.errors import CmmUqError, Gathered
 from cmm_uq.writing import MANIFEST, read_manifest
 
 Origin = Literal["measured", "simulated", "compensated"]
@@ -29,6 +29,11 @@ PLANNED = "# planned, nothing is measured yet: nominal coordinates\n"
 """First line of the recording that a plan writes for the operator to fill in."""
 
 _PLANNED = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*?# planned, nothing is measured yet")
+
+EXAMPLE = "EXAMPLE"
+"""First word behind a figure of a new job.toml that nobody has stated yet."""
+
+_EXAMPLE = re.compile(r"[ \t]*([A-Za-z_]+)[ \t]*=.*# EXAMPLE\b")
 
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
@@ -84,6 +89,29 @@ def check_mark(folder: Path, origin: str, recording: bytes, where: str) -> None:
         found = DERIVING[manifest.owner.command]
         raise CmmUqError(f"the recording was {found}, and job.toml says measured", where=str(folder / MANIFEST),
                          fix=f'Write origin = "{found}" in [job]')  # fmt: skip
+
+
+def check_examples(toml: bytes, origin: str, where: str) -> None:
+    """That no figure of an example is taken for one of a machine or an artefact that was measured.
+
+    Parameters
+    ----------
+    toml : bytes of job.toml.
+    origin : what it says of the recording.
+    where : its path, for messages.
+
+    Raises
+    ------
+    CmmUqError : the recording is measured and a figure is still marked as an example's; every such figure.
+    """
+    if origin != MEASURED:
+        return
+    wrong = Gathered()
+    for number, line in enumerate(toml.decode("utf-8-sig").splitlines(), 1):
+        if found := _EXAMPLE.match(line):
+            wrong.add(CmmUqError(f"{found[1]} is still an example's", where=f"{where} line {number}",
+                                 fix=f"Put in your own, or leave it out, and take the word {EXAMPLE} away"))  # fmt: skip
+    wrong.refuse()
 
 
 def is_planned(recording: bytes) -> bool:

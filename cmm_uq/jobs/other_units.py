@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+_PER_METRE = "{given} · L / 1000, with the length L in mm"
 _BY_ENDING = (
-    ("_um_per_m_k", "_per_k", "1e-6 · {given}"), ("_ppm_per_k", "_per_k", "1e-6 · {given}"), ("_per_f", "_per_k", "1.8 · {given}"),
-    ("_um_per_m", "_um", "{given} · L / 1000, with the length L in mm"), ("_um_m", "_um", "{given} · L / 1000, with the length L in mm"),
-    ("_ppm", "_um", "{given} · L / 1000, with the length L in mm"), ("_mm", "_um", "1000 · {given}"), ("_nm", "_um", "{given} / 1000"),
+    ("_um_per_m_k", "_per_k", "1e-6 · {given}"), ("_ppm_per_k", "_per_k", "1e-6 · {given}"),
+    ("_per_f", "_per_k", "1.8 · {given}"), ("_um_per_m", "_um", _PER_METRE), ("_um_m", "_um", _PER_METRE),
+    ("_ppm", "_um", _PER_METRE), ("_mm", "_um", "1000 · {given}"), ("_nm", "_um", "{given} / 1000"),
     ("_inch", "_um", "25400 · {given}"), ("_in", "_um", "25400 · {given}"), ("_mil", "_um", "25.4 · {given}"),
     ("_inch", "_mm", "25.4 · {given}"), ("_in", "_mm", "25.4 · {given}"), ("_mil", "_mm", "0.0254 · {given}"),
     ("_um", "_mm", "{given} / 1000"), ("_cm", "_mm", "10 · {given}"), ("_m", "_mm", "1000 · {given}"),
     ("_f", "_c", "({given} − 32) / 1.8"), ("_f", "_k", "{given} / 1.8"), ("_k", "_c", "{given} − 273.15"),
-    ("_min", "_s", "60 · {given}"), ("_h", "_s", "3600 · {given}"), ("_kpa", "_hpa", "10 · {given}"), ("_pa", "_hpa", "{given} / 100"),
+    ("_min", "_s", "60 · {given}"), ("_h", "_s", "3600 · {given}"), ("_kpa", "_hpa", "10 · {given}"),
+    ("_pa", "_hpa", "{given} / 100"),
     ("_deg", "_arcsec", "3600 · {given}"),
 )  # fmt: skip
 _FREEDOM = ("dof", "nu", "nu_eff", "v_eff", "degrees_of_freedom", "freiheitsgrade")

@@ -23,7 +23,7 @@ from cmm_uq.jobs.file_names import check_distinct
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
-from cmm_uq.jobs.origin import altered, check_mark, is_planned
+from cmm_uq.jobs.origin import altered, check_examples, check_mark, is_planned
 from cmm_uq.jobs.recording_file import read_recording_file
 from cmm_uq.jobs.reference_file import reference_file, with_references
 from cmm_uq.jobs.results_named import results_named
@@ -102,6 +102,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     inputs |= _contents(source, others, TABLE_BYTES, written=True)
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
+        check_examples(content, facts.job.origin, str(path))
         return Job(folder, facts, _no_points(machine), inputs | _contents(source, maps, MAP_BYTES))
     noise = noise_file(facts.plan)
     if noise is not None:
@@ -115,6 +116,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
         inputs |= _contents(source, others, TABLE_BYTES, written=True)
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
+    check_examples(content, facts.job.origin, str(path))
     points, recognised = read_recording_file(inputs[facts.recording.file], where, machine, facts.recording)
     told = [recognised]
     if certificate:

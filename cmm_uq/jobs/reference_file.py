@@ -1,4 +1,4 @@
-"""Certified values from a file of their own, the artefact's certificate, joined to a recording by the numbers of its points."""
+"""Certified values from the file of the artefact's certificate, joined to a recording by the numbers of its points."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def with_references(
     CmmUqError : the file cannot be read, does not number its values, or lacks a point; or the recording has such values too.
     """
     chain = artefact.certificate
-    assert chain is not None
-    assert chain.file is not None
+    if chain is None or chain.file is None:
+        raise CmmUqError("the certificate names no file", where=where)
     place = str(folder / chain.file)
     twice = next((name for name in REFERENCES if name in points.columns), None)
     if twice is not None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import datetime as dt
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
+
+from cmm_uq.jobs.origin import EXAMPLE
 
 Schema = Mapping[str, Any]
 
@@ -20,7 +22,8 @@ _EXAMPLES: Mapping[str, Any] = {
 
 
 def commented(
-    schema: Schema, given: Mapping[str, Any], leave_out: Iterable[str] = (), asked_by: str = "", comment: bool = True
+    schema: Schema, given: Mapping[str, Any], leave_out: Iterable[str] = (), asked_by: str = "", comment: bool = True,
+    examples: Collection[str] = (),
 ) -> str:  # fmt: skip
     """Tables of a file, in the order of its schema.
 
@@ -31,6 +34,7 @@ def commented(
     leave_out : tables, and dotted keys, that are of no use here.
     asked_by : value by which the keys of a table are chosen (see :func:`cmm_uq.jobs.schema.chosen_by`).
     comment : whether what is not given stands there as a comment.
+    examples : dotted keys whose values are an example's, and are said to be.
     """
     out, parts = set(leave_out), []
     for name, table in schema["properties"].items():
@@ -42,7 +46,8 @@ def commented(
         header = f"[[{name}]]" if several else f"[{name}]"
         for said in _said(given.get(name), several) or ([None] if comment else []):
             lines = [f"{'# ' if said is None else ''}{header}  # {table.get('description', '')}"]
-            lines += _lines(shown, said or {}, comment)
+            marked = {key for key in shown if f"{name}.{key}" in examples}
+            lines += _lines(shown, said or {}, comment, marked)
             parts.append("\n".join(lines))
     return "\n\n".join(parts) + "\n"
 
@@ -84,9 +89,10 @@ def _has(key: Schema, asked_by: str) -> bool:
     return asked_by in key.get("x-for", [asked_by])
 
 
-def _lines(keys: Mapping[str, Schema], given: Mapping[str, Any], comment: bool) -> list[str]:
+def _lines(keys: Mapping[str, Schema], given: Mapping[str, Any], comment: bool, marked: Collection[str]) -> list[str]:
     told = {key: without_place(item["description"]) for key, item in keys.items()}
-    first = [f"{key} = {written(given[key])}  # {told[key]}" for key in keys if key in given]
+    mark = {key: f"{EXAMPLE}, put in your own: " if key in marked else "" for key in keys}
+    first = [f"{key} = {written(given[key])}  # {mark[key]}{told[key]}" for key in keys if key in given]
     first += [f"{key} = {written(value)}" for key, value in given.items() if key not in keys]
     rest = [
         f"# {key} = {written(_example(item))}  # {item['description']}"

@@ -15,11 +15,24 @@ import pytest
 from cmm_uq.api import beginning
 from cmm_uq.commands.budget import write_budget
 from cmm_uq.commands.check import check_job, check_read
-from cmm_uq.commands.new import BUDGET, PLAN, README, RECORDING, SCHEMA, job_of_rows, known, new_job, titles, write_new
+from cmm_uq.commands.new import (
+    BUDGET,
+    PLAN,
+    README,
+    RECORDING,
+    SCHEMA,
+    job_of_export,
+    known,
+    new_job,
+    titles,
+    write_new,
+)
 from cmm_uq.commands.plan import write_plan
 from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.documents.origin import origin_warnings
+from cmm_uq.documents.results_file import as_json
+from cmm_uq.documents.results_keys import RESULTS, described
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import SIMULATED
@@ -40,6 +53,19 @@ def read(files: dict[str, bytes]) -> Job:
     return job_of({name: content for name, content in files.items() if name not in (README, SCHEMA)})
 
 
+EVERY_RESULT = {key.partition(".")[0] for key in RESULTS}
+
+
+def paths(data: object, above: str = "") -> list[str]:
+    """Dotted names of the leaves of results.json, as the reference has them."""
+    if isinstance(data, dict) and data:
+        names = {key.replace(".", "·"): item for key, item in data.items()}  # a point in a name parts nothing
+        return [path for key, item in names.items() for path in paths(item, f"{above}.{key}" if above else key)]
+    if isinstance(data, list) and data and isinstance(data[0], dict):
+        return [path for item in data for path in paths(item, f"{above}[]")]
+    return [above] if data not in ({}, []) else []
+
+
 def test_every_built_in_kind_and_a_plate_that_is_shifted_can_be_begun() -> None:
     assert tuple(known()) == tuple(sorted(NAMES, key=list(known()).index))
     assert set(known()) == set(NAMES)
@@ -54,6 +80,8 @@ def test_a_new_job_is_reported_at_once_as_simulated_and_agrees_with_its_model(na
     assert found.origin == SIMULATED
     assert len(origin_warnings(job)) > 0
     assert found.results.get("diagnosis", {"verdict": "consistent"})["verdict"] == "consistent"
+    undescribed = [path for path in paths(json.loads(as_json(found.results))) if path.split(".")[0] in EVERY_RESULT]
+    assert name in ("shift", "shift_plate", "error_map") or [one for one in undescribed if not described(one)] == []
     statements = found.results.get("conformity", [])
     assert [(one["decision"], one["scope"]) for one in statements] == [("pass", "complete")] * len(job.facts.conformity)
 
@@ -90,13 +118,24 @@ def test_its_recording_has_the_columns_that_the_readme_names(name: str) -> None:
     assert len(files[README].decode().splitlines()) <= 12
 
 
-def test_it_becomes_a_measured_job_when_both_marks_are_taken_away_and_not_before(tmp_path: Path) -> None:
-    write_new("sphere", tmp_path / "job", {})
+def test_it_becomes_a_measured_job_when_every_mark_is_taken_away_and_not_before(tmp_path: Path) -> None:
+    write_new("sphere", tmp_path / "job", {"artefact": {"form_um": 0.1}})
     toml, csv = tmp_path / "job" / "job.toml", tmp_path / "job" / RECORDING
     toml.write_text(re.sub(r"(?m)^origin = .*\n", "", toml.read_text(encoding="utf-8")), encoding="utf-8")
     with pytest.raises(CmmUqError, match=r"was simulated, and job\.toml says measured"):
         read_job(tmp_path / "job")
     csv.write_text(csv.read_text(encoding="utf-8").split("\n", 1)[1], encoding="utf-8")
+    told = {problem.problem.removesuffix(" is still an example's") for problem in check_job(tmp_path / "job").problems}
+    assert told == {
+        "name",
+        "travel_mm",
+        "length_mm",
+        "u_um",
+        "standard",
+        "limit_um",
+        "rule",
+    }  # of form_um somebody answers
+    toml.write_text(toml.read_text(encoding="utf-8").replace("# EXAMPLE, put in your own:", "#"), encoding="utf-8")
     found = check_job(tmp_path / "job")
     assert found.sound
     assert "[laboratory] name" in [one.key for one in found.warnings]
@@ -164,11 +203,15 @@ def test_a_new_plan_is_planned_and_a_new_budget_is_evaluated(tmp_path: Path) -> 
 
 def test_rows_that_were_measured_make_a_measured_job() -> None:
     points = read(begun("ballbar")).points
-    rows = [(*key, *(f"{v:.4f}" for v in xyz)) for key, xyz in
+    rows = [",".join([*map(str, key), *(f"{v:.4f}" for v in xyz)]) for key, xyz in
             zip(zip(points.measurement, points.point, strict=True), points.xyz, strict=True)]  # fmt: skip
-    job = read(job_of_rows("ballbar", REQUIRED, rows, {"machine": {"name": "Bridge 7"}}, id="mine"))
+    files = {RECORDING: "\n".join([",".join(REQUIRED), *rows]).encode()}
+    job = read(job_of_export("ballbar", {"machine": {"name": "Bridge 7"}}, files, id="mine"))
     assert job.origin == "measured"
     np.testing.assert_allclose(job.points.xyz, points.xyz, atol=1e-4)
+    assert (job.facts.artefact.length_mm, job.facts.artefact.u_um, job.facts.conformity) == (None, None, [])
+    with pytest.raises(CmmUqError, match=r"\[machine\].*is missing|machine"):
+        job_of_export("ballbar", {}, files, id="mine")
 
 
 def test_a_kind_of_another_package_that_says_nothing_of_a_beginning_has_one(

@@ -1,7 +1,7 @@
-"""Tables of Calypso (ZEISS): ``…_chr.txt``, a characteristic a line; ``…_fet.txt``, a feature a line; ``…_hdr.txt``, the head alone.
+"""Tables of Calypso (ZEISS): ``…_chr.txt``, a characteristic a line; ``…_fet.txt``, a feature a line; ``…_hdr.txt``, the head.
 
-Of the characteristics those are taken whose ``idsymbol`` is the value of a coordinate (``xValue``, ``yValue``, ``zValue``): the ``actual``
-of the three that have one ``featureid`` is a point.
+Of the characteristics those are taken whose ``idsymbol`` is the value of a coordinate (``xValue``, ``yValue``, ``zValue``):
+the ``actual`` of the three that have one ``featureid`` is a point.
 """
 
 from __future__ import annotations
@@ -71,7 +71,8 @@ class Calypso(Format):
         return self._sheets(found, at, units, others, encoding, where)
 
     def _sheets(
-        self, found: dict[str, dict[str, str]], at: dict[str, int], units: dict[str, int], others: int, encoding: str, where: str
+        self, found: dict[str, dict[str, str]], at: dict[str, int], units: dict[str, int], others: int, encoding: str,
+        where: str,
     ) -> Sequence[Sheet]:  # fmt: skip
         if not found or len(found) > ROWS.most:
             raise CmmUqError(f"holds {others} characteristics and no coordinate of a feature", where=where,
@@ -80,11 +81,11 @@ class Calypso(Format):
         if partly is not None:
             missing = next(axis for axis in _AXES.values() if axis not in found[partly])
             raise CmmUqError(f"{partly!r} has no {missing} value", where=f"{where} line {at[partly]}",
-                             fix="Report X, Y and Z value of every feature; if it is the last one, the file was cut off")  # fmt: skip
+                             fix="Report X, Y and Z of every feature; if it is the last one, it was cut off")  # fmt: skip
         if len(units) > 1:
             one, other = list(units)[:2]
-            raise CmmUqError(f"coordinates are in {one} and in {other}: the file mixes units", where=f"{where} line {units[other]}",
-                             fix="Export it in one unit")  # fmt: skip
+            raise CmmUqError(f"coordinates are in {one} and in {other}: the file mixes units",
+                             where=f"{where} line {units[other]}", fix="Export it in one unit")  # fmt: skip
         facts = [Fact("encoding", say("Encoding"), Verbatim(encoding))]
         if others:
             facts.append(
@@ -107,4 +108,4 @@ def _refuse_another_table(header: Sequence[str], lines: Sequence[str], where: st
         raise CmmUqError("is the head of a Calypso table (hdr.txt), which has no measured value", where=where,
                          fix="Name the file that ends in _chr.txt and was written with it")  # fmt: skip
     raise CmmUqError("is a Calypso table whose columns are not known here (fet.txt?)", where=where,
-                     fix="Name the file that ends in _chr.txt, or the columns: columns = { name = 3, x_mm = 9, y_mm = 10, z_mm = 11 }")  # fmt: skip
+                     fix="Name the file ending in _chr.txt, or columns = { x_mm = 9, y_mm = 10, z_mm = 11 }")  # fmt: skip

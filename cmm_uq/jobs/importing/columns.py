@@ -220,7 +220,7 @@ class _Table:
 
     def sources(self, length: WrittenUnit, values: dict[str, Floats]) -> dict[str, str]:
         """Headings of every column that is taken, by its name."""
-        taken = (*values, *(name for name in NUMBERS if name in self.header.columns))
+        taken = (*(name for name in NUMBERS if name in self.header.columns), *values)
         return {name: ", ".join(self.header.headings[i] for i in self.header.columns[name]) for name in taken}
 
 

@@ -1,4 +1,4 @@
-"""Digital calibration certificates (DCC 3, PTB): the lists of a result, a column each, under the names that the certificate gives them."""
+"""Digital calibration certificates (DCC 3, PTB): the lists of a result, a column each, by the names that it gives them."""
 
 from __future__ import annotations
 

@@ -103,9 +103,8 @@ def _split(text: str, delimiter: str, where: str, most: int | None) -> tuple[lis
         list(_lines(text, where))
     rows = [line.split(delimiter) for line in every]
     short = every and len(max(every, key=len)) <= CELL.most and len(every) <= ROWS.most
-    if short and not _loose("\n".join(every), delimiter):
-        if max(set(map(len, rows))) <= COLUMNS.most:
-            return rows, list(range(1, len(rows) + 1))
+    if short and not _loose("\n".join(every), delimiter) and max(set(map(len, rows))) <= COLUMNS.most:
+        return rows, list(range(1, len(rows) + 1))
     return _kept(enumerate(rows, 1), [], [], where)
 
 
@@ -133,7 +132,7 @@ def _kept(
             )
             limit = COLUMNS if len(cells) > COLUMNS.most else CELL
             raise CmmUqError(f"has {what}, {limit.most} are the most", where=f"{where} line {line}",
-                             fix="Export the columns that the job needs; close every quotation mark on its own line")  # fmt: skip
+                             fix="Export the columns that are needed; close every quotation mark on its own line")  # fmt: skip
         rows.append(cells)
         lines.append(line)
     if len(rows) > ROWS.most + LINES_BEFORE:

@@ -33,8 +33,9 @@ class Excel(Format):
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         """See :meth:`Format.read`."""
-        with opened(content, where):
-            pass
+        with opened(content, where) as archive:
+            if not any(name.startswith("xl/") for name in archive.namelist()):
+                raise CmmUqError("is an Office document, and no workbook", where=where, fix="Save the table as .xlsx")
         from openpyxl import load_workbook
 
         try:

@@ -1,4 +1,4 @@
-"""Reports of features (spheres, points, circles): a sheet for each sort, so that the job says which where there are several."""
+"""Reports of features (spheres, points, circles): a sheet for each sort, of which the job says which."""
 
 from __future__ import annotations
 

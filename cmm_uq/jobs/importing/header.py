@@ -198,7 +198,7 @@ def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Seq
     if best is None:
         given = f" ({', '.join(map(repr, _named(keys)))})" if keys.columns else ""
         return CmmUqError(f"no line names the columns{given} of a table of points", where=where,
-                          fix="Name them by number: columns = { x_mm = 1, y_mm = 2, z_mm = 3 }, or export with a header")  # fmt: skip
+                          fix="Name them by number: columns = { x_mm = 1, y_mm = 2, z_mm = 3 }, or export one")  # fmt: skip
     _, sheet, row, headings = best
     missing = _missing(headings, keys, wanted)
     listed = ", ".join(map(repr, headings[:_SHOWN])) + (" …" if len(headings) > _SHOWN else "")

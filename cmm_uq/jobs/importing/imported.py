@@ -10,9 +10,8 @@ from pathlib import PurePath
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.jobs.importing.columns import columns_of
-from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.header import Header, header_of, no_header
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
 from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.importing.registry import format_of
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
@@ -59,14 +58,15 @@ def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | 
     return _read(content, where, keys, POINTS, reach_mm)
 
 
-def imported_references(content: bytes, where: str, keys: ImportKeys) -> Imported:
+def imported_references(content: bytes, where: str, keys: FileKeys) -> Imported:
     """Certified values in any format that is known: distances or places, by the number of their point.
 
     Raises
     ------
     CmmUqError : see :func:`imported`.
     """
-    found = _read(content, where, keys, REFERENCES, None)
+    asked = ImportKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
+    found = _read(content, where, asked, REFERENCES, None)
     columns = {f"reference_{name}" if name in POINTS[0] else name: values for name, values in found.columns.items()}
     return replace(found, columns=columns)
 
@@ -82,13 +82,9 @@ def _read(
     sheet = _with_unit(sheet, header)
     columns = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
     named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
-    told = Recognised(PurePath(where).name, form.name, _title(form), (*named, *sheet.facts, *columns.facts),
+    told = Recognised(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
                       columns.sources, len(columns.lines))  # fmt: skip
     return Imported(columns.values, columns.lines, told)
-
-
-def _title(form: Format) -> Verbatim:
-    return Verbatim(form.title)
 
 
 def _chosen(

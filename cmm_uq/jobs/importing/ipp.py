@@ -1,7 +1,7 @@
 """Traces of I++ DME (version 1.4 to 1.7): the answers to ``PtMeas``, as ``00169 # X(12.5), Y(0), Z(-3), IJK(0, 0, 1)``.
 
-Lengths are millimetres by the specification. An answer to ``Get`` looks like one to ``PtMeas``, so a trace without the requests is read
-only where all its answers report the same quantities.
+Lengths are millimetres by the specification. An answer to ``Get`` looks like one to ``PtMeas``, so a trace without the
+requests is read only where all its answers report the same quantities.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Ipp(Format):
             answers = [answer for answer in answers if answer[0] in measured]
         elif len({frozenset(terms) for _, terms, _ in answers}) > 1:
             raise CmmUqError("answers report different quantities, and no request tells which are measured points",
-                             where=f"{where} line {answers[0][2]}", fix="Record the requests (PtMeas) in the trace too")  # fmt: skip
+                             where=f"{where} line {answers[0][2]}", fix="Record the requests (PtMeas) too")  # fmt: skip
         _refuse_unanswered(measured, answers, where)
         rows = [_row(tag, terms, line, where) for tag, terms, line in answers]
         facts = [Fact("encoding", say("Encoding"), Verbatim(encoding))]

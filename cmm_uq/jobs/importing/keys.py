@@ -20,8 +20,8 @@ Sources = Source | Annotated[list[Source], Field(min_length=1, max_length=COLUMN
 DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "blank": " ", "|": "|"}
 
 
-class ImportKeys(Table):
-    """Of a file in another format than the project's own; each is needed only where the file leaves it open."""
+class FileKeys(Table):
+    """Of any table that is imported; each is needed only where the file leaves it open."""
 
     columns: Annotated[dict[Column, Sources], Field(max_length=COLUMNS.most)] = {}
     """The file's columns by the recording's names, as `{ x_mm = "X" }`: a heading, a number from 1, or a list of them where a
@@ -36,8 +36,6 @@ class ImportKeys(Table):
     """What separates the cells of a text file, where that is not found."""
     encoding: Literal["utf-8", "utf-16", "cp1252", "latin-1"] | None = None
     """Encoding of a text file, where it is mistaken for another."""
-    points_per_measurement: Annotated[int, Field(ge=1, le=1_000_000)] | Literal["all"] | None = None
-    """How many rows in turn are one measurement, where the file does not number them; `"all"` where they are one."""
 
     @field_validator("unit")
     @classmethod
@@ -45,6 +43,13 @@ class ImportKeys(Table):
         if unit is not None and length_named(unit) is None:
             raise ValueError(f"{unit!r} is no unit of length known here. Known: {', '.join(LENGTHS)}")
         return unit
+
+
+class ImportKeys(FileKeys):
+    """Of a recording in another format than the project's own."""
+
+    points_per_measurement: Annotated[int, Field(ge=1, le=1_000_000)] | Literal["all"] | None = None
+    """How many rows in turn are one measurement, where the file does not number them; `"all"` where they are one."""
 
     @property
     def asked(self) -> bool:

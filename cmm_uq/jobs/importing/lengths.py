@@ -40,7 +40,7 @@ def lengths_unit(
     ------
     CmmUqError : two of these contradict each other, or nothing says the unit and millimetres and inches both fit.
     """
-    found = {unit.name: heading for heading, unit in reversed(named.items())}
+    found = {unit.name: heading for heading, unit in reversed(list(named.items()))}
     if len(found) > 1:
         (one, first), (other, second) = list(found.items())[:2]
         raise CmmUqError(f"{first!r} is in {one} and {second!r} in {other}: the coordinates mix units", where=where,

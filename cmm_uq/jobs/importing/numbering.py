@@ -104,7 +104,7 @@ def _in_turn(found: dict[str, Floats], count: int, each: int | str, place: str) 
     size = count if isinstance(each, str) else each
     if count % size:
         raise CmmUqError(f"{count} points are no whole number of measurements of {size}", where=place,
-                         fix="Mend points_per_measurement, or the table: a point is missing, or one too many is there")  # fmt: skip
+                         fix="Mend points_per_measurement, or the table: a point is missing, or one too many")  # fmt: skip
     rows = np.arange(count)
     found[MEASUREMENT] = (rows // size + 1).astype(np.float64)
     how = say("{size} rows in turn are one measurement", size=size)

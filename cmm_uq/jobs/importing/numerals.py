@@ -70,15 +70,16 @@ def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -
     if comma and point:
         raise CmmUqError(
             f"{comma[2]!r} has a decimal comma, and {point[2]!r} ({at(*point[:2])}) has a decimal point",
-            where=at(*comma[:2]), fix="Export the table again with one decimal sign; if it was put together, mend the odd rows",
+            where=at(*comma[:2]), fix="Export it again with one decimal sign; if it was put together, mend the odd rows",
         )  # fmt: skip
     if comma or point:
         return "," if comma else "."
     i = next(i for i, text in enumerate(texts) if "," in text)
     row = next(row for row, cell in enumerate(columns[i]) if isinstance(cell, str) and "," in cell)
     value = str(columns[i][row])
-    raise CmmUqError(f"{value!r} can be {value.replace(',', '')} or {value.replace(',', '.')}, and no number of the file tells",
-                     where=at(i, row), fix='Say decimal = "," or decimal = "."')  # fmt: skip
+    thousands, thousandths = value.replace(",", ""), value.replace(",", ".")
+    raise CmmUqError(f"{value!r} can be {thousands} or {thousandths}, and no number of the file tells", where=at(i, row),
+                     fix='Say decimal = "," or decimal = "."')  # fmt: skip
 
 
 def _joined(cells: Sequence[Cell]) -> str:

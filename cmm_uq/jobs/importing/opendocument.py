@@ -1,7 +1,7 @@
 """OpenDocument spreadsheets (.ods; ISO/IEC 26300): values as they were last computed, read as a stream.
 
-``office:value`` holds a number to all its digits, whatever the cell shows. Repeated rows and columns are counted, not unfolded, so
-that a file of a few bytes cannot become a table of millions of cells.
+``office:value`` holds a number to all its digits, whatever the cell shows. Repeated rows and columns are counted, not
+unfolded, so that a file of a few bytes cannot become a table of millions of cells.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Text reports of PC-DMIS (Hexagon): the places of features, as ``LOCATION OF SPHERE SPH1`` with its lines X, Y and Z.
 
-The figures stand below the words of a heading line (``AX NOMINAL +TOL -TOL MEAS DEV OUTTOL``), flushed right; which are there and in
-which order is an option of the program, so each figure belongs to the word whose end is nearest to its own.
+The figures stand below the words of a heading line (``AX NOMINAL +TOL -TOL MEAS DEV OUTTOL``), flushed right; which are there
+and in which order is an option of the program, so each figure belongs to the word whose end is nearest to its own.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _incomplete(partly: Sequence[_Place], dimensions: int, where: str) -> CmmUqE
     place = partly[0]
     missing = next(axis for axis in AXES if axis not in place.found)
     return CmmUqError(f"{place.dimension}, the place of {place.feature}, has no {missing}", where=f"{where} line {place.line}",
-                      fix="Report X, Y and Z of every feature; if it is the last one, the file was cut off: print it again")  # fmt: skip
+                      fix="Report X, Y and Z of every feature; if it is the last one, the file was cut off")  # fmt: skip
 
 
 def _places(text: str, where: str) -> tuple[list[_Place], int]:

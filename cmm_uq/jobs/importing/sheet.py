@@ -68,7 +68,7 @@ class Sheet:
 
 
 def letters(column: int) -> str:
-    """Name of a spreadsheet's column by its index from 0: A, …, Z, AA, …"""
+    """Name of a spreadsheet's column by its index from 0: A to Z, then AA and on."""
     name, left = "", column + 1
     while left:
         left, digit = divmod(left - 1, 26)

@@ -1,7 +1,7 @@
 """What laboratories call the columns of a recording, in English, German, French, Italian and Spanish.
 
-A heading is a word for a column of a recording, or a letter of an axis among words that leave it a coordinate; any word that is
-not known here makes it another column, which is left out and named as such.
+A heading is a word for a column of a recording, or a letter of an axis among words that leave it a coordinate; any word that
+is not known here makes it another column, which is left out and named as such.
 """
 
 from __future__ import annotations
@@ -50,9 +50,10 @@ _PHRASES: Mapping[str, str] = {
 _COLUMNS = {phrase: column for column, phrases in _PHRASES.items() for phrase in phrases.split("|")}
 
 _COORDINATE = _set(
-    "coordinate coordinates coord koordinate koord coordonnee coordinata coordenada value wert valeur valore valor axis achse axe "
-    "asse eje actual measured ist istwert gemessen messwert mesure mesuree misurato misurata medido medida position pos center "
-    "centre mitte mittelpunkt centro point punkt punto ball kugel sphere boule bille sfera esfera p pt act ax kugelmitte"
+    "coordinate coordinates coord koordinate koord coordonnee coordinata coordenada value wert valeur valore valor axis achse "
+    "axe asse eje actual measured ist istwert gemessen messwert mesure mesuree misurato misurata medido medida position pos "
+    "center centre mitte mittelpunkt centro point punkt punto ball kugel sphere boule bille sfera esfera p pt act ax "
+    "kugelmitte"
 )
 """Words beside the letter of an axis that leave it a coordinate."""
 
@@ -61,8 +62,8 @@ _NOMINAL = _set(
 )
 _DEVIATION = _set("dev deviation abweichung abw ecart scostamento desviacion diff delta error err fehler tol")
 _CERTIFIED = _set(
-    "reference ref certified calibrated referenz kalibriert kalibrierwert zertifiziert certifie etalonne riferimento certificato "
-    "referencia certificado"
+    "reference ref certified calibrated referenz kalibriert kalibrierwert zertifiziert certifie etalonne riferimento "
+    "certificato referencia certificado"
 )
 _APPROACH = _set("approach anfahrrichtung antastrichtung anfahren approche approccio aproximacion direction richtung")
 _TEMPERATURE = _set("temp temperature temperatur temperatura t scale massstab regle riga regla achse axis axe asse eje")

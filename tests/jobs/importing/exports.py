@@ -1,4 +1,4 @@
-"""Twelve exports of one measurement, two bars of two balls, as programs and spreadsheets write it, in any unit and language."""
+"""Twelve exports of one measurement, two bars of two balls, as programs and spreadsheets write it."""
 
 from __future__ import annotations
 
@@ -58,8 +58,7 @@ def wide(language: str, unit: str) -> bytes:
     heads = HEADINGS[language]
     names = [f"{axis}{i} ({unit})" for i in (1, 2) for axis in "XYZ"]
     rows = [";".join([heads[0], *names])]
-    for i in (0, 2):
-        rows.append(";".join([str(i // 2 + 1), *(text(v, unit, ",") for v in XYZ[i : i + 2].ravel())]))
+    rows += [";".join([str(i + 1), *(text(v, unit, ",") for v in XYZ[2 * i : 2 * i + 2].ravel())]) for i in (0, 1)]
     return "\n".join(rows).encode()
 
 

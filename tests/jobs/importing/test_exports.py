@@ -1,4 +1,4 @@
-"""Twelve exports of one measurement in another language, another unit, and damaged: read right, or refused for the right cause."""
+"""Twelve exports of one measurement, in other languages and units, and damaged: read right, or refused for the right cause."""
 
 from __future__ import annotations
 
@@ -68,9 +68,10 @@ DAMAGES = [
     ("comma.csv", put("Z [mm]", "Z [furlong]"), r"line 1: the unit 'furlong' of 'Z \[furlong\]' is not known"),
     ("comma.csv", put("Y [mm]", "X old [mm]"), r"line 1: no column is y_mm among 'Measurement', 'Ball'"),
     ("comma.csv", put("Operator", "X actual"), r"columns 'X \[mm\]' and 'X actual' could all be x_mm.*columns = \{ x_mm"),
-    ("comma.csv", put("Measurement", "Kennung"), r"nothing says which points belong to one measurement.*points_per_measurement"),
+    ("comma.csv", put("Measurement", "Kennung"), r"nothing says which points belong to one.*points_per_measurement"),
     ("comma.csv", put("2,1,300", "Mean,,\r\n2,1,300"), r"line 4: has no coordinates, and figures follow"),
-    ("semicolon.csv", put("500,0225", "500.0225"), r"has a decimal comma, and '500\.0225\d*' \(.*line 5, column X \[mm\]\) has a decimal point"),
+    ("semicolon.csv", put("500,0225", "500.0225"),
+     r"has a decimal comma, and '500\.0225\d*' \(.*line 5, column X \[mm\]\) has a decimal point"),
     ("semicolon.csv", cut(0.55), r"semicolon\.csv line 5"),
     ("tabs.txt", put("250,010100000", "#DIV/0!"), r"line 3, column Y \[mm\]: '#DIV/0!' is not a number"),
     ("unicode.txt", cut(0.501), r"unicode\.txt.*(is no text in UTF-16|line \d)"),
