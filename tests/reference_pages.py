@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -178,14 +179,21 @@ def results() -> str:
 
 def commands() -> str:
     """Every command with its arguments and options, from the help that it prints."""
-    parts = [f"{app.info.help}", f"{app.info.epilog}", "`cmm-uq COMMAND --help` prints what stands here."]
+    parts = [f"{app.info.help}", *ended(str(app.info.epilog)), "`cmm-uq COMMAND --help` prints what stands here."]
     for command in app.registered_commands:
         rows = list(_parameters(command))
         arguments = " ".join(name for name, _, _ in rows if not name.startswith("`-"))
         usage = f"cmm-uq {command.name} {arguments.replace('`', '')}".strip()
         told = " ".join((inspect.getdoc(command.callback) or "").split())
         parts += [f"## `{usage}`", told, table(("argument or option", "meaning", "default"), rows)]
+        parts += ended(str(command.epilog))
     return page("Commands", *parts)
+
+
+def ended(epilog: str) -> list[str]:
+    """What stands at the end of a help: text, and calls as they are typed."""
+    told, _, calls = epilog.partition("\b\nExamples:\n")
+    return [*filter(None, [told.strip()]), f"```text\n{textwrap.dedent(calls)}\n```"]
 
 
 def header(name: str, one: Mapping[str, Any]) -> str:
@@ -244,8 +252,12 @@ def _parameters(command: CommandInfo) -> Iterable[tuple[str, str, str]]:
         shown = f"`{name.upper()}`" if isinstance(info, ArgumentInfo) else ", ".join(f"`{one}`" for one in names)
         default = parameter.default
         plain = isinstance(default, (int, float)) and switch is not bool
+        shown_default = getattr(info, "show_default", None)
         told = " ".join((getattr(info, "help", None) or "").split())
-        yield shown, told, f"`{default}`" if plain and default is not parameter.empty else "–"
+        if isinstance(shown_default, str):
+            yield shown, told, f"`{shown_default}`" if "<" in shown_default else shown_default
+        else:
+            yield shown, told, f"`{default}`" if plain and default is not parameter.empty else "–"
 
 
 def main() -> None:

@@ -38,7 +38,7 @@ def _json_wanted() -> bool:
 def _in_words(text: str) -> None:
     """One line; on a terminal folded between words, its beginning in red."""
     if on_terminal(sys.stderr):
-        from cmm_uq.cli.layout import folded
+        from cmm_uq.cli.folding import folded
 
         text = "\n".join(folded(text, columns()))
         if styled(sys.stderr) and os.name != "nt":  # old consoles of Windows would show the codes

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from rich.cells import cell_len
 
+from cmm_uq.cli.folding import folded
 from cmm_uq.documents.in_short import Standing, Summary, Verdict
 from cmm_uq.errors import printable
 
@@ -30,21 +31,6 @@ NARROWEST = 8
 """Cells of a column that is folded."""
 
 _GAP, _MORE = "  ", " …"
-
-
-def folded(text: str, width: int | None) -> list[str]:
-    """Lines of at most ``width`` cells, broken at spaces; a no-break space holds, and a longer word stays whole."""
-    words = printable(text.replace("\n", " ")).split(" ")
-    if width is None:
-        return [" ".join(words)]
-    lines, line = [], words[0]
-    for word in words[1:]:
-        if cell_len(line) + 1 + cell_len(word) <= width:
-            line += f" {word}"
-        else:
-            lines.append(line)
-            line = word
-    return [*lines, line]
 
 
 @dataclass(frozen=True)
@@ -109,9 +95,8 @@ class Layout:
         if self.width is not None:
             room = self.width - len(_GAP) * len(widths)
             if sum(widths) > room and not self.verbose:
-                cells = [
-                    [row[0].partition(" (")[0], *row[1:]] for row in cells
-                ]  # what a name means stands in the document
+                # what a name means, in brackets behind it, stands in the document
+                cells = [[row[0].partition(" (")[0], *row[1:]] for row in cells]
                 widths = _widths(cells)
         while room is not None and sum(widths) > room and max(widths) > NARROWEST:
             widths[widths.index(max(widths))] -= 1

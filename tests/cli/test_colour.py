@@ -9,13 +9,7 @@ import pytest
 from cmm_uq.cli.progress import shown
 from tests.cli.terminal import on_terminal
 
-WRONG = ("simulate", "a-folder-that-is-not-there", "--truth", "truth.toml", "--out", "nowhere")
-"""A command without progress, whose job is not there."""
-
-ANSWER = (
-    "cmm-uq: a-folder-that-is-not-there/job.toml: no such file. A job is a folder with a job.toml and the recording "
-    "that it names"
-)
+ANSWER = "cmm-uq: No such option: --sed. Did you mean --seed? cmm-uq report --help lists its options"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals of POSIX")
@@ -25,7 +19,7 @@ ANSWER = (
 def test_an_error_is_folded_between_words_and_red_only_where_colour_is_wanted(
     environment: dict[str, str], coloured: bool
 ) -> None:
-    code, told = on_terminal(*WRONG, columns=60, environment=environment)
+    code, told = on_terminal("report", "x", "--sed", "3", columns=60, environment=environment)
     assert code == 2
     assert ("\x1b[1;31mcmm-uq:\x1b[0m" in told) is coloured
     plain = told.replace("\x1b[1;31m", "").replace("\x1b[0m", "")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.process import run
+from tests.conftest import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -18,8 +19,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_simulation_says_what_it_wrote_where(folder: Path) -> None:
-    from tests.conftest import ROOT
-
     job = ROOT / "examples" / "iota-1102-20C"
     done = run("simulate", job, "--truth", "truth.toml", "--out", "out", "--json", cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
@@ -35,7 +34,6 @@ def test_a_simulation_says_what_it_wrote_where(folder: Path) -> None:
     [
         (("report", "nowhere"), "no such file", str(Path("nowhere") / "job.toml")),
         (("report", "x", "--bogus"), "No such option: --bogus", None),
-        (("budget", "nowhere.toml"), "no such file", "nowhere.toml"),
     ],
 )
 def test_an_error_is_an_object_with_problem_place_and_fix(

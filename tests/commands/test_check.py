@@ -60,7 +60,7 @@ def test_everything_that_is_wrong_is_told_at_once_with_line_key_and_fix(gauge: P
     assert {(Path(one.file).name, one.line, one.key) for one in problems} == {
         ("job.toml", lines["chain"], "[machine] chain"),
         ("job.toml", lines["u_mm"], "[artefact] u_mm"),
-        ("job.toml", lines["mpe"], "[conformity] 0.mpe"),
+        ("job.toml", lines["mpe"], "[[conformity]] 1 mpe"),
         ("job.toml", lines["effects"], "[model] effects"),
         ("recording.csv", lines["reference"], "reference_mm"),
         ("recording.csv", lines["row"], ""),
@@ -122,9 +122,9 @@ def test_the_command_tells_several_jobs_as_text_and_as_json(iota: Path, gauge: P
     (gauge / "recording.csv").unlink()
     ended = run("check", iota, gauge)
     assert ended.returncode == 2
-    assert f"{iota}: nothing would stop report" in ended.stdout
-    assert "problem: " in ended.stdout
-    data = json.loads(run("check", "--json", gauge).stdout)
+    assert f"SOUND  {iota}: nothing would stop report" in ended.stdout
+    assert f"STOPS  {gauge}: 1 problem" in ended.stdout
+    data = json.loads(run("check", "--json", gauge).stdout)["jobs"]
     assert [one["sound"] for one in data] == [False]
     assert data[0]["problems"][0]["fix"].startswith("Put it beside job.toml")
     assert run("check", "-q", iota).returncode == 0
