@@ -20,9 +20,12 @@ from cmm_uq import __version__  # noqa: E402
 CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "overview", "gallery"],
     "How to": [
-        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*", "import/*",
+        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*", "import/index", "import/*",
     ],
-    "Reference": ["running", "words", "api", "reference/*", "uncertainty/model-file", "machine/effects", "limits"],
+    "Reference": [
+        "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget", "reference/commands", "running",
+        "reference/*", "api", "uncertainty/model-file", "machine/effects", "limits", "words",
+    ],
     "How it works": [
         "certificate", "standards", "noise", "screening", "diagnosis", "planning", "selfcalibration", "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
