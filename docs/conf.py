@@ -20,11 +20,12 @@ from cmm_uq import __version__  # noqa: E402
 CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "overview", "gallery"],
     "How to": [
-        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*", "import/index", "import/*",
+        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*",
+        "import/index", "import/*",
     ],
     "Reference": [
-        "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget", "reference/commands", "running",
-        "reference/*", "api", "uncertainty/model-file", "machine/effects", "limits", "words",
+        "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
+        "reference/commands", "running", "reference/*", "api", "uncertainty/model-file", "machine/effects", "limits", "words",
     ],
     "How it works": [
         "certificate", "standards", "noise", "screening", "diagnosis", "planning", "selfcalibration", "artefacts/index",
