@@ -21,7 +21,8 @@ from cmm_uq.messages import Verbatim, say
 from cmm_uq.points import Floats, Ints
 
 _UNIT_LINE = re.compile(
-    r"\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;,\s]\s*(\S+)", re.IGNORECASE
+    r"\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+\s*([^\s;]+)",
+    re.IGNORECASE,
 )
 
 
@@ -116,7 +117,7 @@ def _with_unit(sheet: Sheet, header: Header) -> Sheet:
     if sheet.unit is not None:
         return sheet
     for row in sheet.rows[: header.row]:
-        found = _UNIT_LINE.search(" ".join(str(cell) for cell in row))
+        found = _UNIT_LINE.search(";".join(str(cell) for cell in row))
         if found and (unit := length_named(found[1].strip("[]().,;"))):
             return replace(sheet, unit=unit.name)
     return sheet

@@ -11,12 +11,18 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.numerals import is_number, values_of
 from cmm_uq.jobs.importing.sheet import Cell, Fact
+from cmm_uq.jobs.importing.vocabulary import understood
 from cmm_uq.messages import Text, Verbatim, commas, names, say
 from cmm_uq.points import Floats
 
 MEASUREMENT, POINT, REPEAT = "measurement", "point", "repeat"
 NUMBERS = (MEASUREMENT, POINT, REPEAT)
 _DIGITS = re.compile(r"\d+")
+_WORD = re.compile(r"([^\W\d_]*)[^\w]*_*\d+")
+_BY_LETTER = {"m": MEASUREMENT, "p": POINT, "b": POINT, "k": POINT, "r": REPEAT, "bar": MEASUREMENT, "stab": MEASUREMENT,
+              "barre": MEASUREMENT, "barra": MEASUREMENT, "pos": MEASUREMENT, "line": MEASUREMENT}  # fmt: skip
+"""Short words in the names of features."""
+
 _SHOWN = 6
 _FIX = 'Say points_per_measurement = 2 (or "all"), or which columns number them: columns = { measurement = "…", point = "…" }'
 
@@ -78,10 +84,12 @@ def completed(
     if keys.points_per_measurement is not None:
         return _in_turn(found, count, keys.points_per_measurement, place)
     named = None if labels is None or POINT in found else _of_names(labels)
-    if named is None:
+    if named is None or labels is None:
         raise CmmUqError("nothing says which points belong to one measurement", where=place, fix=_FIX)
-    first = say("from names such as {name}", name=Verbatim(labels[0])) if labels else say("from names")
-    return {**found, **named}, [_fact(first, *named)]
+    first = commas([say("{column} {number:g}", column=Verbatim(column), number=float(numbers[0]))
+                    for column, numbers in named.items()])  # fmt: skip
+    how = say("from names: {name} is {first}", name=Verbatim(labels[0]), first=first)
+    return {**found, **named}, [Fact("numbering", say("Numbering"), how)]
 
 
 def _fact(how: Text, *columns: str) -> Fact:
@@ -114,7 +122,10 @@ def _in_turn(found: dict[str, Floats], count: int, each: int | str, place: str) 
 
 
 def _of_names(labels: Sequence[str]) -> dict[str, Floats] | None:
-    """Measurement, point (and repeat) from names that are alike but for two (or three) numbers."""
+    """Measurement, point (and repeat) from names that are alike but for two (or three) numbers.
+
+    The word before a number says what it numbers; where none is known, they stand in this order.
+    """
     if not labels:
         return None
     form = _DIGITS.sub("0", labels[0])
@@ -122,4 +133,16 @@ def _of_names(labels: Sequence[str]) -> dict[str, Floats] | None:
     if parts not in (2, 3) or any(_DIGITS.sub("0", label) != form for label in labels):
         return None
     numbers = np.array([[float(digits) for digits in _DIGITS.findall(label)] for label in labels])
-    return {column: numbers[:, i] for i, column in enumerate(NUMBERS[:parts])}
+    columns = _in_words(_WORD.findall(labels[0]), NUMBERS[:parts])
+    return None if columns is None else {column: numbers[:, columns.index(column)] for column in NUMBERS[:parts]}
+
+
+def _in_words(words: Sequence[str], columns: Sequence[str]) -> list[str] | None:
+    """What each number of a name numbers, by the word before it; ``None`` where two of them claim the same."""
+    known = [_BY_LETTER.get(word.casefold()) or understood(word).column for word in words]
+    known = [column if column in columns else None for column in known]
+    claimed = [column for column in known if column]
+    if len(set(claimed)) < len(claimed):
+        return None
+    left = iter([column for column in columns if column not in claimed])
+    return [column or next(left) for column in known]

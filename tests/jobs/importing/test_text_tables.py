@@ -240,6 +240,33 @@ def test_numbers_of_measurement_and_point_come_from_names_that_have_two() -> Non
     assert found.columns["point"].tolist() == [1, 2, 1]
 
 
+@pytest.mark.parametrize(
+    ("name", "measurement", "point", "repeat"),
+    [
+        ("Bar 3 ball 2", 3, 2, None), ("Ball2_Pos3", 3, 2, None), ("KUGEL 2 / MESSUNG 3", 3, 2, None), ("3.2", 3, 2, None),
+        ("M3_P2_R4", 3, 2, 4), ("Run 4, bar 3, ball 2", 3, 2, 4), ("Sphere2 (position 3)", 3, 2, None), ("B2-3", 3, 2, None),
+    ],
+)  # fmt: skip
+def test_the_words_of_a_name_say_what_its_numbers_are(
+    name: str, measurement: int, point: int, repeat: int | None
+) -> None:
+    found = read(f'Name;X [mm];Y [mm];Z [mm]\n"{name}";1;2;3\n')
+    assert (found.columns["measurement"][0], found.columns["point"][0]) == (measurement, point)
+    assert found.columns.get("repeat", [None])[0] == repeat
+    assert f"measurement {measurement}, point {point}" in found.recognised.data["numbering"]
+
+
+def test_names_whose_numbers_are_both_of_a_point_say_no_measurement() -> None:
+    with pytest.raises(CmmUqError, match="nothing says which points belong to one measurement"):
+        read("Name;X [mm];Y [mm];Z [mm]\nball 1 to ball 2;1;2;3\n")
+
+
+def test_words_about_a_unit_are_no_unit() -> None:
+    """ "unit in charge" is no inch, "Unit M" no metre."""
+    with pytest.raises(CmmUqError, match="may be in mm or in inch"):
+        read("The unit in charge\nBusiness unit M\nMeasurement;Point;X;Y;Z\n1;1;1;0;0\n")
+
+
 def test_a_number_of_points_that_is_no_whole_number_of_measurements_is_refused() -> None:
     with pytest.raises(CmmUqError, match="3 points are no whole number of measurements of 2"):
         read("X [mm],Y [mm],Z [mm]\n1,2,3\n1,2,4\n1,2,5\n", points_per_measurement=2)
