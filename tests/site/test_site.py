@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 ELSEWHERE = {
-    "arxiv.org", "docs.hexagonmi.com", "doi.org", "github.com", "openturns.github.io", "pradyunsg.me", "pypi.org", "python.arviz.org",
-    "uncertainty.nist.gov", "www.scielo.br", "www.sphinx-doc.org",
+    "arxiv.org", "docs.hexagonmi.com", "doi.org", "github.com", "openturns.github.io", "pradyunsg.me", "pypi.org",
+    "python.arviz.org", "uncertainty.nist.gov", "www.scielo.br", "www.sphinx-doc.org",
 }  # fmt: skip
 """Where links of the documentation lead outside; looked at by eye when one is added, since tests fetch nothing."""
 
