@@ -22,6 +22,7 @@ from cmm_uq.jobs.sentences import unit_of
 from cmm_uq.jobs.toml_text import without_place, written
 from cmm_uq.kinds import kind_named
 from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.planning.setting import Planning
 from cmm_uq.uncertainty.budgets.tables import TABLES
 from cmm_uq.uncertainty.input_keys import KINDS as DISTRIBUTIONS
 from tests.conftest import ROOT
@@ -46,6 +47,7 @@ def files() -> dict[Path, str]:
         "budget": budget(),
         "columns": columns(),
         "commands": commands(),
+        "results": results(),
     }
     return schemas | {PAGES / f"{name}.md": text for name, text in pages.items()}
 
@@ -88,7 +90,7 @@ def plan() -> str:
     ready = [
         (f"`{kind}`", ", ".join(f"`{plan}`" for plan in planning.ready))
         for kind in dict.fromkeys(known().values())
-        if (found := kind_named(kind)) is not None and (planning := found._loaded(found.plan)) is not None
+        if (found := kind_named(kind)) is not None and (planning := found.offers("plan", Planning)) is not None
     ]
     return page(
         "`[plan]` in job.toml, key by key",

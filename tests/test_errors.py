@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import unicodedata
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.errors import LONGEST_MESSAGE, CmmUqError, printable, shortened, suggestion
+from cmm_uq.errors import LONGEST_MESSAGE, CmmUqError, Gathered, printable, shortened, suggestion
+from cmm_uq.physics.catalogue import EVERY
 
 ANY = st.text(st.characters(), max_size=2000)
 VISIBLE = st.text(st.characters(categories=["L", "N", "P", "S"]), max_size=80)
@@ -71,3 +73,25 @@ def test_short_lists_and_near_names_are_told_as_before() -> None:
     assert suggestion("zzz", ["b", "a"]) == "Known: a, b"
     assert suggestion("lenght_mm", ["length_mm", "u_um"]) == "Did you mean 'length_mm'?"
     assert suggestion("k" * 100_000, ["length_mm"]) == "Known: length_mm"
+
+
+def test_a_name_without_its_axis_is_answered_with_all_that_have_one() -> None:
+    assert suggestion("scale", EVERY) == "Did you mean 'scale_x', 'scale_y', 'scale_z'?"
+    assert suggestion("squareness", EVERY) == "Did you mean 'squareness_xy', 'squareness_yz', 'squareness_zx'?"
+    assert suggestion("rotation", EVERY).count("rotation_") == 9
+    assert suggestion("scale_xx", EVERY) == "Did you mean 'scale_x'?"
+
+
+def test_the_first_of_several_problems_is_raised_with_the_others_in_it() -> None:
+    wrong = Gathered()
+    wrong.refuse()  # nothing is wrong yet
+    with wrong.going_on():
+        inner = Gathered()
+        inner.add(CmmUqError("one"))
+        inner.add(CmmUqError("two"))
+        inner.refuse()
+    with wrong.going_on():
+        raise CmmUqError("three")
+    with pytest.raises(CmmUqError, match="one") as told:
+        wrong.refuse()
+    assert [str(error) for error in told.value.also] == ["two", "three"]

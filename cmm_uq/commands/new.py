@@ -7,25 +7,32 @@ names, and everything that is made of them says that they are simulated.
 from __future__ import annotations
 
 import datetime as dt
-import json
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cmm_uq.commands.reading import job_of
-from cmm_uq.commands.schemas import shipped
+from cmm_uq.commands.new_folder import (
+    BUDGET,
+    KEPT,
+    PLAN,
+    README,
+    RECORDING,
+    SCHEMA,
+    Tables,
+    example_keys,
+    job_files,
+    kind_or_refused,
+    read_new,
+)
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.beginning import MACHINE, Beginning
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
-from cmm_uq.jobs.recording import REQUIRED
-from cmm_uq.jobs.toml_file import as_toml
-from cmm_uq.jobs.toml_text import commented
+from cmm_uq.jobs.origin import MEASURED, SIMULATED, Origin, first_line
 from cmm_uq.jobs.truth import Truth
 from cmm_uq.kinds import kind_named, names
 from cmm_uq.model.kind import Kind
@@ -34,15 +41,13 @@ from cmm_uq.points import Points
 from cmm_uq.units import MICROMETRE
 from cmm_uq.writing import Owner, staged
 
-RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
-KEPT = (SCHEMA, README)
-"""Files beside those of the job itself."""
-
-PLAN, BUDGET = "plan", "budget"
-"""Names beside those of kinds."""
+__all__ = [
+    "BUDGET", "KEPT", "PLAN", "README", "RECORDING", "SCHEMA", "job_files", "job_id", "job_of_export", "known",
+    "new_job", "new_plan", "titles", "usual", "write_new",
+]  # fmt: skip
 
 SEED = 1
-Tables = Mapping[str, Mapping[str, Any]]
+"""Of the simulated readings."""
 
 
 def known() -> dict[str, str]:
@@ -57,7 +62,7 @@ def known() -> dict[str, str]:
 
 def titles() -> dict[str, str]:
     """What a new job can be asked for by, each with what it is."""
-    kinds = {name: _kind(kind).beginning(name).title for name, kind in known().items()}
+    kinds = {name: kind_or_refused(kind).beginning(name).title for name, kind in known().items()}
     return {
         **kinds,
         PLAN: "A job that is only planned (--set artefact.kind=…)",
@@ -89,39 +94,16 @@ def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: 
     tables = _tables(kind, begin, given, id)
     if begin.files is not None:
         bare = {**tables, "machine": {k: v for k, v in tables["machine"].items() if k not in begin.machine}}
-        machine = _read(kind, bare, {}).points.machine
-        return job_files(kind.name, tables, begin.files(machine), _examples(tables, given))
-    planned = _read(kind, {**tables, "plan": {**begin.plan, **tables.get("plan", {})}}, {})
+        machine = read_new(kind, bare, {}).points.machine
+        return job_files(kind.name, tables, begin.files(machine), example_keys(tables, given), begin=begin)
+    planned = read_new(kind, {**tables, "plan": {**begin.plan, **tables.get("plan", {})}}, {})
     points = _drawn(planned, kind, begin)
     from cmm_uq.commands.simulate import recording
 
     content = first_line("simulate", f"{PROGRAM} new", ": put in your own readings, and take this line away").encode()
-    return job_files(kind.name, tables, {RECORDING: content + recording(points)}, _examples(tables, given))
-
-
-def job_files(
-    kind: str, tables: Tables, files: Mapping[str, bytes], examples: Collection[str] = ()
-) -> dict[str, bytes]:  # fmt: skip
-    """A job's folder around a recording: job.toml with every other key as a comment, its schema, and what to do next.
-
-    Parameters
-    ----------
-    kind : of measurement.
-    tables : what job.toml says.
-    files : the recording that it names, and other files.
-    examples : dotted keys whose figures are an example's; a measured recording is refused beside them.
-
-    Raises
-    ------
-    CmmUqError : the readers of a job refuse it.
-    """
-    found = _kind(kind)
-    job = _read(found, tables, files)
-    begin = found.beginning(kind)
-    return {
-        "job.toml": _toml(found, tables, examples), **files, README: _readme(job, begin).encode(),
-        SCHEMA: shipped("job").encode(),
-    }  # fmt: skip
+    return job_files(
+        kind.name, tables, {RECORDING: content + recording(points)}, example_keys(tables, given), begin=begin
+    )
 
 
 def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: str) -> dict[str, bytes]:  # noqa: A002
@@ -141,7 +123,7 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
     found, begin = _begun(kind)
     bare = replace(begin, artefact={}, conformity=None)
     whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": dict(given.get("machine", {}))}
-    return job_files(found.name, whole, files)
+    return job_files(found.name, whole, files, begin=begin)
 
 
 @naming_package()
@@ -164,11 +146,7 @@ def new_plan(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     tables = _tables(kind, begin, given, id, origin=MEASURED)
     length = {} if "length_mm" in tables["artefact"] or "pitch_mm" in begin.plan else {"length_mm": 600.0}
     tables["plan"] = {**length, **begin.plan, **tables.get("plan", {})}
-    job = _read(kind, tables, {})
-    return {
-        "job.toml": _toml(kind, tables, _examples(tables, given)), README: _readme(job, replace(begin, command=PLAN)).encode(),
-        SCHEMA: shipped("job").encode(),
-    }  # fmt: skip
+    return job_files(kind.name, tables, {}, example_keys(tables, given), begin=replace(begin, command=PLAN))
 
 
 def write_new(name: str, folder: Path, given: Tables) -> dict[str, Path]:
@@ -236,25 +214,8 @@ def _begun(name: str) -> tuple[Kind, Beginning]:
         kinds = known()
         if name not in kinds:
             raise CmmUqError(f"there is no kind {name!r}", fix=suggestion(name, (*kinds, PLAN, BUDGET)))
-        kind = _kind(kinds[name])
+        kind = kind_or_refused(kinds[name])
     return kind, kind.beginning(name)
-
-
-def _kind(name: str) -> Kind:
-    found = kind_named(name)
-    if found is None:
-        raise CmmUqError(f"there is no kind {name!r}", fix=suggestion(name, names()))
-    return found
-
-
-def _examples(tables: Mapping[str, Any], given: Tables) -> set[str]:
-    """Dotted keys of machine, artefact and limits that nobody gave."""
-    return {
-        f"{table}.{key}"
-        for table in ("machine", "artefact", "conformity")
-        for key in (tables[table][0] if table == "conformity" and table in tables else tables.get(table, {}))
-        if key not in (*given.get(table, ()), "kind", "error_map")
-    }
 
 
 def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin = SIMULATED) -> dict[str, Any]:  # noqa: A002
@@ -287,13 +248,6 @@ def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin
     return whole
 
 
-def _read(kind: Kind, tables: Tables, files: Mapping[str, bytes]) -> Job:
-    """The job as any command reads it."""
-    return job_of(
-        {"job.toml": as_toml(tables, "job.toml"), **files}, recorded=bool(files) or not kind.table.with_recording
-    )
-
-
 def _drawn(job: Job, kind: Kind, begin: Beginning) -> Points:
     """Readings at the kind's set-ups: noise alone, of a machine without errors."""
     from cmm_uq.planning.placing import joined
@@ -313,59 +267,6 @@ def _drawn(job: Job, kind: Kind, begin: Beginning) -> Points:
 
     truth = Truth.model_validate({"seed": SEED, "noise": {"coordinate_um": begin.noise_um}})
     return simulate(replace(job, points=points, planned=True), truth)
-
-
-def _toml(kind: Kind, tables: Tables, examples: Collection[str]) -> bytes:
-    """job.toml with a comment for whatever else a job of this kind may say."""
-    begin = kind.beginning(kind.name)
-    out = {"job.derived_from", *(f"job.{key}" for key in ("as_found",) if SIMULATED in tables["job"].values())}
-    if not kind.tested:
-        out |= {"conformity", "short_gauge", "test_uncertainty", "rated_conditions"} - set(tables)
-    if kind.plan is None:
-        out |= {"plan"}
-    if not kind.table.with_recording:
-        out |= {"recording"}
-    if not kind.table.with_earlier:
-        out |= {"recording.earlier", "recording.earlier_date"}
-    head = [
-        f"#:schema ./{SCHEMA}",
-        f"# {begin.title}. What stands behind # is the default, or what may be said besides.",
-    ]
-    if tables["job"].get("origin") == SIMULATED:
-        head.append(
-            "# THE READINGS ARE SIMULATED: put in your own, then take away their first line and origin below. Figures marked "
-            f"{EXAMPLE} are nobody's."
-        )
-    body = commented(json.loads(shipped("job")), tables, out, kind.name, examples=examples)
-    return ("\n".join(head) + "\n\n" + body).encode()
-
-
-def _readme(job: Job, begin: Beginning) -> str:
-    """What lies here, and what to do next, in ten lines or so."""
-    facts = job.facts
-    columns = ", ".join(f"`{name}`" for name in (*REQUIRED, *begin.columns))
-    further = ", ".join(f"`{name}`" for name in ("repeat", *begin.further))
-    simulated = facts.job.origin == SIMULATED
-    lines = [
-        f"# {begin.title}", "",
-        f"`cmm-uq {begin.command} .` in this folder makes the pages; `cmm-uq check .` says what is missing or wrong.", "",
-        f"- `job.toml`: machine, artefact and limits. Editors that know TOML schemas explain every key (`{SCHEMA}`).",
-    ]  # fmt: skip
-    if facts.recording.file:
-        lines += [
-            f"- `{facts.recording.file}`: one row a point. {begin.numbering}",
-            f"- Its columns: {columns}; it may have {further} and temperatures besides.",
-        ]
-    if simulated:
-        lines.append(
-            "- **The figures are simulated**, and all that is made of them says so. Put in your own, then take away their "
-            f'first line and `origin = "simulated"` in job.toml, and state what is marked {EXAMPLE} there.'
-        )
-    if begin.command == PLAN:
-        lines.append(
-            f"- Nothing is recorded yet: the plan writes `plan.csv`, to be filled in as `{facts.recording.file}`."
-        )
-    return "\n".join(lines) + "\n"
 
 
 def _id_of(name: str) -> str:

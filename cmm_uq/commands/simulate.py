@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.commands.reading import job_of, read_job
-from cmm_uq.commands.recorded import refuse_unfit
 from cmm_uq.documents.program import program
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.content import content_of
@@ -59,7 +58,10 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
     points = replace(job.points, columns={**job.points.columns, **columns})
     observe = kind_of(job).observing("simulated")
-    refuse_unfit(job)
+    if not job.planned:
+        from cmm_uq.commands.recorded import refuse_unfit  # the screening, which a plan's coordinates need not pass
+
+        refuse_unfit(job)
     artefact = observe(job.facts.artefact, points, where=job.recording_path)
     acting = effects(tuple(truth.effects), where=f"{truth_path} [effects]")
     _refuse_unrecorded(points, acting, truth, truth_path)

@@ -76,7 +76,7 @@ def job_schema(
     keys["model"]["properties"]["effects"]["items"] = {
         "enum": list(effects), "x-taplo": {"docs": {"enumValues": list(effects.values())}},
     }  # fmt: skip
-    keys["conformity"]["items"]["properties"]["standard"]["examples"] = list(standards)
+    keys["conformity"]["items"]["properties"]["standard"]["enum"] = list(standards)
     without = [name for name, table in tables.items() if not table.with_recording]
     found["required"] = [name for name in found["required"] if name != "recording"]
     found["if"] = {"properties": {"artefact": {"properties": {"kind": {"not": {"enum": without}}}}}}

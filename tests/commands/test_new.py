@@ -116,6 +116,7 @@ def test_its_recording_has_the_columns_that_the_readme_names(name: str) -> None:
     named = re.findall(r"`(\w+)`", files[README].decode().split("Its columns: ")[1].split(";")[0])
     assert set(REQUIRED) <= set(named) <= set(header)
     assert len(files[README].decode().splitlines()) <= 12
+    assert files[README].decode().startswith(f"# {titles()[name]}\n")
 
 
 def test_it_becomes_a_measured_job_when_every_mark_is_taken_away_and_not_before(tmp_path: Path) -> None:

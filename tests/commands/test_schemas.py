@@ -71,6 +71,7 @@ WRONG: tuple[tuple[str, str, Any], ...] = (
     ("job", "origin", "guessed"),
     ("recording", "file", None),
     ("conformity", "rule", "by feeling"),
+    ("conformity", "standard", "ISO 10360"),
 )
 """Table, key and value that report refuses, of a ballbar."""
 

@@ -67,15 +67,18 @@ def test_a_periodic_error_can_be_simulated(iota: Path) -> None:
         ("[effects.scale_w]\nppm = 1.0", "unknown effect 'scale_w'"),
         ("[effects.scale_x]\narcsec = 1.0", "no parameter 'arcsec'"),
         ("[effects.thermal_scale_x]\ncte_per_k = 1e-6", "needs the column temp_x_c"),
+        ("[noise]\nslow_um = 1.0", "slow noise needs the column time_s"),
         ("[artefact]\nwidth_mm = 1.0", "a ballbar has no size 'width_mm'"),
         ("[noise]\ncoordinate_um = -1.0", "greater than or equal to 0"),
         ("[nois]\ncoordinate_um = 1.0", "unknown key. Did you mean 'noise'"),
     ],
 )
 def test_a_wrong_truth_is_refused(iota: Path, tmp_path: Path, text: str, message: str) -> None:
-    (tmp_path / "truth.toml").write_text(text)
-    with pytest.raises(CmmUqError, match=message):
-        write_simulation(iota, tmp_path / "truth.toml", tmp_path / "drawn")
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(CmmUqError, match=message) as told:
+        write_simulation(iota, tmp_path / "mine.toml", tmp_path / "drawn")
+    assert str(told.value).startswith(f"{tmp_path / 'mine.toml'}")
+    assert "truth.toml" not in str(told.value)
     assert not (tmp_path / "drawn").exists()
 
 

@@ -74,6 +74,8 @@ def test_every_input_is_hashed(iota: Path) -> None:
         (r"^standard = .*", 'standard = "ISO 9001"', r"\[\[conformity\]\] 1 standard: no such standard is.*Known: ASME"),
         (r"^\[\[conformity\]\]$", "[conformity]", r"\[conformity\]: .*Head it \[\[conformity\]\], in double brackets"),
         (r"^rule = .*", 'rule = "lenient"', r"\[\[conformity\]\] 1 rule"),
+        (r"^rule = .*", 'rule = "ISO 14253"', r"Did you mean 'ISO 14253-1'"),
+        (r"^length_mm = ", "lenght_mm = ", r"Did you mean 'length_mm'\? Certified length at 20 °C"),
         (r"^limit_um = .*", "", r'give either limit_um, or mpe = "3 \+ L/300"'),
         (r"^limit_um = .*", "limit_um = -1", r"limit_um: input should be greater than 0"),
         (r"^rule = .*", 'characteristic = "R0"', r"characteristic = 'R0' of ASME B89.4.1-1997 is not decided here"),

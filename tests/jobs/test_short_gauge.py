@@ -39,6 +39,13 @@ def test_its_expansion_is_taken_off() -> None:
     assert read(*rows, head=f"{HEAD},temp_artefact_c").errors_mm == pytest.approx([1.15e-3], abs=1e-9)
 
 
+def test_an_expanded_uncertainty_is_divided_by_its_factor() -> None:
+    given = {"file": "short.csv", "length_mm": 20.0, "U_um": 0.3}
+    assert ShortGaugeFacts.model_validate({**given, "k": 2.0}).u_um == 0.15
+    with pytest.raises(ValueError, match="U_um together with its coverage factor k"):
+        ShortGaugeFacts.model_validate(given)
+
+
 @pytest.mark.parametrize(("rows", "head", "problem", "where"), [
     (("1,1,1,0,0,0",), HEAD, "does not have points 1 and 2 alone", "line 2"),
     (("1,1,1,0,0,0", "1,2,1,20,0,0", "1,3,1,30,0,0"), HEAD, "does not have points 1 and 2 alone", "line 2"),

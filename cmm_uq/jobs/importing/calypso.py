@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import ROWS
-from cmm_uq.jobs.importing.encodings import decoded, head_text
+from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
 from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
@@ -34,7 +34,7 @@ class Calypso(Format):
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         """See :meth:`Format.read`."""
         text, encoding = decoded(content, where, keys.encoding)
-        lines = text.splitlines()
+        lines = report_lines(text, where)
         header = [word.strip() for word in lines[0].split("\t")]
         _refuse_another_table(header, lines, where, keys)
         if keys.columns:

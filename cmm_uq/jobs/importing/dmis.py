@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.importing.encodings import decoded, head_text
+from cmm_uq.files.limits import LINE
+from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
 from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
@@ -20,7 +21,7 @@ _UNITS = {"MM": "mm", "CM": "cm", "M": "m", "INCH": "inch", "FEET": "ft"}
 _UNIT = re.compile(r"^UNITS\s*/\s*(\w+)", re.IGNORECASE)
 _ACTUAL = re.compile(r"^FA\s*\((?P<name>[^)]*)\)\s*=\s*FEAT\s*/\s*(?P<sort>\w+)\s*,(?P<rest>.*)$", re.IGNORECASE)
 _ANY = re.compile(
-    r"^\s*(?:FA\s*\([^)]*\)\s*=\s*FEAT\s*/|OUTPUT\s*/\s*FA|DMISMN\s*/|DMISMD\s*/|FILNAM\s*/)",
+    r"^[ \t]*(?:FA\s*\([^)]*\)\s*=\s*FEAT\s*/|OUTPUT\s*/\s*FA|DMISMN\s*/|DMISMD\s*/|FILNAM\s*/)",
     re.IGNORECASE | re.MULTILINE,
 )
 _POLAR = ("POL", "CYL", "SPH")
@@ -40,7 +41,7 @@ class Dmis(Format):
         """See :meth:`Format.read`."""
         text, encoding = decoded(content, where, keys.encoding)
         unit, rows, others = None, [], 0
-        for line, statement in _statements(text):
+        for line, statement in _statements(report_lines(text, where), where):
             if found := _UNIT.match(statement):
                 unit = _one_unit(unit, found[1], f"{where} line {line}")
             elif found := _ACTUAL.match(statement):
@@ -60,15 +61,18 @@ class Dmis(Format):
         return sheets_of(rows, ["name", "x", "y", "z", "i", "j", "k"], unit=unit, decimal=".", facts=tuple(facts))
 
 
-def _statements(text: str) -> Iterator[tuple[int, str]]:
+def _statements(lines: Sequence[str], where: str) -> Iterator[tuple[int, str]]:
     """Statements without comments, those over several lines joined, with the line that each begins on."""
     begun, start = "", 0
-    for line, content in enumerate(text.splitlines(), 1):
+    for line, content in enumerate(lines, 1):
         part = content.strip()
         if part.startswith("$$"):
             continue
         start = start if begun else line
         begun += part
+        if len(begun) > LINE.most:
+            raise CmmUqError(f"the statement goes on for more than {LINE.most} characters", where=f"{where} line {start}",
+                             fix="Export it again: a line may not end in $ where its statement does")  # fmt: skip
         if begun.endswith("$"):
             begun = begun[:-1].rstrip() + " "
             continue

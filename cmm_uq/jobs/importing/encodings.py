@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.files.limits import LINES
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig", "UTF-8 with a byte-order mark"),
@@ -14,6 +15,8 @@ _MARKS = (
 )
 _TITLES = {"utf-8": "UTF-8", "utf-16": "UTF-16", "cp1252": "Windows-1252", "latin-1": "ISO 8859-1"}
 _FIX = "Export it again, or name encoding"
+_REPORT_LINE = 2000
+"""Characters of a line of a report, which has 80 to 200."""
 
 
 def decoded(content: bytes, where: str, asked: str | None = None) -> tuple[str, str]:
@@ -60,6 +63,23 @@ def _without_mark(content: bytes) -> str:
     except UnicodeDecodeError:
         return "cp1252" if not any(byte in content for byte in b"\x81\x8d\x8f\x90\x9d") else "latin-1"
     return "utf-8"
+
+
+def report_lines(text: str, where: str) -> list[str]:
+    """Lines of a report, none of them longer than a report's can be.
+
+    Raises
+    ------
+    CmmUqError : too many lines, or one too long.
+    """
+    lines = text.splitlines()
+    if len(lines) > LINES.most:
+        raise CmmUqError(f"has {len(lines)} lines, {LINES.most} are the most", where=where, fix="Split the report")
+    longest = max(range(len(lines)), key=lambda i: len(lines[i]), default=0)
+    if lines and len(lines[longest]) > _REPORT_LINE:
+        raise CmmUqError(f"the line has {len(lines[longest])} characters, {_REPORT_LINE} are the most in a report",
+                         where=f"{where} line {longest + 1}", fix="Export it again as text")  # fmt: skip
+    return lines
 
 
 def head_text(head: bytes) -> str:

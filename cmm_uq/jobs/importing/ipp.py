@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.importing.encodings import decoded, head_text
+from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
 from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
@@ -19,7 +19,7 @@ from cmm_uq.messages import Verbatim, number, say
 
 _LINE = re.compile(r"(?:^|[\s>\]:])(?P<tag>[E\d]\d{4})\s+(?P<what>[#&%!]|[A-Za-z]\w*\s*\()\s*(?P<rest>.*)$")
 _TERM = re.compile(r"\b(X|Y|Z|IJK)\s*\(([^)]*)\)")
-_ANY = re.compile(r"^.*\b\d{5}\s+(?:StartSession\s*\(|PtMeas\s*\(|[&%#])", re.MULTILINE)
+_ANY = re.compile(r"\b\d{5}[ \t]+(?:StartSession[ \t]*\(|PtMeas[ \t]*\(|[&%#])", re.MULTILINE)
 _SCANS = ("ScanOn", "ScanIn", "ScanUnknown")
 
 
@@ -36,7 +36,7 @@ class Ipp(Format):
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         """See :meth:`Format.read`."""
         text, encoding = decoded(content, where, keys.encoding)
-        requests, answers, others, scans = _lines(text)
+        requests, answers, others, scans = _lines(report_lines(text, where))
         if not answers:
             what = (
                 f"reports no measured point, and {scans} scans, which are not read"
@@ -63,12 +63,12 @@ Answer = tuple[str, dict[str, str], int]
 """Tag, terms, line."""
 
 
-def _lines(text: str) -> tuple[dict[str, str], list[Answer], int, int]:
+def _lines(lines: Sequence[str]) -> tuple[dict[str, str], list[Answer], int, int]:
     """Requests by tag, answers with a place, number of other answers, number of scans."""
     requests: dict[str, str] = {}
     answers: list[Answer] = []
     others = scans = 0
-    for line, content in enumerate(text.splitlines(), 1):
+    for line, content in enumerate(lines, 1):
         found = _LINE.search(content)
         if found is None or found["tag"].startswith("E"):
             continue

@@ -11,20 +11,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.importing.encodings import decoded, head_text
+from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
 from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
 from cmm_uq.messages import Verbatim, number, say
 
-_HEADING = re.compile(r"^\s*AX\s+(?=.*\bMEAS\b)", re.MULTILINE)
-_DIMENSION = re.compile(
-    r"^\s*(?:DIM\s+)?(?P<name>\S.*?)\s*=\s*(?P<what>[A-Z0-9 ]*?)\s*\bOF\s+(?P<sort>[A-Z]+)\s+(?P<of>\S+).*?"
-    r"\s*UNITS\s*=\s*(?P<unit>\w+)",
-    re.IGNORECASE,
-)
-_OTHER = re.compile(r"^\s*(?:DIM\s|\S.*=\s.*UNITS\s*=)", re.IGNORECASE)
+_HEADING = re.compile(r"^[ \t]*AX[ \t]+(?=.*\bMEAS\b)", re.MULTILINE)
+_LOCATED = re.compile(r"\s*(?P<what>[A-Z0-9 ]*?)\s*\bOF\s+(?P<sort>[A-Z]+)\s+(?P<of>\S+)", re.IGNORECASE)
+_UNITS = re.compile(r"UNITS\s*=\s*(\w+)", re.IGNORECASE)
+_DIMENSION = re.compile(r"^\s*(?:DIM\s|\S.*=\s.*UNITS\s*=)", re.IGNORECASE)
 _FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+[-+\d.]", re.IGNORECASE)
 _NUMBER = re.compile(r"(?<!\S)[-+]?\d*[.,]?\d+(?!\S)")
 _WORD = re.compile(r"\S+")
@@ -53,7 +50,9 @@ class PcDmis(Format):
     def recognises(self, head: bytes) -> bool:
         """See :meth:`Format.recognises`: by the heading of its figures, and the lines that name dimensions."""
         text = head_text(head)
-        return _HEADING.search(text) is not None and re.search(r"^\s*DIM\s|UNITS\s*=", text, re.MULTILINE) is not None
+        return (
+            _HEADING.search(text) is not None and re.search(r"^[ \t]*DIM\s|UNITS\s*=", text, re.MULTILINE) is not None
+        )
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         """See :meth:`Format.read`."""
@@ -93,19 +92,25 @@ def _places(text: str, where: str) -> tuple[list[_Place], int]:
     places: list[_Place] = []
     others, ends = 0, {}
     current: _Place | None = None
-    for line, content in enumerate(text.splitlines(), 1):
+    for line, content in enumerate(report_lines(text, where), 1):
         if _HEADING.match(content):
             ends = dict(_ends(content))
-        elif found := _DIMENSION.match(content):
-            located = found["what"].strip().upper() in ("LOCATION", "")
-            current = _Place(found["name"], found["sort"], found["of"], found["unit"], line) if located else None
+        elif _DIMENSION.match(content):
+            current = _located(content, line)
             places += [current] if current else []
-            others += not located
-        elif _OTHER.match(content):
-            current, others = None, others + 1
+            others += current is None
         elif current is not None and (row := _FIGURES.match(content)) and row["axis"].upper() in AXES:
             current.found[row["axis"].upper()] = _measured(content, ends, f"{where} line {line}")
     return places, others
+
+
+def _located(content: str, line: int) -> _Place | None:
+    """The place that a line announces; ``None`` where it is another dimension."""
+    name, _, rest = content.partition("=")
+    found, unit = _LOCATED.match(rest), _UNITS.search(rest)
+    if found is None or unit is None or found["what"].strip().upper() not in ("LOCATION", ""):
+        return None
+    return _Place(re.sub(r"^DIM\s+", "", name.strip()), found["sort"], found["of"], unit[1], line)
 
 
 def _ends(content: str) -> Iterator[tuple[str, int]]:

@@ -71,6 +71,9 @@ _NORMAL = _set("normal normale normala vector vektor vecteur vettore n")
 _TIP = _set("tip taster stylus tastkopf palpeur tastatore palpador offset")
 _SMALL = _set("no nr n number nummer numero num")
 
+_LONGEST = 120
+"""Characters of a heading; longer text is none."""
+
 _FIGURES = frozenset("0123456789+-−.,")
 _OWN = frozenset((*REQUIRED, *OPTIONAL))
 _IN_BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]*?)\s*[\])>}]\s*$")
@@ -102,7 +105,7 @@ def understood(heading: str) -> Heading:
     """What a heading says."""
     if heading in _OWN:
         return Heading(heading)
-    if heading[:1] in _FIGURES:
+    if heading[:1] in _FIGURES or len(heading) > _LONGEST:
         return Heading()
     text, unit, odd = _without_unit(heading)
     words = _words(text)

@@ -38,6 +38,12 @@ def stored_first(content: bytes) -> bytes:
     return out.getvalue()
 
 
+def claiming(size: int, content: bytes) -> bytes:
+    """The archive, whose last member says that it is so large."""
+    at = content.rindex(b"PK\x01\x02") + 24
+    return content[:at] + size.to_bytes(4, "little") + content[at + 4 :]
+
+
 REFUSED = {
     "an old workbook": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(500), r"old kind \(\.xls\).*Save it as \.xlsx"),
     "a PDF": (b"%PDF-1.7\n%...", "is a PDF.*Export the report as text"),
@@ -51,6 +57,9 @@ REFUSED = {
     "a thousand columns": ((HEAD.strip() + ",a" * 1000 + "\n").encode(), r"line 1: has 1005 cells, 200 are the most"),
     "a huge cell": ((HEAD + "1,1," + "3" * 600 + ",2,3\n").encode(), r"line 2: has a cell of 600 characters"),
     "an unclosed quotation": ((HEAD + '1,1,"1,2,3\n' + "1,2,1,2,3\n" * 100).encode(), "close every quotation mark"),
+    "a statement without end": (b"FILNAM/'A'\n" + b"x$\n" * 200_000, "the statement goes on for more than 100000 characters"),
+    "a report in one line": (b"DIM A= B UNITS=MM\nAX MEAS\n" + b"= OF A " * 20_000, "line 3: the line has 140000 characters"),
+    "a report of empty lines": (b"UNITS=MM" + b"\n" * 60_000 + b"AX MEAS", "reports 0 dimensions and no place"),
     "entities in QIF": (
         b'<?xml version="1.0"?><!DOCTYPE q [<!ENTITY a "1"><!ENTITY b "&a;&a;">]><QIFDocument>&b;</QIFDocument>',
         "declares entities or a document type",
@@ -60,7 +69,7 @@ REFUSED = {
         "declares entities or a document type",
     ),
     "a workbook that unpacks to gigabytes": (
-        archive({"[Content_Types].xml": b"", "xl/workbook.xml": bytes(500_000_000)}), "once it is unpacked: 400000000 are",
+        claiming(500_000_000, archive({"[Content_Types].xml": b"", "xl/workbook.xml": b"x"})), "once it is unpacked: 400000000 are",
     ),
     "a letter of Word": (archive({"[Content_Types].xml": b"<x/>", "word/document.xml": b"<x/>"}), "is an Office document"),
     "a workbook without sheets": (archive({"[Content_Types].xml": b"<x/>", "xl/workbook.xml": b"<x/>"}), "damaged workbook"),

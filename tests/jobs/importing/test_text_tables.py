@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError
@@ -57,6 +57,7 @@ def dialects(draw: st.DrawFn) -> tuple[bytes, list[list[str]], str]:
     return text.encode(draw(st.sampled_from(ENCODINGS))), figures, decimal
 
 
+@settings(deadline=None)
 @given(dialects())
 def test_values_are_read_back_exactly_in_every_dialect(dialect: tuple[bytes, list[list[str]], str]) -> None:
     """Against Python's own reading of the figures; what cannot tell its decimal sign says so, and the key settles it."""
@@ -71,6 +72,7 @@ def test_values_are_read_back_exactly_in_every_dialect(dialect: tuple[bytes, lis
     assert xyz(found) == [[float(figure) for figure in point] for point in figures]
 
 
+@settings(deadline=None)
 @given(
     st.integers(-(10**9), 10**9),
     st.sampled_from([("in", Fraction(254, 10)), ("µm", Fraction(1, 1000)), ("m", Fraction(1000))]),
@@ -281,6 +283,7 @@ def said_of(content: bytes) -> str:
     return ""
 
 
+@settings(deadline=None)
 @given(st.text(max_size=200), st.sampled_from(["", "Measurement;Point;X [mm];Y [mm];Z [mm]\n1;1;"]))
 def test_any_text_is_read_or_refused_in_one_line(text: str, before: str) -> None:
     told = said_of((before + text).encode("utf-8", errors="surrogatepass"))
@@ -288,6 +291,7 @@ def test_any_text_is_read_or_refused_in_one_line(text: str, before: str) -> None
     assert len(told) <= 300
 
 
+@settings(deadline=None)
 @given(
     st.binary(max_size=300),
     st.sampled_from([b"", b"PK\x03\x04[Content_Types].xml", b"<QIFDocument>", b"00001 &\n00001 %\n", b"FILNAM/'A'\n"]),
