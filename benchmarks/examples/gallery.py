@@ -21,6 +21,7 @@ import cmm_uq
 ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "docs" / "images" / "gallery"
 DOTS_PER_INCH = 60
+COLOURS = 24
 LARGEST_BYTES = 60_000
 EXAMPLES = {
     "ballbar": "iota-1102-20C",
@@ -53,10 +54,10 @@ def first_page(kind: str, folder: Path) -> None:
 
 
 def first_page_of(pdf: Path, target: Path) -> None:
-    """As a small picture in sixteen greys."""
-    picture = ["-r", str(DOTS_PER_INCH), "-f", "1", "-l", "1", "-gray", "-png", "-singlefile"]
+    """As a small picture in few colours."""
+    picture = ["-r", str(DOTS_PER_INCH), "-f", "1", "-l", "1", "-png", "-singlefile"]
     subprocess.run(["pdftoppm", *picture, str(pdf), str(target.with_suffix(""))], check=True)
-    Image.open(target).quantize(16).save(target, optimize=True)
+    Image.open(target).quantize(COLOURS).save(target, optimize=True)
 
 
 def placings(kind: str, folder: Path) -> None:
