@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -63,10 +64,37 @@ ALIKE = """() => {
 WHOLE = ("index", "search", "genindex", "tutorial", "posterior", "python")
 """A page of each sort, read by axe with all that stands around its text."""
 
+TELEPHONE = 360
+"""Width of a screen, CSS pixels."""
 
-@pytest.fixture
-def shown(read: dict[Path, Read]) -> list[Path]:
-    return [path for path in read if not path.as_posix().endswith(FIRST)]
+
+@dataclass(frozen=True)
+class Look:
+    """What a browser found of one page."""
+
+    wrong: list[tuple[str, list[str]]]
+    width: int
+
+
+@pytest.fixture(scope="module")
+def looks(read: dict[Path, Read], browser: Browser) -> dict[str, Look]:
+    """Of every page, opened once: what axe-core finds with all its rules, and how wide the page is on a telephone."""
+    tab = browser.new_page()
+    found = {}
+    for path in read:
+        if path.as_posix().endswith(FIRST):
+            continue
+        tab.set_viewport_size({"width": TELEPHONE, "height": 800})
+        tab.goto(path.as_uri())
+        width = tab.evaluate("document.documentElement.scrollWidth")
+        tab.set_viewport_size({"width": 1280, "height": 900})
+        tab.evaluate(ALIKE)
+        part = None if path.stem in WHOLE else {"include": [["article"]]}
+        wrong = Axe().run(tab, context=part, options={"resultTypes": ["violations"]}).response["violations"]
+        told = [(one["id"], [node["html"][:90] for node in one["nodes"]][:2]) for one in wrong]
+        found[f"{path.parent.name}/{path.name}"] = Look(told, width)
+    tab.close()
+    return found
 
 
 def test_every_link_leads_to_a_page_and_a_place_in_it(read: dict[Path, Read]) -> None:
@@ -101,31 +129,18 @@ def tab(browser: Browser) -> Iterator[Page]:
     context.close()
 
 
-def test_axe_finds_nothing_on_any_page(shown: list[Path], tab: Page) -> None:
-    """With all its rules, which hold WCAG 2.2 A and AA; what stands around the text is alike, and is read on some pages."""
-    found = {}
-    for path in shown:
-        tab.goto(path.as_uri())
-        tab.evaluate(ALIKE)
-        part = None if path.stem in WHOLE else {"include": [["article"]]}
-        wrong = Axe().run(tab, context=part, options={"resultTypes": ["violations"]}).response["violations"]
-        if wrong:
-            found[path.name] = [(one["id"], [node["html"][:90] for node in one["nodes"]][:2]) for one in wrong]
-    assert found == {}
+def test_axe_finds_nothing_on_any_page(looks: dict[str, Look]) -> None:
+    """By WCAG 2.2 A and AA; what stands around the text is alike, and is read on some pages."""
+    assert {page: look.wrong for page, look in looks.items() if look.wrong} == {}
+    assert len(looks) > 50
 
 
 def test_every_page_has_one_title(read: dict[Path, Read]) -> None:
     assert {path.name: page.titles for path, page in read.items() if page.titles != 1} == {}
 
 
-def test_on_a_telephone_no_page_is_wider_than_the_screen(shown: list[Path], tab: Page) -> None:
-    tab.set_viewport_size({"width": 360, "height": 800})
-    wide = []
-    for path in shown:
-        tab.goto(path.as_uri(), wait_until="domcontentloaded")
-        if tab.evaluate("document.documentElement.scrollWidth") > 360:
-            wide.append(path.name)
-    assert wide == []
+def test_on_a_telephone_no_page_is_wider_than_the_screen(looks: dict[str, Look]) -> None:
+    assert {page: look.width for page, look in looks.items() if look.width > TELEPHONE} == {}
 
 
 def test_the_search_works_without_a_network(site: Path, tab: Page) -> None:
