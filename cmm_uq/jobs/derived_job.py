@@ -7,6 +7,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from copy import deepcopy
+from pathlib import PurePosixPath
 from typing import Any
 
 import tomlkit
@@ -14,9 +15,10 @@ from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq import __version__
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import DERIVING, MEASURED, SIMULATED
+from cmm_uq.jobs.reference_file import reference_file
 
 PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100
@@ -37,7 +39,7 @@ def recording_name(job: Job) -> str:
     ------
     CmmUqError : an earlier recording was imported too, which the derived job could no longer read.
     """
-    if not job.imported:
+    if not _was_imported(job):
         return job.facts.recording.file
     if job.facts.recording.earlier is not None:
         raise CmmUqError("an imported recording that is compared with an earlier one cannot be simulated",
@@ -47,8 +49,12 @@ def recording_name(job: Job) -> str:
 
 
 def kept_inputs(job: Job) -> dict[str, bytes]:
-    """Inputs of a job that one derived from it has too: not its job.toml, nor a recording that was imported."""
-    left = {"job.toml", *([job.facts.recording.file] if job.imported else [])}
+    """Inputs of a job that one derived from it has too.
+
+    Not its job.toml, nor a recording that was imported, nor a file of certified values, which stand in the new recording.
+    """
+    left = {"job.toml", *reference_file(job.facts.artefact)}
+    left |= {job.facts.recording.file} if _was_imported(job) else set()
     return {name: content for name, content in job.inputs.items() if name not in left}
 
 
@@ -75,7 +81,7 @@ def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tupl
             "job": job.facts.job.id, "by": by, "program": PROGRAM, "inputs": _hashes(job.inputs), "files": written,
         },
     }  # fmt: skip
-    file = recording_name(job) if job.imported else None
+    file = recording_name(job) if _was_imported(job) else None
     wanted = _changed(tomllib.loads(text), changes, without, file)
     try:
         document = _changed(tomlkit.parse(text), changes, without, file)
@@ -85,6 +91,12 @@ def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tupl
     except (TOMLKitError, tomllib.TOMLDecodeError, KeyError, ValueError, TypeError):
         pass  # a layout that the library cannot keep: comments are lost, no value is
     return tomlkit.dumps(wanted).encode()
+
+
+def _was_imported(job: Job) -> bool:
+    """Whether the recording was in another format than the project's own."""
+    name = PurePosixPath(job.facts.recording.file).name
+    return any(recognised.file == name for recognised in job.imported)
 
 
 def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...], file: str | None) -> Any:
@@ -100,9 +112,18 @@ def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...]
     for key in without:
         if key in document["machine"]:
             del document["machine"][key]
+    _without_reference_file(document["artefact"])
     if file is not None:
         _name_recording(document["recording"], file)
     return document
+
+
+def _without_reference_file(table: Any) -> None:
+    """Certified values stand in every recording that a command writes."""
+    if "file" in table.get("certificate", {}):
+        for key in ("file", *FileKeys.model_fields):
+            if key in table["certificate"]:
+                del table["certificate"][key]
 
 
 def _name_recording(table: Any, file: str) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.commands.reading import job_of
+from cmm_uq.commands.simulate import simulated_job
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
@@ -56,6 +57,16 @@ def test_places_of_a_plate_come_from_a_digital_certificate() -> None:
     found = job(PLATE, "plate.xml", Path(SAMPLES / "plate-certificate.xml").read_bytes(), "plate")
     assert found.points.columns["reference_x_mm"].tolist() == [0, 83.00012, 0.00021, 83.00043] * 2
     assert found.points.columns["reference_y_mm"].tolist() == [0, 0, 83.00034, 83.00051] * 2
+
+
+def test_a_derived_recording_has_the_certified_values_in_it() -> None:
+    found = job(GAUGE, "certificate.csv", CERTIFICATE)
+    derived = simulated_job(found, {"seed": 1, "noise": {"coordinate_um": 1.0}})
+    assert derived.points.columns["reference_mm"].tolist() == [0, 20.00013, 40.00008, 60.00031] * 2
+    assert "certificate.csv" not in derived.inputs
+    assert derived.facts.recording.file == "recording.csv"
+    assert derived.facts.artefact.certificate is not None
+    assert (derived.facts.artefact.certificate.number, derived.facts.artefact.certificate.file) == ("7", None)
 
 
 @pytest.mark.parametrize(

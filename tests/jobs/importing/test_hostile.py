@@ -69,7 +69,7 @@ REFUSED = {
         "declares entities or a document type",
     ),
     "a workbook that unpacks to gigabytes": (
-        claiming(500_000_000, archive({"[Content_Types].xml": b"", "xl/workbook.xml": b"x"})), "once it is unpacked: 400000000 are",
+        claiming(500_000_000, archive({"[Content_Types].xml": b"", "xl/workbook.xml": b"x"})), "unpacked: 400000000 are",
     ),
     "a letter of Word": (archive({"[Content_Types].xml": b"<x/>", "word/document.xml": b"<x/>"}), "is an Office document"),
     "a workbook without sheets": (archive({"[Content_Types].xml": b"<x/>", "xl/workbook.xml": b"<x/>"}), "damaged workbook"),
