@@ -4,6 +4,7 @@
     python3 start.py report examples/iota-1102-20C     any cmm-uq command
     python3 start.py test                              lint, types and tests
     python3 start.py test --numprocesses=auto --cov    the same, with the lines that the tests run (twice as long)
+    python3 start.py docs                              the documentation as a site, in build/site
 
 Makes a virtual environment in .venv (or in the folder that CMM_UQ_ENV names) on the first call and reuses it until
 pyproject.toml changes; the system's Python is left alone.
@@ -20,6 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
 ENVIRONMENT = Path(os.environ.get("CMM_UQ_ENV") or ROOT / ".venv")
+SITE = ("--fail-on-warning", "--keep-going", "--quiet", "--conf-dir", "docs")  # a link that leads nowhere is an error
 SCRIPTS = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
 
 
@@ -28,10 +30,12 @@ def main(arguments: list[str]) -> int:
     if sys.version_info < (3, 11):
         print(f"start.py: Python 3.11 or newer is needed, this is {sys.version.split()[0]}", file=sys.stderr)
         return 2
-    testing = arguments[:1] == ["test"]
+    task = arguments[0] if arguments[:1] in (["test"], ["docs"]) else ""
     try:
-        prepare("test" if testing else "")
-        return test(arguments[1:]) if testing else run("cmm-uq", *arguments)
+        prepare(task)
+        if task:
+            return test(arguments[1:]) if task == "test" else docs()
+        return run("cmm-uq", *arguments)
     except subprocess.CalledProcessError as error:
         print(f"start.py: {' '.join(map(str, error.cmd))} failed", file=sys.stderr)
         return 1
@@ -64,6 +68,11 @@ def test(arguments: list[str]) -> int:
         run("pytest", *(arguments or ["--numprocesses=auto", "--dist=loadfile"])),
     ]
     return max(results)
+
+
+def docs() -> int:
+    """The site, from all pages anew."""
+    return run("sphinx-build", *SITE, "--fresh-env", ".", "build/site")
 
 
 def run(command: str, *arguments: str) -> int:

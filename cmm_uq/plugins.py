@@ -1,4 +1,4 @@
-"""What other packages offer by entry points: effects, kinds of measurement, standards.
+"""What other packages offer by entry points: effects, kinds of measurement, standards, formats of files.
 
 Which there are is read from the packages' metadata; a package is imported when something of it is first needed. What its code
 does wrong is said with its name: the user cannot mend the package, but can tell its author, or uninstall it.
@@ -18,8 +18,10 @@ from typing import Any, TypeVar
 
 from cmm_uq.errors import CmmUqError
 
-EFFECTS, KINDS, STANDARDS = "cmm_uq.effects", "cmm_uq.kinds", "cmm_uq.standards"
-WHAT: Mapping[str, str] = MappingProxyType({EFFECTS: "effect", KINDS: "kind", STANDARDS: "standard"})
+EFFECTS, KINDS, STANDARDS, IMPORTS = "cmm_uq.effects", "cmm_uq.kinds", "cmm_uq.standards", "cmm_uq.imports"
+WHAT: Mapping[str, str] = MappingProxyType({
+    EFFECTS: "effect", KINDS: "kind", STANDARDS: "standard", IMPORTS: "format",
+})  # fmt: skip
 """What is offered in each group of entry points."""
 
 Offered = TypeVar("Offered")

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from cmm_uq.points import Machine, Points
 from tests.recordings import TRAVEL, bars
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 ROOT = Path(__file__).parents[1]
 
@@ -42,3 +47,22 @@ def machine() -> Machine:
 def ballbar_points(machine: Machine) -> Points:
     """A bar of 400 mm in forty random places of the machine, without any error."""
     return bars(np.random.default_rng(20), 40, 400.0, machine)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """The installed Chromium; tests that need it are skipped without one, unless CMM_UQ_REQUIRE_BROWSER=1 asks for it."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    path = next((found for name in names if (found := shutil.which(name))), None)
+    if path is None:
+        if os.environ.get("CMM_UQ_REQUIRE_BROWSER") == "1":
+            pytest.fail("CMM_UQ_REQUIRE_BROWSER=1, but no Chromium is installed")
+        pytest.skip("no Chromium is installed")
+    from playwright.sync_api import sync_playwright
+
+    quiet = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
+             "--disable-sync", "--no-first-run"]  # fmt: skip
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=path, args=quiet)
+        yield chromium
+        chromium.close()

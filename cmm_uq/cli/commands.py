@@ -7,7 +7,20 @@ from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.cli import BAD_INPUT, budget, check, compensate, diagnose, new, plan, report, schema, selftest, simulate
+from cmm_uq.cli import (
+    BAD_INPUT,
+    budget,
+    check,
+    compensate,
+    diagnose,
+    importing,
+    new,
+    plan,
+    report,
+    schema,
+    selftest,
+    simulate,
+)
 from cmm_uq.cli.options import examples
 from cmm_uq.cli.printing import say
 from cmm_uq.errors import CmmUqError
@@ -23,6 +36,7 @@ app = typer.Typer(
 )
 for module, short in {
     new: "A job folder that runs at once, to be filled with your own figures.",
+    importing: "What is recognised of a laboratory's export.",
     check: "All that is wrong with jobs, without computing.",
     report: "The certificate of a recording: estimates, figures, decisions.",
     diagnose: "What a recording shows that its model leaves out.",
@@ -33,8 +47,8 @@ for module, short in {
     schema: "JSON Schema of a file, for editors that complete and explain.",
     selftest: "Published reference figures, computed here and compared.",
 }.items():
-    name = module.__name__.rpartition(".")[2]
-    app.command(name, short_help=short, epilog=module.EXAMPLES)(module.command)
+    name = "import" if module is importing else module.__name__.rpartition(".")[2]
+    app.command(name, short_help=short, epilog=getattr(module, "EXAMPLES", None))(module.command)
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
 and the calibration certificates that state it.

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from cmm_uq.cli.importing import show_imported
 from cmm_uq.cli.options import Force, Job, Json, Quiet, Seed, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
@@ -37,5 +38,8 @@ def command(
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.report import write_diagnosis
 
-        written = write_diagnosis(job, out, seed=seed, alpha=alpha, against=against, force=force, stage=stage)
+        told = None if quiet or json else show_imported
+        written = write_diagnosis(
+            job, out, seed=seed, alpha=alpha, against=against, force=force, stage=stage, told=told
+        )  # fmt: skip
     conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import sys
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cmm_uq.cli.completion import kinds
 from cmm_uq.cli.deferred import defer_scipy
 from cmm_uq.cli.derived import put_manifest
+from cmm_uq.cli.importing import Columns, Keys, keys_of, show
 from cmm_uq.cli.options import Json, Quiet, examples
 from cmm_uq.cli.printing import put_data, say
 from cmm_uq.errors import CmmUqError
+
+if TYPE_CHECKING:
+    from cmm_uq.jobs.importing.keys import ImportKeys
 
 EXAMPLES = examples("new", "new step_gauge my-gauge", "new ballbar --machine 'CMM 3' --set artefact.length_mm=500")
 
@@ -47,6 +52,12 @@ def command(
             show_default="none",
         ),
     ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option("--from", help="Begin from a laboratory's export; needs --machine. See cmm-uq import."),
+    ] = None,
+    column: Columns = None,
+    key: Keys = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -67,6 +78,11 @@ def command(
     target = folder or Path(kind)
     check_empty(target)
     given = _given(machine, serial, settings or [])
+    if export is not None:
+        files = _of_export(kind, export, target, given, keys_of(column, key), quiet=quiet or json)
+        if json:
+            put_manifest(files)
+        return
     if not given and not (quiet or json) and kind != BUDGET and kind in known() and _asked_on_a_terminal():
         from cmm_uq.cli.asking import answers
 
@@ -77,6 +93,21 @@ def command(
     elif not quiet:
         say(f"{target}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
         say(f"What to do next: {target / 'README.md'}. What is missing or wrong: cmm-uq check {target}")
+
+
+def _of_export(
+    kind: str, export: Path, folder: Path, given: dict[str, dict[str, Any]], keys: ImportKeys, *, quiet: bool
+) -> Mapping[str, Path]:  # fmt: skip
+    """Show what is recognised of an export, then write the job around it."""
+    from cmm_uq.commands.importing import read_export, write_job_of_export
+
+    recognised = read_export(export, keys).recognised
+    if not quiet:
+        show(recognised)
+    files = write_job_of_export(kind, export, folder, given, keys)
+    if not quiet:
+        say(f"{folder}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
+    return files
 
 
 def _asked_on_a_terminal() -> bool:

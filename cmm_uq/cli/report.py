@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from cmm_uq.cli.importing import show_imported
 from cmm_uq.cli.options import Force, Job, Json, Quiet, Seed, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
@@ -28,5 +29,6 @@ def command(
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.report import write_report
 
-        report = write_report(job, out, seed=seed, force=force, stage=stage)
+        told = None if quiet or json else show_imported
+        report = write_report(job, out, seed=seed, force=force, stage=stage, told=told)
     conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)

@@ -11,7 +11,14 @@ from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.refusals import refuse_planned
 from cmm_uq.commands.simulate import recording
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated
+from cmm_uq.jobs.derived_job import (
+    IN_THE_RECORDING,
+    PROGRAM,
+    derived_toml,
+    is_compensated,
+    kept_inputs,
+    recording_name,
+)  # fmt: skip
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logged_temperatures import log_of
 from cmm_uq.jobs.origin import first_line
@@ -107,8 +114,8 @@ def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, by
     points, provenance = compensate_job(read, beyond=beyond)
     told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
     files = {
-        **{name: data for name, data in read.inputs.items() if name != "job.toml"},
-        read.facts.recording.file: first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
+        **kept_inputs(read),
+        recording_name(read): first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
         **text,
         PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
     }  # fmt: skip

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.commands.reading import job_of
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reading import against
+from cmm_uq.jobs.predicted import against
 from cmm_uq.jobs.toml_file import as_toml
 
 if TYPE_CHECKING:

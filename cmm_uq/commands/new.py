@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -42,8 +42,8 @@ from cmm_uq.units import MICROMETRE
 from cmm_uq.writing import Owner, staged
 
 __all__ = [
-    "BUDGET", "KEPT", "PLAN", "README", "RECORDING", "SCHEMA", "job_files", "job_of_rows", "known", "new_job", "new_plan",
-    "titles", "usual", "write_new",
+    "BUDGET", "KEPT", "PLAN", "README", "RECORDING", "SCHEMA", "job_files", "job_id", "job_of_export", "known",
+    "new_job", "new_plan", "titles", "usual", "write_new",
 ]  # fmt: skip
 
 SEED = 1
@@ -106,27 +106,24 @@ def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: 
     )
 
 
-def job_of_rows(
-    kind: str, columns: Sequence[str], rows: Iterable[Sequence[object]], tables: Tables, *, id: str  # noqa: A002
-) -> dict[str, bytes]:  # fmt: skip
-    """A new job of a recording that was measured: the kind's usual effects, and no figure but those that are given.
+def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: str) -> dict[str, bytes]:  # noqa: A002
+    """A new job of a recording that was measured: nothing of machine, artefact and limits but what is given.
 
     Parameters
     ----------
-    kind : of measurement.
-    columns, rows : of the recording, named as a recording names them.
-    tables : what job.toml is to say beside what follows from the kind; the machine's name at least.
+    kind : of measurement, or a further name of it.
+    given : what job.toml is to say, by table and key.
+    files : the recording that it names, and other files.
     id : of the job.
 
     Raises
     ------
     CmmUqError : the readers of a job refuse it, or a key that the kind needs is not given.
     """
-    found = kind_or_refused(kind)
-    lines = [",".join(columns), *(",".join(str(cell) for cell in row) for row in rows)]
-    begin = replace(found.beginning(kind), artefact={}, conformity=None)
-    whole = _tables(found, begin, tables, id, origin=MEASURED) | {"machine": dict(tables.get("machine", {}))}
-    return job_files(kind, whole, {RECORDING: ("\n".join(lines) + "\n").encode()})
+    found, begin = _begun(kind)
+    bare = replace(begin, artefact={}, conformity=None)
+    whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": dict(given.get("machine", {}))}
+    return job_files(found.name, whole, files, begin=begin)
 
 
 @naming_package()
@@ -171,7 +168,7 @@ def write_new(name: str, folder: Path, given: Tables) -> dict[str, Path]:
     OutputError : the folder cannot be written to.
     """
     check_empty(folder)
-    id = str(given.get("job", {}).get("id", "")) or _id_of(folder.resolve().name or name)  # noqa: A001
+    id = job_id(folder, given, name)  # noqa: A001
     if name == BUDGET:
         from cmm_uq.commands.new_budget import budget_files
 
@@ -185,6 +182,11 @@ def write_new(name: str, folder: Path, given: Tables) -> dict[str, Path]:
     with staged(folder, Owner("new", id, origin), expected=files) as place:
         check_empty(folder, but=".unfinished-")
         return place.write(files)
+
+
+def job_id(folder: Path, given: Tables, otherwise: str = "job") -> str:
+    """Id of a new job: as given, or by its folder's name."""
+    return str(given.get("job", {}).get("id", "")) or _id_of(folder.resolve().name or otherwise)
 
 
 def check_empty(folder: Path, but: str = "") -> None:

@@ -9,7 +9,7 @@ from cmm_uq.conformity.standards import names as standard_names
 from cmm_uq.conformity.standards import standard_named
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import TABLE_BYTES
-from cmm_uq.jobs import reading
+from cmm_uq.jobs import predicted, reading
 from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import Nameable
@@ -66,4 +66,4 @@ def compared_with(job: Job, prediction: Path) -> Job:
     CmmUqError : the file is missing or no prediction.
     """
     content = content_of(prediction, TABLE_BYTES, "Give the file that the simulation wrote")
-    return reading.against(job, content, prediction.name, prediction)
+    return predicted.against(job, content, prediction.name, prediction)

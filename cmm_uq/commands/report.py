@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cmm_uq.commands import analysis, diagnosing
 from cmm_uq.commands.reading import compared_with, read_job
-from cmm_uq.commands.written import Form, Stage, Written, silent
+from cmm_uq.commands.written import Form, Stage, Told, Written, silent
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
@@ -39,8 +39,9 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent) -> Outcome
 
 
 def write_report(
-    job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None
-) -> Written:
+    job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
+    told: Told | None = None,
+) -> Written:  # fmt: skip
     """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
 
     A kind may add files of its own. Documents of a recording that was not measured carry its origin in their names.
@@ -52,6 +53,7 @@ def write_report(
     seed : of everything random.
     force : keep what stands in the way as ``NAME.previous`` instead of refusing.
     stage : told of progress.
+    told : of the job, before anything is computed.
 
     Raises
     ------
@@ -62,6 +64,8 @@ def write_report(
     tell("Reading the job", 0.0)
     read = read_job(job)
     analysis.report_recipe(read)  # refused before anything is made
+    if told is not None:
+        told(read)
     return REPORT.write(read, lambda: report_outcome(read, seed=seed, stage=tell), out, force=force, stage=tell)
 
 
@@ -98,6 +102,7 @@ def write_diagnosis(
     against: Path | None = None,
     force: bool = False,
     stage: Stage | None = None,
+    told: Told | None = None,
 ) -> Written:
     """Diagnose a job and write ``diagnosis.html`` and ``results.json``, both or none.
 
@@ -110,6 +115,7 @@ def write_diagnosis(
     against : file of a simulation's prediction that the recording is compared with, whatever the job names.
     force : keep what stands in the way as ``NAME.previous`` instead of refusing.
     stage : told of progress.
+    told : of the job, before anything is computed.
 
     Raises
     ------
@@ -119,6 +125,8 @@ def write_diagnosis(
     read, tell = read_job(job), stage or silent
     if against is not None:
         read = compared_with(read, against)
+    if told is not None:
+        told(read)
     return DIAGNOSE.write(
         read, lambda: diagnosis_outcome(read, seed=seed, alpha=alpha, stage=tell), out, force=force, stage=tell
     )

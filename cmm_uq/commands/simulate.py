@@ -16,7 +16,7 @@ from cmm_uq.documents.program import program
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES
-from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml
+from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import first_line
 from cmm_uq.jobs.table import LONGEST_MM
@@ -146,8 +146,8 @@ def _files(job: Job, content: bytes, truth: Path, seed: int | None) -> dict[str,
     points = simulate(job, drawn, seed=seed, truth_path=str(truth))
     how = f", seed {drawn.seed if seed is None else seed}, from {TRUTH}"
     files = {
-        **{name: data for name, data in job.inputs.items() if name != "job.toml"},
-        job.facts.recording.file: first_line("simulate", program(job, drawn.effects), how).encode() + recording(points),
+        **kept_inputs(job),
+        recording_name(job): first_line("simulate", program(job, drawn.effects), how).encode() + recording(points),
         TRUTH: content,
     }
     return {"job.toml": derived_toml(job, "simulate", files, without=IN_THE_RECORDING), **files}

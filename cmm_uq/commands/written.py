@@ -15,6 +15,9 @@ from cmm_uq.writing import Owner, staged
 Stage = Callable[[str, float], None]
 """Told what is being done, after a colon what of it is counted, and the part of the whole that is done."""
 
+Told = Callable[[Job], None]
+"""Told of the job as it was read, before anything is computed of it."""
+
 REPORTS, RESULTS = Path("reports"), "results.json"
 
 

@@ -33,6 +33,8 @@ RESULTS: Mapping[str, str] = MappingProxyType(
         "job.derived_from.KEY": "Of a derived recording, what it was made from, as job.toml has it.",
         "job.altered": "Files that were changed after a command derived them.",
         "job.inputs_sha256.FILE": "SHA-256 of each input.",
+        "import[].KEY": "Of each file in another format than the project's own, how it was read: format, encoding, unit, …",
+        "import[].columns.COLUMN": "Heading of the file that a column of the recording was taken from.",
         "estimates.EFFECT.PARAMETER": "Quantity: a parameter of an effect that the model names, by its posterior.",
         "artefact.SIZE": "Quantity: a size of the artefact as the measurement leaves it.",
         "certified.SIZE.value": "A certified size.",

@@ -39,7 +39,8 @@ def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further
     rows : of the artefact; those without a value are left out.
     further : blocks after the statement.
     """
-    facts = Facts(tuple((label, text) for label, text in rows if text))
+    read = tuple((say("Imported file"), recognised.sentence) for recognised in job.imported)
+    facts = Facts(tuple((label, text) for label, text in (*rows, *read) if text))
     said = (Paragraph(statement_of_traceability(job.facts)),) if job.origin == MEASURED else ()
     return Section(say("Artefact and traceability"), (facts, *said, *further))
 

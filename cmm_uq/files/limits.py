@@ -29,6 +29,7 @@ class Limit:
 JOB_BYTES = Limit(1_000_000, "bytes", "job.toml, truth.toml", "a job is a few kilobytes of text")
 MODEL_BYTES = Limit(4_000_000, "bytes", "model file of a budget", "holds 250 000 draws of an earlier Monte Carlo")
 TABLE_BYTES = Limit(64_000_000, "bytes", "recording, temperature log", "100 000 rows of 30 columns take half of it")
+UNPACKED = Limit(400_000_000, "bytes", "workbook once it is unpacked", "200 000 rows of 30 columns take half of it")
 MAP_BYTES = Limit(4_000_000, "bytes", "error map", "30 000 positions")
 
 ROWS = Limit(200_000, "rows", "CSV file", "a scanned surface; larger ones are point clouds")
@@ -63,7 +64,8 @@ DRAWS = Limit(250_000, "entries", "samples of an input", "draws of an earlier Mo
 INPUTS = Limit(500, "entries", "inputs, outputs or correlations of a budget", "its matrix of correlations is square")
 
 LIMITS = (
-    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, MAP_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS, FREEDOMS, CELL, LINE, LINES,
-    COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY, LISTED, DRAWS, INPUTS,
+    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS, FREEDOMS,
+    CELL, LINE, LINES, COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY, LISTED,
+    DRAWS, INPUTS,
 )  # fmt: skip
 """All of them, in the order of docs/limits.md."""

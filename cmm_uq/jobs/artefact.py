@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 from pydantic import model_validator
 
 from cmm_uq.jobs.expanded import ExpandedUncertainty, with_standard_uncertainty
+from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.table import AnyFloat, Length, Table, Uncertainty
 
 
@@ -30,6 +31,14 @@ class Traceability(Table):
     """Date of the artefact's certificate."""
     due: dt.date | None = None
     """Date by which the artefact is to be calibrated again."""
+
+
+class CertificateFile(FileKeys, Traceability):
+    """The artefact's own certificate, and the file that its certified values are read from."""
+
+    file: str | None = None
+    """File of the certified distances or places, a CSV, a workbook or a DCC, by the number of their point; the recording
+    then has none."""
 
 
 class ArtefactFacts(Table):
@@ -68,13 +77,22 @@ class ArtefactFacts(Table):
     cte_per_k: AnyFloat = 0.0
     """Coefficient of thermal expansion of the artefact, 1/K; its recorded temperature `temp_artefact_c` is corrected
     by it."""
-    certificate: Traceability | None = None
+    certificate: CertificateFile | None = None
     """The artefact's own certificate, to which the results are traceable."""
 
     @model_validator(mode="before")
     @classmethod
     def _expanded(cls, data: Any) -> Any:
         return with_standard_uncertainty(data)
+
+    @model_validator(mode="after")
+    def _certified_values_of_a_kind_that_has_some(self) -> Self:
+        if self.certificate is not None and self.certificate.file is not None and not self.with_references:
+            raise ValueError(
+                f"certificate.file: a recording of kind {self.kind!r} has no certified values of single points; "
+                "give length_mm and u_um"
+            )
+        return self
 
     @model_validator(mode="after")
     def _uncertainty_of_something(self) -> Self:

@@ -7,14 +7,18 @@ import json
 import tomllib
 from collections.abc import Mapping
 from copy import deepcopy
+from pathlib import PurePosixPath
 from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq import __version__
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import DERIVING, MEASURED, SIMULATED
+from cmm_uq.jobs.reference_file import reference_file
 
 PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100
@@ -22,8 +26,36 @@ OF_THE_CERTIFICATE = ("number", "issued", "recalibration_agreed", "as_found")
 """Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
 OF_THE_RECORDED_MACHINE = ("short_gauge", "simulation")
 """Tables that speak of the machine as it was recorded, not of one simulated or compensated."""
+DERIVED_RECORDING = "recording.csv"
+"""Name of a recording that was made from one in another format."""
 IN_THE_RECORDING = ("temperature_log",)
 """Keys of ``[machine]`` whose figures stand in every recording that a command writes."""
+
+
+def recording_name(job: Job) -> str:
+    """Name of the recording that a command makes from a job's: its own, or another where that one was imported.
+
+    Raises
+    ------
+    CmmUqError : an earlier recording was imported too, which the derived job could no longer read.
+    """
+    if not _was_imported(job):
+        return job.facts.recording.file
+    if job.facts.recording.earlier is not None:
+        raise CmmUqError("an imported recording that is compared with an earlier one cannot be simulated",
+                         where=f"{job.folder / 'job.toml'} [recording] earlier",
+                         fix="Write both in the own format first: cmm-uq import FILE --out recording.csv")  # fmt: skip
+    return DERIVED_RECORDING
+
+
+def kept_inputs(job: Job) -> dict[str, bytes]:
+    """Inputs of a job that one derived from it has too.
+
+    Not its job.toml, nor a recording that was imported, nor a file of certified values, which stand in the new recording.
+    """
+    left = {"job.toml", *reference_file(job.facts.artefact)}
+    left |= {job.facts.recording.file} if _was_imported(job) else set()
+    return {name: content for name, content in job.inputs.items() if name not in left}
 
 
 def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tuple[str, ...] = ()) -> bytes:
@@ -49,9 +81,10 @@ def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tupl
             "job": job.facts.job.id, "by": by, "program": PROGRAM, "inputs": _hashes(job.inputs), "files": written,
         },
     }  # fmt: skip
-    wanted = _changed(tomllib.loads(text), changes, without)
+    file = recording_name(job) if _was_imported(job) else None
+    wanted = _changed(tomllib.loads(text), changes, without, file)
     try:
-        document = _changed(tomlkit.parse(text), changes, without)
+        document = _changed(tomlkit.parse(text), changes, without, file)
         kept = tomlkit.dumps(document)
         if tomllib.loads(kept) == wanted:
             return kept.encode()
@@ -60,7 +93,13 @@ def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tupl
     return tomlkit.dumps(wanted).encode()
 
 
-def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...]) -> Any:
+def _was_imported(job: Job) -> bool:
+    """Whether the recording was in another format than the project's own."""
+    name = PurePosixPath(job.facts.recording.file).name
+    return any(recognised.file == name for recognised in job.imported)
+
+
+def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...], file: str | None) -> Any:
     table = document["job"]
     for key in (*OF_THE_CERTIFICATE, *changes):
         if key in table:
@@ -73,7 +112,26 @@ def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...]
     for key in without:
         if key in document["machine"]:
             del document["machine"][key]
+    _without_reference_file(document["artefact"])
+    if file is not None:
+        _name_recording(document["recording"], file)
     return document
+
+
+def _without_reference_file(table: Any) -> None:
+    """Certified values stand in every recording that a command writes."""
+    if "file" in table.get("certificate", {}):
+        for key in ("file", *FileKeys.model_fields):
+            if key in table["certificate"]:
+                del table["certificate"][key]
+
+
+def _name_recording(table: Any, file: str) -> None:
+    """The recording in the project's own format, without the keys by which it was imported."""
+    table["file"] = file
+    for key in ImportKeys.model_fields:
+        if key in table:
+            del table[key]
 
 
 def _inline(value: Any) -> Any:

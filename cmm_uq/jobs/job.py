@@ -18,6 +18,8 @@ from cmm_uq.jobs.as_found import AsFound
 from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, needed, probe_unfit, standards_in, uncertainty_missing
 from cmm_uq.jobs.file_names import device_name
+from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
@@ -101,15 +103,11 @@ class JobFacts(Table):
         return self
 
 
-class RecordingFacts(Table):
-    """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
-
-    ``earlier`` names a recording of the same artefact in the same placings at an earlier date: what is estimated then is what
-    changed between.
-    """
+class Recorded(Table):
+    """Which recording, and what is stated of it."""
 
     file: str
-    """The recording, a CSV beside job.toml with one row a point."""
+    """The recording, beside job.toml: a CSV with one row a point, or an export that is imported."""
     earlier: str | None = None
     """Recording of the same artefact in the same placings at an earlier date: what changed between is estimated."""
     earlier_date: dt.date | None = None
@@ -118,6 +116,14 @@ class RecordingFacts(Table):
     """Stated standard uncertainty of one recorded coordinate; left out, it is estimated from repeats and residuals."""
     set_aside: Numbers = []
     """Numbers of measurements that stay on the certificate but are not used for estimates."""
+
+
+class RecordingFacts(ImportKeys, Recorded):
+    """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
+
+    ``earlier`` names a recording of the same artefact in the same placings at an earlier date: what is estimated then is what
+    changed between. The other keys are those of a file in another format than the project's own.
+    """
 
 
 class ModelFacts(Table):
@@ -245,6 +251,7 @@ class Job:
     short_gauge : recorded beside the artefact, where the job names one.
     prediction : of a simulation, where the job names a file of it.
     beside : files that it was read from and that lie outside its folder.
+    imported : how files in another format than the project's own were read.
     """
 
     folder: Path
@@ -257,6 +264,7 @@ class Job:
     short_gauge: ShortGauge | None = None
     prediction: Prediction | None = None
     beside: tuple[Path, ...] = ()
+    imported: tuple[Recognised, ...] = ()
 
     @property
     def circumstances(self) -> Circumstances:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,13 +24,12 @@ from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_examples, check_mark, is_planned
-from cmm_uq.jobs.prediction import Prediction, is_error_map, read_prediction
-from cmm_uq.jobs.recording import read_recording
+from cmm_uq.jobs.predicted import files_of, prediction_of
+from cmm_uq.jobs.recording_file import read_recording_file
+from cmm_uq.jobs.reference_file import reference_file, with_references
 from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
 from cmm_uq.jobs.short_gauge import ShortGauge, short_gauge_of
-from cmm_uq.jobs.simulation import KEY as SIMULATION
-from cmm_uq.jobs.simulation import NOMINAL_C, SimulationFacts
 from cmm_uq.jobs.source import InFolder, InMemory, Source
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
@@ -95,10 +94,11 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
                          where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
     machine = _machine(facts.machine)
     maps, logs, calibrations = _of_the_machine(facts.machine)
-    predicted, predicting_maps = _of_the_simulation(facts, path)
+    predicted, predicting_maps = files_of(facts, path)
+    certificate = reference_file(facts.artefact)
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
     recordings += [facts.short_gauge.file] if facts.short_gauge else []
-    check_distinct([*recordings, *maps, *logs, *calibrations, *predicted, *predicting_maps], str(path))
+    check_distinct([*recordings, *maps, *logs, *calibrations, *certificate, *predicted, *predicting_maps], str(path))
     before = results_named(facts.job.as_found)
     others = calibrations if before is None else [*calibrations, before]
     inputs |= _contents(source, others, TABLE_BYTES, written=True)
@@ -112,7 +112,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     if not recorded and not source.has(facts.recording.file):
         return Job(folder, facts, _no_points(machine), inputs)
     derived = facts.job.derived_from
-    inputs |= _contents(source, [*recordings, *logs, *predicted], TABLE_BYTES)
+    inputs |= _contents(source, [*recordings, *logs, *certificate, *predicted], TABLE_BYTES)
     inputs |= _contents(source, [*maps, *predicting_maps], MAP_BYTES)
     if derived is not None:
         others = [name for name in derived.files if name not in inputs]
@@ -120,82 +120,23 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     check_examples(content, facts.job.origin, str(path))
-    points = read_recording(inputs[facts.recording.file], where, machine)
+    points, recognised = read_recording_file(inputs[facts.recording.file], where, machine, facts.recording)
+    told = [recognised]
+    if certificate:
+        points, recognised = with_references(points, facts.artefact, inputs, folder, where)
+        told.append(recognised)
     planned = is_planned(inputs[facts.recording.file])
     if not planned:  # a plan has no times yet
         points = with_logged(points, log_of(facts.machine, inputs, folder), path, where)
     if earlier is not None:
-        then = read_recording(inputs[earlier], str(folder / earlier), machine)
+        then, recognised = read_recording_file(inputs[earlier], str(folder / earlier), machine, facts.recording)
+        told.append(recognised)
         points = against_earlier(points, then, facts.artefact.cte_per_k, where)
     found = as_found_of(before, inputs, folder, facts.job.origin, facts.machine.name, facts.machine.serial)
     gauge = _short_gauge(facts, inputs, folder, machine)
-    prediction = _prediction(facts.simulation, inputs, folder)
-    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction)
-
-
-def against(job: Job, content: bytes, name: str, path: Path | None = None) -> Job:
-    """A job that is compared with what a simulation predicts, whatever its ``[simulation]`` says.
-
-    Parameters
-    ----------
-    job : that was read, with its recording.
-    content : the bytes of the prediction, or of an error map.
-    name : of its file.
-    path : where that lies, if anywhere.
-
-    Raises
-    ------
-    CmmUqError : it is no prediction, or has the name of another input of the job.
-    """
-    where, is_map = str(path or name), is_error_map(content, str(path or name))
-    predicted = {"file": name, "temperature_c": NOMINAL_C}
-    simulation = SimulationFacts.model_validate({"map": predicted} if is_map else {"file": name})
-    facts = job.facts.model_copy(update={"simulation": simulation})
-    _refuse_beside_a_simulation(facts, where)
-    inputs = _without_the_simulation(job)
-    if inputs.get(name, content) != content:
-        raise CmmUqError(f"the job has another file {name!r}", where=where, fix="Rename the prediction")
-    prediction = None if is_map else read_prediction(content, where, simulation)
-    beside = () if path is None else (path,)
-    return replace(
-        job, facts=facts, inputs={**inputs, name: content}, prediction=prediction, beside=(*job.beside, *beside)
-    )
-
-
-def _without_the_simulation(job: Job) -> dict[str, bytes]:
-    """Inputs of a job but those that only its ``[simulation]`` names."""
-    simulation = job.facts.simulation
-    if simulation is None:
-        return dict(job.inputs)
-    own = {simulation.file, *(given.file for given in simulation.map)} - {
-        given.file for given in job.facts.machine.error_map
-    }
-    return {name: content for name, content in job.inputs.items() if name not in own}
-
-
-def _prediction(facts: SimulationFacts | None, inputs: Mapping[str, bytes], folder: Path) -> Prediction | None:
-    if facts is None or facts.file is None:
-        return None
-    return read_prediction(inputs[facts.file], str(folder / facts.file), facts)
-
-
-def _of_the_simulation(facts: JobFile, path: Path) -> tuple[list[str], list[str]]:
-    """Files of predicted coordinates, and of maps that predict."""
-    if facts.simulation is None:
-        return [], []
-    _refuse_beside_a_simulation(facts, f"{path}: {SIMULATION}")
-    file = facts.simulation.file
-    return [] if file is None else [file], [given.file for given in facts.simulation.map]
-
-
-def _refuse_beside_a_simulation(facts: JobFile, where: str) -> None:
-    """Refuse what cannot be compared with a prediction."""
-    if not facts.artefact.with_recording:
-        raise CmmUqError(f"a job of kind {facts.artefact.kind!r} has no recording of points", where=where,
-                         fix="Leave the simulation out")  # fmt: skip
-    if facts.recording.earlier is not None:
-        raise CmmUqError("the change between two dates is not what a simulation predicts", where=where,
-                         fix="Leave [recording] earlier out, and compare each date by itself")  # fmt: skip
+    prediction = prediction_of(facts.simulation, inputs, folder)
+    how = tuple(filter(None, told))
+    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, imported=how)
 
 
 def _short_gauge(facts: JobFile, inputs: Mapping[str, bytes], folder: Path, machine: Machine) -> ShortGauge | None:

@@ -16,6 +16,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.files.cells import cells_of, column_problem
 from cmm_uq.files.numbers import LARGEST, numbers
+from cmm_uq.jobs.other_units import conversion
 from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.points import Floats, Machine, Points
 
@@ -71,6 +72,27 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
     for i, column in enumerate(header):
         with wrong.going_on():
             table[column] = column_of(i)
+    return points_of(table, lines, name, machine, wrong)
+
+
+def points_of(
+    table: Mapping[str, Floats], lines: Sequence[int], name: str, machine: Machine, wrong: Gathered | None = None
+) -> Points:  # fmt: skip
+    """Points of the columns of a recording.
+
+    Parameters
+    ----------
+    table : columns by name, each (n,), those of :data:`REQUIRED` among them.
+    lines : of each point in its file.
+    name : the file's name, for messages.
+    machine : that read them.
+    wrong : what is wrong with the recording already.
+
+    Raises
+    ------
+    CmmUqError : a number that is impossible in its column, a point that is there twice.
+    """
+    wrong = wrong or Gathered()
     for column, values in table.items():
         with wrong.going_on():
             _check_size(values, column, lines, name)
@@ -86,7 +108,7 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
             with wrong.going_on():
                 _check_directions(table[column], column, lines, name)
     wrong.refuse()
-    number = {column: table.get(column, np.ones(len(rows))).astype(np.int64) for column in WHOLE}
+    number = {column: table.get(column, np.ones(len(lines))).astype(np.int64) for column in WHOLE}
     points = Points(
         np.column_stack([table["x_mm"], table["y_mm"], table["z_mm"]]),
         number["measurement"], number["point"], number["repeat"], machine,
@@ -128,8 +150,8 @@ def _check_header(header: Sequence[str], name: str) -> None:
     for column in header:
         known = QUANTITIES.get(OTHER_UNITS.sub("", column))
         if known and column not in (*REQUIRED, *OPTIONAL):
-            wrong.add(CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where,
-                                 fix=f"Convert it and name it {known}"))  # fmt: skip
+            fix = conversion(column, [known]) or f"Convert it and name it {known}, or say unit under [recording]"
+            wrong.add(CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where, fix=fix))
     for column in REQUIRED:
         if column not in header:
             unread = " (of an axis that nobody reads, give one number in all rows)" * column.endswith("_mm")

@@ -26,33 +26,28 @@ NOMINAL_C = 20.0
 
 
 class SimulationFacts(Table):
-    """``[simulation]``.
-
-    Attributes
-    ----------
-    file : of predicted coordinates or lengths.
-    map : in its place, error maps: the displacements that they give at the recorded positions are the prediction.
-    program : that made it, in the user's words.
-    u_um : standard uncertainty of each predicted coordinate (of a predicted length: of the length), where the file has no
-        column ``u_um``. Independent from point to point; repeats share it.
-    u_common_um : standard uncertainty of the artefact's size that all predictions share.
-    length_mm : of the artefact, as the simulation took it; that of ``[artefact]`` by default.
-    unit : of predicted coordinates and lengths.
-    columns : names of the file's columns, where they are others than the recording's.
-    effects : that the simulation contains.
-    refit : whether these are estimated anew, as corrections to what it contains.
-    """
+    """``[simulation]``."""
 
     file: str | None = None
+    """File of predicted coordinates or lengths."""
     map: Annotated[list[ErrorMapFile], Field(max_length=MAPS.most)] = []
+    """In place of a file, error maps: the displacements that they give at the recorded positions are the prediction."""
     program: str = ""
+    """Program that made the prediction, in your words."""
     u_um: Uncertainty = 0.0
+    """Standard uncertainty of each predicted coordinate (or length), where the file has no column of it; repeats share it."""
     u_common_um: Uncertainty = 0.0
+    """Standard uncertainty of the artefact's size that all predictions share."""
     length_mm: Length | None = None
+    """Length of the artefact, as the simulation took it; otherwise that of [artefact]."""
     unit: Literal["mm", "m", "cm", "um", "inch"] = "mm"
+    """Unit of predicted coordinates and lengths."""
     columns: Annotated[dict[str, str], Field(max_length=10)] = {}
+    """Names of the file's columns, where they are others than the recording's."""
     effects: Names = []
+    """Effects that the simulation contains."""
     refit: bool = False
+    """Whether these are estimated anew, as corrections to what the simulation contains."""
 
     @field_validator("map", mode="before")
     @classmethod

@@ -17,6 +17,7 @@ from tomlkit.exceptions import TOMLKitError
 from cmm_uq.errors import MOST_GATHERED, CmmUqError, shortened, suggestion
 from cmm_uq.files.content import text_of
 from cmm_uq.files.toml import toml_of
+from cmm_uq.jobs.other_units import conversion
 
 Facts = TypeVar("Facts", bound=BaseModel)
 
@@ -149,8 +150,8 @@ _WRITTEN: Mapping[str, str] = {
 def _meant(word: str, table: type[BaseModel] | None) -> str:
     """The key that an unknown one may stand for, with its sentence."""
     known = _known_keys(table)
-    if word.startswith("U_") and f"u{word[1:]}" in known and word not in known:
-        return f"Give u{word[1:]} = U/k, the standard uncertainty: U is k times as large"
+    if converted := conversion(word, known):
+        return converted
     meant = suggestion(word, known)
     found = _ONE_MEANT.fullmatch(meant)
     return f"{meant}{_explained(found[1], table)}" if found else meant

@@ -67,7 +67,7 @@ def test_everything_that_is_wrong_is_told_at_once_with_line_key_and_fix(gauge: P
     }
     told = {one.key: one.fix for one in problems}
     assert told["[model] effects"] == "Did you mean 'scale_x', 'scale_y', 'scale_z'?"
-    assert told["[artefact] u_mm"].startswith("Did you mean 'u_um'? Standard uncertainty (k = 1) of what is certified")
+    assert told["[artefact] u_mm"] == "Give u_um = 1000 · u_mm"
 
 
 @pytest.mark.parametrize(

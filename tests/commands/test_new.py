@@ -15,7 +15,18 @@ import pytest
 from cmm_uq.api import beginning
 from cmm_uq.commands.budget import write_budget
 from cmm_uq.commands.check import check_job, check_read
-from cmm_uq.commands.new import BUDGET, PLAN, README, RECORDING, SCHEMA, job_of_rows, known, new_job, titles, write_new
+from cmm_uq.commands.new import (
+    BUDGET,
+    PLAN,
+    README,
+    RECORDING,
+    SCHEMA,
+    job_of_export,
+    known,
+    new_job,
+    titles,
+    write_new,
+)
 from cmm_uq.commands.plan import write_plan
 from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.report import diagnosis_outcome, report_outcome
@@ -193,14 +204,15 @@ def test_a_new_plan_is_planned_and_a_new_budget_is_evaluated(tmp_path: Path) -> 
 
 def test_rows_that_were_measured_make_a_measured_job() -> None:
     points = read(begun("ballbar")).points
-    rows = [(*key, *(f"{v:.4f}" for v in xyz)) for key, xyz in
+    rows = [",".join([*map(str, key), *(f"{v:.4f}" for v in xyz)]) for key, xyz in
             zip(zip(points.measurement, points.point, strict=True), points.xyz, strict=True)]  # fmt: skip
-    job = read(job_of_rows("ballbar", REQUIRED, rows, {"machine": {"name": "Bridge 7"}}, id="mine"))
+    files = {RECORDING: "\n".join([",".join(REQUIRED), *rows]).encode()}
+    job = read(job_of_export("ballbar", {"machine": {"name": "Bridge 7"}}, files, id="mine"))
     assert job.origin == "measured"
     np.testing.assert_allclose(job.points.xyz, points.xyz, atol=1e-4)
     assert (job.facts.artefact.length_mm, job.facts.artefact.u_um, job.facts.conformity) == (None, None, [])
     with pytest.raises(CmmUqError, match=r"\[machine\].*is missing|machine"):
-        job_of_rows("ballbar", REQUIRED, rows, {}, id="mine")
+        job_of_export("ballbar", {}, files, id="mine")
 
 
 def test_a_kind_of_another_package_that_says_nothing_of_a_beginning_has_one(

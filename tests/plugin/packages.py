@@ -8,6 +8,7 @@ from pathlib import Path
 
 OUTSIDE_KINDS = Path(__file__).parent / "outside_kinds"
 OUTSIDE_EFFECTS = Path(__file__).parent / "outside_effects"
+OUTSIDE_IMPORTS = Path(__file__).parent / "outside_imports"
 OUTSIDE_STANDARDS = Path(__file__).parent / "outside_standards"
 """Sources of packages of their own: what their authors write."""
 

@@ -1,0 +1,95 @@
+"""Draws the pictures of docs/gallery.md: of each kind the artefact in its machine, and the first page of its certificate.
+
+    python -m benchmarks.examples.gallery [KIND ...]
+
+The artefact stands where a plan would put it first; a kind that is not planned is shown by its main figure. Needs pdftoppm.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+import cmm_uq
+
+ROOT = Path(__file__).parents[2]
+PICTURES = ROOT / "docs" / "images" / "gallery"
+DOTS_PER_INCH = 60
+COLOURS = 24
+LARGEST_BYTES = 60_000
+EXAMPLES = {
+    "ballbar": "iota-1102-20C",
+    "bryan": "bryan-simulated",
+    "step_gauge": "step-gauge-simulated",
+    "gauge_blocks": "gauge-blocks-simulated",
+    "plate": "plate-simulated",
+    "plate_two_dates": "plate-two-dates-simulated",
+    "triangle": "triangle-simulated",
+    "sphere": "sphere-simulated",
+    "plane": "plane-simulated",
+    "digitizer": "digitizer-simulated",
+    "shift": "shift-simulated",
+    "shift_plate": "shift-plate-simulated",
+    "error_map": "iota-1102-maps",
+}
+PLANNED = {"ballbar": "plan-ballbar", "step_gauge": "plan-step-gauge"}  # jobs that have no recording yet
+LENGTHS = {"bryan": "\n[plan]\nlength_mm = 300.0\n", "gauge_blocks": "\n[plan]\nlengths_mm = [100.0, 300.0, 500.0]\n"}
+NOT_PLANNED = ("plate_two_dates", "shift_plate", "error_map")
+
+
+def first_page(kind: str, folder: Path) -> None:
+    """Write what the example's job gives, and draw the first page of its certificate."""
+    if kind == "error_map":
+        cmm_uq.diagnose(ROOT / "examples" / EXAMPLES[kind]).write(folder)
+        return
+    cmm_uq.report(ROOT / "examples" / EXAMPLES[kind]).write(folder)
+    (pdf,) = folder.glob("certificate*.pdf")
+    first_page_of(pdf, PICTURES / f"{kind}.png")
+
+
+def first_page_of(pdf: Path, target: Path) -> None:
+    """As a small picture in few colours."""
+    picture = ["-r", str(DOTS_PER_INCH), "-f", "1", "-l", "1", "-png", "-singlefile"]
+    subprocess.run(["pdftoppm", *picture, str(pdf), str(target.with_suffix(""))], check=True)
+    Image.open(target).quantize(COLOURS).save(target, optimize=True)
+
+
+def placings(kind: str, folder: Path) -> None:
+    """The first row of a plan's pictures, or the main figure of what was written for a kind that is not planned."""
+    (page,) = folder.glob("*.html")
+    if kind not in NOT_PLANNED:
+        job = folder / "plan-of"
+        shutil.copytree(ROOT / "examples" / PLANNED.get(kind, EXAMPLES[kind]), job, ignore=lambda _, names: [
+            name for name in names if name.endswith(".csv")
+        ])  # fmt: skip
+        text = (job / "job.toml").read_text(encoding="utf-8")
+        (job / "job.toml").write_text(
+            text.replace('origin = "simulated"\n', "") + LENGTHS.get(kind, ""), encoding="utf-8"
+        )
+        page = cmm_uq.plan(job, power=False).write(folder / "plan")["plan.html"]
+    drawn = re.findall(r"<svg.*?</svg>", page.read_text(encoding="utf-8"), re.DOTALL)[0]
+    paper = re.sub(
+        r"(<svg.*?>)", r'\1<rect width="100%" height="100%" fill="#fff"/>', drawn, count=1
+    )  # for dark screens
+    (PICTURES / f"{kind}.svg").write_text(paper + "\n", encoding="utf-8")
+
+
+def main(kinds: list[str]) -> None:
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    for kind in kinds or EXAMPLES:
+        with tempfile.TemporaryDirectory() as name:
+            first_page(kind, Path(name))
+            placings(kind, Path(name))
+        sizes = {path.name: path.stat().st_size for path in sorted(PICTURES.glob(f"{kind}.*"))}
+        assert max(sizes.values()) <= LARGEST_BYTES, sizes
+        print(kind, sizes)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,301 @@
+"""From a sheet and its header to the columns of a recording, in its units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.files.limits import CELLS, COLUMNS, ROWS
+from cmm_uq.jobs.importing.header import COORDINATES, Header
+from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.lengths import lengths_unit
+from cmm_uq.jobs.importing.numbering import MEASUREMENT, NUMBERS, POINT, completed, numbered
+from cmm_uq.jobs.importing.numerals import decimal_sign, is_number, split_units, values_of
+from cmm_uq.jobs.importing.sheet import Cell, Fact, Sheet
+from cmm_uq.jobs.importing.units import FAHRENHEIT, LENGTH, UNITS, WrittenUnit, converted, sort_of
+from cmm_uq.jobs.importing.vocabulary import NAME
+from cmm_uq.messages import Verbatim, commas, names, number, say
+from cmm_uq.points import Floats, Ints
+
+SIGNS = {".": say("point"), ",": say("comma")}
+_SHOWN = 15
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns of a recording.
+
+    Parameters
+    ----------
+    values : by name, each (n,).
+    lines : (n,) of each point in the file.
+    sources : heading and unit of each column, by name.
+    facts : recognised.
+    """
+
+    values: dict[str, Floats]
+    lines: Ints
+    sources: dict[str, str]
+    facts: tuple[Fact, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Rows of figures.
+
+    Parameters
+    ----------
+    columns : cells of each column of the sheet.
+    at : index of each row in the sheet.
+    after : rows of text after the table.
+    """
+
+    columns: Sequence[Sequence[Cell]]
+    at: Sequence[int]
+    after: int
+
+
+def columns_of(
+    sheet: Sheet, header: Header, keys: ImportKeys, where: str, *, reach_mm: float | None = None, points: bool = True
+) -> Columns:
+    """Columns of a recording, from a sheet.
+
+    Parameters
+    ----------
+    sheet, header : with its header.
+    keys : what the job says.
+    where : the file, for messages.
+    reach_mm : of the machine's travel, where it is known.
+    points : whether measurements and points must be numbered.
+
+    Raises
+    ------
+    CmmUqError : a cell, a row, the decimal sign, the unit or the numbering is missing, damaged or can be read in two ways.
+    """
+    rows = _rows(sheet, header, where)
+    table = _Table(sheet, header, rows, where)
+    numeric = [i for name, own in header.columns.items() if name != NAME and name not in NUMBERS for i in own]
+    sign = sheet.decimal or decimal_sign(
+        [rows.columns[i] for i in numeric], lambda i, row: table.place(numeric[i], row), keys.decimal
+    )  # fmt: skip
+    written = {name: table.written(name, sign) for name in header.columns if name != NAME and name not in NUMBERS}
+    unit, said = lengths_unit(sheet, keys, table.named_units(written), written, where, reach_mm)
+    values = {name: table.in_units(name, parts, unit) for name, parts in written.items() if parts}
+    numbers, facts = table.numbers(sign)
+    lines = np.repeat(np.array([sheet.lines[i] for i in rows.at], dtype=np.int64), header.points)
+    labels = table.labels()
+    if not points and POINT not in numbers and labels and all(label.isdecimal() for label in labels):
+        numbers[POINT] = np.array([float(label) for label in labels])
+    if points:
+        numbers, further = completed(numbers, labels, len(lines), keys, table.start())
+        facts += further
+    left_out = [name for name, parts in written.items() if not parts]
+    facts = [*said, Fact("decimal", say("Decimal sign"), SIGNS[sign]), *table.facts(left_out), *facts]
+    return Columns({**numbers, **values}, lines, table.sources(unit, values), tuple(facts))
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """Rows with their header."""
+
+    sheet: Sheet
+    header: Header
+    rows: _Rows
+    where: str
+
+    def place(self, column: int, row: int) -> str:
+        """Of a cell."""
+        return self.sheet.at(self.where, self.rows.at[row], column, self.header.headings[column])
+
+    def start(self) -> str:
+        """Of the header."""
+        return self.sheet.at(self.where, self.header.row)
+
+    def cells(self, column: int) -> Sequence[Cell]:
+        """Of a column."""
+        return self.rows.columns[column]
+
+    def written(self, name: str, sign: str) -> list[tuple[Floats, WrittenUnit | None, int]]:
+        """Values as written of each column of a name, with the unit that its cells or its heading name.
+
+        A column beside the coordinates that holds no number at all is left out.
+        """
+        found = []
+        for i in self.header.columns[name]:
+            at = partial(self.place, i)
+            cells, unit = split_units(self.cells(i), at)
+            if name not in COORDINATES and not any(cell != "" and is_number(cell) for cell in cells):
+                return []
+            found.append((values_of(cells, sign, at), unit or self.header.units.get(i), i))
+        return found
+
+    def named_units(self, written: dict[str, list[tuple[Floats, WrittenUnit | None, int]]]) -> dict[str, WrittenUnit]:
+        """Units that headings or cells of lengths name, by heading.
+
+        Raises
+        ------
+        CmmUqError : a unit that is not known, or one of another quantity.
+        """
+        named = {}
+        leading = [name for name in COORDINATES if name in written] or list(written)
+        for name, parts in written.items():
+            sort = sort_of(name)
+            for _, unit, i in parts:
+                heading = self.header.headings[i]
+                if sort and unit is None and i in self.header.odd_units:
+                    raise CmmUqError(f"the unit {self.header.odd_units[i]!r} of {heading!r} is not known", where=self.start(),
+                                     fix="Name the column and its unit: columns, unit")  # fmt: skip
+                if unit == FAHRENHEIT:
+                    raise CmmUqError(f"{heading!r} is in °F", where=self.start(),
+                                     fix=f"Export it in °C: {name} = (°F − 32) / 1.8")  # fmt: skip
+                if sort and unit and unit.sort != sort[0]:
+                    raise CmmUqError(f"{heading!r} is in {unit.name}, which is no unit of {name}", where=self.start(),
+                                     fix=f'Say which column it is: columns = {{ {name} = "…" }}')  # fmt: skip
+                if name in leading and sort and sort[0] == LENGTH and (unit or name == heading):
+                    named[heading] = unit or UNITS["mm"]
+        return named
+
+    def in_units(
+        self, name: str, parts: list[tuple[Floats, WrittenUnit | None, int]], length: WrittenUnit
+    ) -> Floats:  # fmt: skip
+        """A column in the unit of its name, (n,), points of a row in turn."""
+        sort, found = sort_of(name), []
+        for values, unit, i in parts:
+            own = unit
+            if own is None and sort and sort[0] == LENGTH and name != self.header.headings[i]:
+                own = length if not name.endswith("_um") else UNITS["um"]
+            found.append(values if own is None or sort is None else converted(values, own, name))
+        if len(found) == 1:
+            return np.repeat(found[0], self.header.points)
+        return np.column_stack(found).ravel()
+
+    def numbers(self, sign: str) -> tuple[dict[str, Floats], list[Fact]]:
+        """Columns of numbers of measurements, points and repeats that the file has."""
+        found, facts = {}, []
+        for name in NUMBERS:
+            for i in self.header.columns.get(name, ())[:1]:
+                values, named = numbered(self.cells(i), sign, partial(self.place, i))
+                found[name] = np.repeat(values, self.header.points)
+                if named:
+                    facts.append(Fact(f"{name}_names", say("Names in {column}", column=Verbatim(name)), named))
+        if self.header.points > 1 and POINT not in found:
+            count = len(self.rows.at)
+            found[POINT] = np.tile(np.arange(1.0, self.header.points + 1), count)
+            if MEASUREMENT not in found:
+                found[MEASUREMENT] = np.repeat(np.arange(1.0, count + 1), self.header.points)
+                facts.append(Fact("numbering", say("Numbering"), say("each row is one measurement")))
+        return found, facts
+
+    def labels(self) -> list[str] | None:
+        """Names of the points."""
+        own = self.header.columns.get(NAME, ())
+        if len(own) != 1 or self.header.points > 1:
+            return None
+        return [cell if isinstance(cell, str) else f"{cell:g}" for cell in self.cells(own[0])]
+
+    def facts(self, left_out: Sequence[str]) -> list[Fact]:
+        """The kind of table, and what of it is not used."""
+        found = []
+        if not self.sheet.listed:
+            several = say("{points} points in a row", points=self.header.points)
+            found.append(Fact("table", say("Table"), several if self.header.points > 1 else say("one point in a row")))
+            found.append(Fact("header", say("Header"), Verbatim(self.start().removeprefix(self.where).lstrip(": "))))
+        unused = [self.header.headings[i] for i in self.header.unused]
+        unused += [self.header.headings[i] for name in left_out for i in self.header.columns[name]]
+        if unused:
+            shown = commas(names(unused[:_SHOWN]))
+            text = (
+                shown
+                if len(unused) <= _SHOWN
+                else say("{shown} and {more} more", shown=shown, more=len(unused) - _SHOWN)
+            )
+            found.append(Fact("not_used", say("Columns not used"), text))
+        if self.rows.after:
+            found.append(Fact("after", say("Lines of text after the table"), number(self.rows.after)))
+        return found
+
+    def sources(self, length: WrittenUnit, values: dict[str, Floats]) -> dict[str, str]:
+        """Headings of every column that is taken, by its name."""
+        taken = (*(name for name in NUMBERS if name in self.header.columns), *values)
+        return {name: ", ".join(self.header.headings[i] for i in self.header.columns[name]) for name in taken}
+
+
+def _rows(sheet: Sheet, header: Header, where: str) -> _Rows:
+    """The rows of figures, complete, without empty ones and without text after the table."""
+    width, first = len(header.headings), header.first
+    if width > COLUMNS.most:
+        raise CmmUqError(f"has {width} columns, {COLUMNS.most} are the most", where=sheet.at(where, header.row),
+                         fix="Export the columns that the job needs")  # fmt: skip
+    body = sheet.rows[first:]
+    if len(body) > ROWS.most or len(body) * width > CELLS.most:
+        raise CmmUqError(f"has {len(body)} rows of {width} columns", where=where,
+                         fix=f"{ROWS.most} rows and {CELLS.most} cells are the most: split or thin out the table")  # fmt: skip
+    needed = [i for name in COORDINATES for i in header.columns.get(name, ())] or [
+        i for name, own in header.columns.items() if name not in (NAME, *NUMBERS) for i in own
+    ]
+    at: Sequence[int] = range(first, first + len(body))
+    after = 0
+    if not set(map(len, body)) - {width}:
+        columns = list(zip(*body, strict=True))
+        if columns and not any("" in columns[i] for i in needed):
+            return _Rows(columns, at, after)
+    at, after = _usable(sheet, header, needed, where)
+    body = [_exactly(sheet.rows[i], width) for i in at]
+    if not body:
+        raise CmmUqError("has a header and no rows of figures", where=sheet.at(where, header.row),
+                         fix="Export the table with its figures")  # fmt: skip
+    return _Rows(list(zip(*body, strict=True)), at, after)
+
+
+def _exactly(row: Sequence[Cell], width: int) -> Sequence[Cell]:
+    return [*row[:width], *[""] * (width - len(row))]
+
+
+def _usable(sheet: Sheet, header: Header, needed: Sequence[int], where: str) -> tuple[list[int], int]:
+    """Indices of the rows with figures, and the number of rows of text after them."""
+    kept: list[int] = []
+    text: list[int] = []
+    width = len(header.headings)
+    for i in range(header.first, len(sheet.rows)):
+        row = sheet.rows[i]
+        if not any(cell != "" for cell in row):
+            continue
+        if all(place >= len(row) or row[place] == "" for place in needed):
+            text.append(i)
+            continue
+        _refuse_another_length(sheet, header, i, needed, where)
+        if text:
+            raise CmmUqError("has no coordinates, and figures follow", where=sheet.at(where, text[0]),
+                             fix="Remove the line, or complete it; two tables in one file are two exports")  # fmt: skip
+        kept.append(i)
+    if sheet.unended and len(kept) > 1 and all(len(sheet.rows[i]) == width for i in kept[:-1]):
+        _refuse_cut(sheet, kept[-1], width, where)
+    for i in text:
+        if all(cell == "" or is_number(cell) for cell in sheet.rows[i]) and not sheet.spreadsheet:
+            _refuse_cut(sheet, i, width, where)
+    return kept, len(text)
+
+
+def _refuse_cut(sheet: Sheet, i: int, width: int, where: str) -> None:
+    """Refuse a row that ends before the others do."""
+    if len(sheet.rows[i]) < width:
+        raise CmmUqError(f"the row ends after {len(sheet.rows[i])} of {width} cells: the file was cut off",
+                         where=sheet.at(where, i), fix="Export it again")  # fmt: skip
+
+
+def _refuse_another_length(sheet: Sheet, header: Header, i: int, needed: Sequence[int], where: str) -> None:
+    row, width = sheet.rows[i], len(header.headings)
+    surplus = [cell for cell in row[width:] if cell != ""]
+    if surplus:
+        halves = " (a decimal comma in cells that commas separate?)" if len(row) >= 2 * width - 1 else ""
+        raise CmmUqError(f"has {len(row)} cells where the header has {width}{halves}", where=sheet.at(where, i),
+                         fix="Export with semicolons or tabs between cells, or mend the row")  # fmt: skip
+    if len(row) <= max(needed) and not sheet.spreadsheet:
+        last = all(not any(cell != "" for cell in later) for later in sheet.rows[i + 1 :])
+        cut = "the file was cut off: export it again" if last else "Complete the row"
+        raise CmmUqError(f"the row ends after {len(row)} of {width} cells", where=sheet.at(where, i),
+                         fix=cut[0].upper() + cut[1:])  # fmt: skip

@@ -1,0 +1,89 @@
+"""Text of a file in whatever encoding it was exported in."""
+
+from __future__ import annotations
+
+import codecs
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.files.limits import LINES
+
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig", "UTF-8 with a byte-order mark"),
+    (codecs.BOM_UTF32_LE, "utf-32", "UTF-32"),
+    (codecs.BOM_UTF16_LE, "utf-16", "UTF-16"),
+    (codecs.BOM_UTF16_BE, "utf-16", "UTF-16"),
+)
+_TITLES = {"utf-8": "UTF-8", "utf-16": "UTF-16", "cp1252": "Windows-1252", "latin-1": "ISO 8859-1"}
+_FIX = "Export it again, or name encoding"
+_REPORT_LINE = 2000
+"""Characters of a line of a report, which has 80 to 200."""
+
+
+def decoded(content: bytes, where: str, asked: str | None = None) -> tuple[str, str]:
+    """Text of a file, and what its encoding is called.
+
+    Parameters
+    ----------
+    content : of the file.
+    where : its name, for messages.
+    asked : encoding that the job names.
+
+    Raises
+    ------
+    CmmUqError : the bytes are no text in it.
+
+    Notes
+    -----
+    A byte-order mark decides; without one, UTF-16 shows by a zero in every other byte, UTF-8 by being valid; what remains is
+    Windows-1252, which has every character of ISO 8859-1 in the same place.
+    """
+    mark = next((found for found in _MARKS if content.startswith(found[0])), None)
+    if mark is not None and (asked is None or mark[1].startswith(asked)):
+        codec, title = mark[1], mark[2]
+    else:
+        codec = asked or _without_mark(content)
+        title = _TITLES.get(codec, "UTF-16")
+    try:
+        text = content.decode(codec)
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise CmmUqError(f"is no text in {title}", where=f"{where} line {line}", fix=_FIX) from None
+    if "\0" in text:
+        line = text[: text.index("\0")].count("\n") + 1
+        raise CmmUqError("has zero bytes in it: it is damaged, or no text", where=f"{where} line {line}", fix=_FIX)
+    return text, title
+
+
+def _without_mark(content: bytes) -> str:
+    head = content[:4096]
+    if len(head) >= 4 and head.count(0) > len(head) // 4:
+        return "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252" if not any(byte in content for byte in b"\x81\x8d\x8f\x90\x9d") else "latin-1"
+    return "utf-8"
+
+
+def report_lines(text: str, where: str) -> list[str]:
+    """Lines of a report, none of them longer than a report's can be.
+
+    Raises
+    ------
+    CmmUqError : too many lines, or one too long.
+    """
+    lines = text.splitlines()
+    if len(lines) > LINES.most:
+        raise CmmUqError(f"has {len(lines)} lines, {LINES.most} are the most", where=where, fix="Split the report")
+    longest = max(range(len(lines)), key=lambda i: len(lines[i]), default=0)
+    if lines and len(lines[longest]) > _REPORT_LINE:
+        raise CmmUqError(f"the line has {len(lines[longest])} characters, {_REPORT_LINE} are the most in a report",
+                         where=f"{where} line {longest + 1}", fix="Export it again as text")  # fmt: skip
+    return lines
+
+
+def head_text(head: bytes) -> str:
+    """The beginning of a file as text, for recognising it: whatever cannot be read is replaced."""
+    mark = next((found for found in _MARKS if head.startswith(found[0])), None)
+    codec = mark[1] if mark else _without_mark(head[: head.rfind(b"\n") + 1] or head)
+    return head.decode(codec, errors="replace")

@@ -1,0 +1,123 @@
+"""A file of a laboratory as the columns of a recording, with what was recognised on the way."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+
+from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.files.limits import TABLE_BYTES
+from cmm_uq.jobs.importing.columns import columns_of
+from cmm_uq.jobs.importing.header import Header, header_of, no_header
+from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
+from cmm_uq.jobs.importing.recognised import Recognised
+from cmm_uq.jobs.importing.registry import format_of
+from cmm_uq.jobs.importing.sheet import Fact, Sheet
+from cmm_uq.jobs.importing.units import length_named
+from cmm_uq.jobs.importing.wanted import POINTS, REFERENCES
+from cmm_uq.messages import Verbatim, say
+from cmm_uq.points import Floats, Ints
+
+_UNIT_LINE = re.compile(
+    r"\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+\s*([^\s;]+)",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Imported:
+    """A file, read.
+
+    Parameters
+    ----------
+    columns : of a recording, by name, each (n,), in the units of their names.
+    lines : (n,) line of each point in the file.
+    recognised : how it was read.
+    """
+
+    columns: dict[str, Floats]
+    lines: Ints
+    recognised: Recognised
+
+
+def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | None = None) -> Imported:
+    """A recording in any format that is known.
+
+    Parameters
+    ----------
+    content : bytes of the file.
+    where : its path, for messages.
+    keys : what the job says beside.
+    reach_mm : diagonal of the machine's travel, where it is known.
+
+    Raises
+    ------
+    CmmUqError : it is of no known format, damaged or hostile, or can be read in two ways that no key settles.
+    """
+    return _read(content, where, keys, POINTS, reach_mm)
+
+
+def imported_references(content: bytes, where: str, keys: FileKeys) -> Imported:
+    """Certified values in any format that is known: distances or places, by the number of their point.
+
+    Raises
+    ------
+    CmmUqError : see :func:`imported`.
+    """
+    asked = ImportKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
+    found = _read(content, where, asked, REFERENCES, None)
+    columns = {f"reference_{name}" if name in POINTS[0] else name: values for name, values in found.columns.items()}
+    return replace(found, columns=columns)
+
+
+def _read(
+    content: bytes, where: str, keys: ImportKeys, wanted: Sequence[Sequence[str]], reach_mm: float | None
+) -> Imported:
+    if len(content) > TABLE_BYTES.most:
+        raise CmmUqError(f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file", where=where,
+                         fix="Split it")  # fmt: skip
+    form = format_of(content, where)
+    sheet, header = _chosen(form.read(content, where, keys), keys, where, wanted)
+    sheet = _with_unit(sheet, header)
+    columns = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
+    named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
+    told = Recognised(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
+                      columns.sources, len(columns.lines))  # fmt: skip
+    return Imported(columns.values, columns.lines, told)
+
+
+def _chosen(
+    sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]
+) -> tuple[Sheet, Header]:  # fmt: skip
+    """The sheet with the table, and its header."""
+    if keys.sheet is not None:
+        sheets = [sheet for sheet in sheets if sheet.name.casefold() == keys.sheet.casefold()] or _no_sheet(
+            sheets, keys.sheet, where
+        )
+    found = [(sheet, header) for sheet in sheets if (header := header_of(sheet, keys, where, wanted)) is not None]
+    if not found:
+        raise no_header(sheets, keys, where, wanted)
+    if len(found) > 1:
+        listed = ", ".join(repr(sheet.name) for sheet, _ in found)
+        raise CmmUqError(f"holds {len(found)} tables of points: {listed}", where=where,
+                         fix=f'Say which: sheet = "{found[0][0].name}"')  # fmt: skip
+    return found[0]
+
+
+def _no_sheet(sheets: Sequence[Sheet], name: str, where: str) -> list[Sheet]:
+    known = [sheet.name for sheet in sheets if sheet.name]
+    fix = suggestion(name, known) if known else "Leave sheet out: the file has only one table"
+    raise CmmUqError(f"has no sheet {name!r}", where=where, fix=fix)
+
+
+def _with_unit(sheet: Sheet, header: Header) -> Sheet:
+    """With the unit that a line before the table names: ``Units: mm``."""
+    if sheet.unit is not None:
+        return sheet
+    for row in sheet.rows[: header.row]:
+        found = _UNIT_LINE.search(";".join(str(cell) for cell in row))
+        if found and (unit := length_named(found[1].strip("[]().,;"))):
+            return replace(sheet, unit=unit.name)
+    return sheet

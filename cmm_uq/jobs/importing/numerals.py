@@ -1,0 +1,186 @@
+"""Numbers as laboratories write them: which sign is the decimal one, and the values.
+
+One group of three digits after a comma, and nothing else in the file to go by, may be thousands or thousandths: that is
+refused, never guessed. A point alone is a decimal point, as in every number of this program.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.files.numbers import LARGEST, number_problem, numbers
+from cmm_uq.jobs.importing.sheet import Cell
+from cmm_uq.jobs.importing.units import WrittenUnit, apart, unit_named
+from cmm_uq.points import Floats
+
+_E = r"(?:[eE][+-]?\d+)?"
+_BLANKS = " \u00a0\u202f\u2009'’"
+_COMMA_DECIMAL = re.compile(
+    rf"^[+-]?(?:\d{{1,3}}(?:[.{_BLANKS}]\d{{3}})+,\d+|0\d*,\d+|\d{{4,}},\d+|\d*,(?:\d{{1,2}}|\d{{4,}})|,\d+"
+    rf"|\d+,\d+(?=[eE])){_E}$", re.MULTILINE,
+)  # fmt: skip
+"""A comma that can only be a decimal one."""
+
+_COMMA_GROUPS = re.compile(rf"^[+-]?[1-9]\d{{0,2}}(?:(?:,\d{{3}})+\.\d*|(?:,\d{{3}}){{2,}}){_E}$", re.MULTILINE)
+"""Commas that can only be between groups of three digits."""
+
+_POINT_DECIMAL = re.compile(
+    rf"^[+-]?(?:0\d*\.\d+|\d{{4,}}\.\d*|\d*\.(?:\d{{1,2}}|\d{{4,}})?|\.\d+|\d+\.\d+(?=[eE])){_E}$", re.MULTILINE
+)
+"""A point that can only be a decimal one."""
+
+_TWO_COMMAS = re.compile(r",\d*,")
+_POINT_GROUPS = re.compile(r"^[+-]?[1-9]\d{0,2}(?:\.\d{3}){2,}$", re.MULTILINE)
+_GROUPED = {
+    sign: re.compile(rf"[+-]?\d{{1,3}}(?:(?:[{_BLANKS}]\d{{3}})+|(?:{group}\d{{3}})+)(?:{mark}\d*)?{_E}")
+    for sign, mark, group in ((".", r"\.", ","), (",", ",", r"\."))
+}
+"""A number with groups of three digits."""
+
+At = Callable[[int, int], str]
+"""Place of a cell, by indices of column and row."""
+
+
+def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -> str:
+    """The decimal sign of the numbers of a table.
+
+    Parameters
+    ----------
+    columns : that must be numbers.
+    at : place of a cell.
+    asked : the sign that the job names.
+
+    Raises
+    ------
+    CmmUqError : cells contradict each other, or every comma can be read either way.
+    """
+    if asked is not None:
+        return asked
+    texts = [_joined(column) for column in columns]
+    if not any("," in text for text in texts):
+        return "," if any(_POINT_GROUPS.search(text) for text in texts) else "."
+    points = any("." in text for text in texts)
+    comma = _first(texts, (_COMMA_DECIMAL, _POINT_GROUPS) if points else (_COMMA_DECIMAL,))
+    groups = (_COMMA_GROUPS,) if any(_TWO_COMMAS.search(text) for text in texts) or points else ()
+    point = _first(texts, (*groups, _POINT_DECIMAL) if points else groups)
+    if comma and point:
+        raise CmmUqError(
+            f"{comma[2]!r} has a decimal comma, and {point[2]!r} ({at(*point[:2])}) has a decimal point",
+            where=at(*comma[:2]), fix="Export it again with one decimal sign; if it was put together, mend the odd rows",
+        )  # fmt: skip
+    if comma or point:
+        return "," if comma else "."
+    i = next(i for i, text in enumerate(texts) if "," in text)
+    row = next(row for row, cell in enumerate(columns[i]) if isinstance(cell, str) and "," in cell)
+    value = str(columns[i][row])
+    thousands, thousandths = value.replace(",", ""), value.replace(",", ".")
+    raise CmmUqError(f"{value!r} can be {thousands} or {thousandths}, and no number of the file tells", where=at(i, row),
+                     fix='Say decimal = "," or decimal = "."')  # fmt: skip
+
+
+def _joined(cells: Sequence[Cell]) -> str:
+    """The texts among the cells, each on its line."""
+    if set(map(type, cells)) <= {str}:
+        return "\n".join(cells)  # type: ignore[arg-type]
+    return "\n".join([cell if isinstance(cell, str) else "" for cell in cells])
+
+
+def _first(texts: Sequence[str], patterns: Sequence[re.Pattern[str]]) -> tuple[int, int, str] | None:
+    """Column, row and text of the first cell that shows one of the patterns."""
+    for i, text in enumerate(texts):
+        for pattern in patterns:
+            if found := pattern.search(text):
+                return i, text.count("\n", 0, found.start()), found[0]
+    return None
+
+
+def split_units(cells: Sequence[Cell], at: Callable[[int], str]) -> tuple[Sequence[Cell], WrittenUnit | None]:
+    """Cells without the unit that all of them end in, and that unit.
+
+    Raises
+    ------
+    CmmUqError : some cells have another unit, or none.
+    """
+    first = next((cell for cell in cells if isinstance(cell, str) and cell), None)
+    found = apart(first) if first else None
+    if found is None:
+        return cells, None
+    unit, bare = found[1], list(cells)
+    for row, cell in enumerate(cells):
+        own = apart(cell) if isinstance(cell, str) else None
+        if cell == "":
+            continue
+        if own is None or own[1] != unit:
+            raise CmmUqError(f"{cell!r} among numbers in {unit.name}: the column mixes units", where=at(row),
+                             fix="Export the column in one unit")  # fmt: skip
+        bare[row] = own[0]
+    return bare, unit
+
+
+def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> Floats:
+    """Values (n,) of cells.
+
+    Parameters
+    ----------
+    cells : of a column.
+    sign : its decimal sign.
+    at : place of a cell by its index.
+
+    Raises
+    ------
+    CmmUqError : a cell is no number.
+    """
+    sorts = set(map(type, cells))
+    if str not in sorts:
+        return _of_numbers(np.array(cells, dtype=np.float64), at)
+    if len(sorts) > 1:
+        return np.array([values_of([cell], sign, lambda _, row=row: at(row))[0] for row, cell in enumerate(cells)])  # type: ignore[misc]
+    texts: Sequence[str] = cells  # type: ignore[assignment]
+    joined = "\n".join(texts)
+    if "−" in joined:
+        joined = joined.replace("−", "-")
+        texts = joined.split("\n")
+    if (sign == "," and "." in joined) or (sign == "." and "," in joined) or any(blank in joined for blank in _BLANKS):
+        texts = [_plain(text, sign, row, at) for row, text in enumerate(texts)]
+    elif sign == ",":
+        texts = joined.replace(",", ".").split("\n")
+    return numbers(texts, at)
+
+
+def _of_numbers(values: Floats, at: Callable[[int], str]) -> Floats:
+    bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
+    if bad.size:
+        raise CmmUqError(f"{values[bad[0]]:g} is no number that can be used", where=at(int(bad[0])),
+                         fix="Measure the point again, or leave out its measurement")  # fmt: skip
+    return values
+
+
+def _plain(text: str, sign: str, row: int, at: Callable[[int], str]) -> str:
+    """A number with a decimal point and no groups; whatever is no number stays as it is, and is refused as such."""
+    other = "." if sign == "," else ","
+    if other in text or any(blank in text for blank in _BLANKS):
+        if _GROUPED[sign].fullmatch(text):
+            text = text.translate(_WITHOUT[sign])
+        elif other in text and number_problem(text.replace(other, ".")) is None:
+            raise CmmUqError(f"{text!r} has its decimal sign as {other!r}, the others as {sign!r}", where=at(row),
+                             fix="Export the table again with one decimal sign, or say decimal")  # fmt: skip
+    return text.replace(",", ".") if sign == "," else text
+
+
+_WITHOUT = {sign: str.maketrans("", "", other + _BLANKS) for sign, other in ((".", ","), (",", "."))}
+
+
+def is_number(cell: Cell) -> bool:
+    """Whether a cell is a number in any of the ways of writing one."""
+    if not isinstance(cell, str):
+        return True
+    plain = cell.replace("−", "-")
+    if apart(plain) is not None and unit_named(plain) is None:
+        plain = apart(plain)[0]  # type: ignore[index]
+    return number_problem(plain.replace(",", ".")) is None or any(
+        pattern.fullmatch(plain) for pattern in _GROUPED.values()
+    )

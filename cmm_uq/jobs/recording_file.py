@@ -1,0 +1,49 @@
+"""The file of a recording, whatever its format: the project's own is read as it is, any other is imported."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.jobs.importing.imported import imported
+from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.recognised import Recognised
+from cmm_uq.jobs.recording import REQUIRED, points_of, read_recording
+from cmm_uq.points import Machine, Points
+
+_HEAD = 16_384
+
+
+def read_recording_file(
+    content: bytes, where: str, machine: Machine, keys: ImportKeys
+) -> tuple[Points, Recognised | None]:  # fmt: skip
+    """Points of a recording, and how it was read where it is in another format than the project's own.
+
+    Parameters
+    ----------
+    content : bytes of the file.
+    where : its path, for messages.
+    machine : that read the points.
+    keys : what the job says beside the name of the file.
+
+    Raises
+    ------
+    CmmUqError : it is damaged, or of no format that is known.
+    """
+    if not keys.asked and is_own(content):
+        return read_recording(content, where, machine), None
+    found = imported(content, where, keys, reach_mm=_reach(machine))
+    return points_of(found.columns, found.lines.tolist(), where, machine), found.recognised
+
+
+def is_own(content: bytes) -> bool:
+    """Whether a recording is in the project's own format: empty, or a header that names one of its columns between commas."""
+    text = content[:_HEAD].decode("utf-8-sig", errors="replace")
+    header = next((line for line in map(str.strip, text.splitlines()) if line and not line.startswith("#")), "")
+    names = [name.strip().strip('"') for name in header.split(",")]
+    return not content.strip() or any(name in REQUIRED for name in names)
+
+
+def _reach(machine: Machine) -> float | None:
+    """Diagonal of the travel, mm; ``None`` where the job does not say it."""
+    spans = machine.travel_mm[:, 1] - machine.travel_mm[:, 0]
+    return float(np.linalg.norm(spans)) if np.all(np.isfinite(spans)) else None

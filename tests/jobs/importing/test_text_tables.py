@@ -1,0 +1,300 @@
+"""Whatever the dialect of a text table, its values are read back as they were written; two ways to read them are refused."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.importing.imported import Imported, imported
+from cmm_uq.jobs.importing.keys import ImportKeys
+from tests.jobs.importing.exports import HEADINGS
+
+MICROMETRES = st.integers(-2_000_000_000, 2_000_000_000)
+ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1252")
+
+
+def read(content: str | bytes, **keys: object) -> Imported:
+    data = content.encode() if isinstance(content, str) else content
+    return imported(data, "export.csv", ImportKeys.model_validate(keys))
+
+
+def xyz(found: Imported) -> list[list[float]]:
+    return np.column_stack([found.columns[f"{axis}_mm"] for axis in "xyz"]).tolist()
+
+
+def grouped(figure: str, group: str) -> str:
+    """A figure with a sign between groups of three digits of its whole part."""
+    whole, point, rest = figure.partition(".")
+    sign, digits = ("-", whole[1:]) if whole.startswith("-") else ("", whole)
+    parts = [digits[max(0, i - 3) : i] for i in range(len(digits), 0, -3)][::-1]
+    return sign + group.join(parts) + point + rest
+
+
+@st.composite
+def dialects(draw: st.DrawFn) -> tuple[bytes, list[list[str]], str]:
+    """Bytes of a table, its figures with a decimal point, and its decimal sign."""
+    points = draw(st.lists(st.tuples(MICROMETRES, MICROMETRES, MICROMETRES), min_size=1, max_size=6))
+    digits = draw(st.integers(1, 6))
+    figures = [[f"{value / 1e6:.{digits}f}" for value in point] for point in points]
+    decimal = draw(st.sampled_from(".,"))
+    separator = draw(st.sampled_from(";\t|," if decimal == "." else ";\t|"))
+    group = draw(st.sampled_from(["", " ", "'", "," if decimal == "." and separator != "," else ".", "\u00a0"]))
+    assume(not (decimal == "." and group == "."))
+    heads = HEADINGS[draw(st.sampled_from(sorted(HEADINGS)))]
+    mark = "\x00"
+    rows = [separator.join([*heads[:2], *(f"{head} [mm]" for head in heads[2:5])])]
+    for i, point in enumerate(figures):
+        cells = [grouped(figure, mark).replace(".", decimal).replace(mark, group) for figure in point]
+        rows.append(separator.join([str(i + 1), "1", *cells]))
+    before = draw(st.lists(st.sampled_from(["Protokoll", "", "Kunde: Müller", "x"]), max_size=3))
+    end = draw(st.sampled_from(["\n", "\r\n", "\r"]))
+    text = end.join([*before, *rows]) + draw(st.sampled_from(["", end, end + end]))
+    return text.encode(draw(st.sampled_from(ENCODINGS))), figures, decimal
+
+
+@settings(deadline=None)
+@given(dialects())
+def test_values_are_read_back_exactly_in_every_dialect(dialect: tuple[bytes, list[list[str]], str]) -> None:
+    """Against Python's own reading of the figures; what cannot tell its decimal sign says so, and the key settles it."""
+    content, figures, decimal = dialect
+    refused = ""
+    try:
+        found = read(content)
+    except CmmUqError as error:
+        refused = str(error)
+        found = read(content, decimal=decimal)
+    assert not refused or "Say decimal" in refused
+    assert xyz(found) == [[float(figure) for figure in point] for point in figures]
+
+
+@settings(deadline=None)
+@given(
+    st.integers(-(10**9), 10**9),
+    st.sampled_from([("in", Fraction(254, 10)), ("µm", Fraction(1, 1000)), ("m", Fraction(1000))]),
+)
+def test_a_unit_is_converted_to_the_last_digit_of_a_double(millionths: int, unit: tuple[str, Fraction]) -> None:
+    """Against exact fractions: reading, multiplying and dividing round once each, by 2⁻⁵³ of the value at most."""
+    figure = f"{millionths / 10**6:.6f}"
+    assume(abs(Fraction(figure) * unit[1]) <= 10**7)
+    found = read(f"Measurement,Point,X [{unit[0]}],Y [{unit[0]}],Z [{unit[0]}]\n1,1,{figure},0,0\n").columns["x_mm"][0]
+    exact = Fraction(figure) * unit[1]
+    assert abs(Fraction(float(found)) - exact) <= 3 * abs(exact) * Fraction(1, 2**53)
+
+
+def test_an_inch_is_25_4_millimetres() -> None:
+    assert xyz(read("Measurement,Point,X [in],Y [in],Z [in]\n1,1,1,0.5,-10\n")) == [[25.4, 12.7, -254.0]]
+
+
+AMBIGUOUS = "Measurement;Point;X [mm];Y [mm];Z [mm]\n1;1;1,234;12,345;-3,210\n"
+
+
+def test_a_comma_before_three_digits_everywhere_may_be_thousands_or_thousandths() -> None:
+    with pytest.raises(CmmUqError, match=r"line 2, column X \[mm\]: '1,234' can be 1234 or 1\.234.*decimal = \",\""):
+        read(AMBIGUOUS)
+    assert xyz(read(AMBIGUOUS, decimal=",")) == [[1.234, 12.345, -3.21]]
+    assert xyz(read(AMBIGUOUS, decimal=".")) == [[1234.0, 12345.0, -3210.0]]
+
+
+@pytest.mark.parametrize(
+    ("cell", "value"),
+    [
+        ("0,123", 0.123),
+        ("1234,567", 1234.567),
+        ("1,5", 1.5),
+        ("1.234,567", 1234.567),
+        ("1,234e2", 123.4),
+        (",250", 0.25),
+    ],
+)
+def test_one_cell_that_tells_settles_the_whole_table(cell: str, value: float) -> None:
+    assert xyz(read(AMBIGUOUS + f"2;1;{cell};1,234;1,234\n"))[1] == [value, 1.234, 1.234]
+
+
+@pytest.mark.parametrize(("cell", "value"), [("1,234.5", 1234.5), ("1,234,567", 1234567.0), ("12.5", 12.5)])
+def test_commas_between_groups_are_no_decimal_commas(cell: str, value: float) -> None:
+    assert xyz(read(AMBIGUOUS + f"2;1;{cell};1,234;1,234\n"))[1] == [value, 1234.0, 1234.0]
+
+
+def test_nothing_that_says_the_unit_is_asked_for_where_inches_would_fit_too() -> None:
+    text = "Measurement,Point,X,Y,Z\n1,1,0,0,0\n1,2,{},0,0\n"
+    with pytest.raises(CmmUqError, match=r'may be in mm or in inch\. Say unit = "mm" or unit = "inch"'):
+        read(text.format(400))
+    assert xyz(read(text.format(400), unit="inch"))[1] == [10160.0, 0.0, 0.0]
+    assert xyz(read(text.format(1600)))[1] == [1600.0, 0.0, 0.0]  # 40 640 mm is longer than any machine
+
+
+def test_the_travel_of_the_machine_settles_the_unit() -> None:
+    text = b"Measurement,Point,X,Y,Z\n1,1,0,0,0\n1,2,400,0,0\n"
+    assert xyz(imported(text, "e.csv", ImportKeys(), reach_mm=1500.0))[1] == [400.0, 0.0, 0.0]
+    with pytest.raises(CmmUqError, match="may be in mm or in inch"):
+        imported(text, "e.csv", ImportKeys(), reach_mm=12_000.0)
+
+
+@pytest.mark.parametrize("line", ["Units: inch", "Einheit;inch", "Unité = inch", "Unità: inch", "Unidad: inch"])
+def test_a_line_before_the_table_may_say_the_unit(line: str) -> None:
+    assert xyz(read(f"{line}\nMeasurement;Point;X;Y;Z\n1;1;1;0;0\n")) == [[25.4, 0.0, 0.0]]
+
+
+def test_a_row_of_units_below_the_header_says_the_unit() -> None:
+    assert xyz(read("Measurement;Point;X;Y;Z\n;;in;in;in\n1;1;1;0;0\n")) == [[25.4, 0.0, 0.0]]
+
+
+def test_units_may_stand_in_the_cells_and_must_be_one() -> None:
+    text = "Measurement;Point;X;Y;Z\n1;1;1 in;0 in;0 in\n1;2;{};0 in;0 in\n"
+    assert xyz(read(text.format("2 in")))[1] == [50.8, 0.0, 0.0]
+    with pytest.raises(CmmUqError, match=r"line 3, column X: '2 mm' among numbers in inch: the column mixes units"):
+        read(text.format("2 mm"))
+
+
+def test_columns_that_a_job_names_by_heading_or_number_win() -> None:
+    text = "Nr;a;b;c\n1;1,5;2,5;3,5\n2;4,5;5,5;6,5\n"
+    for columns in ({"x_mm": "c", "y_mm": "b", "z_mm": "a"}, {"x_mm": 4, "y_mm": 3, "z_mm": 2}):
+        found = read(
+            text,
+            columns=columns,
+            unit="mm",
+            points_per_measurement=2,
+            **({} if "c" in columns.values() else {"delimiter": ";"}),
+        )
+        assert xyz(found) == [[3.5, 2.5, 1.5], [6.5, 5.5, 4.5]]
+
+
+def test_columns_of_several_points_are_named_in_their_order_and_further_ones_by_any_name() -> None:
+    text = "Nr;XA;YA;ZA;XB;YB;ZB;Wind\n1;1,5;2;3;4;5;6;0,7\n"
+    columns = {"measurement": "Nr", "x_mm": ["XB", "XA"], "y_mm": ["YB", "YA"], "z_mm": [7, 4], "wind": "Wind"}
+    found = read(text, columns=columns, unit="mm")
+    assert xyz(found) == [[4.0, 5.0, 6.0], [1.5, 2.0, 3.0]]
+    assert found.columns["wind"].tolist() == [0.7, 0.7]
+    with pytest.raises(CmmUqError, match=r"no column is wind among"):
+        read(text, columns={**columns, "wind": "Wnd"}, unit="mm")
+
+
+def test_a_table_without_a_header_is_read_by_numbers_of_columns() -> None:
+    found = read("1\t0.5\t1.5\n2\t0.25\t1.25\n", columns={"x_mm": 1, "y_mm": 2, "z_mm": 3}, unit="mm", delimiter="tab",
+                 points_per_measurement="all")  # fmt: skip
+    assert xyz(found) == [[1.0, 0.5, 1.5], [2.0, 0.25, 1.25]]
+    assert found.columns["measurement"].tolist() == [1, 1]
+    assert found.columns["point"].tolist() == [1, 2]
+
+
+def test_a_row_may_hold_several_points_with_what_they_share() -> None:
+    found = read(
+        "Position;x1 [mm];y1 [mm];z1 [mm];x2 [mm];y2 [mm];z2 [mm];Lufttemperatur [°C]\n"
+        "7;1;2;3;4;5;6;20,5\n9;7;8;9;10;11;12;21,5\n"
+    )
+    assert xyz(found) == [[1, 2, 3], [4, 5, 6], [7, 8, 9], [10, 11, 12]]
+    assert found.columns["measurement"].tolist() == [7, 7, 9, 9]
+    assert found.columns["point"].tolist() == [1, 2, 1, 2]
+    assert found.columns["temp_air_c"].tolist() == [20.5, 20.5, 21.5, 21.5]
+    assert found.lines.tolist() == [2, 2, 3, 3]
+
+
+def test_nominal_values_are_never_taken_for_measured_ones() -> None:
+    found = read("Messung;Punkt;X Soll [mm];X Ist [mm];Y Ist [mm];Z Ist [mm];X Abw [mm]\n1;1;5;5,1;2,5;3,5;0,1\n")
+    assert xyz(found) == [[5.1, 2.5, 3.5]]
+    assert found.recognised.data["not_used"] == "X Soll [mm], X Abw [mm]"
+    with pytest.raises(CmmUqError, match=r"nominal values are not taken for measured ones"):
+        read("Messung;Punkt;X Soll [mm];Y Soll [mm];Z Soll [mm]\n1;1;5;5;5\n")
+
+
+@pytest.mark.parametrize(
+    ("heading", "value", "column", "read_as"),
+    [
+        ("Zeit [min]", "2", "time_s", 120.0), ("Temp X [K]", "293.15", "temp_x_c", 20.0),
+        ("Luftdruck [kPa]", "101.3", "pressure_hpa", 1013.0),
+        ("Part temperature [°C]", "20.1", "temp_artefact_c", 20.1),
+        ("Certified length [µm]", "20000.1", "reference_mm", 20.0001),
+        ("Approach X", "-1", "approach_x", -1.0), ("J", "1", "ny", 1.0), ("Wiederholung", "3", "repeat", 3.0),
+    ],
+)  # fmt: skip
+def test_further_columns_are_brought_to_the_units_of_their_names(
+    heading: str, value: str, column: str, read_as: float
+) -> None:
+    found = read(f"Measurement,Point,X [mm],Y [mm],Z [mm],{heading}\n1,1,1,2,3,{value}\n")
+    assert found.columns[column].tolist() == pytest.approx([read_as], rel=1e-15)
+
+
+def test_fahrenheit_is_refused_with_its_conversion() -> None:
+    with pytest.raises(CmmUqError, match=r"'Temp X \[°F\]' is in °F. Export it in °C: temp_x_c = \(°F − 32\) / 1.8"):
+        read("Measurement,Point,X [mm],Y [mm],Z [mm],Temp X [°F]\n1,1,1,2,3,68\n")
+
+
+def test_what_was_recognised_is_told_in_full() -> None:
+    told = read("Bericht\nMessung;Kugel;X [mm];Y [mm];Z [mm];Farbe\n1;A;1,5;2;3;rot\n1;B;2;3;4;rot\n").recognised.data
+    assert told == {
+        "file": "export.csv", "format": "text", "encoding": "UTF-8", "delimiter": "semicolon",
+        "unit": "mm, in the heading X [mm]",
+        "decimal": "comma", "table": "one point in a row", "header": "line 2", "not_used": "Farbe",
+        "point_names": "A is 1, B is 2",
+        "columns": {"x_mm": "X [mm]", "y_mm": "Y [mm]", "z_mm": "Z [mm]", "measurement": "Messung", "point": "Kugel"},
+        "points": 2,
+    }  # fmt: skip
+
+
+def test_numbers_of_measurement_and_point_come_from_names_that_have_two() -> None:
+    found = read("Name,X [mm],Y [mm],Z [mm]\nBar 3 ball 1,1,2,3\nBar 3 ball 2,1,2,4\nBar 10 ball 1,1,2,5\n")
+    assert found.columns["measurement"].tolist() == [3, 3, 10]
+    assert found.columns["point"].tolist() == [1, 2, 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "measurement", "point", "repeat"),
+    [
+        ("Bar 3 ball 2", 3, 2, None), ("Ball2_Pos3", 3, 2, None), ("KUGEL 2 / MESSUNG 3", 3, 2, None), ("3.2", 3, 2, None),
+        ("M3_P2_R4", 3, 2, 4), ("Run 4, bar 3, ball 2", 3, 2, 4), ("Sphere2 (position 3)", 3, 2, None), ("B2-3", 3, 2, None),
+    ],
+)  # fmt: skip
+def test_the_words_of_a_name_say_what_its_numbers_are(
+    name: str, measurement: int, point: int, repeat: int | None
+) -> None:
+    found = read(f'Name;X [mm];Y [mm];Z [mm]\n"{name}";1;2;3\n')
+    assert (found.columns["measurement"][0], found.columns["point"][0]) == (measurement, point)
+    assert found.columns.get("repeat", [None])[0] == repeat
+    assert f"measurement {measurement}, point {point}" in found.recognised.data["numbering"]
+
+
+def test_names_whose_numbers_are_both_of_a_point_say_no_measurement() -> None:
+    with pytest.raises(CmmUqError, match="nothing says which points belong to one measurement"):
+        read("Name;X [mm];Y [mm];Z [mm]\nball 1 to ball 2;1;2;3\n")
+
+
+def test_words_about_a_unit_are_no_unit() -> None:
+    """ "unit in charge" is no inch, "Unit M" no metre."""
+    with pytest.raises(CmmUqError, match="may be in mm or in inch"):
+        read("The unit in charge\nBusiness unit M\nMeasurement;Point;X;Y;Z\n1;1;1;0;0\n")
+
+
+def test_a_number_of_points_that_is_no_whole_number_of_measurements_is_refused() -> None:
+    with pytest.raises(CmmUqError, match="3 points are no whole number of measurements of 2"):
+        read("X [mm],Y [mm],Z [mm]\n1,2,3\n1,2,4\n1,2,5\n", points_per_measurement=2)
+
+
+def said_of(content: bytes) -> str:
+    """The refusal of a file, or nothing."""
+    try:
+        read(content)
+    except CmmUqError as error:
+        return str(error)
+    return ""
+
+
+@settings(deadline=None)
+@given(st.text(max_size=200), st.sampled_from(["", "Measurement;Point;X [mm];Y [mm];Z [mm]\n1;1;"]))
+def test_any_text_is_read_or_refused_in_one_line(text: str, before: str) -> None:
+    told = said_of((before + text).encode("utf-8", errors="surrogatepass"))
+    assert "\n" not in told
+    assert len(told) <= 300
+
+
+@settings(deadline=None)
+@given(
+    st.binary(max_size=300),
+    st.sampled_from([b"", b"PK\x03\x04[Content_Types].xml", b"<QIFDocument>", b"00001 &\n00001 %\n", b"FILNAM/'A'\n"]),
+)
+def test_any_bytes_are_read_or_refused_in_one_line(content: bytes, before: bytes) -> None:
+    assert "\n" not in said_of(before + content)

@@ -1,0 +1,87 @@
+"""Certified values from the artefact's certificate, joined to a recording by the numbers of its points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cmm_uq.commands.reading import job_of
+from cmm_uq.commands.simulate import simulated_job
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import Job
+from tests.conftest import ROOT
+
+SAMPLES = ROOT / "docs" / "import" / "samples"
+TOML = """
+[job]
+id = "gauge"
+date = 2026-11-20
+[machine]
+name = "CMM"
+[artefact]
+kind = "{kind}"
+u_um = 0.2
+[artefact.certificate]
+number = "7"
+file = "{file}"
+[recording]
+file = "recording.csv"
+[model]
+effects = ["scale_x"]
+"""
+GAUGE = "measurement,point,x_mm,y_mm,z_mm\n" + "".join(
+    f"{m},{p},{20.001 * (p - 1)},{m},0\n" for m in (1, 2) for p in (1, 2, 3, 4)
+)
+PLATE = "measurement,point,x_mm,y_mm,z_mm\n" + "".join(
+    f"{m},{p},{x + m},{y},0\n" for m in (1, 2) for p, (x, y) in enumerate(((0, 0), (83, 0), (0, 83), (83, 83)), 1)
+)
+
+
+def job(recording: str, name: str, content: bytes | str, kind: str = "step_gauge") -> Job:
+    files = {"job.toml": TOML.format(kind=kind, file=name), "recording.csv": recording, name: content}
+    return job_of({name: text.encode() if isinstance(text, str) else text for name, text in files.items()})
+
+
+CERTIFICATE = (SAMPLES / "step-gauge-certificate.csv").read_text(encoding="utf-8")
+
+
+def test_distances_of_a_step_gauge_come_from_its_certificate() -> None:
+    found = job(GAUGE, "certificate.csv", CERTIFICATE)
+    assert found.points.columns["reference_mm"].tolist() == [0, 20.00013, 40.00008, 60.00031] * 2
+    assert "certificate.csv" in found.inputs
+    assert found.imported[0].data["columns"] == {"point": "Face", "reference_mm": "Certified length (mm)"}
+
+
+def test_places_of_a_plate_come_from_a_digital_certificate() -> None:
+    found = job(PLATE, "plate.xml", Path(SAMPLES / "plate-certificate.xml").read_bytes(), "plate")
+    assert found.points.columns["reference_x_mm"].tolist() == [0, 83.00012, 0.00021, 83.00043] * 2
+    assert found.points.columns["reference_y_mm"].tolist() == [0, 0, 83.00034, 83.00051] * 2
+
+
+def test_a_derived_recording_has_the_certified_values_in_it() -> None:
+    found = job(GAUGE, "certificate.csv", CERTIFICATE)
+    derived = simulated_job(found, {"seed": 1, "noise": {"coordinate_um": 1.0}})
+    assert derived.points.columns["reference_mm"].tolist() == [0, 20.00013, 40.00008, 60.00031] * 2
+    assert "certificate.csv" not in derived.inputs
+    assert derived.facts.recording.file == "recording.csv"
+    assert derived.facts.artefact.certificate is not None
+    assert (derived.facts.artefact.certificate.number, derived.facts.artefact.certificate.file) == ("7", None)
+
+
+@pytest.mark.parametrize(
+    ("recording", "certificate", "kind", "message"),
+    [
+        (GAUGE, CERTIFICATE.replace("4,60", "5,60"), "step_gauge",
+         r"recording\.csv line 5: point 4 is not among the certified values"),
+        (GAUGE, CERTIFICATE.replace("4,60", "3,60"), "step_gauge", r"certificate\.csv line 5: point 3 is there twice"),
+        (GAUGE, CERTIFICATE.replace("Face,", "Wert,"), "step_gauge", "does not number its values"),
+        (GAUGE, CERTIFICATE.replace(" (mm)", ""), "step_gauge", 'may be in mm or in inch. Say unit = "mm"'),
+        (GAUGE.replace("z_mm\n", "z_mm,reference_mm\n").replace(",0\n", ",0,0\n"), CERTIFICATE, "step_gauge",
+         "has reference_mm, and so has certificate.csv. Leave one of them out"),
+        (GAUGE, CERTIFICATE, "ballbar", "a recording of kind 'ballbar' has no certified values of single points"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused(recording: str, certificate: str, kind: str, message: str) -> None:
+    with pytest.raises(CmmUqError, match=message):
+        job(recording, "certificate.csv", certificate, kind)
