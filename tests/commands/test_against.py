@@ -102,7 +102,7 @@ def test_an_effect_of_the_wrong_sign_is_found_twice_as_large_and_said_to_be_cont
     found = cmm_uq.diagnose(job(RECORDED, wrong, effects=["squareness_xy"]))
     row = found.effects.loc["squareness_xy.angle_arcsec"]
     assert row["lower"] < 50.0 < row["upper"]
-    assert any("The simulation contains it" in " ".join(line) for line in found.outcome.summary)
+    assert any("The simulation contains it" in str(line) for line in found.outcome.summary.remarks)
 
 
 def test_nothing_is_asserted_within_the_uncertainty_of_the_prediction() -> None:
