@@ -25,8 +25,8 @@ CONTENTS: dict[str, list[str]] = {
     ],
     "Reference": [
         "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
-        "reference/commands", "reference/results", "running", "api", "reference/python",
-        "uncertainty/model-file", "machine/effects", "limits", "words",
+        "reference/commands", "reference/results", "running", "api", "reference/python", "uncertainty/model-file",
+        "machine/effects", "limits", "words",
     ],
     "How it works": [
         "certificate", "standards", "noise", "screening", "diagnosis", "planning", "selfcalibration", "artefacts/index",

@@ -48,7 +48,7 @@ for module, short in {
     selftest: "Published reference figures, computed here and compared.",
 }.items():
     name = "import" if module is importing else module.__name__.rpartition(".")[2]
-    app.command(name, short_help=short, epilog=getattr(module, "EXAMPLES", None))(module.command)
+    app.command(name, short_help=short, epilog=module.EXAMPLES)(module.command)
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
 and the calibration certificates that state it.

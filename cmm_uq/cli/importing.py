@@ -11,7 +11,7 @@ import typer
 
 from cmm_uq.cli import printing
 from cmm_uq.cli.deferred import defer_scipy
-from cmm_uq.cli.options import Quiet
+from cmm_uq.cli.options import Quiet, examples
 from cmm_uq.cli.printing import put, say
 from cmm_uq.errors import CmmUqError
 
@@ -20,20 +20,43 @@ if TYPE_CHECKING:
     from cmm_uq.jobs.importing.recognised import Recognised
     from cmm_uq.jobs.job import Job
 
+EXAMPLES = examples(
+    "import export.xlsx", "import export.csv --key unit=inch --out recording.csv",
+    "new ballbar my-job --from export.xlsx --machine 'CMM 3'",
+)  # fmt: skip
+
 Columns = Annotated[
     list[str] | None,
-    typer.Option("--column", help='Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3.'),
+    typer.Option(
+        "--column",
+        help='Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3.',
+        metavar="NAME=COLUMN",
+        show_default="as recognised",
+    ),
 ]
 Keys = Annotated[
-    list[str] | None, typer.Option("--key", help='Any other key of an import: unit=inch, sheet="Run 2", decimal=",".')
+    list[str] | None,
+    typer.Option(
+        "--key",
+        help='Any other key of an import: unit=inch, sheet="Run 2", decimal=",".',
+        metavar="KEY=VALUE",
+        show_default="as recognised",
+    ),
 ]
 
 
 def command(
-    file: Annotated[Path, typer.Argument(help="Export: CSV, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++.")],
+    file: Annotated[
+        Path, typer.Argument(help="Export: CSV, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++.", metavar="FILE")
+    ],
     column: Columns = None,
     key: Keys = None,
-    out: Annotated[Path | None, typer.Option(help="Write it as a recording, such as recording.csv.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write it as a recording, such as recording.csv.", metavar="FILE", show_default="not written"
+        ),
+    ] = None,
     quiet: Quiet = False,
     json: Annotated[bool, typer.Option("--json", help="Print what is recognised as JSON.")] = False,
 ) -> None:

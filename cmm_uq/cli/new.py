@@ -54,7 +54,12 @@ def command(
     ] = None,
     export: Annotated[
         Path | None,
-        typer.Option("--from", help="Begin from a laboratory's export; needs --machine. See cmm-uq import."),
+        typer.Option(
+            "--from",
+            help="Begin from a laboratory's export; needs --machine. See cmm-uq import.",
+            metavar="FILE",
+            show_default="simulated readings",
+        ),
     ] = None,
     column: Columns = None,
     key: Keys = None,

@@ -16,8 +16,9 @@ SAMPLE = ROOT / "docs" / "import" / "samples" / "ballbar-de.csv"
 def test_import_shows_what_is_recognised_and_writes_the_own_format(tmp_path: Path) -> None:
     shown = run("import", SAMPLE, "--out", tmp_path / "recording.csv")
     assert shown.returncode == 0
-    assert "Decimal sign: comma" in shown.stdout
-    assert "Column x_mm: X-Istwert [mm]" in shown.stdout
+    rows = [line.split(maxsplit=2) for line in shown.stdout.splitlines()]
+    assert ["Decimal", "sign", "comma"] in rows
+    assert ["Column", "x_mm", "X-Istwert [mm]"] in rows
     assert (tmp_path / "recording.csv").read_text().splitlines()[:2] == [
         "measurement,point,x_mm,y_mm,z_mm",
         "1,1,100.0213,250.0044,-120.0018",
