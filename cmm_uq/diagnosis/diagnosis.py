@@ -212,13 +212,14 @@ def _noise(found: Found, joint: Joint, stated: float | None) -> NoiseFound:
     sizes, weight = joint.posterior.sizes, found.last.noise_posterior().sum(axis=1)
     estimate = found.model.estimate()
     residuals = joint.components.white(sizes.typical)(estimate.least_squares.residuals[:, None])[:, 0]
+    likeliest = int(weight.argmax())  # quick noise is no other noise than a reading's for who states that
+    squares = found.last.squares[likeliest] * found.last.kinds[likeliest].scatter ** 2
     return NoiseFound(
         Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
         Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
         float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
         named(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or _heavy(residuals),
-        stated is not None
-        and _contradicts(stated, found.last.squares[int(weight.argmax())], found.last.degrees_of_freedom),
+        stated is not None and _contradicts(stated, squares, found.last.degrees_of_freedom),
     )  # fmt: skip
 
 

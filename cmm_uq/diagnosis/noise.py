@@ -39,6 +39,7 @@ class Kind:
     slow : (m, c) columns with standard normal coefficients that it has besides.
     log_factor : logarithm by which its density exceeds that of a normal distribution with this covariance.
     unrounded : the same without the display's steps, where there are any.
+    scatter : standard deviation of neighbouring readings about each other, over √2, over that of a reading alone.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Kind:
     slow: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     log_factor: float = 0.0
     unrounded: Kind | None = None
+    scatter: float = 1.0
 
     def white(self, columns: Floats) -> Floats:
         """W times columns (m, b)."""

@@ -70,7 +70,10 @@ def kinds(
     kept, weight = _representative(components.sizes(shapes.latent), shapes.weight, np.mean(shares, axis=0))
     scale = linear.noise_scale
     found = [
-        shape_of(components, components.sizes(shapes.latent[[i]]), scale, (1 - TAILS) * w)
+        replace(
+            shape_of(components, components.sizes(shapes.latent[[i]]), scale, (1 - TAILS) * w),
+            scatter=float(np.exp(shapes.latent[i, 0])),
+        )
         for i, w in zip(kept, weight, strict=True)
     ]
     return [*found, tails(residuals / scale)]
