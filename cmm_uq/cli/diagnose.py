@@ -12,7 +12,9 @@ from cmm_uq.cli.options import Force, Job, Json, Quiet, Seed, Strict, Verbose, e
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
 
-EXAMPLES = examples("diagnose examples/iota-1102-20C", "diagnose JOB --alpha 0.05", "diagnose JOB --strict --quiet")
+EXAMPLES = examples(
+    "diagnose examples/iota-1102-20C", "diagnose JOB --against predicted.csv", "diagnose JOB --strict --quiet"
+)
 
 
 def command(
@@ -25,7 +27,9 @@ def command(
     against: Annotated[
         Path | None,
         typer.Option(
-            help="Coordinates or lengths that a simulation predicts, in place of the job's model.", metavar="FILE"
+            help="Coordinates or lengths that a simulation predicts, or an error map.",
+            metavar="FILE",
+            show_default="the job's model",
         ),
     ] = None,
     force: Force = False,
