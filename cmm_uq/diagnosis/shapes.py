@@ -136,7 +136,7 @@ class _Density:
 
     def share(self, shapes: Shapes) -> Floats:
         """(n,) probability of each shape, in place of all."""
-        log = self.log_probability(shapes.latent) + np.log(shapes.weight)
+        log = self.log_probability(shapes.latent) + np.log(len(shapes.weight) * shapes.weight)
         return np.asarray(np.exp(log - special.logsumexp(log)))
 
     def __call__(self, numbers: Floats) -> Floats:
