@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from cmm_uq.points import Floats, Ints
 
@@ -41,14 +39,15 @@ class SlowFirst:
     @cached_property
     def groups(self) -> tuple[tuple[Ints, Ints], ...]:
         """Columns and rows of cosines that share an observation, directly or through others."""
-        m, c = self.cosines.shape
-        shared = sparse.coo_array(np.abs(self.cosines) > _NOTHING * np.abs(self.cosines).max(initial=0.0))
-        size = (m + c, m + c)
-        graph = sparse.coo_array((np.ones(shared.nnz), (shared.row, shared.col + m)), shape=size)
-        _, label = csgraph.connected_components(graph, directed=False)
-        return tuple(
-            (np.flatnonzero(label[m:] == part), np.flatnonzero(label[:m] == part)) for part in np.unique(label[m:])
-        )
+        seen = np.abs(self.cosines) > _NOTHING * np.abs(self.cosines).max(initial=0.0)
+        reached = seen.T.astype(np.float64) @ seen > 0
+        while np.any(further := (reached.astype(np.float64) @ reached > 0) & ~reached):
+            reached |= further
+        found = []
+        for first in np.unique(reached.argmax(axis=1)):
+            columns = np.flatnonzero(reached[first])
+            found.append((columns, np.flatnonzero(seen[:, columns].any(axis=1))))
+        return tuple(found)
 
     @cached_property
     def _others(self) -> Floats:
