@@ -51,7 +51,7 @@ def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS, d
     ------
     CmmUqError : it is no text, or goes beyond the limits of a table.
     """
-    reader = csv.reader(_lines(text_of(content, where, fix), where), delimiter=delimiter, skipinitialspace=True)
+    reader = csv.reader(lines_within(text_of(content, where, fix), where), delimiter=delimiter, skipinitialspace=True)
     found: list[list[str]] = []
     lines: list[int] = []
     count = 0
@@ -104,12 +104,18 @@ def _check_row(cells: list[str], count: int, rows: int, most_rows: Limit, file: 
                      fix="Shorten it; if it swallowed other rows, a quotation mark is not closed")  # fmt: skip
 
 
-def _lines(text: str, where: str) -> Iterator[str]:
+def lines_within(text: str, where: str) -> Iterator[str]:
+    """Lines of a table, none longer and no more of them than are read.
+
+    Raises
+    ------
+    CmmUqError : one is, or there are.
+    """
     for number, line in enumerate(io.StringIO(text, newline=""), 1):
         if len(line) > LINE.most or number > LINES.most:
             raise CmmUqError(
                 f"the line has {len(line)} characters, {LINE.most} are the most" if number <= LINES.most
                 else f"has more than {LINES.most} lines",
-                where=f"{where} line {number}", fix="Check that it is a CSV with one row a line",
+                where=f"{where} line {number}", fix="Check that it is a table with one row a line",
             )  # fmt: skip
         yield line

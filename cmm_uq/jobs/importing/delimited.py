@@ -6,12 +6,12 @@ The delimiter is the one by which a line names the columns of a recording: a hea
 from __future__ import annotations
 
 import csv
-import io
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import islice
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.files.cells import lines_within
 from cmm_uq.files.limits import CELL, COLUMNS, LINE, LINES, ROWS
 from cmm_uq.jobs.importing.encodings import decoded, head_text
 from cmm_uq.jobs.importing.format import Format
@@ -80,7 +80,7 @@ def _rows(text: str, delimiter: str, where: str, most: int | None = None) -> tup
     lines: list[int] = []
     if '"' not in text and delimiter not in _BLANKS:
         return _split(text, delimiter, where, most)
-    taken = _lines(text, where)
+    taken = lines_within(text, where)
     if delimiter in _BLANKS:
         split = _BLANKS[delimiter].split
         cut: Iterable[tuple[int, list[str]]] = ((i, split(line.strip())) for i, line in enumerate(taken, 1))
@@ -100,7 +100,7 @@ def _split(text: str, delimiter: str, where: str, most: int | None) -> tuple[lis
     """The same of a text without quotation marks, as fast as it can be."""
     every = text.splitlines() if most is None else text[: most * 200].splitlines()[:most]
     if len(every) > LINES.most or (every and len(max(every, key=len)) > LINE.most):
-        list(_lines(text, where))
+        list(lines_within(text, where))
     rows = [line.split(delimiter) for line in every]
     short = every and len(max(every, key=len)) <= CELL.most and len(every) <= ROWS.most
     if short and not _loose("\n".join(every), delimiter) and max(set(map(len, rows))) <= COLUMNS.most:
@@ -140,14 +140,3 @@ def _kept(
             f"has {len(rows)} rows, {ROWS.most} are the most", where=where, fix="Split or thin out the table"
         )
     return rows, lines
-
-
-def _lines(text: str, where: str) -> Iterator[str]:
-    for number, line in enumerate(io.StringIO(text, newline=""), 1):
-        if len(line) > LINE.most or number > LINES.most:
-            raise CmmUqError(
-                f"the line has {len(line)} characters, {LINE.most} are the most" if number <= LINES.most
-                else f"has more than {LINES.most} lines",
-                where=f"{where} line {number}", fix="Check that it is a table with one row a line",
-            )  # fmt: skip
-        yield line
