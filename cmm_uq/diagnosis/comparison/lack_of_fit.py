@@ -23,6 +23,8 @@ DRAWS = 200
 _TAIL = 0.8
 _STEEPEST = 1.0
 """Mean excess of log odds whose tail is that of Markov's inequality."""
+_CROWDED = 0.25
+"""Mean excess below which draws lie at the floor: tails of tests with a few candidates have one half or more."""
 
 
 def log_prior(candidates: Sequence[Explanation]) -> Floats:
@@ -73,13 +75,16 @@ def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
 def tail_probability(draws: Floats, value: float) -> float:
     """Probability of reaching a value of log odds, from draws; beyond their upper fifth with an exponential tail.
 
-    Log odds have a floor, near which draws may crowd. Beyond the largest draw the tail is no steeper than Markov's inequality
-    has it: the odds of what is not there have a mean of one, and so reach e^x in no more than e^−x of all cases.
+    Log odds have a floor. Where draws crowd at it they show no tail, and beyond the largest draw they show none in any case:
+    there it is no steeper than Markov's inequality has it. The odds of what is not there have a mean of one, and so
+    reach e^x in no more than e^−x of all cases.
     """
     start, largest = float(np.quantile(draws, _TAIL)), float(draws.max())
     if value <= start:
         return float((np.sum(draws >= value) + 1) / (len(draws) + 1))
     excess = float((draws[draws > start] - start).mean())
+    if excess < _CROWDED:
+        return float((1 - _TAIL) * np.exp(-(value - start)))
     shown = (1 - _TAIL) * np.exp(-(min(value, largest) - start) / excess)
     if value <= largest:
         return float(shown)

@@ -168,13 +168,18 @@ def test_the_tail_of_a_known_distribution_is_extrapolated() -> None:
 
 
 def test_beyond_the_largest_draw_the_tail_is_no_steeper_than_markov_s_inequality_has_it() -> None:
-    """Draws that crowd at the floor of the log odds: a factor of e for each unit, not for each of their own."""
-    draws = -1.6 + 0.01 * np.random.default_rng(4).exponential(size=200)
+    draws = 0.5 * np.random.default_rng(4).exponential(size=200)
     last = tail_probability(draws, float(draws.max()))
-    assert 1e-3 < last < 2e-2
+    assert last < 2e-2
     assert tail_probability(draws, float(draws.max()) + 3.0) == pytest.approx(last * np.exp(-3.0), rel=1e-9)
     wide = np.random.default_rng(4).exponential(2.0, size=20_000)
     assert tail_probability(wide, 60.0) == pytest.approx(np.exp(-30.0), rel=1.0)
+
+
+def test_draws_that_crowd_at_the_floor_of_the_log_odds_show_no_tail() -> None:
+    draws = -1.6 + 0.01 * np.random.default_rng(4).exponential(size=200)
+    start = float(np.quantile(draws, 0.8))
+    assert tail_probability(draws, start + 3.0) == pytest.approx(0.2 * np.exp(-3.0), rel=1e-9)
 
 
 def test_nothing_is_rounded_as_the_recording_was() -> None:
