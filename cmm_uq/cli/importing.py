@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = examples(
     "import export.xlsx", "import export.csv --key unit=inch --out recording.csv",
-    "new ballbar my-job --from export.xlsx --machine 'CMM 3'",
+    "new ballbar my-job --from export.xlsx --machine 'CMM 3' --set job.date=2026-05-31",
 )  # fmt: skip
 
 Columns = Annotated[

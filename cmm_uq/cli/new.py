@@ -56,7 +56,7 @@ def command(
         Path | None,
         typer.Option(
             "--from",
-            help="Begin from a laboratory's export; needs --machine. See cmm-uq import.",
+            help="Begin from a laboratory's export; needs --machine and --set job.date=… See cmm-uq import.",
             metavar="FILE",
             show_default="simulated readings",
         ),

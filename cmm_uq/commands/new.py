@@ -121,6 +121,9 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
     CmmUqError : the readers of a job refuse it, or a key that the kind needs is not given.
     """
     found, begin = _begun(kind)
+    if "date" not in given.get("job", {}):
+        raise CmmUqError("an export does not say when it was measured", where="[job] date",
+                         fix="Give the date of measurement: --set job.date=2026-05-31")  # fmt: skip
     bare = replace(begin, artefact={}, conformity=None)
     whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": dict(given.get("machine", {}))}
     return job_files(found.name, whole, files, begin=begin)

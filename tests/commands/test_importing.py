@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import datetime as dt
 import shutil
 import tomllib
 from pathlib import Path
@@ -22,6 +23,7 @@ from cmm_uq.points import Machine
 from tests.conftest import ROOT
 from tests.jobs.importing.exports import EXPORTS, NUMBERS, XYZ
 
+DATED = {"date": dt.date(2026, 5, 31)}
 SAMPLE = ROOT / "docs" / "import" / "samples" / "ballbar-de.csv"
 HEADINGS = {"measurement": "Messung", "point": "Kugel", "x_mm": "X [mm]", "y_mm": "Y [mm]", "z_mm": "Z [mm]"}
 
@@ -119,12 +121,13 @@ def test_digits_of_a_double_survive() -> None:
 
 
 def test_a_new_job_of_an_export_makes_nothing_up(tmp_path: Path) -> None:
-    given = {"machine": {"name": "My CMM"}, "artefact": {"U_um": 1.0, "k": 2.0, "length_mm": 400.002}}
+    given = {"job": DATED, "machine": {"name": "My CMM"}, "artefact": {"U_um": 1.0, "k": 2.0, "length_mm": 400.002}}
     files = write_job_of_export("ballbar", SAMPLE, tmp_path / "job", given, ImportKeys())
     assert {"job.toml", "ballbar-de.csv"} <= set(files)
     job = read_job(tmp_path / "job")
     assert job.origin == "measured"
     assert job.facts.machine.name == "My CMM"
+    assert job.facts.job.date == DATED["date"]
     assert job.facts.machine.travel_mm.x is None
     assert job.facts.artefact.u_um == 0.5
     assert job.facts.conformity == []
@@ -136,14 +139,18 @@ def test_a_new_job_of_an_export_needs_the_name_of_the_machine_and_whatever_its_k
     with pytest.raises(CmmUqError, match="the machine that was measured has no name"):
         write_job_of_export("ballbar", SAMPLE, tmp_path / "job", {}, ImportKeys())
     with pytest.raises(CmmUqError, match=r"\[artefact\] blocks_mm: is missing"):
-        write_job_of_export("triangle", SAMPLE, tmp_path / "job", {"machine": {"name": "A"}}, ImportKeys())
+        write_job_of_export(
+            "triangle", SAMPLE, tmp_path / "job", {"job": DATED, "machine": {"name": "A"}}, ImportKeys()
+        )
+    with pytest.raises(CmmUqError, match=r"does not say when it was measured.*--set job\.date="):
+        write_job_of_export("ballbar", SAMPLE, tmp_path / "job", {"machine": {"name": "A"}}, ImportKeys())
     assert not (tmp_path / "job").exists()
 
 
 def test_a_copy_of_an_export_keeps_the_keys_that_settled_it(tmp_path: Path) -> None:
     export = shutil.copy(SAMPLE, tmp_path / "e.csv")
     keys = ImportKeys(decimal=",", columns={"x_mm": "X-Istwert [mm]"})
-    write_job_of_export("ballbar", Path(export), tmp_path / "job", {"machine": {"name": "A"}}, keys)
+    write_job_of_export("ballbar", Path(export), tmp_path / "job", {"job": DATED, "machine": {"name": "A"}}, keys)
     recording = read_job(tmp_path / "job").facts.recording
     assert recording.decimal == ","
     assert recording.columns == {"x_mm": "X-Istwert [mm]"}

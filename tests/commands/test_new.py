@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 import re
 import tomllib
@@ -208,12 +209,16 @@ def test_rows_that_were_measured_make_a_measured_job() -> None:
     rows = [",".join([*map(str, key), *(f"{v:.4f}" for v in xyz)]) for key, xyz in
             zip(zip(points.measurement, points.point, strict=True), points.xyz, strict=True)]  # fmt: skip
     files = {RECORDING: "\n".join([",".join(REQUIRED), *rows]).encode()}
-    job = read(job_of_export("ballbar", {"machine": {"name": "Bridge 7"}}, files, id="mine"))
+    job = read(
+        job_of_export(
+            "ballbar", {"job": {"date": dt.date(2026, 5, 31)}, "machine": {"name": "Bridge 7"}}, files, id="mine"
+        )
+    )
     assert job.origin == "measured"
     np.testing.assert_allclose(job.points.xyz, points.xyz, atol=1e-4)
     assert (job.facts.artefact.length_mm, job.facts.artefact.u_um, job.facts.conformity) == (None, None, [])
     with pytest.raises(CmmUqError, match=r"\[machine\].*is missing|machine"):
-        job_of_export("ballbar", {}, files, id="mine")
+        job_of_export("ballbar", {"job": {"date": dt.date(2026, 5, 31)}}, files, id="mine")
 
 
 def test_a_kind_of_another_package_that_says_nothing_of_a_beginning_has_one(
