@@ -131,6 +131,7 @@ def test_it_becomes_a_measured_job_when_every_mark_is_taken_away_and_not_before(
     assert told == {
         "name",
         "travel_mm",
+        "date",
         "length_mm",
         "u_um",
         "standard",
