@@ -57,17 +57,17 @@ def test_twins_are_detected_and_never_named() -> None:
 
 
 def test_the_gate_opens_as_often_as_predicted() -> None:
-    """Ten simulated recordings: the count lies within the central 99.9 % of the predicted binomial."""
+    """Six simulated recordings: the count lies within the central 99.9 % of the predicted binomial."""
     power = predicted()["rotation_y_y"]
     assert power.detectable is not None
     acting = MeasurementModel(artefact_of(GAUGE, POINTS), effects(("rotation_y_y",)))
     random = np.random.default_rng(12)
     alarms = 0
-    for _ in range(10):
+    for _ in range(6):
         sizes = np.array([size.nominal + size.sd * random.standard_normal() for size in acting.artefact.sizes])
         xyz = acting.simulate(np.array([power.detectable]), sizes, Noise(SETTING.sigma), random)
         alarms += model_comparison(SETTING.model(POINTS.at(xyz)), SETTING.sigma, 0).p_value < ALPHA
-    low, high = stats.binom.interval(0.999, 10, power.detected(power.detectable))
+    low, high = stats.binom.interval(0.999, 6, power.detected(power.detectable))
     assert low <= alarms <= high
 
 

@@ -84,7 +84,7 @@ def tail_probability(draws: Floats, value: float) -> float:
         return float((np.sum(draws >= value) + 1) / (len(draws) + 1))
     excess = float((draws[draws > start] - start).mean())
     if excess < _CROWDED:
-        return float((1 - _TAIL) * np.exp(-(value - start)))
+        return float(max((1 - _TAIL) * np.exp(-(value - start)), np.mean(draws >= value)))
     shown = (1 - _TAIL) * np.exp(-(min(value, largest) - start) / excess)
     if value <= largest:
         return float(shown)

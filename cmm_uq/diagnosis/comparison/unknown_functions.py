@@ -30,6 +30,9 @@ _MANY_DIRECTIONS, _SEEN = 12, 1e-6
 _PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")
 """Beginnings of columns that belong to a point's place, or have functions of their own."""
 
+_SAME_PLACE = 0.1
+"""mm: no jump is sought between readings nearer than this, which are one place read again; what parts these is their noise."""
+
 _SUDDEN = ("time_s", "row")
 """Covariates of an observation at which an error may jump."""
 
@@ -63,7 +66,7 @@ def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Ite
     for axis, readings in points.readings.items():
         if np.ptp(readings) < 1.0:
             continue
-        functions = list(_functions(readings))
+        functions = list(_functions(readings, _SAME_PLACE))
         for j, direction in enumerate(AXES):
             members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
             name = say(
@@ -174,14 +177,18 @@ def mean_of(model: MeasurementModel, values: Floats) -> Floats:
     return np.asarray(values[model.artefact.rows].mean(axis=1)[model.used], dtype=np.float64)
 
 
-def _functions(covariate: Floats) -> Iterator[tuple[Floats, float]]:
-    """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps."""
+def _functions(covariate: Floats, same: float = 0.0) -> Iterator[tuple[Floats, float]]:
+    """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps.
+
+    ``same`` is the largest gap between values that are taken for one.
+    """
     for function in smooth_functions(covariate):
         yield function, 1.0
     distinct = np.unique(covariate)
     gaps = np.diff(distinct)
-    parts = np.array_split(np.arange(len(gaps)), min(len(gaps), _MOST_STEPS))
-    widest = np.array([part[np.argmax(gaps[part])] for part in parts])
+    apart = np.flatnonzero(gaps > same)
+    parts = np.array_split(apart, min(len(apart), _MOST_STEPS)) if len(apart) else []
+    widest = np.array([part[np.argmax(gaps[part])] for part in parts], dtype=np.int64)
     chosen = distinct[widest] + 0.5 * gaps[widest]
     for place in chosen:
         yield UNKNOWN_SD * np.where(covariate > place, 1.0, -1.0)[:, None], 1 / len(chosen)
