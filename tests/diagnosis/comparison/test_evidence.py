@@ -180,6 +180,7 @@ def test_draws_that_crowd_at_the_floor_of_the_log_odds_show_no_tail() -> None:
     draws = -1.6 + 0.01 * np.random.default_rng(4).exponential(size=200)
     start = float(np.quantile(draws, 0.8))
     assert tail_probability(draws, start + 3.0) == pytest.approx(0.2 * np.exp(-3.0), rel=1e-9)
+    assert tail_probability(np.append(draws[1:], 7.0), 7.0) == pytest.approx(1 / 200)
 
 
 def test_nothing_is_rounded_as_the_recording_was() -> None:

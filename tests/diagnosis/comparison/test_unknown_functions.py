@@ -62,3 +62,15 @@ def test_a_scale_may_depend_on_a_column_about_the_middle_of_the_volume() -> None
     u = (load - load.mean()) / np.ptp(load)
     what = model.seen(((1 + u - u**2)[:, None] * (points.carriages - middle))[:, :, None], values)[:, 0]
     assert reached(found["scale of all axes as a function of load_kg"], what) > 0.999
+
+
+def test_no_jump_parts_readings_of_one_place() -> None:
+    """Repeats of a grid differ by their noise, and where a point is placed follows its residual: between them nothing jumps."""
+    model, _ = screened_model(read_job(EXAMPLES / "plane-simulated"))
+    values = model.estimate().least_squares.value
+    along_y = model.artefact.points.at(model.where(values)).readings["y"]
+    found = {e.name: e for e in unknown(model, values)}["error along Z as a function of Y"]
+    jumps = [member.values[:, 0] for member in found.members if len(np.unique(member.values)) == 2]
+    assert len(jumps) == len(np.unique(np.round(along_y))) - 1
+    for high in (jump > 0 for jump in jumps):
+        assert along_y[high].min() - along_y[~high].max() > 1.0
