@@ -19,7 +19,7 @@ from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.model.noise import noise_of
 from tests.conftest import ROOT
 
-RECORDINGS = 300
+RECORDINGS = 120
 CHANCE = 1e-4 / (2 * 4 * 3)
 """Of one bound, of two for each of four coverages in three cases: together they fail once in ten thousand by chance."""
 
