@@ -9,7 +9,8 @@ from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import VERDICTS as AGAINST
 from cmm_uq.documents.against import contained
-from cmm_uq.documents.in_short import Standing, Summary, Verdict
+from cmm_uq.documents.document import Standing
+from cmm_uq.documents.in_short import Summary, Verdict
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.wording import expanded, probability
 from cmm_uq.jobs.job import JobFile
