@@ -12,6 +12,7 @@ _WHAT = {
     "certificate.html": "the certificate",
     "certificate.pdf": "the certificate",
     "diagnosis.html": "the diagnosis, with its plots",
+    "diagnosis.pdf": "the diagnosis, with its plots",
     "plan.html": "the plan, with a picture of each placing",
     "plan.csv": "the placings, to be filled in as the recording",
     "budget.html": "the budget",

@@ -39,7 +39,7 @@ class Improvement:
     heldout_rms_after_um: float
     elpd_gain: float
     elpd_gain_se: float
-    unseen: Text = say("placings")
+    unseen: Text = say("set-ups")
 
 
 def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvement:
@@ -104,7 +104,7 @@ def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], Text]:
     artefact, used = model.artefact, model.used
     placing = artefact.measurement[used]
     if len(np.unique(placing)) >= FOLDS:
-        return (placing, say("placings"))
+        return (placing, say("set-ups"))
     key = np.column_stack([placing, artefact.points.point[artefact.rows[:, 0]][used]])
     return (np.unique(key, axis=0, return_inverse=True)[1].ravel(), say("points"))
 

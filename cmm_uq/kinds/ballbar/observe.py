@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.messages import say
+from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Indications, Size
 from cmm_uq.model.recorded import check_length, expansion
 from cmm_uq.points import Floats, Ints, Points
@@ -61,6 +61,11 @@ class Ballbar(Artefact):
                     say("length"),
                 ),
             )
+
+    @property
+    def set_up(self) -> Text:
+        """See :attr:`Artefact.set_up`."""
+        return say("Position of the bar")
 
     def lengths(self) -> Floats:
         """Indicated lengths brought to 20 °C with the bar's stated expansion, (m,) mm."""

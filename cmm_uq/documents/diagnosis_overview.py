@@ -1,0 +1,132 @@
+"""A diagnosis in four lines: what was found, where, how sure that is, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
+from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.against import contained
+from cmm_uq.documents.document import Overview, Standing
+from cmm_uq.documents.effect_words import effect_of, size_of, titles
+from cmm_uq.documents.result import Diagnosed
+from cmm_uq.documents.where_section import place_words
+from cmm_uq.documents.wording import probability
+from cmm_uq.messages import Text, after, alternatives, lines, say, semicolons, sentences
+from cmm_uq.screening.finding import Finding
+
+STANDING: Mapping[str, Standing] = {
+    "consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad",
+}  # fmt: skip
+"""What a verdict means for who is to act."""
+
+VERDICT_TITLES: Mapping[str, Text] = {
+    "consistent": say("Consistent: nothing is missing"),
+    "explained": say("Explained: the cause is found"),
+    "partial": say("Partly explained: a cause is found, and there is more"),
+    "unexplained": say("Unexplained: something is wrong that no known effect accounts for"),
+}
+"""A verdict as the title of its overview."""
+
+_FEWEST = 10_000
+
+
+def overview_of(found: Diagnosed) -> Overview:
+    """The overview of a recording's diagnosis."""
+    d = found.diagnosis
+    rows = (
+        (say("Found"), _found(found)), (say("Where"), _where(d)), (say("How sure"), _sure(d)),
+        (say("What to do"), _to_do(found)),
+    )  # fmt: skip
+    return Overview(VERDICT_TITLES[d.verdict], STANDING[d.verdict], tuple(row for row in rows if row[1]))
+
+
+def _found(found: Diagnosed) -> Text:
+    d = found.diagnosis
+    if d.verdict == "consistent":
+        if found.simulated is None:
+            return say("Nothing beyond the effects that the job names: what they leave is noise.")
+        return say("Nothing beyond the simulation: what it leaves is noise.")
+    if not d.effects:
+        return say("A misfit that no known effect accounts for.")
+    told = [_one(found, item) for item in d.effects]
+    if d.verdict == "partial":
+        told.append(say("And more that no known effect accounts for."))
+    return lines(told)
+
+
+def _one(found: Diagnosed, item: LeftOut) -> Text:
+    d = found.diagnosis
+    effect = effect_of(item.effect, d.after.effects)
+    told = say("{title}: {size}.", title=item.title, size=size_of(effect, item.parameters, factors=False))
+    for group in d.indistinguishable:
+        if group[0] == item.effect:
+            others = alternatives(titles(group[1:], d.after.effects))
+            told = say("{told} It could as well be: {others}.", told=told, others=others)
+    return after(told, contained(found.simulated, item.effect))
+
+
+def _where(d: Diagnosis) -> Text:
+    if d.verdict == "consistent":
+        return say("No place, direction or time stands out.")
+    if not d.where:
+        return say("Spread over the recording: no reading or direction by itself stands out.")
+    return say("{places:capital}.", places=semicolons([place_words(place) for place in d.where[:2]]))
+
+
+def _sure(d: Diagnosis) -> Text:
+    if d.verdict == "consistent":
+        return say("Noise alone leaves as much as this in {share} recordings.", share=share_of(d.p_value))
+    by_chance = say("By noise alone in {share} recordings.", share=share_of(d.p_value))
+    if not d.effects:
+        return by_chance
+    probable = semicolons([
+        say("{title} {probability}", title=item.title, probability=probability(item.probability)) for item in d.effects
+    ])  # fmt: skip
+    return sentences((by_chance, say("Probability: {each}.", each=probable), gained(d.improvement)))
+
+
+def gained(gain: Improvement) -> Text:
+    """What the cause gains where the fit had not seen the recording, in a sentence."""
+    return say(
+        "{unseen:capital} that the fit had not seen are predicted to {after:.1f}\u00a0µm with it, to {before:.1f}\u00a0µm "
+        "without it.",
+        unseen=gain.unseen, before=gain.heldout_rms_before_um, after=gain.heldout_rms_after_um,
+    )  # fmt: skip
+
+
+def share_of(p_value: float) -> Text:
+    """A probability as a share of recordings: ``17 of 100``."""
+    if p_value < 1 / _FEWEST:
+        return say("fewer than 1 of {many}", many=_FEWEST)
+    if p_value < 0.05:
+        return say("1 of {many:.0f}", many=1 / p_value)
+    return say("{many:.0f} of 100", many=100 * p_value)
+
+
+def _to_do(found: Diagnosed) -> Text:
+    d = found.diagnosis
+    told: list[Text] = []
+    if found.suggestions:
+        told.append(say("First measure what is told below, to part what this recording cannot."))
+    told += _look_at(d.effects)
+    if d.verdict in ("partial", "unexplained"):
+        told.append(
+            say("Look at the pictures below and measure again: do not compensate by a model that does not fit.")
+        )
+    if d.verdict == "explained":
+        told.append(say("Then measure again."))
+    if d.verdict == "consistent":
+        told.append(_nothing_to_do(found.findings))
+    return sentences(told)
+
+
+def _look_at(effects: Sequence[LeftOut]) -> list[Text]:
+    """Each cause once."""
+    return [say("{what:capital}.", what=what) for what in dict.fromkeys(item.points_to for item in effects)]
+
+
+def _nothing_to_do(findings: Sequence[Finding]) -> Text:
+    if findings:
+        return say("Nothing on account of the machine; see the warnings on the recording.")
+    return say("Nothing on account of this recording.")

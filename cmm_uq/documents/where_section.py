@@ -1,0 +1,128 @@
+"""Where a mismatch lives, in words and in pictures: the residual field in the machine's volume, and its profile."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.diagnosis.location import Place
+from cmm_uq.diagnosis.residual_field import residual_field
+from cmm_uq.documents.document import Block, Column, Paragraph, Plot, Section, Table
+from cmm_uq.documents.profile_plot import profile_plot
+from cmm_uq.documents.residual_field import Shade, residual_field_plot
+from cmm_uq.jobs.column_words import in_words, labelled, unit_of
+from cmm_uq.messages import Text, Verbatim, after, alternatives, number, say
+from cmm_uq.points import AXES
+from cmm_uq.units import unit
+
+
+def place_words(place: Place) -> Text:
+    """A place in words: ``along Y, for X from 300 to 600 mm``."""
+    region = region_words(place.covariate, *place.region)
+    if place.along is None:
+        return region
+    axis = Verbatim(place.along.upper())
+    if place.scale:
+        return say("in the scale of {axis}, {region}", axis=axis, region=region)
+    return say("along {axis}, {region}", axis=axis, region=region)
+
+
+def region_words(covariate: str, low: float, high: float) -> Text:
+    """A region of a covariate: ``for X from 300 to 600 mm``; of one value, ``at X = 300 mm``."""
+    what, own = in_words(covariate), unit_of(covariate)
+    space = Verbatim("\u00a0" if own else "")
+    one, other = number(low, ".4g"), number(high, ".4g")
+    if one == other:
+        return say("at {what} = {value}{space}{unit}", what=what, value=one, space=space, unit=own)
+    return say(
+        "for {what} from {low} to {high}{space}{unit}", what=what, low=one, high=other, space=space, unit=own
+    )  # fmt: skip
+
+
+def where_section(d: Diagnosis) -> Section:
+    """Pictures and table of where the residuals lie; without a mismatch, nothing."""
+    if d.verdict == "consistent":
+        return Section(say("Where it is"), ())
+    blocks: list[Block] = [Paragraph(where_sentence(d))]
+    if (picture := field_picture(d)) is not None:
+        blocks.append(picture)
+    if d.where:
+        blocks.append(_profile(d.where[0]))
+        blocks.append(_table(d.where))
+    return Section(say("Where it is"), tuple(blocks))
+
+
+def where_sentence(d: Diagnosis) -> Text:
+    """The first place, and what shows the same."""
+    if not d.where:
+        return say("No reading, column or direction by itself carries the evidence: it is spread over the recording.")
+    first = d.where[0]
+    told = say("The evidence lies {place}: up to {size:.2g} µm.", place=place_words(first), size=first.amplitude_um)
+    if not first.also:
+        return told
+    return after(told, say("The same shows as well as: {others}.", others=alternatives(first.also)))
+
+
+def field_picture(d: Diagnosis) -> Plot | None:
+    """The residual field before and after what was found; before alone, where nothing was."""
+    field = residual_field(d.before, d.after)
+    if field is None:
+        return None
+    expanded = field.expanded(d.noise.coordinate)
+    beyond = [int(np.sum(np.linalg.norm(values, axis=1) > expanded)) for values in (field.before, field.after)]
+    titles: tuple[Text, Text] | tuple[Text] = (say("Before: what the model leaves"), say("After: with what was found"))
+    if not d.effects:
+        titles = (titles[0],)
+    what = say("Half of each length's residual at either end") if field.lengths else say("Residual of each point")
+    told = say(
+        "{what}, as far as it was observed, over the scale readings; arrows are longer than their U, shaded is where the "
+        "evidence lies.",
+        what=what,
+    )  # fmt: skip
+    count = say("{before} of {all} vectors are longer than their U before", before=beyond[0], all=len(expanded))
+    if d.effects:
+        count = say("{count} and {after} after", count=count, after=beyond[1])
+    return residual_field_plot(
+        field, expanded, titles=titles, shade=_shade(d.where), caption=told, alternative=say("{count}.", count=count)
+    )  # fmt: skip
+
+
+def _shade(where: tuple[Place, ...]) -> Shade | None:
+    if not where or where[0].covariate not in {f"{a}_mm" for a in AXES}:
+        return None
+    return where[0].covariate[0], *where[0].region
+
+
+def _profile(place: Place) -> Plot:
+    x, y, u = place.curve
+    sizes = {"along": Verbatim((place.along or "").upper()), "k": number(place.k, ".2f")}
+    label = say("Error along {along} / µm", along=sizes["along"]) if place.along else say("Error / µm")
+    if place.scale:
+        label = say("Scale of {along}, at the end of its range / µm", along=sizes["along"])
+    return profile_plot(
+        (x, y, place.k * u), place.data, place.region, x_label=labelled(place.covariate), y_label=label,
+        caption=say(
+            "{what:capital}, with U (k = {k}), as what the model leaves shows it; below, each observation over the range of "
+            "its points. What the model itself would absorb is no part of it.",
+            what=place.what, k=sizes["k"],
+        ),
+        alternative=say("A function of up to {size:.3g} µm {region}.", size=place.amplitude_um,
+                        region=region_words(place.covariate, *place.region)),
+    )  # fmt: skip
+
+
+def _table(where: tuple[Place, ...]) -> Table:
+    rows = tuple(
+        (place.what, say("{where:capital}", where=region_words(place.covariate, *place.region)),
+         number(place.amplitude_um, ".3g"), number(place.p_value, ".1g"))
+        for place in where
+    )  # fmt: skip
+    heads = (
+        Column(say("What it depends on"), numeric=False), Column(say("Where"), numeric=False),
+        Column(say("Up to"), unit("µm")), Column(say("p")),
+    )  # fmt: skip
+    note = say(
+        "p is corrected for having looked everywhere, and of a further place holds beside those above it. A region is where "
+        "the function exceeds half its largest value and its band does not hold zero, or between which values it jumps."
+    )
+    return Table(say("What the residuals depend on"), heads, rows, (note,))
