@@ -12,7 +12,7 @@ from cmm_uq.documents.effect_words import effect_of, size_of, titles
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.where_section import place_words
 from cmm_uq.documents.wording import probability
-from cmm_uq.messages import Text, after, alternatives, lines, say, semicolons, sentences
+from cmm_uq.messages import Text, after, alternatives, lines, say, semicolons
 from cmm_uq.screening.finding import Finding
 
 STANDING: Mapping[str, Standing] = {
@@ -21,14 +21,15 @@ STANDING: Mapping[str, Standing] = {
 """What a verdict means for who is to act."""
 
 VERDICT_TITLES: Mapping[str, Text] = {
-    "consistent": say("Consistent: nothing is missing"),
+    "consistent": say("Consistent: nothing is found to be missing"),
     "explained": say("Explained: the cause is found"),
     "partial": say("Partly explained: a cause is found, and there is more"),
     "unexplained": say("Unexplained: something is wrong that no known effect accounts for"),
 }
 """A verdict as the title of its overview."""
 
-_FEWEST = 10_000
+_RAREST = 1e-4
+"""Probability below which only this is told."""
 
 
 def overview_of(found: Diagnosed) -> Overview:
@@ -76,14 +77,14 @@ def _where(d: Diagnosis) -> Text:
 
 def _sure(d: Diagnosis) -> Text:
     if d.verdict == "consistent":
-        return say("Noise alone leaves as much as this in {share} recordings.", share=share_of(d.p_value))
-    by_chance = say("By noise alone in {share} recordings.", share=share_of(d.p_value))
+        return say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
+    by_chance = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
     if not d.effects:
         return by_chance
     probable = semicolons([
         say("{title} {probability}", title=item.title, probability=probability(item.probability)) for item in d.effects
     ])  # fmt: skip
-    return sentences((by_chance, say("Probability: {each}.", each=probable), gained(d.improvement)))
+    return lines((by_chance, say("Probability: {each}.", each=probable), gained(d.improvement)))
 
 
 def gained(gain: Improvement) -> Text:
@@ -97,8 +98,8 @@ def gained(gain: Improvement) -> Text:
 
 def share_of(p_value: float) -> Text:
     """A probability as a share of recordings: ``17 of 100``."""
-    if p_value < 1 / _FEWEST:
-        return say("fewer than 1 of {many}", many=_FEWEST)
+    if p_value < _RAREST:
+        return say("fewer than 1 of 10\u00a0000")
     if p_value < 0.05:
         return say("1 of {many:.0f}", many=1 / p_value)
     return say("{many:.0f} of 100", many=100 * p_value)
@@ -109,7 +110,7 @@ def _to_do(found: Diagnosed) -> Text:
     told: list[Text] = []
     if found.suggestions:
         told.append(say("First measure what is told below, to part what this recording cannot."))
-    told += _look_at(d.effects)
+    told += [_look_at(d, item) for item in d.effects]
     if d.verdict in ("partial", "unexplained"):
         told.append(
             say("Look at the pictures below and measure again: do not compensate by a model that does not fit.")
@@ -118,12 +119,18 @@ def _to_do(found: Diagnosed) -> Text:
         told.append(say("Then measure again."))
     if d.verdict == "consistent":
         told.append(_nothing_to_do(found.findings))
-    return sentences(told)
+    return lines(dict.fromkeys(told))
 
 
-def _look_at(effects: Sequence[LeftOut]) -> list[Text]:
-    """Each cause once."""
-    return [say("{what:capital}.", what=what) for what in dict.fromkeys(item.points_to for item in effects)]
+def _look_at(d: Diagnosis, item: LeftOut) -> Text:
+    """The cause to look at; of effects that cannot be told apart, that of each on a line."""
+    own = d.after.effects
+    others = [effect_of(name, own) for group in d.indistinguishable if group[0] == item.effect for name in group[1:]]
+    named = [effect for effect in others if effect is not None]
+    if not named:
+        return say("{what:capital}.", what=item.points_to)
+    causes = [(item.title, item.points_to), *((effect.title, effect.points_to) for effect in named)]
+    return lines(say("If it is {title}: {what}.", title=title, what=what) for title, what in causes)
 
 
 def _nothing_to_do(findings: Sequence[Finding]) -> Text:

@@ -123,6 +123,8 @@ def _simulation(found: Diagnosed) -> tuple[Section, ...]:
 
 def _left_out(found: Diagnosed) -> tuple[Block, ...]:
     d = found.diagnosis
+    if d.verdict == "consistent":
+        return ()
     blocks: list[Block] = [Paragraph(verdict_of(found))]
     blocks += [_effect(found, item) for item in d.effects]
     blocks += [Paragraph(ambiguous(titles(group, d.after.effects)), tone="warning") for group in d.indistinguishable]
@@ -167,7 +169,7 @@ def _consistent(found: Diagnosed) -> tuple[Block, ...]:
         ),
         alternative=say("Residuals of {rms:.1f} µm rms.", rms=d.improvement.rms_before_um),
     )  # fmt: skip
-    return (plot,)
+    return Paragraph(verdict_of(found)), plot
 
 
 def _before_after(found: Diagnosed) -> tuple[Block, ...]:

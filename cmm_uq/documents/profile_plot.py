@@ -37,9 +37,9 @@ def profile_plot(
     caption = told(caption, len(rows), len(low))
     low, high, residual = low[rows], high[rows], residual[rows]
     with house_style():
-        figure = new_figure(104)
+        figure = new_figure(90)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 0.8))
-        figure.subplots_adjust(left=0.105, right=0.985, bottom=0.1, top=0.945, hspace=0.2)
+        figure.subplots_adjust(left=0.105, right=0.985, bottom=0.115, top=0.94, hspace=0.22)
         for ax in (above, below):
             ax.axvspan(*_widened(region, x), color=BAND, lw=0, zorder=0)
             ax.axhline(0, color=INK, lw=0.6, zorder=1)

@@ -120,7 +120,7 @@ def _panels(planes: list[tuple[int, int]], columns: int, spans: Floats) -> tuple
     left, gap, right, label, top, base = 14.0, 12.0, 2.0, 9.0, 6.0, 11.0
     wide = max(float(spans[a]) for a, _ in planes)
     width = (WIDTH_MM - left - right - gap * (columns - 1)) / max(columns, 2)
-    scale = min(width / wide, 150.0 / sum(float(spans[b]) for _, b in planes))
+    scale = min(width / wide, 94.0 / sum(float(spans[b]) for _, b in planes))
     heights = [scale * float(spans[b]) for _, b in planes]
     height = top + base + sum(heights) + label * len(planes)
     figure = new_figure(height)

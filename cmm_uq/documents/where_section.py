@@ -11,32 +11,44 @@ from cmm_uq.documents.document import Block, Column, Paragraph, Plot, Section, T
 from cmm_uq.documents.profile_plot import profile_plot
 from cmm_uq.documents.residual_field import Shade, residual_field_plot
 from cmm_uq.jobs.column_words import in_words, labelled, unit_of
-from cmm_uq.messages import Text, Verbatim, after, alternatives, number, say
+from cmm_uq.messages import Number, Text, Verbatim, after, alternatives, number, say, signed
 from cmm_uq.points import AXES
+from cmm_uq.uncertainty.rounding import significant
 from cmm_uq.units import unit
+
+_READINGS = frozenset(f"{a}_mm" for a in AXES)
 
 
 def place_words(place: Place) -> Text:
-    """A place in words: ``along Y, for X from 300 to 600 mm``."""
-    region = region_words(place.covariate, *place.region)
+    """A place in words: ``along Y, depending on X, most for X from 300 to 600 mm``."""
+    what, region = in_words(place.covariate), region_words(place.covariate, *place.region)
     if place.along is None:
-        return region
+        return say("depending on the {what}, most {region}", what=what, region=region)
     axis = Verbatim(place.along.upper())
     if place.scale:
-        return say("in the scale of {axis}, {region}", axis=axis, region=region)
-    return say("along {axis}, {region}", axis=axis, region=region)
+        return say(
+            "in the scale of {axis}, depending on the {what}, most {region}", axis=axis, what=what, region=region
+        )
+    if place.covariate in _READINGS:
+        return say("along {axis}, depending on {what}, most {region}", axis=axis, what=what, region=region)
+    return say("along {axis}, depending on the {what}, most {region}", axis=axis, what=what, region=region)
 
 
 def region_words(covariate: str, low: float, high: float) -> Text:
     """A region of a covariate: ``for X from 300 to 600 mm``; of one value, ``at X = 300 mm``."""
     what, own = in_words(covariate), unit_of(covariate)
     space = Verbatim("\u00a0" if own else "")
-    one, other = number(low, ".4g"), number(high, ".4g")
+    one, other = _reading(low), _reading(high)
     if one == other:
         return say("at {what} = {value}{space}{unit}", what=what, value=one, space=space, unit=own)
     return say(
         "for {what} from {low} to {high}{space}{unit}", what=what, low=one, high=other, space=space, unit=own
     )  # fmt: skip
+
+
+def _reading(value: float) -> Number:
+    """To three digits, or to whole units."""
+    return signed(value, ".0f" if abs(value) >= 100 else ".3g")
 
 
 def where_section(d: Diagnosis) -> Section:
@@ -57,10 +69,11 @@ def where_sentence(d: Diagnosis) -> Text:
     if not d.where:
         return say("No reading, column or direction by itself carries the evidence: it is spread over the recording.")
     first = d.where[0]
-    told = say("The evidence lies {place}: up to {size:.2g} µm.", place=place_words(first), size=first.amplitude_um)
+    size = significant(first.amplitude_um)
+    told = say("The evidence lies {place}: up to {size} µm.", place=place_words(first), size=size)
     if not first.also:
         return told
-    return after(told, say("The same shows as well as: {others}.", others=alternatives(first.also)))
+    return after(told, say("It could as well be read as {others}.", others=alternatives(first.also)))
 
 
 def field_picture(d: Diagnosis) -> Plot | None:
@@ -88,7 +101,7 @@ def field_picture(d: Diagnosis) -> Plot | None:
 
 
 def _shade(where: tuple[Place, ...]) -> Shade | None:
-    if not where or where[0].covariate not in {f"{a}_mm" for a in AXES}:
+    if not where or where[0].covariate not in _READINGS:
         return None
     return where[0].covariate[0], *where[0].region
 
@@ -114,7 +127,7 @@ def _profile(place: Place) -> Plot:
 def _table(where: tuple[Place, ...]) -> Table:
     rows = tuple(
         (place.what, say("{where:capital}", where=region_words(place.covariate, *place.region)),
-         number(place.amplitude_um, ".3g"), number(place.p_value, ".1g"))
+         significant(place.amplitude_um), number(place.p_value, ".1g"))
         for place in where
     )  # fmt: skip
     heads = (

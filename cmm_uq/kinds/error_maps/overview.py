@@ -10,8 +10,8 @@ from cmm_uq.documents.effect_words import effect_of, size_of
 from cmm_uq.documents.wording import probability
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.kinds.error_maps.diagnosis import Difference, MapsDiagnosis
-from cmm_uq.kinds.error_maps.words import next_words
-from cmm_uq.messages import NOTHING, Text, Verbatim, lines, plural, say, semicolons, sentences
+from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
+from cmm_uq.messages import NOTHING, Text, Verbatim, lines, plural, say, semicolons
 
 VERDICT_TITLES: Mapping[str, Text] = {
     "consistent": say("Consistent: the maps agree"),
@@ -35,18 +35,27 @@ def overview_of(found: MapsDiagnosed) -> Overview:
     return Overview(VERDICT_TITLES[d.verdict], STANDING[d.verdict], tuple(row for row in rows if row[1]))
 
 
+def told(found: MapsDiagnosed) -> list[Text]:
+    """Verdict, the overview and what else follows, a sentence or two each."""
+    d = found.diagnosis
+    said: list[Text] = [VERDICTS[d.verdict]]
+    said += [say("{label}: {text}", label=label, text=text) for label, text in overview_of(found).rows]
+    said += [difference_words(difference) for difference in d.differences]
+    return [*said, *noise_words(d), *(what for _, what in next_words(d))]
+
+
 def _found(d: MapsDiagnosis) -> Text:
     if d.verdict == "consistent":
         return say("Nothing beyond noise.")
-    told: list[Text] = [
+    said: list[Text] = [
         say("{title}: {size}.", title=item.title, size=size_of(effect_of(item.effect), item.parameters, factors=False))
         for item in d.effects
     ]
-    told += [_difference(difference) for difference in d.differences[:_SHOWN]]
+    said += [_difference(difference) for difference in d.differences[:_SHOWN]]
     if (more := len(d.differences) - _SHOWN) > 0:
         many = say("{more} more differences are told below.", more=more)
-        told.append(plural(more, one=say("One more difference is told below."), many=many))
-    return lines(told)
+        said.append(plural(more, one=say("One more difference is told below."), many=many))
+    return lines(said)
 
 
 def _difference(item: Difference) -> Text:
@@ -58,8 +67,8 @@ def _difference(item: Difference) -> Text:
 
 def _where(d: MapsDiagnosis) -> Text:
     places = [
-        say("{what} from {axis} = {low:g} to {high:g}\u00a0mm", what=item.column.title, axis=Verbatim(item.column.axis.upper()),
-            low=item.region[0], high=item.region[1])
+        say("{what} from {axis} = {low:g} to {high:g}\u00a0mm", what=item.column.title,
+            axis=Verbatim(item.column.axis.upper()), low=item.region[0], high=item.region[1])
         for item in d.differences[:_SHOWN]
     ]  # fmt: skip
     return say("{places:capital}.", places=semicolons(places)) if places else NOTHING
@@ -67,23 +76,24 @@ def _where(d: MapsDiagnosis) -> Text:
 
 def _sure(d: MapsDiagnosis) -> Text:
     if d.verdict == "consistent":
-        return say("Noise alone makes maps differ as much as this in {share} sets.", share=share_of(d.p_value))
-    told: list[Text] = [say("By noise alone in {share} sets of maps.", share=share_of(d.p_value))]
-    named = [(item.title, item.probability) for item in d.effects]
-    named += [(item.rival.name, item.probability) for item in d.differences[:_SHOWN]]
-    each = semicolons(say("{what} {probability}", what=what, probability=probability(p)) for what, p in named)
-    told.append(say("Probability: {each}.", each=each))
+        return say("Noise alone looks like this in {share} sets of maps.", share=share_of(d.p_value))
+    said: list[Text] = [say("Noise alone looks like this in {share} sets of maps.", share=share_of(d.p_value))]
     if d.effects:
-        told.append(gained(d.improvement))
-    return sentences(told)
+        each = semicolons(
+            say("{what} {probability}", what=item.title, probability=probability(item.probability))
+            for item in d.effects
+        )
+        said.append(say("Probability: {each}.", each=each))
+        said.append(gained(d.improvement))
+    return lines(said)
 
 
 def _to_do(found: MapsDiagnosed) -> Text:
     d = found.diagnosis
-    told: list[Text] = [
+    said: list[Text] = [
         say("{what:capital}.", what=what) for what in dict.fromkeys(item.points_to for item in d.effects)
     ]
-    told += [what for _, what in next_words(d)[:_SHOWN]]
+    said += [what for _, what in next_words(d)[:_SHOWN]]
     if found.findings:
-        told.append(say("See the warnings on the maps."))
-    return sentences(told) if told else say("Nothing on account of these maps.")
+        said.append(say("See the warnings on the maps."))
+    return lines(said) if said else say("Nothing on account of these maps.")
