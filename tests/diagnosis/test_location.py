@@ -87,7 +87,11 @@ def compared(
     artefact = SimpleNamespace(rows=np.arange(12)[:, None], points=range(12))
     return SimpleNamespace(
         model=SimpleNamespace(artefact=artefact, used=np.ones(12, dtype=bool)),
-        p_value=p_value, explanations=terms, comparison=comparison, null_maximum=NULL, log_odds=np.array(log_odds)
+        p_value=p_value,
+        explanations=terms,
+        comparison=comparison,
+        null_maximum=NULL,
+        log_odds=np.array(log_odds),
     )
 
 
@@ -113,7 +117,9 @@ def test_the_curve_is_that_of_kriging(exact: bool, sign: float) -> None:
     assert x.tolist() == np.unique(X).tolist()
     np.testing.assert_allclose(found, 1e3 * curve, rtol=1e-8)
     np.testing.assert_allclose(u, 1e3 * np.sqrt(variance), rtol=1e-6)
-    assert place.k == pytest.approx(2.262157, abs=1e-6)  # Student's t for nine degrees of freedom, 95 % (GUM table G.2: 2.26)
+    assert place.k == pytest.approx(
+        2.262157, abs=1e-6
+    )  # Student's t for nine degrees of freedom, 95 % (GUM table G.2: 2.26)
     assured = np.abs(curve) > place.k * np.sqrt(variance)
     assert place.amplitude_um == pytest.approx(1e3 * np.abs(curve)[assured].max())
     assert place.region == region_of(x, curve, assured)
