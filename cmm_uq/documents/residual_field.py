@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 _PLANES = ((0, 1), (0, 2), (1, 2))
 _AXES = "XYZ"
+_TITLE = 56.0
+"""mm that the title of a column needs."""
+
 _LONGEST = 0.16
 """Of the drawn width, the longest vector."""
 
@@ -127,7 +130,7 @@ def _panels(planes: list[tuple[int, int]], columns: int, spans: Floats) -> tuple
     axes, y = [], height - top
     for (a, _), own in zip(planes, heights, strict=True):
         y -= own
-        step = width + gap
+        step = max(scale * wide, _TITLE) + gap
         axes.append([
             figure.add_axes(((left + column * step) / WIDTH_MM, y / height, scale * float(spans[a]) / WIDTH_MM, own / height))
             for column in range(columns)

@@ -112,7 +112,7 @@ RESULTS: Mapping[str, str] = MappingProxyType(
         "conformity[].errors[].standing": "What it counts for in the test.",
         "diagnosis.verdict": "Whether recording and model agree: consistent, explained, partial or unexplained.",
         "diagnosis.p_value": "Of the lack-of-fit test.",
-        "diagnosis.where[].KEY": "Where they do not agree: covariate and region, axis along which, and what shows the same as well.",
+        "diagnosis.where[].KEY": "Where they do not agree: covariate, region, axis along which, what shows the same as well.",
         "diagnosis.effects[].effect": "An effect that was left out.",
         "diagnosis.effects[].probability": "Its posterior probability.",
         "diagnosis.effects[].parameters.PARAMETER": "Quantity: a parameter of it.",
