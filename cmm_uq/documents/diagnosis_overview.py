@@ -10,10 +10,9 @@ from cmm_uq.documents.against import contained
 from cmm_uq.documents.document import Overview, Standing
 from cmm_uq.documents.effect_words import effect_of, size_of, titles
 from cmm_uq.documents.result import Diagnosed
-from cmm_uq.documents.where_section import place_words
+from cmm_uq.documents.where_section import by_columns, place_words
 from cmm_uq.documents.wording import probability
-from cmm_uq.jobs.column_words import in_words
-from cmm_uq.messages import NOTHING, Text, after, alternatives, commas, lines, say, semicolons
+from cmm_uq.messages import Text, after, alternatives, lines, say, semicolons
 from cmm_uq.screening.finding import Finding
 
 STANDING: Mapping[str, Standing] = {
@@ -71,18 +70,11 @@ def _one(found: Diagnosed, item: LeftOut) -> Text:
 def _where(d: Diagnosis) -> Text:
     if d.verdict == "consistent":
         return say("No place, direction or time stands out.")
-    if not d.where and (told := _by_column(d)):
+    if not d.where and (told := by_columns(d)):
         return told
     if not d.where:
         return say("Spread over the recording: no reading or direction by itself stands out.")
     return say("{places:capital}.", places=semicolons([place_words(place) for place in d.where[:2]]))
-
-
-def _by_column(d: Diagnosis) -> Text:
-    """What the effects found go by, where no function of it was looked for, such as of two directions of travel."""
-    found = (effect_of(item.effect, d.after.effects) for item in d.effects)
-    columns = dict.fromkeys(column for effect in found if effect is not None for column in effect.columns)
-    return say("It depends on the {what}.", what=commas(in_words(column) for column in columns)) if columns else NOTHING
 
 
 def _sure(d: Diagnosis) -> Text:

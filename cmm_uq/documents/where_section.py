@@ -8,10 +8,11 @@ from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.diagnosis.location import Place
 from cmm_uq.diagnosis.residual_field import residual_field
 from cmm_uq.documents.document import Block, Column, Paragraph, Plot, Section, Table
+from cmm_uq.documents.effect_words import effect_of
 from cmm_uq.documents.profile_plot import profile_plot
 from cmm_uq.documents.residual_field import Shade, residual_field_plot
 from cmm_uq.jobs.column_words import in_words, labelled, unit_of
-from cmm_uq.messages import Number, Text, Verbatim, after, alternatives, number, say, signed
+from cmm_uq.messages import NOTHING, Number, Text, Verbatim, after, alternatives, commas, number, say, signed
 from cmm_uq.points import AXES
 from cmm_uq.uncertainty.rounding import significant
 from cmm_uq.units import unit
@@ -20,30 +21,33 @@ _READINGS = frozenset(f"{a}_mm" for a in AXES)
 
 
 def place_words(place: Place) -> Text:
-    """A place in words: ``along Y, depending on X, most for X from 300 to 600 mm``."""
+    """A place in words: ``along Y, depending on X, most from 300 to 600 mm``."""
     what, region = in_words(place.covariate), region_words(place.covariate, *place.region)
+    if place.covariate not in _READINGS:
+        what = say("the {what}", what=what)
     if place.along is None:
-        return say("depending on the {what}, most {region}", what=what, region=region)
+        return say("depending on {what}, most {region}", what=what, region=region)
     axis = Verbatim(place.along.upper())
     if place.scale:
-        return say(
-            "in the scale of {axis}, depending on the {what}, most {region}", axis=axis, what=what, region=region
-        )
-    if place.covariate in _READINGS:
-        return say("along {axis}, depending on {what}, most {region}", axis=axis, what=what, region=region)
-    return say("along {axis}, depending on the {what}, most {region}", axis=axis, what=what, region=region)
+        return say("in the scale of {axis}, depending on {what}, most {region}", axis=axis, what=what, region=region)
+    return say("along {axis}, depending on {what}, most {region}", axis=axis, what=what, region=region)
 
 
 def region_words(covariate: str, low: float, high: float) -> Text:
-    """A region of a covariate: ``for X from 300 to 600 mm``; of one value, ``at X = 300 mm``."""
-    what, own = in_words(covariate), unit_of(covariate)
+    """A region of a covariate: ``from 300 to 600 mm``; of one value, ``at 300 mm``."""
+    own = unit_of(covariate)
     space = Verbatim("\u00a0" if own else "")
     one, other = _reading(low), _reading(high)
     if one == other:
-        return say("at {what} = {value}{space}{unit}", what=what, value=one, space=space, unit=own)
-    return say(
-        "for {what} from {low} to {high}{space}{unit}", what=what, low=one, high=other, space=space, unit=own
-    )  # fmt: skip
+        return say("at {value}{space}{unit}", value=one, space=space, unit=own)
+    return say("from {low} to {high}{space}{unit}", low=one, high=other, space=space, unit=own)
+
+
+def by_columns(d: Diagnosis) -> Text:
+    """What the effects found go by, where no function of it was looked for, such as of two directions of travel."""
+    found = (effect_of(item.effect, d.after.effects) for item in d.effects)
+    columns = dict.fromkeys(column for effect in found if effect is not None for column in effect.columns)
+    return say("It depends on the {what}.", what=commas(in_words(column) for column in columns)) if columns else NOTHING
 
 
 def _reading(value: float) -> Number:
@@ -66,6 +70,8 @@ def where_section(d: Diagnosis) -> Section:
 
 def where_sentence(d: Diagnosis) -> Text:
     """The first place, and what shows the same."""
+    if not d.where and (told := by_columns(d)):
+        return told
     if not d.where:
         return say("No reading, column or direction by itself carries the evidence: it is spread over the recording.")
     first = d.where[0]
@@ -119,7 +125,7 @@ def _profile(place: Place) -> Plot:
             "its points. What the model itself would absorb is no part of it.",
             what=place.what, k=sizes["k"],
         ),
-        alternative=say("A function of up to {size:.3g} µm {region}.", size=place.amplitude_um,
+        alternative=say("A function of up to {size:.3g} µm, largest {region}.", size=place.amplitude_um,
                         region=region_words(place.covariate, *place.region)),
     )  # fmt: skip
 

@@ -33,7 +33,7 @@ class PeriodicScale(Harmonic):
         """See :meth:`Effect.meaning`."""
         amplitude, period = (amounts[parameter.name].size for parameter in (self.amplitude, self.shape[0]))
         return say(
-            "the error of {axis} swings by ± ({amplitude}) and repeats every {period}",
+            "the error of {axis} swings to either side by {amplitude} and repeats every {period}",
             axis=Verbatim(self.axis.upper()), amplitude=amplitude, period=period,
         )  # fmt: skip
 

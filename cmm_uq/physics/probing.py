@@ -56,7 +56,7 @@ class ProbeLobing(Harmonic):
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
         """See :meth:`Effect.meaning`."""
         size = amounts[self.amplitude.name].size
-        return say("the probing error swings by ± ({size}), three times in a turn about Z", size=size)
+        return say("the probing error swings to either side by {size}, three times in a turn about Z", size=size)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""

@@ -156,10 +156,9 @@ def test_a_warm_artefact_that_expands_more_is_drawn_together(sign: float) -> Non
 def test_what_swings_is_told_with_its_period() -> None:
     amounts = {"amplitude_um": Amount(say("THREE")), "period_mm": Amount(say("TEN")), "phase_rad": Amount(say("no"))}
     told = EVERY["periodic_scale_y"].meaning(amounts)
-    assert told == "the error of Y swings by ± (THREE) and repeats every TEN"
-    assert (
-        EVERY["probe_lobing"].meaning(amounts) == "the probing error swings by ± (THREE), three times in a turn about Z"
-    )
+    assert told == "the error of Y swings to either side by THREE and repeats every TEN"
+    told = EVERY["probe_lobing"].meaning(amounts)
+    assert told == "the probing error swings to either side by THREE, three times in a turn about Z"
 
 
 def test_effects_with_nothing_to_add_say_nothing() -> None:
