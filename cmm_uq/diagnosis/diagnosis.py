@@ -20,6 +20,7 @@ from cmm_uq.inference.noise import Components
 from cmm_uq.inference.posterior import NoisyPosterior, Progress
 from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.display import of_last_digit
 from cmm_uq.model.kind import Observed
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
@@ -125,6 +126,7 @@ def diagnose(
     observe : makes the artefact of points; without it a large recording is searched with all its observations.
     """
     stated = None if stated_um is None else stated_um * MICROMETRE
+    model = _with_last_digit(model)
     some = model if observe is None else compared_on(model, observe, seed)
     found = search(some, stated, alpha=alpha, seed=seed)
     if some is not model:
@@ -141,6 +143,12 @@ def diagnose(
         _left_out(found, joint, model), _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
         joint.components, joint.posterior, int(some.used.sum()),
     )  # fmt: skip
+
+
+def _with_last_digit(model: MeasurementModel) -> MeasurementModel:
+    """The model whose noise is no less than the last digit of what was recorded: exact figures, and copies, have no other."""
+    least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
+    return replace(model, least_noise=least) if least > model.least_noise else model
 
 
 def _verdict(found: Found, alpha: float) -> str:

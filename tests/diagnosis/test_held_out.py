@@ -89,6 +89,9 @@ def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Fl
 def compared(before: MeasurementModel, after: MeasurementModel, groups: Ints, unseen: str) -> None:
     """All figures of an improvement against the joint distribution; its standard error is over what was left out."""
     whole = unseen == "placings"
+    _, index = np.unique(groups, return_inverse=True)
+    squares = np.bincount(index, before.estimate().least_squares.residuals ** 2)
+    groups = np.argsort(np.argsort(squares))[index]  # in folds by their misfit, whatever their numbers
     (first, rms_first), (second, rms_second) = (predicted(model, groups, whole=whole) for model in (before, after))
     found = improvement(before, after)
     assert found.unseen == unseen
