@@ -45,7 +45,7 @@ def display_step(xyz: Floats, scatter: float) -> float:
 
 
 def of_last_digit(xyz: Floats, scatter: float) -> float:
-    """Standard deviation, mm, that the last digit of recorded figures leaves open, or a nanometre; 0 where residuals show more.
+    """Standard deviation, mm, that the last digit of figures leaves open, or a nanometre; 0 where residuals show more.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Noise drawn so that nothing but the recording decides it: neither its order of rows, nor its numbering, nor the side that axes count from.
+"""Noise drawn so that nothing but the recording's values decides it: no order of rows, no numbering, no direction of an axis.
 
-What is drawn first is white, in the order of what the baseline leaves of the observations and along it; the symmetric root of the
-covariance turns it into noise. Rows that are exchanged, numbered anew or mirrored then have the same noise as before.
+What is drawn first is white, in the order of what the baseline leaves of the observations and along it; the symmetric root of
+the covariance turns it into noise. Rows that are exchanged, numbered anew or mirrored then have the same noise as before.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ _DIGITS = 7
 """Of what is left, over its root mean square, that rounding spares."""
 
 
-def drawn(kind: Kind, random: np.random.Generator, draws: int, noise_scale: Floats, standing: tuple[Ints, Floats]) -> Floats:
+def drawn(
+    kind: Kind, random: np.random.Generator, draws: int, noise_scale: Floats, standing: tuple[Ints, Floats]
+) -> Floats:  # fmt: skip
     """Noise (m, draws) of one kind, over the noise scale, a reading's standard deviation being one.
 
     Parameters
@@ -53,13 +55,3 @@ def standing_of(left: Floats, reached: Floats) -> tuple[Ints, Floats]:
     size = float(np.sqrt(np.mean(left**2))) or 1.0
     keys = (left / size, np.sum(reached**2, axis=1), np.abs(left) / size)
     return np.lexsort([np.round(key, _DIGITS) for key in keys]), np.where(left < 0, -1.0, 1.0)
-
-
-def numbered_by_misfit(group: Ints, left: Floats) -> Ints:
-    """Numbers (m,) of groups, from the one with the least sum of squares of what is left (m,): whatever numbers they had."""
-    _, index = np.unique(group, axis=0, return_inverse=True)
-    index = index.ravel()
-    squares = np.bincount(index, left**2)
-    rank = np.empty(len(squares), dtype=np.int64)
-    rank[np.argsort(squares, kind="stable")] = np.arange(len(squares))
-    return rank[index]
