@@ -25,6 +25,7 @@ from cmm_uq.documents.plots import curve_with_band, length_plot
 from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.results_file import diagnosis_data, head
+from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.messages import Text, Verbatim, commas, day, names, number, say, together
@@ -114,7 +115,7 @@ def _simulation(found: Diagnosed) -> tuple[Section, ...]:
 def _left_out(found: Diagnosed) -> tuple[Block, ...]:
     d = found.diagnosis
     blocks: list[Block] = [Paragraph(verdict_of(found))]
-    blocks += [Paragraph(text) for text in sentences_of(found)]
+    blocks += [Paragraph(text) for text in (*sentences_of(found), *withheld_sentences(d.withheld))]
     blocks += [
         Paragraph(say("This recording cannot tell apart: {effects}.", effects=commas(names(group))), tone="warning")
         for group in d.indistinguishable

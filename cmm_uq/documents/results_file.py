@@ -17,6 +17,7 @@ from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.program import software
 from cmm_uq.documents.result import Diagnosed, Result
 from cmm_uq.documents.simulated import Simulated
+from cmm_uq.documents.withheld import periods_data, withheld_data
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
@@ -111,6 +112,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
             for place in d.where
         ],
         "effects": [effect_data(item, d.improvement) for item in d.effects],
+        "withheld": withheld_data(d.withheld),
         "indistinguishable": [list(group) for group in d.indistinguishable],
         "suggested_measurements": [
             {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions, "odds": s.odds}
@@ -145,7 +147,8 @@ def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
     """One effect that was left out."""
     return {
         "effect": item.effect, "probability": item.probability, "probability_together": item.together,
-        "explained": item.explained, "parameters": _quantities(item.parameters), "words": sentence(item, gain),
+        "group": list(item.group), "explained": item.explained, "parameters": _quantities(item.parameters),
+        **({"other_periods_mm": periods_data(item.modes)} if item.modes else {}), "words": sentence(item, gain),
     }  # fmt: skip
 
 

@@ -20,14 +20,21 @@ OUTCOME_WORDS: Mapping[str, Text] = {
 """What a statement of conformity comes to, in a table."""
 
 
+NO_FACTOR = say("–")
+"""In place of a coverage factor that would mean nothing."""
+
+_ONE_HILL = 1.6
+"""Least U/u of a distribution with one hill: a rectangle has 1.645. A smaller one has several, between which nothing lies."""
+
+
 def expanded(quantity: Quantity) -> tuple[Text, Text, Text]:
     """Value, expanded uncertainty and coverage factor, as text.
 
-    The expanded uncertainty is given to two significant digits.
+    The expanded uncertainty is given to two significant digits; the factor where U/u is one.
     """
     value, uncertainty = rounded(quantity.value, quantity.expanded)
     k = quantity.coverage_factor
-    return (value, uncertainty, (say("–") if k is None else number(k, ".2f")))
+    return (value, uncertainty, (NO_FACTOR if k is None or k < _ONE_HILL else number(k, ".2f")))
 
 
 def probability(p: float) -> Text:
