@@ -183,7 +183,10 @@ def _reported(model: MeasurementModel, draws: Floats) -> dict[str, dict[str, Qua
         column += len(effect.coefficients)
         shape = np.tile(np.array(model.shapes.get(effect.name, ()), dtype=np.float64), (len(own), 1))
         units = {parameter.name: parameter.unit for parameter in effect.reported}
+        # what shapes an effect is held here: neither it nor a phase, which goes with it, is estimated
+        held = {shaped.name for shaped in effect.shape} | ({"phase_rad"} if effect.shape else set())
         found[effect.name] = {
-            name: Quantity.of_draws(values, units[name]) for name, values in effect.to_reported(own, shape).items()
-        }
+            name: Quantity.of_draws(values, units[name])
+            for name, values in effect.to_reported(own, shape).items() if name not in held
+        }  # fmt: skip
     return found

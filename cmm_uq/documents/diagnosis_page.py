@@ -8,6 +8,7 @@ import numpy as np
 
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.documents.against import corrections, simulation_section
+from cmm_uq.documents.diagnosis_costs import costs_section
 from cmm_uq.documents.diagnosis_words import (
     VERDICT_WORDS,
     lines,
@@ -88,6 +89,7 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
         *_simulation(found),
         Section(say("Before and after"), _before_after(found)),
         Section(say("What a correction would change"), _consequences(found)),
+        costs_section(found),
         Section(say("Where the mismatch lives"), _where(found)),
         Section(say("Candidate explanations"), (_rivals(found),)),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise)),

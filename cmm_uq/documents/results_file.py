@@ -13,8 +13,10 @@ from cmm_uq.conformity.statement import Decided, Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import corrections
+from cmm_uq.documents.diagnosis_costs import costs_data
 from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.program import software
+from cmm_uq.documents.quantity_data import quantity_data as quantity_data
 from cmm_uq.documents.result import Diagnosed, Result
 from cmm_uq.documents.simulated import Simulated
 from cmm_uq.documents.withheld import periods_data, withheld_data
@@ -127,6 +129,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         "screening": [finding_data(f, found.job.facts.recording.file) for f in found.findings],
         "improvement": improvement_data(d.improvement),
         "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
+        **costs_data(found),
         **({"compared_on": d.compared} if d.compared < int(d.before.used.sum()) else {}),
         "corrected": None if changes is None else {
             "accuracy": {
@@ -168,14 +171,6 @@ def as_json(data: Mapping[str, Any]) -> bytes:
     except ValueError as error:
         raise CmmUqError(f"a figure is not finite: {error}", where="results.json",
                          fix="Look for a number in the input that no measurement gives") from error  # fmt: skip
-
-
-def quantity_data(quantity: Quantity) -> dict[str, Any]:
-    """Value, standard uncertainty, 95 % interval, expanded uncertainty, coverage factor; its unit is in the key above it."""
-    return {
-        "value": quantity.value, "u": quantity.u, "interval95": list(quantity.interval95), "U": quantity.expanded,
-        "k": quantity.coverage_factor,
-    }  # fmt: skip
 
 
 def covariance_data(covariance: Covariance) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import NOTHING, Text, Verbatim, foreign, number, say
 from cmm_uq.model.measurement import ARTEFACT
+from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
@@ -59,7 +60,11 @@ def title_of(key: tuple[str, str], result: Result) -> Text:
     owner, name = key
     if owner == ARTEFACT:
         return next(size.title for size in result.artefact.sizes if size.name == name)
-    effect = next(effect for effect in result.model.effects if effect.name == owner)
+    return title_of_parameter(next(effect for effect in result.model.effects if effect.name == owner), name)
+
+
+def title_of_parameter(effect: Effect, name: str) -> Text:
+    """A parameter of an effect in words: the effect alone where it has no other."""
     return (
         effect.title if len(effect.reported) == 1 else say("{title}, {name}", title=effect.title, name=Verbatim(name))
     )

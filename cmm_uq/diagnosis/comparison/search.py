@@ -17,7 +17,7 @@ from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import Explanation, Member, finer, known, several, shorter
 from cmm_uq.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
-from cmm_uq.diagnosis.comparison.stack import Version
+from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Version
 from cmm_uq.diagnosis.comparison.unknown_functions import unknown
 from cmm_uq.diagnosis.noise import sigma_grid
 from cmm_uq.diagnosis.recorded_noise import noise_kinds
@@ -39,8 +39,14 @@ _MECHANISM = 0.2
 _PROBABLE = 0.02
 """Probability of a combination from which the period in it is refined."""
 
-_FITS = 12.0
-"""Log evidence below that of the best up to which a period is refined: between two trials it may be as much more."""
+_SHOWN = 6.0
+"""Log evidence of a period from which shorter ones are tried besides: less shows none."""
+
+_BETWEEN = 0.12
+"""Part of the log evidence that a period may lose where it lies between two trials (sinc² at half of a step, and more)."""
+
+_IMPROBABLE = 12.0
+"""Log evidence below that of the best from which a period is not followed."""
 
 _AGAIN = 3
 """Times that everything is compared again about what was found."""
@@ -204,25 +210,38 @@ def _shaped(combinations: Combinations) -> set[int]:
 
 def _refined(first: ModelComparison, combinations: Combinations, index: int) -> Explanation:
     """An effect with a nonlinear parameter, finer wherever that fits beside what is most probable with it, however short."""
-    wider = shorter(first.model, first.values, first.explanations[index])
     most = max(
         (key for key in combinations.found if index in key), key=lambda key: combinations.found[key].log_posterior
     )
     others = [v for v in combinations.found[most].versions if v.explanation != index]
+    explanation = first.explanations[index]
+    gains = _gains(first, explanation, others)
+    if gains.max() > _SHOWN:
+        explanation = shorter(first.model, first.values, explanation)
+        gains = _gains(first, explanation, others)
+    below = gains.max() - gains
+    shaped = np.array([bool(member.shape) for member in explanation.members])
+    between = _BETWEEN * max(float(gains.max()), 0.0) + 1.0
+    fits = np.flatnonzero(shaped & (below < between)).tolist()
+    refined = finer(first.model, first.values, explanation, fits)
+    # what does not fit at all keeps its weight, and costs nothing: columns of zeros are invisible
+    lost = set(np.flatnonzero(shaped & (below > max(_IMPROBABLE, between))).tolist())
+    weight = sum(explanation.members[i].weight for i in lost)
+    kept = tuple(member for i, member in enumerate(refined.members) if i not in lost)
+    nothing = Member(np.zeros((len(first.comparison.left), 1)), weight=weight)
+    return replace(refined, members=(*kept, nothing) if lost else kept)
+
+
+def _gains(first: ModelComparison, explanation: Explanation, others: Sequence[Version]) -> Floats:
+    """Log evidence (members,) of each version of an explanation beside others, over that of the others alone."""
     beside = [replace(e, members=(e.members[v.member],)) for v in others for e in [first.explanations[v.explanation]]]
-    comparison = replace(first.comparison, explanations=[wider, *beside])
+    comparison = replace(first.comparison, explanations=[explanation, *beside])
     given = [Version(k, 0, v.amplitude) for k, v in enumerate(others, 1)]
-    evidence = np.full(len(wider.members), -np.inf)
+    evidence = np.full(len(explanation.members), -np.inf)
     for group, cube in comparison.each(None, given, (0,)):
         own = group.explanation == 0
-        evidence[group.member[own]] = special.logsumexp(cube[own, :, 0], axis=1) + group.weight[own]
-    fits = [i for i, member in enumerate(wider.members) if member.shape and evidence[i] > evidence.max() - _FITS]
-    refined = finer(first.model, first.values, wider, fits)
-    # what does not fit keeps its weight, and costs nothing: columns of zeros are invisible
-    lost = [i for i, member in enumerate(wider.members) if member.shape and i not in fits]
-    nothing = Member(np.zeros((len(first.comparison.left), 1)), weight=sum(wider.members[i].weight for i in lost))
-    kept = tuple(member for i, member in enumerate(refined.members) if i not in lost)
-    return replace(refined, members=(*kept, nothing) if lost else kept)
+        evidence[group.member[own]] = special.logsumexp(cube[own, :, 0], axis=1) - np.log(AMPLITUDES)
+    return np.asarray(evidence - comparison.log_evidence_of(given)[0], dtype=np.float64)
 
 
 def asserted(combinations: Combinations) -> Key:
