@@ -11,7 +11,7 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
-from cmm_uq.conformity.consequences import consequences
+from cmm_uq.conformity.consequences import consequences, costs
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, diagnose
 from cmm_uq.documents.diagnosis_page import diagnosed_outcome
 from cmm_uq.documents.outcome import Found, Outcome, Recipe
@@ -121,7 +121,8 @@ def diagnosed(
     )  # fmt: skip
     changes = consequences(job, diagnosis, made, kind.tested, seed)
     next_ones = suggestions(diagnosis, facts, observe, kind.offers("plan", Planning), job.facts.plan)
-    return Diagnosed(job, findings, diagnosis, next_ones, changes)
+    cost = costs(job, diagnosis, made, kind.tested, seed)
+    return Diagnosed(job, findings, diagnosis, next_ones, changes, costs=cost)
 
 
 def outcome_of(found: Found, seed: int = 0) -> Outcome:

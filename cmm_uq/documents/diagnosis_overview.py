@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from cmm_uq.diagnosis.comparison.search import ASSERTED
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import contained
@@ -11,6 +12,7 @@ from cmm_uq.documents.document import Overview, Standing
 from cmm_uq.documents.effect_words import effect_of, size_of, titles
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.where_section import by_columns, place_words
+from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import probability
 from cmm_uq.messages import Text, after, alternatives, lines, say, semicolons
 from cmm_uq.screening.finding import Finding
@@ -49,7 +51,7 @@ def _found(found: Diagnosed) -> Text:
             return say("Nothing beyond the effects that the job names: what they leave is noise.")
         return say("Nothing beyond the simulation: what it leaves is noise.")
     if not d.effects:
-        return say("A misfit that no known effect accounts for.")
+        return lines((say("A misfit that no known effect accounts for."), *withheld_sentences(d.withheld)))
     told = [_one(found, item) for item in d.effects]
     if d.verdict == "partial":
         told.append(say("And more that no known effect accounts for."))
@@ -60,11 +62,18 @@ def _one(found: Diagnosed, item: LeftOut) -> Text:
     d = found.diagnosis
     effect = effect_of(item.effect, d.after.effects)
     told = say("{title}: {size}.", title=item.title, size=size_of(effect, item.parameters, factors=False))
-    for group in d.indistinguishable:
-        if group[0] == item.effect:
-            others = alternatives(titles(group[1:], d.after.effects))
-            told = say("{told} It could as well be: {others}.", told=told, others=others)
+    if others := _instead(d, item):
+        told = say(
+            "{told} It could as well be: {others}.", told=told, others=alternatives(titles(others, d.after.effects))
+        )
     return after(told, contained(found.simulated, item.effect))
+
+
+def _instead(d: Diagnosis, item: LeftOut) -> list[str]:
+    """What this recording cannot tell from an effect; of an improbable one the whole group, as one of which it is asserted."""
+    group = item.group if item.probability < ASSERTED else ()
+    twins = (name for twins in d.indistinguishable if twins[0] == item.effect for name in twins[1:])
+    return [name for name in dict.fromkeys((*group, *twins)) if name != item.effect]
 
 
 def _where(d: Diagnosis) -> Text:
@@ -83,10 +92,17 @@ def _sure(d: Diagnosis) -> Text:
     by_chance = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
     if not d.effects:
         return by_chance
-    probable = semicolons([
-        say("{title} {probability}", title=item.title, probability=probability(item.probability)) for item in d.effects
-    ])  # fmt: skip
+    probable = semicolons([_probable(item) for item in d.effects])
     return lines((by_chance, say("Probability: {each}.", each=probable), gained(d.improvement)))
+
+
+def _probable(item: LeftOut) -> Text:
+    if item.probability < ASSERTED:
+        return say(
+            "{title} {probability}, it or one that it could as well be {together}",
+            title=item.title, probability=probability(item.probability), together=probability(item.together),
+        )  # fmt: skip
+    return say("{title} {probability}", title=item.title, probability=probability(item.probability))
 
 
 def gained(gain: Improvement) -> Text:
@@ -127,7 +143,7 @@ def _to_do(found: Diagnosed) -> Text:
 def _look_at(d: Diagnosis, item: LeftOut) -> Text:
     """The cause to look at; of effects that cannot be told apart, that of each on a line."""
     own = d.after.effects
-    others = [effect_of(name, own) for group in d.indistinguishable if group[0] == item.effect for name in group[1:]]
+    others = [effect_of(name, own) for name in _instead(d, item)]
     named = [effect for effect in others if effect is not None]
     if not named:
         return say("{what:capital}.", what=item.points_to)

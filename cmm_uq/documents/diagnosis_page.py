@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.documents.against import contained, corrections, simulation_section
+from cmm_uq.documents.diagnosis_costs import costs_section
 from cmm_uq.documents.diagnosis_overview import overview_of
 from cmm_uq.documents.diagnosis_words import (
     ambiguous,
@@ -31,6 +32,8 @@ from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.results_file import diagnosis_data, head
 from cmm_uq.documents.where_section import where_section
+from cmm_uq.documents.withheld import other_periods
+from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.messages import Text, Verbatim, commas, day, names, number, say, sentences, together
@@ -99,6 +102,7 @@ def _sections(found: Diagnosed) -> tuple[Section, ...]:
         Section(say("What to measure next"), _next(found)),
         Section(say("Before and after"), _before_after(found)),
         Section(say("What a correction would change"), _consequences(found)),
+        costs_section(found),
         Section(say("What remains"), _consistent(found)),
         *_simulation(found),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise)),
@@ -127,6 +131,7 @@ def _left_out(found: Diagnosed) -> tuple[Block, ...]:
         return ()
     blocks: list[Block] = [Paragraph(verdict_of(found))]
     blocks += [_effect(found, item) for item in d.effects]
+    blocks += [Paragraph(text) for text in withheld_sentences(d.withheld)]
     blocks += [Paragraph(ambiguous(titles(group, d.after.effects)), tone="warning") for group in d.indistinguishable]
     return tuple(blocks)
 
@@ -135,7 +140,7 @@ def _effect(found: Diagnosed, item: LeftOut) -> Facts:
     """One effect: what it is, how large, what to look at, how sure."""
     d = found.diagnosis
     size = size_of(effect_of(item.effect, d.after.effects), item.parameters)
-    told = (say("{size:capital}.", size=size), contained(found.simulated, item.effect))
+    told = (say("{size:capital}.", size=size), other_periods(item.modes), contained(found.simulated, item.effect))
     return Facts((
         (say("Effect"), item.title),
         (say("Size"), sentences(filter(None, told))),

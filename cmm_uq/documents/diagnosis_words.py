@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from cmm_uq.diagnosis.comparison.search import ASSERTED
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import VERDICTS as AGAINST
 from cmm_uq.documents.diagnosis_overview import STANDING, overview_of
-from cmm_uq.documents.effect_words import effect_of, size_of, titles
+from cmm_uq.documents.effect_words import effect_of, size_of, title_of, titles
 from cmm_uq.documents.in_short import Summary, Verdict
 from cmm_uq.documents.result import Diagnosed
+from cmm_uq.documents.withheld import other_periods
+from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import probability
 from cmm_uq.jobs.job import JobFile
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, say, together
+from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, day, say, together
 from cmm_uq.physics.effect import Effect
 from cmm_uq.screening.finding import Finding
 
@@ -50,6 +53,7 @@ def lines(found: Diagnosed) -> list[Text]:
     said = [
         verdict_of(found),
         *(say("{label}: {text}", label=label, text=text) for label, text in overview_of(found).rows),
+        *withheld_sentences(d.withheld),
     ]
     said += [ambiguous(titles(group, own)) for group in d.indistinguishable]
     said += [
@@ -76,11 +80,12 @@ def stated_um(found: Diagnosed) -> float | None:
 
 def sentence(item: LeftOut, gain: Improvement, own: Iterable[Effect] = ()) -> Text:
     """One left-out effect: size, cause, what it explains, and what was held out says."""
-    return say(
+    told = say(
         "{title}: {size}. What it points to: {points_to}. {sure:capital}; {gain}.",
         title=item.title, size=size_of(effect_of(item.effect, own), item.parameters), points_to=item.points_to,
         sure=sure(item), gain=held_out(gain),
     )  # fmt: skip
+    return after(told, other_periods(item.modes))
 
 
 def sure(item: LeftOut) -> Text:
@@ -91,6 +96,11 @@ def sure(item: LeftOut) -> Text:
         if alike
         else NOTHING
     )
+    if item.probability < ASSERTED:
+        together = say(
+            ", {probability} that it is this or one that this recording cannot tell from it: {group}",
+            probability=probability(item.together), group=commas(title_of(name) for name in item.group),
+        )  # fmt: skip
     return say(
         "probability {probability}{together}; explains {explained:.0f}\u00a0% of the misfit",
         probability=probability(item.probability), together=together, explained=100 * item.explained,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from cmm_uq.documents.wording import expanded
+from cmm_uq.documents.wording import NO_FACTOR, expanded
 from cmm_uq.messages import Text, Verbatim, commas, say
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Amount, Effect
@@ -81,6 +81,6 @@ def _figures(quantity: Quantity, factors: bool) -> Text:
     if not quantity.u > 0:
         return say("{value:.4g}\u00a0{unit}", value=quantity.value, unit=quantity.unit)
     value, U, k = expanded(quantity)
-    if not factors:
+    if not factors or k == NO_FACTOR:
         return say("{value} ± {U}\u00a0{unit}", value=value, U=U, unit=quantity.unit)
     return say("{value} ± {U}\u00a0{unit} (k\u00a0=\u00a0{k})", value=value, U=U, unit=quantity.unit, k=k)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.conformity.consequences import Consequences
+from cmm_uq.conformity.consequences import Consequences, Costs
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.conformity.tolerances import Judged
 from cmm_uq.diagnosis.diagnosis import Diagnosis
@@ -91,6 +91,7 @@ class Diagnosed:
     suggestions : what to measure next.
     consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
     simulated : the simulation that the recording was compared with, if it was with one.
+    costs : what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
     """
 
     job: Job
@@ -99,6 +100,7 @@ class Diagnosed:
     suggestions: tuple[Suggestion, ...]
     consequences: Consequences | None = None
     simulated: Simulated | None = None
+    costs: Costs | None = None
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ class Result:
     estimate : least squares.
     posterior : draws of the model's own parameters.
     draws : of all that is reported, by name and chain.
-    parameters : reported parameters of each effect, by effect and name.
+    parameters : reported parameters of each effect, by effect and name; averaged over the explanations that remain.
     sizes : of the artefact, by name.
     noise : of a coordinate.
     accuracy : figures of the lengths, by name; empty for artefacts without lengths.

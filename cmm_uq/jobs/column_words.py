@@ -20,7 +20,7 @@ WORDS: Mapping[str, Text] = MappingProxyType({
     **{f"reference_{a}_mm": say("{axis} in the artefact's own frame", axis=axis) for a, axis in _AXES.items()},
     **{f"temp_{a}_c": say("temperature of scale {axis}", axis=axis) for a, axis in _AXES.items()},
     **{f"tip_{a}_mm": say("offset of the stylus tip along {axis}", axis=axis) for a, axis in _AXES.items()},
-    "reference_mm": say("certified distance"), "time_s": say("time"), "row": say("order of the recording"),
+    "reference_mm": say("certified distance"), "time_s": say("time"), "order": say("order of measurement"),
     "azimuth_deg": say("direction about Z"), "temp_artefact_c": say("temperature of the artefact"),
     "temp_table_top_c": say("temperature of the table's top"),
     "temp_table_bottom_c": say("temperature of the table's underside"),
