@@ -49,6 +49,7 @@ class _Outside(Effect):
         self.coefficients, self.shape, self.columns = effect.coefficients, effect.shape, effect.columns
         self.tier, self.idealised_over, self.imitated_by = effect.tier, effect.idealised_over, effect.imitated_by
         self.along_motion, self.plane = effect.along_motion, effect.plane
+        self.least_set_ups = effect.least_set_ups
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -61,6 +62,10 @@ class _Outside(Effect):
     def lean(self, points: Points) -> Floats:
         """See :meth:`Effect.lean`."""
         return np.asarray(self._plugin.attempt(lambda: self._effect.lean(points)), dtype=np.float64)
+
+    def course(self, points: Points) -> Floats | None:
+        """See :meth:`Effect.course`."""
+        return self._plugin.attempt(lambda: self._effect.course(points))
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """See :meth:`Effect.trials`."""
