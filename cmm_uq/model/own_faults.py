@@ -1,8 +1,8 @@
 """What may be wrong with an artefact itself, as large and as likely as what is known of it allows.
 
 Sizes and weights are judgements, stated here once. A certificate with an uncertainty leaves little: three times its standard
-uncertainty, since certificates age and now and then are wrong, a tenth as readily thought of as an error of the machine.
-Where nothing is certified it is the other way round: holes and balls were placed by a machine, and mostly by a worse one than
+uncertainty, a tenth as readily thought of as an error of the machine; ten times more rarely it is plainly wrong, or the
+artefact has changed since, and may then be off like one without a certificate. Where nothing is certified it is the other way round: holes and balls were placed by a machine, and mostly by a worse one than
 the machine that measures them.
 """
 
@@ -38,8 +38,11 @@ _MEASURED_KELVIN, _ASSUMED_KELVIN = 0.3, 1.0
 _TEMPERATURE = 0.3
 """Weight of the artefact's temperature: rooms and thermometers are mostly right; of two dates, nothing is likelier."""
 
-_BENDING_UM, _FIXTURE_UM, _HELD = 5.0, 2.0, 0.1
+_BENDING_UM, _FIXTURE_UM, _HELD = 10.0, 10.0, 0.1
 """µm, and weight, of how an artefact is supported and clamped."""
+
+MOST_ERRORS = 120
+"""Coefficients of a pattern: with more of them a diagnosis would take minutes."""
 
 _FORM, _LEAST_FORM_UM, _UNKNOWN_FORM_UM = 4.0, 0.05, 0.3
 """Form deviation over its standard deviation; the least that a certificate is believed; the latter without a certificate."""
@@ -54,13 +57,15 @@ class Known:
 
     Parameters
     ----------
-    um : plausible standard deviation of a place from where it should be, µm.
+    um : largest plausible standard deviation of a place from where it should be, µm.
+    mostly : part of it that a certificate leaves.
     weight : how readily it is thought of, beside the machine's errors.
     kelvin_weight : the same of its temperature.
     """
 
     um: float
     weight: float
+    mostly: float = 1.0
     kelvin_weight: float = _TEMPERATURE
 
 
@@ -68,12 +73,13 @@ def by_certificate(u_um: float | None, uncalibrated_um: float) -> Known:
     """By the standard uncertainty, µm, that the artefact's certificate states; by its make where there is none."""
     if u_um is None:
         return Known(uncalibrated_um, _UNKNOWN)
-    return Known(max(_CERTIFICATES * u_um, _LEAST_UM), _CERTIFIED)
+    certified = max(_CERTIFICATES * u_um, _LEAST_UM)
+    return Known(max(uncalibrated_um, certified), _CERTIFIED, min(certified / uncalibrated_um, 1.0))
 
 
 def since_earlier(um: float) -> Known:
     """Of an artefact that is compared with itself at an earlier date: what it may have changed by since, µm."""
-    return Known(um, _CHANGED, 1.0)
+    return Known(um, _CHANGED, kelvin_weight=1.0)
 
 
 def faults(
@@ -90,23 +96,24 @@ def faults(
     axes : how many of its own axes are seen.
     geometry : errors of machines that it may look like; all by default.
     """
-    own = Owner(body, points, known.um, known.weight, axes, expansion_of(facts))
-    yield PATTERN.made(own)
+    own = Owner(body, points, known.um, known.weight, axes, expansion_of(facts), known.mostly)
+    if axes * len(body.places) <= MOST_ERRORS:
+        yield PATTERN.made(own)
     for name, fault in GEOMETRY.items():
         if geometry is None or name in geometry:
             yield fault.made(own)
     yield from temperatures(own, known.kelvin_weight)
     extents = np.linalg.svd(body.about_middle(), compute_uv=False)
     if axes == len(extents) and len(body.places) > axes and extents[2] < _FLAT * extents[1]:
-        yield BENDING.made(replace(own, size=_BENDING_UM, weight=_HELD))
-        yield FIXTURE.made(replace(own, size=_FIXTURE_UM, weight=_HELD))
+        yield BENDING.made(replace(own, size=_BENDING_UM, weight=_HELD, mostly=1.0))
+        yield FIXTURE.made(replace(own, size=_FIXTURE_UM, weight=_HELD, mostly=1.0))
 
 
 def temperatures(own: Owner, weight: float) -> Iterable[Effect]:
     """That the artefact had another temperature than is known: in all set-ups, or in each its own."""
     kelvin = _MEASURED_KELVIN if "temp_artefact_c" in own.points.columns else _ASSUMED_KELVIN
-    yield TEMPERATURE.made(replace(own, size=kelvin, weight=weight))
-    yield SET_UP_TEMPERATURE.made(replace(own, size=kelvin, weight=weight * _TEMPERATURE))
+    yield TEMPERATURE.made(replace(own, size=kelvin, weight=weight, mostly=1.0))
+    yield SET_UP_TEMPERATURE.made(replace(own, size=kelvin, weight=weight * _TEMPERATURE, mostly=1.0))
 
 
 def temperature_of(facts: ArtefactFacts, points: Points) -> Effect:

@@ -18,6 +18,10 @@ SEED = "seed"
 """Beside the size, in a truth: which of all errors of this size."""
 
 
+_ROUNDS, _HELD = 60, 1e-9
+"""Of the iteration; part of the largest variance below which a combination is held."""
+
+
 class CommonSize(Effect):
     """See the module's docstring.
 
@@ -69,9 +73,18 @@ class CommonSize(Effect):
 def _shrunk(draws: Floats) -> Floats:
     """Draws (N, j) of errors with their common size for a prior, which is what they themselves tell (empirical Bayes).
 
-    With errors ĉ of variance v and of a size s, the posterior is normal about k·ĉ with variance k·v, k = s²/(s² + v).
+    Along each principal axis of their covariance, with an error ĉ of variance v and a size s, the posterior is normal about
+    k·ĉ with variance k·v, k = s²/(s² + v); s² is the likeliest, found by expectation and maximisation.
     """
-    mean, variance = draws.mean(axis=0), float(draws.var(axis=0).mean())
-    squares = float(np.mean(mean**2))
-    k = max(squares - variance, 0.0) / squares if squares > 0 else 0.0
-    return np.asarray(k * mean + np.sqrt(k) * (draws - mean), dtype=np.float64)
+    mean = draws.mean(axis=0)
+    v, axes = np.linalg.eigh(np.atleast_2d(np.cov(draws, rowvar=False)))
+    v = np.maximum(v, 0.0)
+    about, c = (draws - mean) @ axes, mean @ axes
+    free = v > _HELD * v.max(initial=0.0)  # what no coefficient does is no error
+    squares = float(np.mean(c[free] ** 2)) if free.any() else 0.0
+    for _ in range(_ROUNDS):
+        k = squares / (squares + v[free]) if squares > 0 else np.zeros(int(free.sum()))
+        squares = float(np.mean((k * c[free]) ** 2 + k * v[free])) if free.any() else 0.0
+    k = np.ones(len(v))
+    k[free] = squares / (squares + v[free]) if squares > 0 else 0.0
+    return np.asarray((k * c + np.sqrt(k) * about) @ axes.T, dtype=np.float64)

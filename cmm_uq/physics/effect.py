@@ -102,6 +102,7 @@ class Effect(ABC):
     along_motion : carriage along whose motion e goes, however that leans; ``None`` where e keeps to the coordinates.
     plane : pair of axes whose squareness it is (``xy``, ``yz``, ``zx``), if it is one; it then gives its :meth:`lean`.
     of_artefact : whether it is a fault of the artefact itself, which only that artefact can say in full.
+    mostly : part of its prior standard deviation that it mostly keeps to, where a certificate says so and may be wrong.
     least_set_ups : set-ups that a recording must have to show it as an effect of its own.
     """
 
@@ -120,6 +121,7 @@ class Effect(ABC):
     plane: str | None = None
     of_artefact: bool = False
     least_set_ups: int = 1
+    mostly: float = 1.0
 
     @property
     def prior_weight(self) -> float:

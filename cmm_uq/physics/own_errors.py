@@ -36,6 +36,7 @@ class Owner:
     size : plausible standard deviation of what a fault does, in the unit of the fault.
     weight : how readily the fault is thought of, beside effects of the machine.
     axes : how many of its own axes are seen: all three, or the first, along which its faces lie.
+    mostly : part of that size that it mostly keeps to (see :attr:`Effect.mostly`).
     cte : its coefficient of thermal expansion, 1/K.
     """
 
@@ -45,6 +46,7 @@ class Owner:
     weight: float
     axes: int = 3
     cte: float = 0.0
+    mostly: float = 1.0
 
 
 class OwnError(Effect):
@@ -63,7 +65,7 @@ class OwnError(Effect):
     def made(self, owner: Owner) -> OwnError:
         """The fault of one artefact."""
         found = copy(self)
-        found.owner = owner
+        found.owner, found.mostly = owner, owner.mostly
         found.coefficients = found.sized(owner)
         return found
 
@@ -111,7 +113,6 @@ class OwnGeometry(OwnError):
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
         """See :meth:`OwnError.sized`: it moves the farthest place by the plausible size, or as far as physics allows."""
         (c,) = self.coefficients
-        self._lies(owner)
         field = self.effect.basis(self._there(owner.points))[:, :, 0]
         largest = float(np.linalg.norm(field - field.mean(axis=0), axis=1).max()) / MICROMETRE
         sd = min(c.prior_sd, owner.size / largest) if largest > 0 else c.prior_sd
@@ -120,7 +121,7 @@ class OwnGeometry(OwnError):
     def made(self, owner: Owner) -> OwnError:
         """See :meth:`OwnError.made`."""
         found = copy(self)
-        found.owner = owner
+        found.owner, found.mostly = owner, owner.mostly
         found._lies(owner)
         found.coefficients = found.sized(owner)
         return found
@@ -176,7 +177,7 @@ class OwnPattern(OwnError, CommonSize):
     def made(self, owner: Owner) -> OwnError:
         """See :meth:`OwnError.made`."""
         found = copy(self)
-        found.owner, found.coefficients = owner, self.sized(owner)
+        found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
         found._shown = _without_rigid(owner.body.about_middle()[:, : owner.axes])
         found.size = Parameter("rms_um", unit("µm"), owner.size)
         return found

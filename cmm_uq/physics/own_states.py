@@ -86,7 +86,12 @@ class SetUpTemperature(OfSetUps):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return self.by_set_up(points, (-self.whose().cte * _about_set_up(points))[:, :, None])
+        each = self.by_set_up(points, (-self.whose().cte * _about_set_up(points))[:, :, None])
+        return np.asarray(each - each.mean(axis=2, keepdims=True))
+
+    def errors(self, coefficients: Floats) -> Floats:
+        """See :meth:`CommonSize.errors`: about the mean of all set-ups, which is the artefact's temperature in all of them."""
+        return np.asarray(coefficients - coefficients.mean(axis=-1, keepdims=True))
 
 
 class ArtefactBending(OwnError):

@@ -32,6 +32,9 @@ _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
 _ROUGH = 0.25
 """Probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest."""
 
+_BEYOND = 0.1
+"""How readily an effect is thought of beyond the size that it mostly keeps to (:attr:`Effect.mostly`)."""
+
 _MOST_PERIODS = 240
 _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
@@ -119,6 +122,9 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
         except CmmUqError:  # the job does not give the travel that this effect needs
             continue
         if any(np.any(member.columns) for member in members):
+            if effect.mostly < 1:
+                members = (*(replace(m, columns=effect.mostly * m.columns) for m in members),
+                           *(replace(m, weight=_BEYOND) for m in members))  # fmt: skip
             members = (*members, *_roughly(model, effect, points, values))
             found.append(
                 Explanation(

@@ -29,7 +29,7 @@ from cmm_uq.physics.own_body import Body
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.units import unit
 
-_LAPPED_UM = 3.0
+_LAPPED_UM = 5.0
 """Standard deviation of the faces of a gauge without a certificate from their nominal places, µm."""
 
 _OWN_GEOMETRY = ("scale_curvature_x", "scale_curvature_y", "scale_curvature_z")
