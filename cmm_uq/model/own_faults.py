@@ -2,8 +2,9 @@
 
 Sizes and weights are judgements, stated here once. A certificate with an uncertainty leaves little: three times its standard
 uncertainty, a tenth as readily thought of as an error of the machine; ten times more rarely it is plainly wrong, or the
-artefact has changed since, and may then be off like one without a certificate. Where nothing is certified it is the other way round: holes and balls were placed by a machine, and mostly by a worse one than
-the machine that measures them.
+artefact has changed since, and may then be off like one without a certificate. Where nothing
+is certified it is the other way round: holes and balls were placed by a machine, and mostly by a worse one than the machine
+that measures them.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _LEAST_UM = 0.1
 """However small the uncertainty that a certificate states: balls have dirt on them, and glue creeps."""
 
 _CERTIFIED, _CHANGED, _UNKNOWN = 0.1, 0.3, 2.0
-"""Weights: of faults of a certified artefact, of one that is compared with itself at an earlier date, of an uncalibrated one."""
+"""Weights of faults: of a certified artefact, of one compared with itself at an earlier date, of an uncalibrated one."""
 
 _MEASURED_KELVIN, _ASSUMED_KELVIN = 0.3, 1.0
 """Standard deviation of the artefact's temperature where it was recorded, and where it was not."""
@@ -83,7 +84,13 @@ def since_earlier(um: float) -> Known:
 
 
 def faults(
-    facts: ArtefactFacts, points: Points, body: Body, known: Known, *, axes: int = 3, geometry: Sequence[str] | None = None
+    facts: ArtefactFacts,
+    points: Points,
+    body: Body,
+    known: Known,
+    *,
+    axes: int = 3,
+    geometry: Sequence[str] | None = None,
 ) -> Iterable[Effect]:
     """Faults of an artefact of several places.
 

@@ -57,9 +57,7 @@ class CommonSize(Effect):
         """
         for name in parameters:
             if name not in (self.size.name, SEED):
-                raise CmmUqError(
-                    f"{self.name} has no parameter {name!r}", fix=suggestion(name, [self.size.name, SEED])
-                )
+                raise CmmUqError(f"{self.name} has no parameter {name!r}", fix=suggestion(name, [self.size.name, SEED]))
         if self.size.name not in parameters:
             raise CmmUqError(f"{self.name} needs the parameter {self.size.name!r}")
         seed = parameters.get(SEED, 0.0)

@@ -1,6 +1,6 @@
 """Faults of an artefact: what is wrong with it turns and moves with it, and looks like the machine in a single set-up.
 
-In the catalogue they stand for their names and words. What they do follows from an artefact: :meth:`OwnError.made` gives the
+In the catalogue they stand for their names and words. What they do follows from an artefact: :meth:`OwnFault.made` gives the
 fault of one, with its places and with the size that is plausible for it.
 """
 
@@ -49,7 +49,7 @@ class Owner:
     mostly: float = 1.0
 
 
-class OwnError(Effect):
+class OwnFault(Effect):
     """A fault of the artefact itself; ``owner`` is that artefact, ``None`` in the catalogue."""
 
     mechanism = "artefact"
@@ -62,7 +62,7 @@ class OwnError(Effect):
         """See :attr:`Effect.prior_weight`: by what is known of the artefact."""
         return PRIOR_WEIGHT[OWN] if self.owner is None else self.owner.weight
 
-    def made(self, owner: Owner) -> OwnError:
+    def made(self, owner: Owner) -> OwnFault:
         """The fault of one artefact."""
         found = copy(self)
         found.owner, found.mostly = owner, owner.mostly
@@ -91,10 +91,10 @@ class OwnError(Effect):
         return self.owner
 
 
-class OwnGeometry(OwnError):
+class OwnGeometry(OwnFault):
     """The artefact deviates as an ideal one would seem to on a machine with this error, and takes that with it when it turns.
 
-    Its field is the error of the machine where the artefact lay in one of its set-ups; the artefact's true places deviate by it.
+    Its field is the error of the machine where the artefact lay in one of its set-ups; the artefact's places deviate by it.
     """
 
     def __init__(self, effect: Effect) -> None:
@@ -103,23 +103,23 @@ class OwnGeometry(OwnError):
         self.title = say("Error of the artefact itself that looks like: {effect:small}", effect=effect.title)
         self.formula = f"e = −(e of {effect.name} at the artefact's reference set-up, turned with the artefact)"
         self.points_to = say(
-            "the artefact itself deviates, as if it had been made or calibrated on a machine with this error ({effect:small}): "
-            "have it calibrated, or measure it turned",
+            "the artefact itself deviates, as if it had been made or calibrated on a machine with this error "
+            "({effect:small}): have it calibrated, or measure it turned",
             effect=effect.title,
         )
         self.coefficients = effect.coefficients
         self.idealised_over = effect.idealised_over
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnError.sized`: it moves the farthest place by the plausible size, or as far as physics allows."""
+        """See :meth:`OwnFault.sized`: it moves the farthest place by the plausible size, or as far as physics allows."""
         (c,) = self.coefficients
         field = self.effect.basis(self._there(owner.points))[:, :, 0]
         largest = float(np.linalg.norm(field - field.mean(axis=0), axis=1).max()) / MICROMETRE
         sd = min(c.prior_sd, owner.size / largest) if largest > 0 else c.prior_sd
         return (Parameter(c.name, c.unit, sd),)
 
-    def made(self, owner: Owner) -> OwnError:
-        """See :meth:`OwnError.made`."""
+    def made(self, owner: Owner) -> OwnFault:
+        """See :meth:`OwnFault.made`."""
         found = copy(self)
         found.owner, found.mostly = owner, owner.mostly
         found._lies(owner)
@@ -138,7 +138,7 @@ class OwnGeometry(OwnError):
         return self.effect.course(self._there(points))
 
     def _lies(self, owner: Owner) -> None:
-        """Where it is like the machine's error: in the set-up least turned against its own axes, by what no renumbering changes."""
+        """Find where it is like the machine's error: in the set-up least turned against its own axes, however numbered."""
         poses = owner.body.poses(owner.points)
         middle = owner.body.places.mean(axis=0)
         _, first = np.unique(owner.points.measurement, return_index=True)
@@ -155,27 +155,30 @@ class OwnGeometry(OwnError):
         return points.at(self._origin + places @ self._rotation.T)
 
 
-class OwnPattern(OwnError, CommonSize):
+class OwnPattern(OwnFault, CommonSize):
     """Every place of the artefact has an error of its own, the same in all set-ups and repeats."""
 
     name = "artefact_pattern"
     title = say("Pattern of the artefact itself")
-    formula = "e = −(deviation of each ball, hole or face from its certified place, less a shift, a turn and a scale of all)"
-    points_to = say(
-        "balls, holes or faces of the artefact are not where its certificate or its drawing says: have it calibrated, or estimate "
-        "its deviations from turned set-ups"
+    formula = (
+        "e = −(deviation of each ball, hole or face from its certified place, less a shift, a turn and a scale of all)"
     )
-    coefficients = (Parameter("um", unit("µm"), 10.0),)
+    points_to = say(
+        "balls, holes or faces of the artefact are not where its certificate or its drawing says: have it calibrated, or "
+        "estimate its deviations from turned set-ups"
+    )
+    coefficients: tuple[Parameter, ...] = (Parameter("um", unit("µm"), 10.0),)
     size = Parameter("rms_um", unit("µm"), 10.0)
     least_set_ups = 2
+    _shown: Floats
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnError.sized`: one for every axis of every place."""
+        """See :meth:`OwnFault.sized`: one for every axis of every place."""
         names = (f"{AXES[j]}_{i + 1}_um" for i in range(len(owner.body.places)) for j in range(owner.axes))
         return tuple(Parameter(name, unit("µm"), owner.size) for name in names)
 
-    def made(self, owner: Owner) -> OwnError:
-        """See :meth:`OwnError.made`."""
+    def made(self, owner: Owner) -> OwnFault:
+        """See :meth:`OwnFault.made`."""
         found = copy(self)
         found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
         found._shown = _without_rigid(owner.body.about_middle()[:, : owner.axes])
@@ -223,4 +226,4 @@ GEOMETRY = MappingProxyType(
 
 PATTERN = OwnPattern()
 
-EFFECTS: tuple[OwnError, ...] = (PATTERN, *GEOMETRY.values())
+EFFECTS: tuple[OwnFault, ...] = (PATTERN, *GEOMETRY.values())

@@ -1,4 +1,4 @@
-"""Faults of an artefact that come from how it was kept, laid and held: its temperature, its bending, its fixture; a sphere's form."""
+"""Faults of an artefact by how it was kept, laid and held: its temperature, bending, fixture; and the form of a sphere."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from copy import copy
 import numpy as np
 from scipy import special
 
+from cmm_uq.geometry.frame import frame_about, upward
 from cmm_uq.messages import say
 from cmm_uq.physics.common_size import CommonSize
 from cmm_uq.physics.effect import Effect, Harmonic, Parameter
-from cmm_uq.physics.own_errors import OwnError, Owner
+from cmm_uq.physics.own_errors import Owner, OwnFault
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE, unit
 
@@ -24,7 +25,7 @@ _DEGREES = (2, 3, 4, 5)
 """Of the harmonics of a sphere's form: the size and the place of the ball are those of 0 and 1."""
 
 
-class ArtefactTemperature(OwnError):
+class ArtefactTemperature(OwnFault):
     """The artefact was warmer than its recorded or assumed temperature says, in the whole recording.
 
     What is certified of it too short looks the same.
@@ -44,20 +45,20 @@ class ArtefactTemperature(OwnError):
         return (-self.whose().cte * _about_set_up(points))[:, :, None]
 
 
-class OfSetUps(OwnError, CommonSize):
+class OfSetUps(OwnFault, CommonSize):
     """A fault with coefficients of its own in each set-up, of one common size."""
 
     each: tuple[str, ...]
     least_set_ups = 2
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnError.sized`: those of each set-up."""
+        """See :meth:`OwnFault.sized`: those of each set-up."""
         (c,) = self.coefficients
         numbers = np.unique(owner.points.measurement)
         return tuple(Parameter(f"{name}_{m}_{c.name}", c.unit, owner.size) for m in numbers for name in self.each)
 
-    def made(self, owner: Owner) -> OwnError:
-        """See :meth:`OwnError.made`."""
+    def made(self, owner: Owner) -> OwnFault:
+        """See :meth:`OwnFault.made`."""
         found = copy(self)
         found.owner, found.coefficients = owner, self.sized(owner)
         found.size = Parameter(self.size.name, self.size.unit, owner.size)
@@ -94,8 +95,8 @@ class SetUpTemperature(OfSetUps):
         return np.asarray(coefficients - coefficients.mean(axis=-1, keepdims=True))
 
 
-class ArtefactBending(OwnError):
-    """A flat artefact bends between its supports by its own weight: most where it lies, not at all where it stands upright."""
+class ArtefactBending(OwnFault):
+    """A flat artefact bends between its supports by its own weight: most as it lies, not at all where it stands upright."""
 
     name = "artefact_bending"
     title = say("Bending of the artefact by its own weight")
@@ -109,7 +110,7 @@ class ArtefactBending(OwnError):
         """See :meth:`Effect.basis`."""
         normal, across = _flat(self.whose(), points)
         rho2 = np.sum(across**2, axis=1)
-        return (MICROMETRE * (normal[:, 2] * (1 - rho2))[:, None] * normal)[:, :, None]
+        return np.asarray((MICROMETRE * (normal[:, 2] * (1 - rho2))[:, None] * normal)[:, :, None])
 
 
 class ArtefactFixture(OfSetUps):
@@ -133,7 +134,7 @@ class ArtefactFixture(OfSetUps):
         return self.by_set_up(points, -MICROMETRE * normal[:, :, None] * bends[:, None, :])
 
 
-class OwnLobes(OwnError, Harmonic):
+class OwnLobes(OwnFault, Harmonic):
     """The sphere itself has three lobes, which turn with it."""
 
     name = "artefact_lobing"
@@ -145,17 +146,18 @@ class OwnLobes(OwnError, Harmonic):
     columns = ("nx", "ny", "nz")
 
     def belongs_to(self, points: Points) -> bool:
-        """See :meth:`OwnError.belongs_to`: a sphere has no places."""
+        """See :meth:`OwnFault.belongs_to`: a sphere has no places."""
         return self.owner is not None
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
         self.whose()
         angle = 3 * (np.arctan2(points.column("ny"), points.column("nx")) - _turned(points))
-        return -MICROMETRE * _normals(points)[:, :, None] * np.column_stack([np.cos(angle), -np.sin(angle)])[:, None, :]
+        lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
+        return np.asarray(-MICROMETRE * _normals(points)[:, :, None] * lobes[:, None, :])
 
 
-class OwnForm(OwnError, CommonSize):
+class OwnForm(OwnFault, CommonSize):
     """The sphere itself is not round: spherical harmonics of the degrees 2 to 5, which turn with it."""
 
     name = "artefact_form"
@@ -167,11 +169,11 @@ class OwnForm(OwnError, CommonSize):
     columns = ("nx", "ny", "nz")
 
     def belongs_to(self, points: Points) -> bool:
-        """See :meth:`OwnError.belongs_to`: a sphere has no places."""
+        """See :meth:`OwnFault.belongs_to`: a sphere has no places."""
         return self.owner is not None
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnError.sized`: one for every harmonic."""
+        """See :meth:`OwnFault.sized`: one for every harmonic."""
         return tuple(
             Parameter(f"c{degree}_{order}_um", unit("µm"), owner.size)
             for degree in _DEGREES
@@ -216,12 +218,10 @@ def _about_set_up(points: Points) -> Floats:
 def _flat(owner: Owner, points: Points) -> tuple[Floats, Floats]:
     """Normal (n, 3) of a flat artefact as it lay, and place (n, 2) across it, over the largest distance from its middle."""
     places = owner.body.about_middle()
-    _, _, axes = np.linalg.svd(places, full_matrices=False)
-    signs = np.sign(axes[np.arange(3), np.abs(axes).argmax(axis=1)])
-    axes = axes * signs[:, None]
+    u, v, normal = frame_about(upward(np.linalg.svd(places, full_matrices=False)[2][2]))
     poses = owner.body.poses(points)
-    across = (places @ axes[:2].T)[poses.node] / owner.body.extent
-    return np.asarray(poses.rotation @ axes[2]), np.asarray(across)
+    across = (places @ np.column_stack([u, v]))[poses.node] / owner.body.extent
+    return np.asarray(poses.rotation @ normal), np.asarray(across)
 
 
 def _normals(points: Points) -> Floats:

@@ -65,7 +65,8 @@ class _Outside(Effect):
 
     def course(self, points: Points) -> Floats | None:
         """See :meth:`Effect.course`."""
-        return self._plugin.attempt(lambda: self._effect.course(points))
+        found = self._plugin.attempt(lambda: self._effect.course(points))
+        return None if found is None else np.asarray(found, dtype=np.float64)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """See :meth:`Effect.trials`."""
