@@ -9,7 +9,7 @@ that measures them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.physics.effect import Effect
 from cmm_uq.physics.own_body import Body
-from cmm_uq.physics.own_errors import GEOMETRY, PATTERN, Owner
+from cmm_uq.physics.own_errors import GEOMETRY, PATTERN, Owner, OwnFault
 from cmm_uq.physics.own_states import BENDING, FIXTURE, FORM, LOBES, SET_UP_TEMPERATURE, TEMPERATURE
 from cmm_uq.points import Points
 
@@ -90,7 +90,7 @@ def faults(
     known: Known,
     *,
     axes: int = 3,
-    geometry: Sequence[str] | None = None,
+    geometry: Iterable[OwnFault] = tuple(GEOMETRY.values()),
 ) -> Iterable[Effect]:
     """Faults of an artefact of several places.
 
@@ -106,9 +106,8 @@ def faults(
     own = Owner(body, points, known.um, known.weight, axes, expansion_of(facts), known.mostly)
     if axes * len(body.places) <= MOST_ERRORS:
         yield PATTERN.made(own)
-    for name, fault in GEOMETRY.items():
-        if geometry is None or name in geometry:
-            yield fault.made(own)
+    for fault in geometry:
+        yield fault.made(own)
     yield from temperatures(own, known.kelvin_weight)
     extents = np.linalg.svd(body.about_middle(), compute_uv=False)
     if axes == len(extents) and len(body.places) > axes and extents[2] < _FLAT * extents[1]:

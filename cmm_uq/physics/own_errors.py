@@ -224,6 +224,12 @@ GEOMETRY = MappingProxyType(
 )  # fmt: skip
 """By the name of the machine's error that it looks like."""
 
+ALONG_A_LINE: tuple[OwnGeometry, ...] = tuple(GEOMETRY[effect.name] for effect in _CURVATURE)
+"""What faces along one line can look like, and that is no scale."""
+
+AFFINE: tuple[OwnGeometry, ...] = tuple(GEOMETRY[e.name] for e in (*SCALE.values(), *SQUARENESS.values()))
+"""What three corners can look like."""
+
 PATTERN = OwnPattern()
 
 EFFECTS: tuple[OwnFault, ...] = (PATTERN, *GEOMETRY.values())

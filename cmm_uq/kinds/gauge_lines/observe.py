@@ -26,14 +26,12 @@ from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
 from cmm_uq.physics.effect import Effect
 from cmm_uq.physics.own_body import Body
+from cmm_uq.physics.own_errors import ALONG_A_LINE
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.units import unit
 
 _LAPPED_UM = 5.0
 """Standard deviation of the faces of a gauge without a certificate from their nominal places, µm."""
-
-_OWN_GEOMETRY = ("scale_curvature_x", "scale_curvature_y", "scale_curvature_z")
-"""Errors of machines that a gauge's own faces may look like along its line, and that are no scale."""
 
 _SAME_FACE = 1e-6
 """mm; certified distances closer than this belong to one face."""
@@ -112,7 +110,7 @@ class StepGauge(Artefact):
         places = np.column_stack([self.reference, np.zeros((len(self.reference), 2))])
         body = Body.of(self.points, places, ("reference_mm",))
         known = by_certificate(self._facts.u_um, _LAPPED_UM)
-        return faults(self._facts, self.points, body, known, axes=1, geometry=_OWN_GEOMETRY)
+        return faults(self._facts, self.points, body, known, axes=1, geometry=ALONG_A_LINE)
 
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`: in proportion to the distance."""

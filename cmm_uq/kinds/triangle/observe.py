@@ -21,7 +21,8 @@ from cmm_uq.model.recorded import check_length, expansion, place
 from cmm_uq.model.rigid import Rigid
 from cmm_uq.physics.effect import Effect
 from cmm_uq.physics.own_body import Body
-from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.physics.own_errors import AFFINE
+from cmm_uq.points import Floats, Points
 from cmm_uq.units import unit
 
 _TITLES = (
@@ -31,9 +32,6 @@ _TITLES = (
 
 _WRONG_UM = 5.0
 """By how much a side may be off whose block or cylinder is another than the job says, µm."""
-
-_OWN_GEOMETRY = (*(f"scale_{a}" for a in AXES), *(f"squareness_{plane}" for plane in ("xy", "yz", "zx")))
-"""Errors of machines that three corners can look like."""
 
 
 class Triangle(Rigid):
@@ -84,7 +82,7 @@ class Triangle(Rigid):
         """See :meth:`Artefact.own_faults`: by the uncertainty of its blocks and cylinders."""
         body = Body.of(self.points, corners(self.standard.sides)[self._corner])
         u_um = float(np.hypot(self._facts.u_blocks_um, self._facts.u_cylinders_um))
-        return faults(self._facts, self.points, body, by_certificate(u_um, _WRONG_UM), geometry=_OWN_GEOMETRY)
+        return faults(self._facts, self.points, body, by_certificate(u_um, _WRONG_UM), geometry=AFFINE)
 
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`."""
