@@ -17,7 +17,7 @@ import numpy as np
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.physics.effect import Effect
 from cmm_uq.physics.own_body import Body
-from cmm_uq.physics.own_errors import GEOMETRY, PATTERN, Owner, OwnFault
+from cmm_uq.physics.own_errors import GEOMETRY, PATTERN, Owner, OwnFault, deformations
 from cmm_uq.physics.own_states import BENDING, FIXTURE, FORM, LOBES, SET_UP_TEMPERATURE, TEMPERATURE
 from cmm_uq.points import Points
 
@@ -104,7 +104,7 @@ def faults(
     geometry : errors of machines that it may look like; all by default.
     """
     own = Owner(body, points, known.um, known.weight, axes, expansion_of(facts), known.mostly)
-    if axes * len(body.places) <= MOST_ERRORS:
+    if axes * len(body.places) <= MOST_ERRORS and deformations(own).shape[1]:
         yield PATTERN.made(own)
     for fault in geometry:
         yield fault.made(own)
@@ -119,7 +119,8 @@ def temperatures(own: Owner, weight: float) -> Iterable[Effect]:
     """That the artefact had another temperature than is known: in all set-ups, or in each its own."""
     kelvin = _MEASURED_KELVIN if "temp_artefact_c" in own.points.columns else _ASSUMED_KELVIN
     yield TEMPERATURE.made(replace(own, size=kelvin, weight=weight, mostly=1.0))
-    yield SET_UP_TEMPERATURE.made(replace(own, size=kelvin, weight=weight * _TEMPERATURE, mostly=1.0))
+    if len(np.unique(own.points.measurement)) > 1:
+        yield SET_UP_TEMPERATURE.made(replace(own, size=kelvin, weight=weight * _TEMPERATURE, mostly=1.0))
 
 
 def temperature_of(facts: ArtefactFacts, points: Points) -> Effect:

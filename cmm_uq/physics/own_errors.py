@@ -21,7 +21,7 @@ from cmm_uq.physics.own_body import Body
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.physics.scales import EFFECTS as FURTHER_OF_SCALES
 from cmm_uq.physics.scales import ScaleCurvature
-from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.points import Floats, Points
 from cmm_uq.units import MICROMETRE, unit
 
 
@@ -173,22 +173,21 @@ class OwnPattern(OwnFault, CommonSize):
     _shown: Floats
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnFault.sized`: one for every axis of every place."""
-        names = (f"{AXES[j]}_{i + 1}_um" for i in range(len(owner.body.places)) for j in range(owner.axes))
-        return tuple(Parameter(name, unit("µm"), owner.size) for name in names)
+        """See :meth:`OwnFault.sized`: one for every deformation."""
+        return tuple(Parameter(f"c{i + 1}_um", unit("µm"), owner.size) for i in range(deformations(owner).shape[1]))
 
     def made(self, owner: Owner) -> OwnFault:
         """See :meth:`OwnFault.made`."""
         found = copy(self)
         found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
-        found._shown = _without_rigid(owner.body.about_middle()[:, : owner.axes])
+        found._shown = deformations(owner)
         found.size = Parameter("rms_um", unit("µm"), owner.size)
         return found
 
     def errors(self, coefficients: Floats) -> Floats:
-        """See :meth:`CommonSize.errors`: deviations, less what the whole artefact's shift, turn and scale are."""
+        """See :meth:`CommonSize.errors`: deviations of every place along every axis."""
         self.whose()
-        return np.asarray(coefficients @ self._shown, dtype=np.float64)
+        return np.asarray(coefficients @ self._shown.T, dtype=np.float64)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -198,8 +197,9 @@ class OwnPattern(OwnFault, CommonSize):
         return -MICROMETRE * np.asarray(np.einsum("nij,njk->nik", poses.rotation[:, :, : owner.axes], own))
 
 
-def _without_rigid(places: Floats) -> Floats:
-    """Projector (N·a, N·a) that takes shift, turn and scale from deviations at places (N, a) along their a axes."""
+def deformations(owner: Owner) -> Floats:
+    """Orthonormal deviations (N·a, r) of N places along a axes that contain no shift, turn or scale of the whole."""
+    places = owner.body.about_middle()[:, : owner.axes]
     count, a = places.shape
     columns = [np.tile(np.eye(a), (count, 1)), places.reshape(-1, 1)]
     for i in range(a):
@@ -207,9 +207,9 @@ def _without_rigid(places: Floats) -> Floats:
             turn = np.zeros((count, a))
             turn[:, i], turn[:, j] = places[:, j], -places[:, i]
             columns.append(turn.reshape(-1, 1))
-    U, s, _ = np.linalg.svd(np.hstack(columns), full_matrices=False)
-    basis = U[:, s > 1e-9 * s[0]]
-    return np.asarray(np.eye(count * a) - basis @ basis.T, dtype=np.float64)
+    whole = np.hstack(columns)
+    U, s, _ = np.linalg.svd(whole / np.linalg.norm(whole, axis=0).clip(1e-12), full_matrices=True)
+    return np.asarray(U[:, int(np.sum(s > 1e-9 * s[0])) :], dtype=np.float64)
 
 
 _CURVATURE = [effect for effect in FURTHER_OF_SCALES if isinstance(effect, ScaleCurvature)]

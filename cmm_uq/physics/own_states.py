@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
-from scipy import special
+from scipy import linalg, special
 
 from cmm_uq.geometry.frame import frame_about, upward
 from cmm_uq.messages import say
 from cmm_uq.physics.common_size import CommonSize
 from cmm_uq.physics.effect import Effect, Harmonic, Parameter
 from cmm_uq.physics.own_errors import Owner, OwnFault
-from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.units import MICROMETRE, unit
 
 KELVIN = Parameter("k", unit("K"), 1.0)
@@ -54,8 +54,13 @@ class OfSetUps(OwnFault, CommonSize):
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
         """See :meth:`OwnFault.sized`: those of each set-up."""
         (c,) = self.coefficients
-        numbers = np.unique(owner.points.measurement)
-        return tuple(Parameter(f"{name}_{m}_{c.name}", c.unit, owner.size) for m in numbers for name in self.each)
+        return tuple(
+            Parameter(f"{name}_{m}_{c.name}", c.unit, owner.size) for m in self.numbered(owner) for name in self.each
+        )
+
+    def numbered(self, owner: Owner) -> Ints:
+        """Numbers of the coefficients: those of the set-ups."""
+        return np.unique(owner.points.measurement)
 
     def made(self, owner: Owner) -> OwnFault:
         """See :meth:`OwnFault.made`."""
@@ -88,11 +93,19 @@ class SetUpTemperature(OfSetUps):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         each = self.by_set_up(points, (-self.whose().cte * _about_set_up(points))[:, :, None])
-        return np.asarray(each - each.mean(axis=2, keepdims=True))
+        return np.asarray(each @ self._contrasts())
+
+    def numbered(self, owner: Owner) -> Ints:
+        """See :meth:`OfSetUps.numbered`: one less, as the mean of all is the artefact's temperature in all of them."""
+        return np.arange(1, len(np.unique(owner.points.measurement)))
 
     def errors(self, coefficients: Floats) -> Floats:
-        """See :meth:`CommonSize.errors`: about the mean of all set-ups, which is the artefact's temperature in all of them."""
-        return np.asarray(coefficients - coefficients.mean(axis=-1, keepdims=True))
+        """See :meth:`CommonSize.errors`: temperatures about the mean of all set-ups."""
+        return np.asarray(coefficients @ self._contrasts().T)
+
+    def _contrasts(self) -> Floats:
+        """(q, q − 1) orthonormal, each without a mean (Helmert)."""
+        return np.asarray(linalg.helmert(len(np.unique(self.whose().points.measurement))).T, dtype=np.float64)
 
 
 class ArtefactBending(OwnFault):
