@@ -111,10 +111,13 @@ class OwnGeometry(OwnFault):
         self.idealised_over = effect.idealised_over
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnFault.sized`: it moves the farthest place by the plausible size, or as far as physics allows."""
+        """See :meth:`OwnFault.sized`: it deforms by the plausible size where it does so most, or as far as physics allows."""
         (c,) = self.coefficients
-        field = self.effect.basis(self._there(owner.points))[:, :, 0]
-        largest = float(np.linalg.norm(field - field.mean(axis=0), axis=1).max()) / MICROMETRE
+        _, rows = np.unique(owner.body.poses(owner.points).node, return_index=True)
+        field = self.effect.basis(self._there(owner.points))[rows, :, 0] @ self._rotation
+        shapes = deformations(owner)
+        deformed = shapes @ (shapes.T @ field[:, : owner.axes].ravel())
+        largest = float(np.linalg.norm(deformed.reshape(-1, owner.axes), axis=1).max()) / MICROMETRE
         sd = min(c.prior_sd, owner.size / largest) if largest > 0 else c.prior_sd
         return (Parameter(c.name, c.unit, sd),)
 
