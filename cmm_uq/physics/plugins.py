@@ -49,6 +49,7 @@ class _Outside(Effect):
         self.coefficients, self.shape, self.columns = effect.coefficients, effect.shape, effect.columns
         self.tier, self.idealised_over, self.imitated_by = effect.tier, effect.idealised_over, effect.imitated_by
         self.along_motion, self.plane = effect.along_motion, effect.plane
+        self.least_set_ups = effect.least_set_ups
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -65,6 +66,11 @@ class _Outside(Effect):
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
         """See :meth:`Effect.meaning`."""
         return foreign(self._plugin.attempt(lambda: self._effect.meaning(amounts)))
+
+    def course(self, points: Points) -> Floats | None:
+        """See :meth:`Effect.course`."""
+        found = self._plugin.attempt(lambda: self._effect.course(points))
+        return None if found is None else np.asarray(found, dtype=np.float64)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """See :meth:`Effect.trials`."""

@@ -24,7 +24,6 @@ from cmm_uq.diagnosis.recorded_noise import noise_kinds
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.measurement import SMALL_LEAN
 from cmm_uq.model.noise import display_of
-from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 
 _MISFIT = 20.0
@@ -323,7 +322,9 @@ def with_effects(compared: ModelComparison, versions: Sequence[Version], chosen:
     for version in sorted(versions, key=lambda v: v.explanation):
         if version.explanation in chosen:
             explanation = compared.explanations[version.explanation]
-            added.append(every()[explanation.name])
+            if explanation.effect is None:
+                continue
+            added.append(explanation.effect)
             if added[-1].shape:
                 shapes[explanation.name] = explanation.members[version.member].shape
     return replace(compared.model, effects=(*compared.model.effects, *added), shapes=shapes, within=None)
