@@ -13,6 +13,7 @@ from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
 from cmm_uq.conformity.consequences import consequences
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, diagnose
+from cmm_uq.diagnosis.unseen import smallest_effects
 from cmm_uq.documents.diagnosis_page import diagnosed_outcome
 from cmm_uq.documents.outcome import Found, Outcome, Recipe
 from cmm_uq.documents.result import Diagnosed
@@ -86,7 +87,8 @@ def _against(job: Job, compared: Against, *, seed: int, alpha: float, progress: 
     )  # fmt: skip
     next_ones = suggestions(diagnosis, facts, compared.observe, kind.offers("plan", Planning), job.facts.plan)
     findings = (*compared.findings, *outliers)
-    return Diagnosed(job, findings, diagnosis, next_ones, simulated=compared.simulated)
+    unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
+    return Diagnosed(job, findings, diagnosis, next_ones, simulated=compared.simulated, unseen=unseen)
 
 
 def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
@@ -121,7 +123,8 @@ def diagnosed(
     )  # fmt: skip
     changes = consequences(job, diagnosis, made, kind.tested, seed)
     next_ones = suggestions(diagnosis, facts, observe, kind.offers("plan", Planning), job.facts.plan)
-    return Diagnosed(job, findings, diagnosis, next_ones, changes)
+    unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
+    return Diagnosed(job, findings, diagnosis, next_ones, changes, unseen=unseen)
 
 
 def outcome_of(found: Found, seed: int = 0) -> Outcome:

@@ -85,6 +85,7 @@ class Diagnosis:
     components : of the noise, for the model after.
     posterior : joint, of the model after.
     compared : observations that the candidates were compared on; what was found is estimated from all.
+    found : the search that it rests on.
     """
 
     verdict: str
@@ -101,6 +102,7 @@ class Diagnosis:
     components: Components
     posterior: NoisyPosterior
     compared: int
+    found: Found
 
 
 def diagnose(
@@ -139,7 +141,7 @@ def diagnose(
     return Diagnosis(
         _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha),
         _left_out(found, joint, model), _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
-        joint.components, joint.posterior, int(some.used.sum()),
+        joint.components, joint.posterior, int(some.used.sum()), found,
     )  # fmt: skip
 
 

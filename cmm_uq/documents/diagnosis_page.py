@@ -8,6 +8,7 @@ import numpy as np
 
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.documents.against import corrections, simulation_section
+from cmm_uq.documents.diagnosis_unseen import unseen_section
 from cmm_uq.documents.diagnosis_words import (
     VERDICT_WORDS,
     lines,
@@ -89,6 +90,7 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
         Section(say("What a correction would change"), _consequences(found)),
         Section(say("Where the mismatch lives"), _where(found)),
         Section(say("Candidate explanations"), (_rivals(found),)),
+        unseen_section(found),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise)),
         Section(say("What to measure next"), tuple(
             Paragraph(say("{effects}: {what}", effects=together(names(s.separates)), what=s.what)) for s in found.suggestions

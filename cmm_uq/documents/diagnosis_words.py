@@ -9,6 +9,7 @@ from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import VERDICTS as AGAINST
 from cmm_uq.documents.against import contained
+from cmm_uq.documents.diagnosis_unseen import without_power
 from cmm_uq.documents.in_short import Standing, Summary, Verdict
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.wording import expanded, probability
@@ -50,7 +51,7 @@ _STANDING: Mapping[str, Standing] = {
 def verdict_of(found: Diagnosed) -> Text:
     """The verdict in a sentence."""
     told = VERDICTS if found.simulated is None else AGAINST
-    return told[found.diagnosis.verdict]
+    return after(told[found.diagnosis.verdict], without_power(found))
 
 
 def sentences_of(found: Diagnosed) -> list[Text]:

@@ -13,6 +13,7 @@ from cmm_uq.conformity.consequences import Consequences
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.conformity.tolerances import Judged
 from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.diagnosis.unseen import Smallest
 from cmm_uq.documents.simulated import Simulated
 from cmm_uq.documents.stating import Stating
 from cmm_uq.inference.draws import Draws
@@ -91,6 +92,7 @@ class Diagnosed:
     suggestions : what to measure next.
     consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
     simulated : the simulation that the recording was compared with, if it was with one.
+    unseen : the smallest amplitude of each effect that the recording would have shown.
     """
 
     job: Job
@@ -99,6 +101,7 @@ class Diagnosed:
     suggestions: tuple[Suggestion, ...]
     consequences: Consequences | None = None
     simulated: Simulated | None = None
+    unseen: tuple[Smallest, ...] = ()
 
 
 @dataclass(frozen=True)
