@@ -35,6 +35,9 @@ POWER = 0.9
 BLIND = 1 / 6
 """Part of what physics allows, half of its standard deviation, that a recording with power shows of a common effect."""
 
+USUAL_LENGTH = 6.0
+"""Visible length, over the noise, from which on a usual diagnosis detects an effect."""
+
 PLACES = "placing"
 """Name among what takes an effect up: the free places of the artefact."""
 
@@ -99,6 +102,7 @@ class Smallest:
     taken_up : names of what is fitted that takes up the rest, where that is most of it.
     common : whether it is one of the common effects.
     periods : where it has a nonlinear parameter, of which the figures are then the typical ones.
+    length : of what is left of it over the noise, from which on it is detected; ``None`` where it was not computed.
     """
 
     effect: str
@@ -112,6 +116,7 @@ class Smallest:
     taken_up: tuple[str, ...]
     common: bool
     periods: Periods | None = None
+    length: float | None = None
 
     @property
     def shown(self) -> bool:
@@ -279,7 +284,7 @@ class _Signal:
         taken_up = _imitators(view.found.first.model, self.raw, view) if share < _HIDDEN else ()
         return Smallest(
             effect.name, effect.title, effect.reported[0].name, parameter.unit, ALLOWED * parameter.prior_sd, detected, named,
-            share, taken_up, effect.tier == CONTRACT, periods,
+            share, taken_up, effect.tier == CONTRACT, periods, length if np.isfinite(length) else None,
         )  # fmt: skip
 
     def _periods(self, length: float) -> Periods:

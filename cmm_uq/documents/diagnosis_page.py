@@ -8,6 +8,7 @@ import numpy as np
 
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.documents.against import corrections, simulation_section
+from cmm_uq.documents.diagnosis_next import next_section
 from cmm_uq.documents.diagnosis_unseen import unseen_section
 from cmm_uq.documents.diagnosis_words import (
     VERDICT_WORDS,
@@ -28,7 +29,7 @@ from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.results_file import diagnosis_data, head
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.messages import Text, Verbatim, commas, day, names, number, say, together
+from cmm_uq.messages import Text, Verbatim, commas, day, names, number, say
 from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.units import MICROMETRE, unit
 
@@ -92,9 +93,7 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
         Section(say("Candidate explanations"), (_rivals(found),)),
         unseen_section(found),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise)),
-        Section(say("What to measure next"), tuple(
-            Paragraph(say("{effects}: {what}", effects=together(names(s.separates)), what=s.what)) for s in found.suggestions
-        )),
+        next_section(found),
     )  # fmt: skip
     return tuple(section for section in sections if section.blocks)
 

@@ -22,7 +22,7 @@ from cmm_uq.inference.posterior import NoisyPosterior
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
-from cmm_uq.planning.suggestion import Suggestion
+from cmm_uq.planning.suggestion import NextPlan, Suggestion
 from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding
 from cmm_uq.uncertainty.covariance import Covariance
@@ -93,6 +93,7 @@ class Diagnosed:
     consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
     simulated : the simulation that the recording was compared with, if it was with one.
     unseen : the smallest amplitude of each effect that the recording would have shown.
+    next_plan : the fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any.
     """
 
     job: Job
@@ -102,6 +103,7 @@ class Diagnosed:
     consequences: Consequences | None = None
     simulated: Simulated | None = None
     unseen: tuple[Smallest, ...] = ()
+    next_plan: NextPlan | None = None
 
 
 @dataclass(frozen=True)

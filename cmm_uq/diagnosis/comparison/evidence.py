@@ -262,9 +262,13 @@ class Comparison:
         return np.asarray(np.einsum("mb,kmb->kb", columns, self._by_noise(columns)))
 
     def of_signal(self, signal: Floats, noise: Floats) -> Floats:
-        """Log evidence (c, b) of each explanation over nothing for signals (m, b) in a noise (m,) at right angles to everything.
+        """Log evidence (c, b) of each explanation over nothing for signals (m, b) in noise at right angles to everything.
 
-        The noise counts by its size alone: what a signal shows on average, nearly.
+        It is nearly what a signal shows on average.
+
+        Parameters
+        ----------
+        noise : (m,) that counts by its size alone.
         """
         known = self._beside(signal, ())
         known = replace(known, squares=known.squares + self.lengths(noise[:, None]))
