@@ -385,7 +385,7 @@ def _thresholds(view: _View, signals: Sequence[_Signal], alpha: float) -> Iterat
     columns = np.stack([s.column / s.unit_length for s in signals])
     data = (sizes[:, :, None] * columns[:, None, :]).reshape(-1, columns.shape[1]).T
     odds = comparison.of_signal(data, view.noise).reshape(len(explanations), len(signals), len(SIZES))
-    dof = view.known + view.left
+    dof = max(view.known + view.left, 1.0)
     naming = Naming(explanations)
     pair = _pair(explanations, comparison.visible)
     for i, signal in enumerate(signals):
@@ -416,7 +416,7 @@ def _pair(explanations: Sequence[Explanation], visible: frozenset[int]) -> float
 
 def _gate(null: Floats, alpha: float) -> float:
     """Statistic that the test rejects from."""
-    low, high = float(np.quantile(null, 0.5)), float(null.max()) + 50.0
+    low, high = float(null.min()) - 1.0, float(null.max()) + 50.0
     return float(optimize.brentq(lambda value: np.log(tail_probability(null, value) / alpha), low, high, xtol=1e-6))
 
 
