@@ -39,7 +39,7 @@ from cmm_uq.points import Floats, Points
 ODDS = 20.0
 """Odds that a plan is expected to reach for every pair, whichever of the two is true."""
 
-SET_UPS, REPEATS = 12, 30
+SET_UPS, REPEATS = 8, 10
 """Most set-ups of a plan, and most repeats of each."""
 
 _NEVER = 1e6
@@ -281,14 +281,14 @@ def next_plan(
     most = aims.amplitudes(everything[None], wanted)[0]
     showing = [one for one, amplitude in zip(wanted, most, strict=True) if amplitude < _NEVER]
     aims = replace(aims, wanted=tuple(showing))
-    found = _fewest(aims)
+    found = _within_reach(aims)
     if found is None:
         return None
     chosen, repeats = found
-    after_all = known.recorded + aims.added(repeats)[list(chosen.indices)].sum(axis=0)
+    after_all = aims.after(chosen, repeats)
     return NextPlan(
         tuple(places[i] for i in chosen.indices), repeats, int(points.measurement.max()) + 1, aims.partings(after_all),
-        aims.shown(after_all), chosen.after <= 0, volume.box,
+        aims.shown(after_all), float(aims.short(after_all[None])[0]) <= 0, volume.box,
     )  # fmt: skip
 
 
@@ -391,6 +391,10 @@ class _Aims:
         reading, set_up = self.variances
         return np.asarray(self.known.told.each / (reading / repeats + set_up))
 
+    def after(self, chosen: Chosen, repeats: int) -> Floats:
+        """Information (k, k) of the recording and what is added to it."""
+        return np.asarray(self.start + self.added(repeats)[list(chosen.indices)].sum(axis=0))
+
     def short(self, information: Floats) -> Floats:
         """By how much (c,) a plan falls short of all aims together, in logarithms; 0 where it reaches them."""
         total = np.zeros(len(information))
@@ -453,6 +457,21 @@ class _Aims:
     def start(self) -> Floats:
         """Information (k, k) of the recording."""
         return self.known.recorded
+
+
+def _within_reach(aims: _Aims) -> tuple[Chosen, int] | None:
+    """The plan for all aims but effects to show that would need too many set-ups, the one that needs most first."""
+    found = _fewest(aims)
+    while found is not None and found[0].after > 0 and aims.wanted:
+        shown = aims.amplitudes(aims.after(*found)[None], aims.wanted)[0]
+        missing = shown / np.array([one.amplitude for one in aims.wanted])
+        worst = int(np.argmax(missing))
+        if missing[worst] <= 1:
+            break
+        aims = replace(aims, wanted=aims.wanted[:worst] + aims.wanted[worst + 1 :])
+        nearer = _fewest(aims)
+        found = found if nearer is None else nearer
+    return found
 
 
 def _fewest(aims: _Aims) -> tuple[Chosen, int] | None:
