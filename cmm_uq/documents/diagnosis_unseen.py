@@ -54,7 +54,7 @@ def unseen_section(found: Diagnosed) -> Section:
         say(
             "With the noise that was found and beside what was asserted, an error of this size would have been found, or "
             "called by its right name, in {power:.0f} of 100 such recordings; “not found” where even the largest error "
-            "reckoned with would not. In closed form: mostly within 15 %, with a close rival’s name within a factor of two.",
+            "reckoned with would not. In closed form: mostly within 15 %, a name with a close rival within a factor of two.",
             power=100 * POWER,
         ),
     )
