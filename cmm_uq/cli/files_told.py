@@ -15,6 +15,7 @@ _WHAT = {
     "diagnosis.pdf": "the diagnosis, with its plots",
     "plan.html": "the plan, with a picture of each placing",
     "plan.csv": "the placings, to be filled in as the recording",
+    "next_plan.csv": "the set-ups to measure next, to be filled in",
     "budget.html": "the budget",
     "budget.pdf": "the budget",
     "results.json": "every figure, for other programs",

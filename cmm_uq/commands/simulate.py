@@ -18,7 +18,7 @@ from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import first_line
+from cmm_uq.jobs.origin import PLANNED, first_line
 from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.jobs.toml_file import as_toml, checked
 from cmm_uq.jobs.truth import NoiseFacts, Truth
@@ -173,6 +173,11 @@ def recording(points: Points) -> bytes:
         coordinates = [f"{value:.7f}" for value in points.xyz[i]]
         writer.writerow([*numbers, *coordinates, *(f"{values[i]:.10g}" for values in points.columns.values())])
     return text.getvalue().encode()
+
+
+def to_fill_in(points: Points) -> bytes:
+    """Points at nominal coordinates as the CSV of a recording that is still to be measured."""
+    return PLANNED.encode() + recording(points)
 
 
 def _noise(given: NoiseFacts) -> Noise:

@@ -93,6 +93,7 @@ class Diagnosis:
     components : of the noise, for the model after.
     posterior : joint, of the model after.
     compared : observations that the candidates were compared on; what was found is estimated from all.
+    found : the search that it rests on.
     withheld : effects that are probable, and yet not asserted.
     remaining : combinations of explanations that remain, and what they make of the named effects.
     """
@@ -111,6 +112,7 @@ class Diagnosis:
     components: Components
     posterior: NoisyPosterior
     compared: int
+    found: Found
     withheld: tuple[Withheld, ...] = ()
     remaining: Remaining = field(default_factory=Remaining)
 
@@ -149,7 +151,7 @@ def diagnose(
     return Diagnosis(
         _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha, found.chosen),
         _left_out(found, joint, model), _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
-        joint.components, joint.posterior, int(some.used.sum()), withheld,
+        joint.components, joint.posterior, int(some.used.sum()), found, withheld,
         remaining(found, joint, model, seed),
     )  # fmt: skip
 

@@ -8,6 +8,7 @@ from cmm_uq.diagnosis.comparison.search import ASSERTED
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import contained
+from cmm_uq.documents.diagnosis_unseen import without_power
 from cmm_uq.documents.document import Overview, Standing
 from cmm_uq.documents.effect_words import effect_of, size_of, titles
 from cmm_uq.documents.result import Diagnosed
@@ -38,10 +39,13 @@ def overview_of(found: Diagnosed) -> Overview:
     """The overview of a recording's diagnosis."""
     d = found.diagnosis
     rows = (
-        (say("Found"), _found(found)), (say("Where"), _where(d)), (say("How sure"), _sure(d)),
+        (say("Found"), _found(found)), (say("Where"), _where(d)), (say("How sure"), _sure(found)),
         (say("What to do"), _to_do(found)),
     )  # fmt: skip
-    return Overview(VERDICT_TITLES[d.verdict], STANDING[d.verdict], tuple(row for row in rows if row[1]))
+    title, standing = VERDICT_TITLES[d.verdict], STANDING[d.verdict]
+    if without_power(found):
+        title, standing = say("Consistent, as far as this recording can show"), "open"
+    return Overview(title, standing, tuple(row for row in rows if row[1]))
 
 
 def _found(found: Diagnosed) -> Text:
@@ -86,9 +90,11 @@ def _where(d: Diagnosis) -> Text:
     return say("{places:capital}.", places=semicolons([place_words(place) for place in d.where[:2]]))
 
 
-def _sure(d: Diagnosis) -> Text:
+def _sure(found: Diagnosed) -> Text:
+    d = found.diagnosis
     if d.verdict == "consistent":
-        return say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
+        told = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
+        return lines(text for text in (told, without_power(found)) if text)
     by_chance = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
     if not d.effects:
         return by_chance
@@ -126,8 +132,8 @@ def share_of(p_value: float) -> Text:
 def _to_do(found: Diagnosed) -> Text:
     d = found.diagnosis
     told: list[Text] = []
-    if found.suggestions:
-        told.append(say("First measure what is told below, to part what this recording cannot."))
+    if found.next_plan is not None and d.verdict != "consistent":
+        told.append(say("First measure the set-ups that are told below, to part what this recording cannot."))
     told += [_look_at(d, item) for item in d.effects]
     if d.verdict in ("partial", "unexplained"):
         told.append(
@@ -137,6 +143,8 @@ def _to_do(found: Diagnosed) -> Text:
         told.append(say("Then measure again."))
     if d.verdict == "consistent":
         told.append(_nothing_to_do(found.findings))
+        if found.next_plan is not None:
+            told.append(say("To see what it could not have shown, measure the set-ups that are told below."))
     return lines(dict.fromkeys(told))
 
 

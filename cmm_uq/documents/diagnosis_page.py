@@ -11,7 +11,9 @@ from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.documents.against import contained, corrections, simulation_section
 from cmm_uq.documents.diagnosis_costs import costs_section
+from cmm_uq.documents.diagnosis_next import next_section
 from cmm_uq.documents.diagnosis_overview import overview_of
+from cmm_uq.documents.diagnosis_unseen import unseen_section
 from cmm_uq.documents.diagnosis_words import (
     ambiguous,
     held_out,
@@ -36,7 +38,7 @@ from cmm_uq.documents.withheld import other_periods
 from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.messages import Text, Verbatim, commas, day, names, number, say, sentences, together
+from cmm_uq.messages import Text, Verbatim, commas, day, names, number, say, sentences
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.points import Floats
@@ -95,15 +97,18 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
 
 def _sections(found: Diagnosed) -> tuple[Section, ...]:
     """What is to be done first, what it rests on behind it, long tables last."""
-    noise = noise_words(found.diagnosis, stated_um(found))
+    noise, unseen = noise_words(found.diagnosis, stated_um(found)), unseen_section(found)
+    consistent = found.diagnosis.verdict == "consistent"
     sections = (
         Section(say("What was left out"), _left_out(found)),
         where_section(found.diagnosis),
-        Section(say("What to measure next"), _next(found)),
+        Section(say("What remains"), _consistent(found)),
+        *((unseen,) if consistent else ()),
+        next_section(found),
         Section(say("Before and after"), _before_after(found)),
         Section(say("What a correction would change"), _consequences(found)),
         costs_section(found),
-        Section(say("What remains"), _consistent(found)),
+        *(() if consistent else (unseen,)),
         *_simulation(found),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise)),
         Section(say("Candidate explanations"), (_rivals(found),)),
@@ -148,14 +153,6 @@ def _effect(found: Diagnosed, item: LeftOut) -> Facts:
         (say("How sure"), say("{sure:capital}.", sure=sure(item))),
         (say("Gain"), say("{gain:capital}.", gain=held_out(d.improvement))),
     ))  # fmt: skip
-
-
-def _next(found: Diagnosed) -> tuple[Block, ...]:
-    own = found.diagnosis.after.effects
-    return tuple(
-        Paragraph(say("To part {effects}: {what}", effects=together(titles(s.separates, own)), what=s.what))
-        for s in found.suggestions
-    )
 
 
 def _consistent(found: Diagnosed) -> tuple[Block, ...]:

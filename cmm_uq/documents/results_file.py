@@ -14,6 +14,8 @@ from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import corrections
 from cmm_uq.documents.diagnosis_costs import costs_data
+from cmm_uq.documents.diagnosis_next import next_data
+from cmm_uq.documents.diagnosis_unseen import unseen_data
 from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.program import software
 from cmm_uq.documents.quantity_data import quantity_data as quantity_data
@@ -128,6 +130,8 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         },
         "screening": [finding_data(f, found.job.facts.recording.file) for f in found.findings],
         "improvement": improvement_data(d.improvement),
+        "next_plan": next_data(found.next_plan),
+        "unseen": unseen_data(found.unseen),
         "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
         **costs_data(found),
         **({"compared_on": d.compared} if d.compared < int(d.before.used.sum()) else {}),

@@ -29,7 +29,8 @@ WORDS: Mapping[str, Text] = MappingProxyType({
     "temp_ram_front_c": say("temperature of the front of the ram"),
     "temp_ram_back_c": say("temperature of the back of the ram"),
     "temp_air_c": say("temperature of the air"), "pressure_hpa": say("air pressure"), "humidity_pct": say("humidity"),
-    "speed_mm_s": say("speed"), "gamma_deg": say("turn of the digitizer"), "turned_deg": say("turn of the sphere"), "depth_mm": say("scan depth"),
+    "speed_mm_s": say("speed"), "gamma_deg": say("turn of the digitizer"), "turned_deg": say("turn of the sphere"),
+    "depth_mm": say("scan depth"),
     "radius_mm": say("fitted radius"), "fit_rms_um": say("residuals of the fit"), "n_points": say("number of points fitted"),
 })  # fmt: skip
 """By name of the column."""

@@ -65,6 +65,7 @@ class ModelComparison:
     log_odds : (c,) log evidence of each over nothing.
     probability : (c,) of each explanation, nothing included in the comparison.
     p_value : of "nothing is missing".
+    null : (draws,) test statistic under nothing.
     null_maximum : (draws,) largest log evidence of a nonparametric term over nothing, under nothing.
     """
 
@@ -74,6 +75,7 @@ class ModelComparison:
     log_odds: Floats
     probability: Floats
     p_value: float
+    null: Floats
     null_maximum: Floats
 
     @property
@@ -296,8 +298,9 @@ def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -
     log_odds = something[:, 0] - nothing[0]
     prior = log_prior(candidates)
     log_total = special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
-    p_value, maxima = lack_of_fit(comparison, seed)
-    return ModelComparison(model, values, comparison, log_odds, np.exp(prior + log_odds - log_total), p_value, maxima)
+    p_value, null, maxima = lack_of_fit(comparison, seed)
+    probability = np.exp(prior + log_odds - log_total)
+    return ModelComparison(model, values, comparison, log_odds, probability, p_value, null, maxima)
 
 
 def comparison_of(model: MeasurementModel, stated: float | None, candidates: Sequence[Explanation]) -> Comparison:
