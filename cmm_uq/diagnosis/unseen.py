@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import optimize, special
 
 from cmm_uq.diagnosis.comparison.combinations import EFFECTS
-from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, effect_of
 from cmm_uq.diagnosis.comparison.lack_of_fit import NOTHING, log_prior, tail_probability
 from cmm_uq.diagnosis.comparison.search import Found
 from cmm_uq.diagnosis.detection import LONGEST, SHORTEST, Thresholds
@@ -142,7 +142,7 @@ def smallest_effects(found: Found, alpha: float, model: MeasurementModel) -> tup
     view = _View.of(found)
     named = {effect.name for effect in model.effects}
     listed = [
-        (i, explanation, every()[explanation.name])
+        (i, explanation, effect_of(explanation))
         for i, explanation in enumerate(view.explanations)
         if explanation.kind == EFFECT and explanation.name not in named and explanation.name in every()
     ]

@@ -9,6 +9,7 @@ from cmm_uq.diagnosis.comparison.search import ASSERTED
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import VERDICTS as AGAINST
+from cmm_uq.documents.diagnosis_next import next_sentence
 from cmm_uq.documents.diagnosis_overview import STANDING, overview_of
 from cmm_uq.documents.effect_words import effect_of, size_of, title_of, titles
 from cmm_uq.documents.in_short import Summary, Verdict
@@ -17,7 +18,7 @@ from cmm_uq.documents.withheld import other_periods
 from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import probability
 from cmm_uq.jobs.job import JobFile
-from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, day, say, together
+from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, day, say
 from cmm_uq.physics.effect import Effect
 from cmm_uq.screening.finding import Finding
 
@@ -56,10 +57,8 @@ def lines(found: Diagnosed) -> list[Text]:
         *withheld_sentences(d.withheld),
     ]
     said += [ambiguous(titles(group, own)) for group in d.indistinguishable]
-    said += [
-        say("To part {effects}: {what}", effects=together(titles(s.separates, own)), what=s.what)
-        for s in found.suggestions
-    ]
+    if told := next_sentence(found):
+        said.append(told)
     return said + list(noise_words(d, stated_um(found)))
 
 
