@@ -6,7 +6,7 @@ included, and nothing of the truth.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import every
+from cmm_uq.plugins import BrokenPluginError
 from cmm_uq.points import Floats, Points
 from cmm_uq.proving.cases import Case, Design
 from cmm_uq.proving.judged import REFUSED
@@ -77,6 +78,8 @@ def diagnosed_case(job: Job, design: Design, case: Case, setting: CaseSetting) -
     seed = int(np.random.SeedSequence(setting.seed, spawn_key=(case.number, 2)).generate_state(1)[0])
     try:
         found = diagnose_read(replace(job, points=points), seed=seed, alpha=setting.alpha)
+    except BrokenPluginError:
+        raise
     except CmmUqError as error:
         return {"number": case.number, REFUSED: str(error)}
     except Exception as error:
@@ -94,12 +97,12 @@ def diagnosed_case(job: Job, design: Design, case: Case, setting: CaseSetting) -
             {
                 "effect": str.__str__(each.effect), "probability": _rounded(each.probability),
                 "together": _rounded(each.together),
-                "parameters": {name: _interval(quantity) for name, quantity in each.parameters.items()},
+                "parameters": _intervals(each.parameters),
             }
             for each in d.effects
         ],
         "groups": [[str.__str__(name) for name in group] for group in d.indistinguishable],
-        "named": {name: _interval(quantity) for name, quantity in _named(d).items()},
+        "named": _intervals(_named(d)),
         "heldout_um": [_rounded(d.improvement.heldout_rms_before_um), _rounded(d.improvement.heldout_rms_after_um)],
         "elpd_gain": [_rounded(d.improvement.elpd_gain), _rounded(d.improvement.elpd_gain_se)],
     }  # fmt: skip
@@ -123,12 +126,13 @@ def _named(d: Diagnosis) -> dict[str, Quantity]:
     return told
 
 
-def _interval(quantity: Quantity) -> list[float]:
-    return [_rounded(each) for each in (quantity.value, *quantity.interval95)]
+def _intervals(quantities: Mapping[str, Quantity]) -> dict[str, list[float | None]]:
+    """Value, lower and upper end of each."""
+    return {name: [_rounded(each) for each in (one.value, *one.interval95)] for name, one in quantities.items()}
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+def _rounded(value: float) -> float | None:
+    return float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None
 
 
 def main() -> None:

@@ -26,6 +26,7 @@ from cmm_uq.proving.cases import KINDS, STRONGEST, WEAKEST, micrometres
 from cmm_uq.proving.intervals import Rate
 from cmm_uq.proving.judged import REFUSED, VERDICTS
 from cmm_uq.proving.running import RECORDS, TRUTH
+from cmm_uq.proving.sight import ALLOWED
 from cmm_uq.proving.smallest import FEWEST, LARGEST
 from cmm_uq.units import unit
 
@@ -154,11 +155,11 @@ def _method(proof: Proof) -> tuple[Text, ...]:
             "does not show in these set-ups, another takes its place."
         ),
         say(
-            "A hidden cause has a strength √λ between {weakest:g} and {strongest:g}, evenly distributed: its length "
-            "in all observations over the noise, once all that the job names, and what else is hidden, has taken "
-            "what it can. No effect is larger than {allowed} standard deviations of what physics allows, and of no "
-            "function, and no fault, does a single effect leave less than {weakest:g}.",
-            weakest=WEAKEST, strongest=STRONGEST, allowed=3,
+            "A hidden cause has a strength √λ: its length in all observations over the noise, once all that the job "
+            "names, and what else is hidden, has taken what it can. Strengths are evenly distributed from {weakest:g} "
+            "to {strongest:g}, or to that of {allowed:g} standard deviations of what physics allows where an effect is "
+            "then weaker. Of a function or a fault, no single effect leaves less than {weakest:g}.",
+            weakest=WEAKEST, strongest=STRONGEST, allowed=ALLOWED,
         ),
         say(
             "Every other case has the noise of the job; the others in turn each kind of noise that these set-ups "

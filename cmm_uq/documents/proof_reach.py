@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.proof import Proof
 from cmm_uq.documents.proof_words import FAULT_WORDS
-from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, names, number, say
-from cmm_uq.proving.reach import DRAWN, NO_TRAVEL, TAKEN, TOO_SMALL, UNRECORDED, FaultReach, Reach
+from cmm_uq.messages import DASH, NOTHING, Text, commas, names, number, say, semicolons
+from cmm_uq.proving.reach import DRAWN, NO_TRAVEL, TAKEN, TOO_SMALL, UNRECORDED, Reach
 from cmm_uq.proving.smallest import LARGEST
 
 
 def effects_section(proof: Proof) -> Section:
     """Every effect that cases could hide: how often it was found, and how large it must be."""
+    titles = {reach.effect: reach.title for reach in proof.reaches}
     rows = []
     for reach in proof.reaches:
         if reach.standing != DRAWN:
             continue
         found, wrong = proof.judgement.of_effect(reach.effect)
         cell = say("{count} of {of}", count=found.count, of=found.of) if found.of else DASH
-        alike: Text = Verbatim(reach.alike) if reach.alike else NOTHING
+        alike: Text = titles[reach.alike] if reach.alike else NOTHING
         rows.append(
             (
-                Verbatim(reach.effect),
+                reach.title,
                 cell,
                 number(wrong),
                 *_smallest(proof, reach),
@@ -64,53 +63,51 @@ def _smallest(proof: Proof, reach: Reach) -> tuple[Text, Text]:
 
 def unseen_section(proof: Proof) -> Section:
     """What these set-ups cannot see, and why."""
-    sentences = [*_unseen(proof.reaches), *_faults(proof.faults)]
-    return Section(say("What these set-ups cannot see"), tuple(Paragraph(text) for text in sentences))
+    found: list[Block] = [Paragraph(text) for text in (*_unseen(proof.reaches), *_faults(proof))]
+    return Section(say("What these set-ups cannot see"), (*found, *_unrecorded(proof.reaches)))
 
 
 def _unseen(reaches: tuple[Reach, ...]) -> list[Text]:
-    def of(standing: str) -> list[str]:
-        return [reach.effect for reach in reaches if reach.standing == standing]
-
+    """Effects that act on what is recorded, and do not show."""
+    told = {
+        TAKEN: say(
+            "Nothing of these shows, for they leave the observations as they are or what the job names takes all:"
+        ),
+        TOO_SMALL: say("These drown in the noise even as large as physics allows:"),
+        NO_TRAVEL: say("Not considered, for the job does not say what they need of the machine:"),
+    }
     found: list[Text] = []
-    if taken := of(TAKEN):
-        found.append(
-            say(
-                "Nothing of these shows: they leave the observations as they are, or what the job names takes all: {effects}.",
-                effects=commas(names(taken)),
-            )
-        )
-    if small := of(TOO_SMALL):
-        found.append(
-            say("These drown in the noise even as large as physics allows: {effects}.", effects=commas(names(small)))
-        )
-    by_columns: dict[tuple[str, ...], list[str]] = {}
-    for reach in reaches:
-        if reach.standing == UNRECORDED:
-            by_columns.setdefault(reach.columns, []).append(reach.effect)
-    for columns, effects in by_columns.items():
-        found.append(say("Not recorded, so not considered: {effects}, for want of {columns}.", effects=commas(names(effects)),
-                         columns=commas(names(columns))))  # fmt: skip
-    if travel := of(NO_TRAVEL):
-        found.append(
-            say(
-                "Not considered, for the job does not say what they need of the machine: {effects}.",
-                effects=commas(names(travel)),
-            )
-        )
+    for standing, what in told.items():
+        titles = [reach.title for reach in reaches if reach.standing == standing]
+        if titles:
+            found.append(say("{what} {effects}.", what=what, effects=semicolons(titles)))
     return found
 
 
-def _faults(faults: Iterable[FaultReach]) -> list[Text]:
+def _unrecorded(reaches: tuple[Reach, ...]) -> tuple[Block, ...]:
+    """Effects that go by what was not recorded."""
+    by_columns: dict[tuple[str, ...], list[Text]] = {}
+    for reach in reaches:
+        if reach.standing == UNRECORDED:
+            by_columns.setdefault(reach.columns, []).append(reach.title)
+    rows = tuple((semicolons(titles), commas(names(columns))) for columns, titles in by_columns.items())
+    heads = (Column(say("Effects"), numeric=False), Column(say("Columns that they go by"), numeric=False))
+    return (Table(say("Not considered, because it is not recorded"), heads, rows),) if rows else ()
+
+
+def _faults(proof: Proof) -> list[Text]:
+    titles = {reach.effect: reach.title for reach in proof.reaches}
     found: list[Text] = []
-    for fault in faults:
+    for fault in proof.faults:
         what = FAULT_WORDS[fault.what]
         if not fault.shows:
             found.append(say("Of the artefact, nothing shows of {what}: what the job names takes it.", what=what))
         elif fault.hidden:
-            like = Verbatim(fault.like)
+            like = titles[fault.like]
             told = say(
-                "Of the artefact, {what} looks like {effect}; only other set-ups would tell.", what=what, effect=like
+                "Of the artefact, {what} looks like {effect:small}; only other set-ups would tell.",
+                what=what,
+                effect=like,
             )
             found.append(told)
     return found

@@ -116,20 +116,17 @@ def _held_out(record: Mapping[str, Any]) -> tuple[float, float] | None:
     if not record["effects"]:
         return None
     before, after = record["heldout_um"]
-    return float(before), float(after)
+    return None if before is None or after is None else (float(before), float(after))
 
 
-def _inside(said: Mapping[str, Sequence[float]], true: Mapping[str, float]) -> tuple[int, int]:
-    """How many intervals hold the truth, of how many; of a phase on the circle."""
-    inside = [_holds(name, said[name], true[name]) for name in said if name in true]
+def _inside(said: Mapping[str, Sequence[float | None]], true: Mapping[str, float]) -> tuple[int, int]:
+    """How many intervals hold the truth, of how many that have two ends; of a phase on the circle."""
+    inside = []
+    for name, (_, low, high) in said.items():
+        if name in true and low is not None and high is not None:
+            turns = np.ceil((low - true[name]) / _CIRCLE) if name.endswith("phase_rad") else 0.0
+            inside.append(bool(low <= true[name] + _CIRCLE * turns <= high))
     return sum(inside), len(inside)
-
-
-def _holds(name: str, said: Sequence[float], true: float) -> bool:
-    _, low, high = said
-    if name.rpartition(".")[2] == "phase_rad":
-        true += _CIRCLE * np.ceil((low - true) / _CIRCLE)
-    return bool(low <= true <= high)
 
 
 @dataclass(frozen=True, eq=False)

@@ -148,9 +148,13 @@ def answered(
         waiting.put(None)
     answers: queue.SimpleQueue[Record | Exception] = queue.SimpleQueue()
     processes = [_process(program) for _ in range(count if tasks else 0)]
+    talks = [
+        threading.Thread(target=_converse, args=(process, setting, waiting, answers), daemon=True)
+        for process in processes
+    ]
     try:
-        for process in processes:
-            threading.Thread(target=_converse, args=(process, setting, waiting, answers), daemon=True).start()
+        for talk in talks:
+            talk.start()
         for _ in tasks:
             answer = answers.get()
             if isinstance(answer, Exception):
@@ -159,8 +163,13 @@ def answered(
     finally:
         for process in processes:
             process.kill()
-        for process in processes:
+        for process, talk in zip(processes, talks, strict=True):
             process.wait()
+            talk.join()
+            for pipe in (process.stdin, process.stdout):
+                with contextlib.suppress(OSError):  # what was not read any more
+                    if pipe is not None:
+                        pipe.close()
 
 
 def _ended(answer: Exception) -> CmmUqError:

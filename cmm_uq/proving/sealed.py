@@ -9,9 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cmm_uq.proving.cases import Case
+if TYPE_CHECKING:
+    from cmm_uq.proving.cases import Case
 
 SCHEMA = "cmm-uq/prove-truth/1"
 
