@@ -18,7 +18,7 @@ from cmm_uq.messages import NOTHING, Verbatim, say
 from cmm_uq.proving.accepted import MET, MISSED, OPEN
 from cmm_uq.proving.cases import KINDS, micrometres
 from cmm_uq.proving.intervals import Rate
-from cmm_uq.proving.judged import NAMED, NAMED_BESIDE, NAMED_MISSED, STATED
+from cmm_uq.proving.judged import NAMED, NAMED_BESIDE, NAMED_MISSED, REFUSED, STATED, VERDICTS
 from cmm_uq.proving.running import RECORDS, TRUTH
 
 SCHEMA = "cmm-uq/prove/1"
@@ -116,7 +116,10 @@ def proof_results(proof: Proof) -> dict[str, Any]:
         "alpha": proof.alpha,
         "truth_sha256": proof.sha256,
         "noise": micrometres(proof.design.noise),
-        "verdicts": {kind.replace(" ", "_"): dict(judgement.verdicts(kind)) for kind in KINDS},
+        "verdicts": {
+            kind.replace(" ", "_"): {said: judgement.verdicts(kind).get(said, 0) for said in (*VERDICTS, REFUSED)}
+            for kind in KINDS
+        },
         "rates": {name: _rate(getattr(judgement, name)) for name in rates},
         "held_out_ratio": judgement.held_out_ratio,
         "coverage": {
