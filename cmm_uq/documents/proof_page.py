@@ -313,7 +313,7 @@ def _intervals(proof: Proof) -> Block:
         rate = proof.judgement.coverage_of(sort)
         rows.append((what, counted(rate), percent(rate), interval(rate)))
     rate = proof.judgement.coverage
-    rows.append((say("the first three, pooled"), counted(rate), percent(rate), interval(rate)))
+    rows.append((say("all but the last, pooled"), counted(rate), percent(rate), interval(rate)))
     note = say(
         "95 % intervals that hold the truth. Those of one recording are not independent; the interval of the rate "
         "allows for that. What is estimated beside a cause that was not found is shown for itself: it cannot be "

@@ -18,7 +18,7 @@ from cmm_uq.messages import NOTHING, Verbatim, say
 from cmm_uq.proving.accepted import MET, MISSED, OPEN
 from cmm_uq.proving.cases import KINDS, micrometres
 from cmm_uq.proving.intervals import Rate
-from cmm_uq.proving.judged import NAMED, NAMED_BESIDE, NAMED_MISSED, REFUSED, STATED, VERDICTS
+from cmm_uq.proving.judged import NAMED, NAMED_BESIDE, NAMED_GROUPED, NAMED_MISSED, REFUSED, STATED, VERDICTS
 from cmm_uq.proving.running import RECORDS, TRUTH
 
 SCHEMA = "cmm-uq/prove/1"
@@ -104,7 +104,13 @@ def proof_outcome(proof: Proof) -> Outcome:
 def proof_results(proof: Proof) -> dict[str, Any]:
     """results.json."""
     judgement, found = proof.judgement, proof.judgement.by_strength
-    sorts = {"found": STATED, "named": NAMED, "named_beside_found": NAMED_BESIDE, "named_beside_missed": NAMED_MISSED}
+    sorts = {
+        "found": STATED,
+        "named": NAMED,
+        "named_beside_found": NAMED_BESIDE,
+        "named_beside_group": NAMED_GROUPED,
+        "named_beside_missed": NAMED_MISSED,
+    }
     rates = (
         "false_alarms", "right", "found", "found_alone", "wrong_names", "recognised", "machine_blamed", "predicts_better",
         "refused",

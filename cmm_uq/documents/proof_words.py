@@ -44,7 +44,8 @@ INTERVAL_WORDS: Mapping[str, Text] = MappingProxyType(
     {
         judged.STATED: say("of effects that were found"),
         judged.NAMED: say("of what the job names, nothing hidden"),
-        judged.NAMED_BESIDE: say("of what the job names, all that is hidden found"),
+        judged.NAMED_BESIDE: say("of what the job names, all that is hidden found and told apart"),
+        judged.NAMED_GROUPED: say("of what the job names, something found only as one of a group"),
         judged.NAMED_MISSED: say("of what the job names, something hidden not found"),
     }
 )

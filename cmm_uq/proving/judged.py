@@ -26,7 +26,9 @@ CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED = "consistent", "explained", "partia
 VERDICTS = (CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED)
 REFUSED = "refused"
 
-STATED, NAMED, NAMED_BESIDE, NAMED_MISSED = "found", "named, nothing hidden", "named, all found", "named, not all found"
+STATED, NAMED, NAMED_BESIDE, NAMED_GROUPED, NAMED_MISSED = (
+    "found", "named, nothing hidden", "named, all found and told apart", "named, found in a group", "named, not all found",
+)  # fmt: skip
 """Which 95 % intervals are counted: of effects that were found; of those that the job names, by what was hidden."""
 
 _CIRCLE = 2 * np.pi
@@ -88,14 +90,22 @@ def judge(
     intervals = [(STATED, k, n) for k, n in counted]
     whole = reached == set(hidden) and not wrong
     if case.kind in (NOTHING, ONE, TWO):
-        sort = NAMED if case.kind == NOTHING else NAMED_BESIDE if whole else NAMED_MISSED
-        intervals.append((sort, *_inside(record["named"], named)))
+        intervals.append((_beside(case, whole=whole, apart=alone == set(hidden)), *_inside(record["named"], named)))
     verdict = record["verdict"]
     return Judged(
         case, verdict, tuple(sorted(reached)), tuple(sorted(alone)), tuple(wrong),
         tuple((float(each["probability"]), name in hidden) for name, each in asserted.items()), tuple(intervals),
         _right(case, verdict, whole=whole), _held_out(record),
     )  # fmt: skip
+
+
+def _beside(case: Case, *, whole: bool, apart: bool) -> str:
+    """Beside what the parameters are estimated that the job names."""
+    if case.kind == NOTHING:
+        return NAMED
+    if not whole:
+        return NAMED_MISSED
+    return NAMED_BESIDE if apart else NAMED_GROUPED
 
 
 def _nobody(name: str) -> bool:
@@ -182,7 +192,7 @@ class Judgement:
     @cached_property
     def coverage(self) -> Rate:
         """95 % intervals that hold the truth, where all that acts was named or found."""
-        return self.coverage_of(STATED, NAMED, NAMED_BESIDE)
+        return self.coverage_of(STATED, NAMED, NAMED_BESIDE, NAMED_GROUPED)
 
     def coverage_of(self, *sorts: str) -> Rate:
         """The same of some sorts of intervals; those of one recording are not independent of each other."""

@@ -10,7 +10,7 @@ from cmm_uq.jobs.prove import ProveFacts
 from cmm_uq.model import Noise
 from cmm_uq.proving.accepted import MET, MISSED, OPEN, accepted
 from cmm_uq.proving.cases import ARTEFACT, NOTHING, ONE, OUTSIDE, TWO, Case, Hidden, Stranger
-from cmm_uq.proving.judged import NAMED, NAMED_BESIDE, NAMED_MISSED, STATED, Judged, Judgement, judge
+from cmm_uq.proving.judged import NAMED, NAMED_BESIDE, NAMED_GROUPED, NAMED_MISSED, STATED, Judged, Judgement, judge
 
 TRUE = {"scale_x.ppm": 3.0}
 HOLDS, FAILS = {"scale_x.ppm": [3.1, 2.0, 4.0]}, {"scale_x.ppm": [6.0, 5.0, 7.0]}
@@ -76,6 +76,8 @@ def test_intervals_are_counted_by_what_they_are_of() -> None:
     assert both.intervals == ((STATED, 0, 1), (STATED, 3, 3), (NAMED_BESIDE, 1, 1))  # −3.18 is 3.1 on the circle
     assert judged(case(NOTHING), said("consistent", named=FAILS)).intervals == ((NAMED, 0, 1),)
     assert judged(case(ONE, BOW), said("consistent")).intervals == ((NAMED_MISSED, 1, 1),)
+    grouped = judged(case(ONE, BOW), said("explained", TWIN, groups=[["rotation_x_z", "straightness_x_y"]]))
+    assert grouped.intervals == ((NAMED_GROUPED, 1, 1),)
     assert judged(case(OUTSIDE), said("unexplained")).intervals == ()
 
 
