@@ -187,8 +187,8 @@ def prove() -> str:
     rows = [(f"`{name}`", told) for name, told in PROOF.items()]
     return page(
         "results.json of `cmm-uq prove`, key by key",
-        "Schema `cmm-uq/prove/1`. A part in capitals stands for any name, `[]` for each entry of a list. Numbers are finite; what has "
-        "no value is `null`. What it is and how it comes about: [proof on one's own set-ups](../proving.md).",
+        "Schema `cmm-uq/prove/1`. A part in capitals stands for any name, `[]` for each entry of a list. Numbers are finite; "
+        "what has no value is `null`. How it comes about: [proof on one's own set-ups](../proving.md).",
         "A *rate* is a table of", table(("key", "meaning"), [(f"`{name}`", told) for name, told in RATE.items()]),
         "## Keys", table(("key", "meaning"), rows),
     )  # fmt: skip

@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+import cmm_uq
+from cmm_uq.api import outcomes as api
 from cmm_uq.commands.prove import UNFINISHED
 from cmm_uq.commands.proving import Asked, design_of, prove_job, true_values
 from cmm_uq.commands.reading import read_job
 from cmm_uq.documents.proof import Proof
 from cmm_uq.documents.proof_page import proof_document
-from cmm_uq.documents.proof_results import KEYS, RATE, proof_results
+from cmm_uq.documents.proof_results import KEYS, RATE, proof_outcome, proof_results
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.toml_file import as_toml
 from cmm_uq.physics.catalogue import every
@@ -101,6 +103,19 @@ def test_another_seed_is_refused_where_a_run_is_unfinished(ran: Ran, tmp_path: P
     assert "another truth" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == [UNFINISHED]
     assert (tmp_path / UNFINISHED / TRUTH).read_bytes() == ran.proof.truth
+
+
+def test_python_gives_the_rates_as_a_table(ran: Ran) -> None:
+    found = api.Proof(proof_outcome(ran.proof))
+    assert found.rates.loc["false_alarms", ["count", "of"]].tolist() == [0, 1]
+    assert found.rates.loc["coverage", "of"] >= 1
+    assert found.sha256 == ran.proof.sha256
+    assert repr(found).startswith("<Proof of plane-simulated: 2 cases, false_alarms open, coverage open")
+
+
+def test_a_call_from_python_refuses_what_the_command_refuses(iota: Path) -> None:
+    with pytest.raises(CmmUqError, match="0 cases"):
+        cmm_uq.prove(iota, cases=0)
 
 
 def paths(data: Any, here: str = "") -> Iterator[str]:
