@@ -43,7 +43,7 @@ def next_sentence(found: Diagnosed) -> Text:
     if not plan.partings:
         return told
     least = min(parting.after for parting in plan.partings)
-    return say("{told} Odds of at least {odds} : 1 for the true one are then expected.", told=told, odds=rounded(least))
+    return say("{told} Odds of {odds} : 1 or more for the true one are then expected.", told=told, odds=rounded(least))
 
 
 def _what(found: Diagnosed, plan: NextPlan) -> Text:

@@ -67,9 +67,8 @@ def _one(found: Diagnosed, item: LeftOut) -> Text:
     effect = effect_of(item.effect, d.after.effects)
     told = say("{title}: {size}.", title=item.title, size=size_of(effect, item.parameters, factors=False))
     if others := _instead(d, item):
-        told = say(
-            "{told} It could as well be: {others}.", told=told, others=alternatives(titles(others, d.after.effects))
-        )
+        small = alternatives(say("{title:small}", title=title) for title in titles(others, d.after.effects))
+        told = say("{told} It could as well be: {others}.", told=told, others=small)
     return after(told, contained(found.simulated, item.effect))
 
 
@@ -156,7 +155,7 @@ def _look_at(d: Diagnosis, item: LeftOut) -> Text:
     if not named:
         return say("{what:capital}.", what=item.points_to)
     causes = [(item.title, item.points_to), *((effect.title, effect.points_to) for effect in named)]
-    return lines(say("If it is {title}: {what}.", title=title, what=what) for title, what in causes)
+    return lines(say("If it is {title:small}: {what}.", title=title, what=what) for title, what in causes)
 
 
 def _nothing_to_do(findings: Sequence[Finding]) -> Text:

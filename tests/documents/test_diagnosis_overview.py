@@ -102,9 +102,9 @@ def test_an_unexplained_one_says_so_and_sends_nobody_to_compensate(explained: Di
 def test_of_two_that_cannot_be_told_apart_both_causes_are_told(explained: Diagnosed) -> None:
     group = (("squareness_xy", "straightness_x_y"),)
     told = rows(replace(explained, diagnosis=replace(explained.diagnosis, indistinguishable=group)))
-    assert "It could as well be: Straightness of X along Y." in told["Found"]
-    assert "If it is Squareness X–Y: the axes are not square" in told["What to do"]
-    assert "If it is Straightness of X along Y: a bowed guideway" in told["What to do"]
+    assert "It could as well be: straightness of X along Y." in told["Found"]
+    assert "If it is squareness X–Y: the axes are not square" in told["What to do"]
+    assert "If it is straightness of X along Y: a bowed guideway" in told["What to do"]
 
 
 def test_where_nothing_stands_out_by_itself_it_says_so(explained: Diagnosed) -> None:
