@@ -34,6 +34,12 @@ VERDICTS: Mapping[str, Text] = {
     ),
 }
 
+VERDICT_WORDS: Mapping[str, Text] = {
+    "consistent": say("consistent"), "explained": say("explained"), "partial": say("partial"),
+    "unexplained": say("unexplained"),
+}  # fmt: skip
+"""A verdict in a word."""
+
 VERDICTS_IN_SHORT: Mapping[str, Text] = {
     "consistent": say("CONSISTENT"), "explained": say("EXPLAINED"), "partial": say("PARTIAL"),
     "unexplained": say("UNEXPLAINED"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.effect_words import titles
 from cmm_uq.documents.program import program
 from cmm_uq.documents.proof import Proof
 from cmm_uq.documents.proof_plots import said_plot, strength_plot
@@ -20,7 +21,7 @@ from cmm_uq.documents.proof_words import (
     standing,
 )
 from cmm_uq.documents.working_page import working_page
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, number, plural, say
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.proving.accepted import MISSED, OPEN
 from cmm_uq.proving.cases import KINDS, STRONGEST, WEAKEST, micrometres
 from cmm_uq.proving.intervals import Rate
@@ -45,7 +46,7 @@ def proof_document(proof: Proof) -> Document:
                     (say("Machine"), Verbatim(facts.machine.name)),
                     (say("Artefact"), proof.design.model.artefact.title),
                     (say("Set-ups"), _set_ups(len(set(points.measurement.tolist())), len(points))),
-                    (say("Effects that the job names"), commas(names(facts.model.effects)) or say("none")),
+                    (say("Effects that the job names"), commas(titles(facts.model.effects)) or say("none")),
                 )
             ),
             Facts(

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.documents.in_short import Standing, Summary, Verdict
+from cmm_uq.documents.document import Standing
+from cmm_uq.documents.in_short import Summary, Verdict
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.documents.proof import Proof
 from cmm_uq.documents.proof_page import conclusion_of, often_words, proof_document, warnings_of
