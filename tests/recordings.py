@@ -9,7 +9,7 @@ import numpy as np
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.planning.setting import Planning
-from cmm_uq.planning.suggestion import Suggestion, suggestions
+from cmm_uq.planning.suggestion import Suggestion, next_plan, suggestions
 from cmm_uq.points import Floats, Machine, Points
 from cmm_uq.screening import screened as screening
 from cmm_uq.screening.screened import Screened
@@ -52,4 +52,5 @@ def suggested(diagnosis: Any, facts: ArtefactFacts) -> tuple[Suggestion, ...]:
     """Placings that would part what a diagnosis cannot, by what its kind offers."""
     kind = kind_named(facts.kind)
     assert kind is not None
-    return suggestions(diagnosis, facts, kind.observing("diagnosed"), kind.offers("plan", Planning))
+    plan = next_plan(diagnosis, facts, kind.observing("diagnosed"), kind.offers("plan", Planning))
+    return suggestions(plan, diagnosis.after.artefact.title)

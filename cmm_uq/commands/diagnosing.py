@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -11,8 +13,12 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
-from cmm_uq.conformity.consequences import consequences
-from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, diagnose
+from cmm_uq.commands.simulate import to_fill_in
+from cmm_uq.conformity.consequences import consequences, costs
+from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
+from cmm_uq.diagnosis.power import ALLOWED
+from cmm_uq.diagnosis.unseen import USUAL_LENGTH, Smallest, smallest_effects
+from cmm_uq.documents.diagnosis_next import TO_FILL_IN
 from cmm_uq.documents.diagnosis_page import diagnosed_outcome
 from cmm_uq.documents.outcome import Found, Outcome, Recipe
 from cmm_uq.documents.result import Diagnosed
@@ -22,10 +28,10 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.simulation import KEY
 from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel
-from cmm_uq.model.kind import Kind
+from cmm_uq.model.kind import Kind, Observe
 from cmm_uq.overflow import refusing_overflow
 from cmm_uq.planning.setting import Planning
-from cmm_uq.planning.suggestion import suggestions
+from cmm_uq.planning.suggestion import NextPlan, Wanted, next_plan, suggestions
 from cmm_uq.screening.screened import Finding
 
 
@@ -73,20 +79,24 @@ def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = 
     if simulation is not None:
         return _against(job, against_simulation(job, simulation), seed=seed, alpha=alpha, progress=progress)
     model, findings = screened_model(job)
-    return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress)
+    return diagnosed(job, model, findings, seed=seed, alpha=alpha, progress=progress, show=True)
 
 
 def _against(job: Job, compared: Against, *, seed: int, alpha: float, progress: Progress | None) -> Diagnosed:
     """Diagnose what a simulation leaves of a recording. Figures and decisions are the recording's own: none is corrected."""
-    kind, facts = kind_of(job), job.facts.artefact
+    facts = job.facts.artefact
     model, outliers = without_outliers(compared.model)
     made = partial(compared.observe, facts, where=job.recording_path)
     diagnosis = diagnose(
         model, stated_um=compared.stated_um, alpha=alpha, seed=seed, progress=progress, observe=made
     )  # fmt: skip
-    next_ones = suggestions(diagnosis, facts, compared.observe, kind.offers("plan", Planning), job.facts.plan)
     findings = (*compared.findings, *outliers)
-    return Diagnosed(job, findings, diagnosis, next_ones, simulated=compared.simulated)
+    unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
+    plan = _next(job, diagnosis, compared.observe, _wanted(job, diagnosis, unseen))
+    next_ones = suggestions(plan, model.artefact.title)
+    return Diagnosed(
+        job, findings, diagnosis, next_ones, simulated=compared.simulated, unseen=unseen, next_plan=plan
+    )  # fmt: skip
 
 
 def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
@@ -110,8 +120,15 @@ def diagnosed(
     alpha: float = FALSE_ALARMS,
     progress: Progress | None = None,
     known: NoisyPosterior | None = None,
+    show: bool = False,
 ) -> Diagnosed:
-    """Diagnose the screened model of a job; ``known`` is its posterior where it was sampled already."""
+    """Diagnose the screened model of a job.
+
+    Parameters
+    ----------
+    known : its posterior where it was sampled already.
+    show : whether what to measure next shall also show what this recording could not have shown.
+    """
     stated = job.facts.recording.u_coordinate_um
     kind, facts = kind_of(job), job.facts.artefact
     observe = kind.observing("diagnosed")
@@ -120,8 +137,31 @@ def diagnosed(
         model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known, observe=made
     )  # fmt: skip
     changes = consequences(job, diagnosis, made, kind.tested, seed)
-    next_ones = suggestions(diagnosis, facts, observe, kind.offers("plan", Planning), job.facts.plan)
-    return Diagnosed(job, findings, diagnosis, next_ones, changes)
+    cost = costs(job, diagnosis, made, kind.tested, seed)
+    unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
+    plan = _next(job, diagnosis, observe, _wanted(job, diagnosis, unseen) if show else ())
+    next_ones = suggestions(plan, model.artefact.title)
+    return Diagnosed(job, findings, diagnosis, next_ones, changes, costs=cost, unseen=unseen, next_plan=plan)
+
+
+def _wanted(job: Job, diagnosis: Diagnosis, unseen: Sequence[Smallest]) -> tuple[Wanted, ...]:
+    """What further set-ups shall show: as the job says, else what a recording that agrees could not have shown."""
+    asked = job.facts.plan.unseen
+    if not (diagnosis.verdict == "consistent" if asked is None else asked):
+        return ()
+    blind = [row for row in unseen if row.blind and row.periods is None]
+    needed = max((row.length for row in unseen if row.length is not None), default=USUAL_LENGTH)
+    return tuple(Wanted(row.effect, ALLOWED * _enough(row), row.length or needed) for row in blind)
+
+
+def _enough(row: Smallest) -> float:
+    """Part of what physics allows that further set-ups shall show: all of it, or half of what shows already."""
+    return 1.0 if row.detected is None or not row.shown else 0.5 * row.detected / row.allowed
+
+
+def _next(job: Job, diagnosis: Diagnosis, observe: Observe, wanted: tuple[Wanted, ...]) -> NextPlan | None:
+    facts = job.facts
+    return next_plan(diagnosis, facts.artefact, observe, kind_of(job).offers("plan", Planning), facts.plan, wanted)
 
 
 def outcome_of(found: Found, seed: int = 0) -> Outcome:
@@ -143,4 +183,10 @@ def _recipe(job: Job) -> Recipe:
 
 
 def _usual(kind: Kind) -> Recipe:
-    return Recipe(_diagnose, lambda found, seed: diagnosed_outcome(found))
+    return Recipe(_diagnose, lambda found, seed: _outcome(found))
+
+
+def _outcome(found: Diagnosed) -> Outcome:
+    plan = found.next_plan
+    files = {} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)}
+    return replace(diagnosed_outcome(found), files=files)

@@ -9,7 +9,6 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.written import Form, Stage, Written, silent
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import PLANNED
 from cmm_uq.planning.placing import joined
 from cmm_uq.plugins import naming_package
 
@@ -86,11 +85,11 @@ def write_plan(
 
 def _recording_to_be(plan: Plan) -> bytes:
     """The placings as the CSV of a recording at nominal coordinates."""
-    from cmm_uq.commands.simulate import recording
+    from cmm_uq.commands.simulate import to_fill_in
 
     wishes = plan.setting.plan
     points = joined(
         plan.to_measure, seconds_per_point=wishes.seconds_per_point, minutes_per_placing=wishes.minutes_per_placing,
         first=plan.first,
     )  # fmt: skip
-    return PLANNED.encode() + recording(points)
+    return to_fill_in(points)

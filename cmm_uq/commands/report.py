@@ -8,13 +8,14 @@ from cmm_uq.commands import analysis, diagnosing
 from cmm_uq.commands.reading import compared_with, read_job
 from cmm_uq.commands.written import Form, Stage, Told, Written, silent
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
+from cmm_uq.documents.diagnosis_next import TO_FILL_IN
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
 from cmm_uq.plugins import naming_package
 
-CERTIFICATE, DIAGNOSIS = ("certificate.html", "certificate.pdf"), "diagnosis.html"
+CERTIFICATE, DIAGNOSIS = ("certificate.html", "certificate.pdf"), ("diagnosis.html", "diagnosis.pdf")
 REPORT = Form("report", CERTIFICATE)
-DIAGNOSE = Form("diagnose", (DIAGNOSIS,), "diagnosis")
+DIAGNOSE = Form("diagnose", DIAGNOSIS, "diagnosis", (TO_FILL_IN,))
 
 
 @naming_package()
@@ -104,7 +105,7 @@ def write_diagnosis(
     stage: Stage | None = None,
     told: Told | None = None,
 ) -> Written:
-    """Diagnose a job and write ``diagnosis.html`` and ``results.json``, both or none.
+    """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import first_line
+from cmm_uq.jobs.origin import PLANNED, first_line
 from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.jobs.toml_file import as_toml, checked
 from cmm_uq.jobs.truth import NoiseFacts, Truth
@@ -63,7 +63,8 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
 
         refuse_unfit(job)
     artefact = observe(job.facts.artefact, points, where=job.recording_path)
-    acting = effects(tuple(truth.effects), where=f"{truth_path} [effects]")
+    where = f"{truth_path} [effects]"
+    acting = tuple(_acting(artefact, effect, where) for effect in effects(tuple(truth.effects), where=where))
     _refuse_unrecorded(points, acting, truth, truth_path)
     given = [_given(effect, truth, truth_path) for effect in acting]
     model = MeasurementModel(
@@ -77,6 +78,14 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     if not np.all(np.abs(drawn) <= LONGEST_MM):
         raise CmmUqError(f"the coordinates would go beyond {LONGEST_MM:g} mm", where=truth_path, fix=_FIX)
     return points.at(drawn)
+
+
+def _acting(artefact: Artefact, effect: Effect, where: str) -> Effect:
+    """An effect as it acts on this artefact."""
+    try:
+        return artefact.acting(effect)
+    except CmmUqError as error:
+        raise CmmUqError(error.problem, where=where, fix=error.fix) from None
 
 
 def _given(effect: Effect, truth: Truth, truth_path: str) -> tuple[Floats, tuple[float, ...]]:
@@ -164,6 +173,11 @@ def recording(points: Points) -> bytes:
         coordinates = [f"{value:.7f}" for value in points.xyz[i]]
         writer.writerow([*numbers, *coordinates, *(f"{values[i]:.10g}" for values in points.columns.values())])
     return text.getvalue().encode()
+
+
+def to_fill_in(points: Points) -> bytes:
+    """Points at nominal coordinates as the CSV of a recording that is still to be measured."""
+    return PLANNED.encode() + recording(points)
 
 
 def _noise(given: NoiseFacts) -> Noise:

@@ -11,11 +11,14 @@ from cmm_uq.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.inference.noise import Sizes
 from cmm_uq.jobs.job import Job
+from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Observed
 from cmm_uq.model.noise import noise_of
 from cmm_uq.points import Floats, Ints
 from cmm_uq.screening.copies import counted_with
+from cmm_uq.uncertainty.mixture import averaged
 from cmm_uq.uncertainty.quantity import Quantity
 
 
@@ -33,6 +36,38 @@ class Consequences:
     statements: tuple[tuple[Statement, Statement], ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Cost:
+    """What the recording comes to if one explanation that remains is the right one, and is corrected for.
+
+    Parameters
+    ----------
+    probability : of the explanation.
+    figures : by name.
+    statements : as the job asks for.
+    """
+
+    probability: float
+    figures: Mapping[str, Quantity]
+    statements: tuple[Statement, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Costs:
+    """Of every explanation that remains, the most probable first, and of all together.
+
+    Parameters
+    ----------
+    each : in the order of the explanations.
+    figures : averaged, by name.
+    decisions : of each statement, the probability of every outcome.
+    """
+
+    each: tuple[Cost, ...]
+    figures: Mapping[str, Quantity]
+    decisions: tuple[Mapping[str, float], ...]
+
+
 def consequences(
     job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int
 ) -> Consequences | None:
@@ -47,12 +82,55 @@ def consequences(
     seed : of the figures' repetitions.
     """
     found = {item.effect for item in diagnosis.effects}
-    model = replace(diagnosis.after, used=np.ones_like(diagnosis.after.used))
+    if not found or not _depends(job, diagnosis):
+        return None
+    posterior = diagnosis.posterior
+    return _corrected(job, diagnosis.after, found, posterior.draws, posterior.sizes, observe, tested, seed)
+
+
+def costs(job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int) -> Costs | None:
+    """Of the explanations that remain; ``None`` where none do, and for artefacts without lengths and statements.
+
+    What is unknown, or nothing, is not corrected for. Parameters as those of :func:`consequences`.
+    """
+    rivals = diagnosis.remaining.rivals
+    if not rivals or not _depends(job, diagnosis):
+        return None
+    each = []
+    for rival in rivals:
+        sizes = diagnosis.posterior.sizes.at(np.resize(np.arange(len(diagnosis.posterior.draws)), len(rival.draws)))
+        found = _corrected(job, rival.model, set(rival.effects), rival.draws, sizes, observe, tested, seed)
+        figures = {name: after for name, (_, after) in found.figures.items()}
+        each.append(Cost(rival.probability, figures, tuple(after for _, after in found.statements)))
+    weights = diagnosis.remaining.weights
+    decisions: tuple[dict[str, float], ...] = tuple({} for _ in each[0].statements)
+    for cost, weight in zip(each, weights, strict=True):
+        for decided, one in zip(decisions, cost.statements, strict=True):
+            decided[one.outcome] = decided.get(one.outcome, 0.0) + weight / sum(weights)
+    figures = {name: averaged([cost.figures[name] for cost in each], weights) for name in each[0].figures}
+    return Costs(tuple(each), figures, decisions)
+
+
+def _depends(job: Job, diagnosis: Diagnosis) -> bool:
+    return diagnosis.after.artefact.lengths() is not None or bool(job.facts.conformity)
+
+
+def _corrected(
+    job: Job, fitted: MeasurementModel, found: Collection[str], drawn: Floats, noise_sizes: Sizes, observe: Observed,
+    tested: Collection[str], seed: int,
+) -> Consequences:  # fmt: skip
+    """Figures and statements as recorded, and corrected for some effects of a model.
+
+    Parameters
+    ----------
+    fitted : model with these effects.
+    found : their names.
+    drawn, noise_sizes : from its posterior.
+    """
+    model = replace(fitted, used=np.ones_like(fitted.used))
     artefact = model.artefact
     lengths = artefact.lengths()
-    if not found or (lengths is None and not job.facts.conformity):
-        return None
-    estimate = diagnosis.after.estimate()
+    estimate = fitted.estimate()
     linear, value = estimate.linear, estimate.about
     ours = np.array([unknown.key[0] in found for unknown in linear.unknowns])
     coefficients = np.where(ours, value, 0.0)[: len(value) - len(artefact.sizes)]
@@ -62,8 +140,8 @@ def consequences(
     after: dict[str, Quantity] = {}
     late = corrected.lengths()
     if lengths is not None and late is not None:
-        some = repeated_draws(len(diagnosis.posterior.draws), len(lengths))
-        draws, sizes, components = diagnosis.posterior.draws[some], diagnosis.posterior.sizes.at(some), noise_of(model)
+        some = repeated_draws(len(drawn), len(lengths))
+        draws, sizes, components = drawn[some], noise_sizes.at(some), noise_of(model)
         whole = model.linearised(value)
         predicted = lengths - whole.observed + draws @ whole.design.T
 

@@ -21,7 +21,7 @@ from scipy import special
 
 from cmm_uq.diagnosis.comparison.combinations import Prior
 from cmm_uq.diagnosis.comparison.evidence import Comparison
-from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.diagnosis.comparison.lack_of_fit import DRAWS, statistic_of
 from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.inference.noise import Components, Sizes
@@ -40,10 +40,10 @@ _LARGER = np.array([1.0, 1.3])
 """Noise as it looks, over what it is, at which the threshold of the test is found."""
 
 _TAIL = 0.2
-_CERTAIN = float(np.log(0.95 / 0.05))
+CERTAIN = float(np.log(0.95 / 0.05))
 """Log odds of an effect against everything else from which on no other is said to be as possible."""
 
-_ALLOWED = 3.0
+ALLOWED = 3.0
 """Prior standard deviations up to which an effect is reckoned with."""
 
 
@@ -163,7 +163,7 @@ def _power(rule: _Rule, model: MeasurementModel, values: Floats, effect: Effect,
     shown = rule.comparison.rest(column)
     length = float(np.linalg.norm(shown))
     name, unit = effect.reported[0].name, effect.coefficients[0].unit
-    allowed = _ALLOWED * effect.coefficients[0].prior_sd
+    allowed = ALLOWED * effect.coefficients[0].prior_sd
     index = rule.index(effect.name)
     if length * allowed < SIZES[0] * rule.sigma or index is None:
         never = np.full(draws, np.inf)
@@ -193,6 +193,38 @@ def _reached(margin: Floats) -> Floats:
         part = -values[last] / (values[last + 1] - values[last])
         found[column] = float(np.sqrt(squares[last] + part * (squares[last + 1] - squares[last])))
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class Naming:
+    """When one effect alone is called by its name."""
+
+    explanations: Sequence[Explanation]
+
+    @cached_property
+    def priors(self) -> Floats:
+        """(c,) log probability, beforehand, of each explanation alone among combinations; minus infinity for several."""
+        prior = Prior(self.explanations)
+        return np.array([prior.log([i]) for i in range(len(self.explanations))])
+
+    def __call__(self, odds: Floats, true: int) -> Floats:
+        """By how much (b,) the true effect passes what would let others stand beside it.
+
+        Parameters
+        ----------
+        odds : (c, b) log evidence of each explanation over nothing.
+        true : which of them acts.
+        """
+        weight = odds + self.priors[:, None]
+        kinds = np.array([explanation.kind for explanation in self.explanations])
+        nothing = np.full((1, odds.shape[1]), Prior(self.explanations).log([]))
+        none = special.logsumexp(np.vstack([nothing, weight[kinds == UNKNOWN]]), axis=0)
+        others = weight[(kinds == EFFECT) & (np.arange(len(kinds)) != true)]
+        other = others.max(axis=0, initial=-np.inf)
+        asserted = weight[true] - np.maximum(none, other)
+        without_rival = np.minimum(asserted, weight[true] - other + np.log(NOT_TOLD_APART))
+        all_but_certain = weight[true] - special.logsumexp(np.vstack([none, others]), axis=0) - CERTAIN
+        return np.asarray(np.maximum(without_rival, all_but_certain))
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,21 +289,10 @@ class _Rule:
         return None
 
     @cached_property
-    def _priors(self) -> Floats:
-        """(c,) log probability, beforehand, of each explanation alone among combinations; minus infinity for several."""
-        prior = Prior(self.comparison.explanations)
-        return np.array([prior.log([i]) for i in range(len(self.comparison.explanations))])
+    def _naming(self) -> Naming:
+        return Naming(self.comparison.explanations)
 
     def __call__(self, data: Floats, true: int) -> tuple[Floats, Floats]:
         """By how much the statistic (b,) passes the threshold, and the true effect what would let others stand beside it."""
         statistic, odds = statistic_of(self.comparison, data)
-        weight = odds + self._priors[:, None]
-        kinds = np.array([explanation.kind for explanation in self.comparison.explanations])
-        nothing = np.full((1, data.shape[1]), Prior(self.comparison.explanations).log([]))
-        none = special.logsumexp(np.vstack([nothing, weight[kinds == UNKNOWN]]), axis=0)
-        others = weight[(kinds == EFFECT) & (np.arange(len(kinds)) != true)]
-        other = others.max(axis=0, initial=-np.inf)
-        asserted = weight[true] - np.maximum(none, other)
-        without_rival = np.minimum(asserted, weight[true] - other + np.log(NOT_TOLD_APART))
-        all_but_certain = weight[true] - special.logsumexp(np.vstack([none, others]), axis=0) - _CERTAIN
-        return statistic - self.threshold(data), np.maximum(without_rival, all_but_certain)
+        return statistic - self.threshold(data), self._naming(odds, true)

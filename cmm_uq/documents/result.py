@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.conformity.consequences import Consequences
+from cmm_uq.conformity.consequences import Consequences, Costs
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.conformity.tolerances import Judged
 from cmm_uq.diagnosis.diagnosis import Diagnosis
+from cmm_uq.diagnosis.unseen import Smallest
 from cmm_uq.documents.simulated import Simulated
 from cmm_uq.documents.stating import Stating
 from cmm_uq.inference.draws import Draws
@@ -21,7 +22,7 @@ from cmm_uq.inference.posterior import NoisyPosterior
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
-from cmm_uq.planning.suggestion import Suggestion
+from cmm_uq.planning.suggestion import NextPlan, Suggestion
 from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding
 from cmm_uq.uncertainty.covariance import Covariance
@@ -91,6 +92,9 @@ class Diagnosed:
     suggestions : what to measure next.
     consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
     simulated : the simulation that the recording was compared with, if it was with one.
+    costs : what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
+    unseen : the smallest amplitude of each effect that the recording would have shown.
+    next_plan : the fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any.
     """
 
     job: Job
@@ -99,6 +103,9 @@ class Diagnosed:
     suggestions: tuple[Suggestion, ...]
     consequences: Consequences | None = None
     simulated: Simulated | None = None
+    costs: Costs | None = None
+    unseen: tuple[Smallest, ...] = ()
+    next_plan: NextPlan | None = None
 
 
 @dataclass(frozen=True)
@@ -121,7 +128,7 @@ class Result:
     estimate : least squares.
     posterior : draws of the model's own parameters.
     draws : of all that is reported, by name and chain.
-    parameters : reported parameters of each effect, by effect and name.
+    parameters : reported parameters of each effect, by effect and name; averaged over the explanations that remain.
     sizes : of the artefact, by name.
     noise : of a coordinate.
     accuracy : figures of the lengths, by name; empty for artefacts without lengths.

@@ -74,6 +74,9 @@ class PlanFacts(Table):
     """Effects that may act and are not named in the model; by default all linear ones that these columns could show."""
     columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
     """Further columns of the recording at a constant value, such as temperatures."""
+    unseen: bool | None = None
+    """Whether what a diagnosis says to measure next shall also show what the recording could not have shown; by default where
+    it agrees with the model."""
     criterion: Criterion | None = None
     """What a better plan is searched by: that effects can be told apart, or the volume, mean or worst variance."""
     number: Annotated[int, Field(ge=1, le=200)] | None = None

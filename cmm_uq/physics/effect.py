@@ -16,15 +16,17 @@ from typing import ClassVar
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.messages import Text
+from cmm_uq.messages import NOTHING, Text, say
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import Unit, unit
 
-CONTRACT, FURTHER = "contract", "further"
-"""Tiers: effects that every job file may count on, and rarer ones that only some machines and recordings show."""
+CONTRACT, FURTHER, OWN = "contract", "further", "own"
+"""Tiers: effects that every job file may count on, rarer ones that only some machines and recordings show, and faults of the
+artefact itself."""
 
-PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1}
-"""How readily an effect of a tier is thought of, beside others: a judgement of how many machines show it."""
+PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1, OWN: 0.1}
+"""How readily an effect of a tier is thought of, beside others: a judgement of how many machines show it. A fault of the
+artefact has a weight by what is known of that artefact."""
 
 TRIALS = 7
 
@@ -38,11 +40,13 @@ class Parameter:
     name : with its unit, as in results.json: ``angle_arcsec``.
     unit : as printed: ``″``.
     prior_sd : standard deviation that physics allows, about zero, in the same unit.
+    what : it is, in words, where an effect has several: ``amplitude``.
     """
 
     name: str
     unit: Unit
     prior_sd: float
+    what: Text = NOTHING
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", unit(self.unit))
@@ -60,9 +64,27 @@ class Shape:
     low: float
     high: float
     period_along: str | None = None
+    what: Text = NOTHING
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", unit(self.unit))
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much of a parameter, for a sentence: without its sign, with unit and uncertainty, as printed; and the sign."""
+
+    size: Text
+    negative: bool = False
+
+    @property
+    def side(self) -> Text:
+        """Towards which end of an axis the sign points."""
+        return say("minus") if self.negative else say("plus")
+
+    def more(self, more: Text, less: Text) -> Text:
+        """The one word for a positive amount, the other for a negative one."""
+        return less if self.negative else more
 
 
 @dataclass(frozen=True)
@@ -99,6 +121,9 @@ class Effect(ABC):
     imitated_by : nonparametric terms that could pass for it.
     along_motion : carriage along whose motion e goes, however that leans; ``None`` where e keeps to the coordinates.
     plane : pair of axes whose squareness it is (``xy``, ``yz``, ``zx``), if it is one; it then gives its :meth:`lean`.
+    of_artefact : whether it is a fault of the artefact itself, which only that artefact can say in full.
+    mostly : part of its prior standard deviation that it mostly keeps to, where a certificate says so and may be wrong.
+    least_set_ups : set-ups that a recording must have to show it as an effect of its own.
     """
 
     name: str
@@ -114,6 +139,9 @@ class Effect(ABC):
     imitated_by: tuple[Nonparametric, ...] = ()
     along_motion: str | None = None
     plane: str | None = None
+    of_artefact: bool = False
+    least_set_ups: int = 1
+    mostly: float = 1.0
 
     @property
     def prior_weight(self) -> float:
@@ -137,6 +165,26 @@ class Effect(ABC):
         CmmUqError : a column is missing, or it is no squareness.
         """
         raise CmmUqError(f"{self.name} is no squareness")
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """What reported parameters mean at the machine, with their signs, in words; nothing where the figures say it.
+
+        Parameters
+        ----------
+        amounts : of each reported parameter, by name.
+        """
+        return NOTHING
+
+    def belongs_to(self, points: Points) -> bool:
+        """Whether a fault of an artefact is that of the artefact in these points."""
+        return False
+
+    def course(self, points: Points) -> Floats | None:
+        """Where each point is on the axis, or in the column, of ``idealised_over``, (n,); ``None`` without one."""
+        over = self.idealised_over
+        if over is None:
+            return None
+        return points.readings[over] if over in points.readings else points.column(over)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """Values of the shape worth trying, evenly spread in their logarithm; one empty tuple without a shape."""
@@ -186,7 +234,7 @@ class Harmonic(Effect):
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:
         """Amplitude, shape, phase."""
-        return (self.amplitude, *self.shape, Parameter("phase_rad", unit("rad"), np.pi))
+        return (self.amplitude, *self.shape, Parameter("phase_rad", unit("rad"), np.pi, say("phase")))
 
     def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
         """Amplitude ≥ 0, shape, and phase in (−π, π]."""

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import foreign
-from cmm_uq.physics.effect import Effect, Parameter, Shape
+from cmm_uq.messages import Text, foreign
+from cmm_uq.physics.effect import Amount, Effect, Parameter, Shape
 from cmm_uq.plugins import EFFECTS, Plugin, offered
 from cmm_uq.points import Floats, Points
 
@@ -49,6 +49,7 @@ class _Outside(Effect):
         self.coefficients, self.shape, self.columns = effect.coefficients, effect.shape, effect.columns
         self.tier, self.idealised_over, self.imitated_by = effect.tier, effect.idealised_over, effect.imitated_by
         self.along_motion, self.plane = effect.along_motion, effect.plane
+        self.least_set_ups = effect.least_set_ups
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -61,6 +62,15 @@ class _Outside(Effect):
     def lean(self, points: Points) -> Floats:
         """See :meth:`Effect.lean`."""
         return np.asarray(self._plugin.attempt(lambda: self._effect.lean(points)), dtype=np.float64)
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        return foreign(self._plugin.attempt(lambda: self._effect.meaning(amounts)))
+
+    def course(self, points: Points) -> Floats | None:
+        """See :meth:`Effect.course`."""
+        found = self._plugin.attempt(lambda: self._effect.course(points))
+        return None if found is None else np.asarray(found, dtype=np.float64)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """See :meth:`Effect.trials`."""

@@ -87,9 +87,21 @@ def gram(model: MeasurementModel, values: Floats, noise: PlannedNoise | None = N
     ----------
     noise : in its typical sizes; ``None`` for the white noise that the model states.
     """
-    linear = uncorrelated(model, values, noise)
-    white = linear.reduced.design * scales(linear.unknowns) / _sigma(model, noise)
+    white = _white(model, values, noise)
     return np.asarray(white.T @ white, dtype=np.float64)
+
+
+def by_measurement(model: MeasurementModel, values: Floats) -> Floats:
+    """The same for each measurement (c, k, k), in ascending order, under the white noise that the model states."""
+    white = _white(model, values, None)
+    index = np.unique(model.artefact.measurement[model.used], return_inverse=True)[1].ravel()
+    return np.stack([rows.T @ rows for rows in (white[index == i] for i in range(int(index.max()) + 1))])
+
+
+def _white(model: MeasurementModel, values: Floats, noise: PlannedNoise | None) -> Floats:
+    """Design (m, k) over the noise, the placing projected out, in the units of :func:`scales`."""
+    linear = uncorrelated(model, values, noise)
+    return np.asarray(linear.reduced.design * scales(linear.unknowns) / _sigma(model, noise))
 
 
 def scales(unknowns: Sequence[Unknown]) -> Floats:

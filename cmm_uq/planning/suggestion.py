@@ -1,15 +1,18 @@
-"""Which further placing would part effects that a recording cannot tell apart, how often to measure it, and what follows.
+"""What to measure next: the fewest set-ups that part all effects which a recording cannot tell apart.
 
-The artefact is set up as it was recorded, elsewhere and in other attitudes. What each such placing would add to the recording
-is known before it is measured; the odds that are to be expected follow from the size at which each effect of a pair explains
-the recording, with everything else fitted anew.
+The artefact is set up as it was recorded, elsewhere, in other attitudes, and turned about its own axes. What each such set-up
+would add to the recording is known before it is measured. The odds of two effects are those that the diagnosis found; by how
+much more of them is to be expected follows from the size at which each explains the recording, with everything else fitted
+anew. Which of the two is true is not known: what counts is the worse case.
+
+Where it is asked for, the set-ups also show effects that the recording would not have shown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from itertools import combinations
 
 import numpy as np
@@ -19,34 +22,135 @@ from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.messages import Text, number, say
+from cmm_uq.messages import Text, Verbatim, number, say, semicolons
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Observe, Observed
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import every
-from cmm_uq.planning.information import certified, gram, scales, shared
-from cmm_uq.planning.placing import Placing, appended
+from cmm_uq.planning.exchange import Chosen, choose
+from cmm_uq.planning.information import Told, by_measurement, certified, gram, scales, shared
+from cmm_uq.planning.placing import Placing, appended, joined
 from cmm_uq.planning.separation import left_of
 from cmm_uq.planning.setting import Planning
+from cmm_uq.planning.turned import turned_placings
 from cmm_uq.planning.volume import Volume
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Points
 
 ODDS = 20.0
-"""Odds that the suggested repetitions are expected to reach."""
+"""Odds that a plan is expected to reach for every pair, whichever of the two is true."""
 
-_MOST = 30
+SET_UPS, REPEATS = 8, 10
+"""Most set-ups of a plan, and most repeats of each."""
+
+_NEVER = 1e6
+"""Amplitude, over the prior standard deviation, of what does not show at all."""
+
+_ROUNDING = 1e-9
+"""Part of an effect's information, of what it would be if nothing else were fitted, below which rounding hides it."""
+
+_HOPELESS = 3
+"""Repeats of a plan that cannot reach everything."""
+
+_WORTH = 0.1
+"""Least gain in the logarithm of odds for which a plan that does not reach everything is told."""
+
 _CANDIDATES = 120
+_TURNED = 12
+"""Of the candidates, how many are tried turned besides."""
+
+_OF_FITS = ("radius_mm", "fit_rms_um", "n_points")
+"""Columns of a recording that tell of the fit that gave a point."""
+
+_OF_A_GROUP = 5
+"""Effects of a group of which all pairs are parted."""
+
+
+@dataclass(frozen=True)
+class Parting:
+    """Two effects that the recording cannot tell apart.
+
+    Parameters
+    ----------
+    effects : their names.
+    before : odds of the first over the second, by the recording.
+    after : odds of the true one over the other that are to be expected, the worse of the two cases.
+    """
+
+    effects: tuple[str, str]
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """An effect that is to be shown.
+
+    Parameters
+    ----------
+    effect : its name.
+    amplitude : that is to be detected, over its prior standard deviation.
+    length : visible length from which on it is detected.
+    """
+
+    effect: str
+    amplitude: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How well an effect that was not seen will show.
+
+    Parameters
+    ----------
+    effect : its name.
+    before, after : smallest amplitude that is detected, over its prior standard deviation; infinite where none is.
+    """
+
+    effect: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, eq=False)
+class NextPlan:
+    """What to measure next.
+
+    Parameters
+    ----------
+    placings : set-ups, in this order.
+    repeats : how often each is measured.
+    first : number of the first as a measurement.
+    partings : pairs, with the odds before and after.
+    shown : effects that were asked for.
+    reached : whether every pair reaches :data:`ODDS` and every effect shows as asked for.
+    box : (3, 2) the room for the artefact, scale readings, mm.
+    """
+
+    placings: tuple[Placing, ...]
+    repeats: int
+    first: int
+    partings: tuple[Parting, ...]
+    shown: tuple[Shown, ...]
+    reached: bool
+    box: Floats
+
+    @property
+    def points(self) -> Points:
+        """All of it as a recording at nominal coordinates, numbered on from what is recorded; without what fits told."""
+        points = joined([_repeated(placing, self.repeats) for placing in self.placings], first=self.first)
+        return replace(points, columns={k: v for k, v in points.columns.items() if k not in _OF_FITS})
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A placing, how often to repeat it, and what it is expected to decide.
+    """What parts two effects.
 
     Parameters
     ----------
     separates : names of the two effects.
     what : in words.
-    repetitions : how often to measure it.
+    repetitions : how often to measure each set-up.
     odds : of the true one of the two over the other that are then to be expected.
     """
 
@@ -56,59 +160,172 @@ class Suggestion:
     odds: float
 
 
+def suggestions(plan: NextPlan | None, title: Text) -> tuple[Suggestion, ...]:
+    """A plan for each pair that it parts.
+
+    Parameters
+    ----------
+    plan : of all pairs together.
+    title : of the artefact.
+    """
+    if plan is None:
+        return ()
+    times = say("once") if plan.repeats == 1 else say("{repetitions} times", repetitions=plan.repeats)
+    ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
+    return tuple(
+        Suggestion(
+            parting.effects,
+            say(
+                "Place the {title:small} at {ends} in scale readings and measure it {times}: odds of {odds} : 1 for the true "
+                "one are to be expected; by this recording they are {before} for {first} over {second}.",
+                title=title, ends=ends, times=times, odds=rounded(parting.after), before=odds_words(parting.before),
+                first=_title(parting.effects[0]), second=_title(parting.effects[1]),
+            ),
+            plan.repeats, parting.after,
+        )
+        for parting in plan.partings
+    )  # fmt: skip
+
+
+def _title(name: str) -> Text:
+    effect = every().get(name)
+    return Verbatim(name) if effect is None else say("{title:small}", title=effect.title)
+
+
+def odds_words(odds: float) -> Text:
+    """Odds as ``3 : 1`` or ``1 : 3``."""
+    if odds >= 1:
+        return say("{odds} : 1", odds=rounded(odds))
+    return say("1 : {odds}", odds=rounded(1 / odds))
+
+
+def rounded(odds: float) -> Text:
+    """Odds of one or more, as many digits as they are worth."""
+    if odds >= 1000:
+        return say("more than 1000")
+    return number(odds, ".0f" if odds >= 10 else ".2g")
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Effects in each other's place, and the logarithm of the odds of each, up to a constant."""
+
+    names: tuple[str, ...]
+    log_odds: Floats
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        return list(combinations(range(len(self.names)), 2))
+
+
 @dataclass(frozen=True, eq=False)
 class _Information:
     """Information of the recording (k, k), of each candidate (c, k, k) and of certificates (k, k).
 
-    ``names`` (k,) says whose rows they are, ``fitted`` which of them the diagnosis fits beside any pair.
+    ``names`` (k,) says whose rows they are, ``fitted`` which of them the diagnosis fits.
     """
 
+    told: Told
     names: tuple[str, ...]
     fitted: frozenset[str]
     recorded: Floats
-    each: Floats
-    prior: Floats
+
+    def rows(self, name: str) -> list[int]:
+        """Of an effect."""
+        return [i for i, owner in enumerate(self.names) if owner == name]
+
+    def left(self, information: Floats, rows: Sequence[int], apart: Sequence[str], other: Sequence[int] = ()) -> Floats:
+        """What (..., r, r) is left on rows once what is fitted is, but for some effects, and further rows."""
+        rest = [i for i, owner in enumerate(self.names) if owner in self.fitted and owner not in apart]
+        return left_of(information + self.told.prior, rows, [*rest, *other])
 
 
-def suggestions(
+def next_plan(
     diagnosis: Diagnosis,
     facts: ArtefactFacts,
     observe: Observe,
     planning: Planning | None,
     plan: PlanFacts | None = None,
-) -> tuple[Suggestion, ...]:
-    """One placing for each pair that cannot be told apart, within the machine's travel or the recorded volume.
+    wanted: Sequence[Wanted] = (),
+) -> NextPlan | None:
+    """The fewest set-ups, within the machine's travel or the recorded volume, that part all that cannot be told apart.
 
     Parameters
     ----------
     diagnosis : with groups of effects that look alike.
     facts : of the artefact.
     observe : makes the artefact of facts and points.
-    planning : what its kind offers; without it nothing is suggested.
+    planning : what its kind offers; without it nothing is planned.
     plan : what the volume and the fixtures allow.
+    wanted : effects that are to be shown besides.
+
+    Returns
+    -------
+    plan, ``None`` where nothing is to be parted or shown, or no set-up helps. What it reaches of what is wanted it says.
     """
-    pairs = [pair for group in diagnosis.indistinguishable for pair in combinations(group[:3], 2)]
-    if not pairs or planning is None or planning.elsewhere is None:
-        return ()
-    model = _with_all(diagnosis.after, sorted({name for pair in pairs for name in pair}))
-    artefact = diagnosis.after.artefact
+    groups = _groups(diagnosis)
+    if not (groups or wanted) or planning is None or planning.elsewhere is None:
+        return None
+    after = diagnosis.after
+    names = sorted({name for group in groups for name in group.names} | {one.effect for one in wanted})
+    model = _with_all(after, names)
     if facts.with_references:  # one placing alone does not show how long the artefact is
-        facts = facts.model_copy(update={"length_mm": artefact.sizes[0].nominal})
+        facts = facts.model_copy(update={"length_mm": after.artefact.sizes[0].nominal})
     try:
-        points = artefact.points
+        points = after.artefact.points
         volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.carriages)
-        places = planning.elsewhere(artefact, volume, _CANDIDATES)
-        known = _information(diagnosis.after, model, partial(observe, facts), places, shared_freedoms=planning.shared)
+        places = planning.elsewhere(after.artefact, volume, _CANDIDATES)
+        if not planning.shared:
+            some = places[:: max(1, len(places) // _TURNED)]
+            places = (*places, *turned_placings(some, volume))
+        known = _information(after, model, partial(observe, facts), places, shared_freedoms=planning.shared)
     except CmmUqError:  # nowhere else to put it
-        return ()
-    found = [
-        _best(diagnosis.after, known, places, say("{artefact:small}", artefact=artefact.title), pair) for pair in pairs
-    ]
-    return tuple(suggestion for suggestion in found if suggestion is not None)
+        return None
+    aims = _Aims(known, groups, (), _sizes(after, groups), _variances(diagnosis))
+    everything = known.recorded + known.told.each.sum(axis=0)
+    most = aims.amplitudes(everything[None], wanted)[0]
+    showing = [one for one, amplitude in zip(wanted, most, strict=True) if amplitude < _NEVER]
+    aims = replace(aims, wanted=tuple(showing))
+    found = _within_reach(aims)
+    if found is None:
+        return None
+    chosen, repeats = found
+    after_all = aims.after(chosen, repeats)
+    return NextPlan(
+        tuple(places[i] for i in chosen.indices), repeats, int(points.measurement.max()) + 1, aims.partings(after_all),
+        aims.shown(after_all), float(aims.short(after_all[None])[0]) <= 0, volume.box,
+    )  # fmt: skip
+
+
+def _groups(diagnosis: Diagnosis) -> list[_Group]:
+    """What cannot be told apart, with the odds by which the diagnosis says so."""
+    found = []
+    combinations_found = diagnosis.found.combinations
+    index = {str.__str__(e.name): i for i, e in enumerate(diagnosis.found.first.explanations)}
+    for names in diagnosis.indistinguishable:
+        taken = names[:_OF_A_GROUP]
+        instead: Mapping[int, float] = {}
+        if combinations_found is not None and names[0] in index:
+            instead = combinations_found.instead(diagnosis.found.chosen, index[names[0]])
+        odds = [1.0, *(instead.get(index.get(name, -1), 1.0) for name in taken[1:])]
+        found.append(_Group(taken, np.log(odds)))
+    return found
+
+
+def _variances(diagnosis: Diagnosis) -> tuple[float, float]:
+    """Of a reading, which repeats average, and of a set-up, which they do not, over that of a coordinate as it was found.
+
+    Without repeats a recording does not tell one from the other: each then has half.
+    """
+    noise, points = diagnosis.noise, diagnosis.after.artefact.points
+    if int(points.group.max()) + 1 == len(np.unique(points.measurement)):
+        return 0.5, 0.5
+    offset = noise.placing.value / noise.coordinate.value if noise.coordinate.value > 0 else 0.0
+    return 1.0, offset**2
 
 
 def _with_all(after: MeasurementModel, names: Sequence[str]) -> MeasurementModel:
-    """The model with every effect of every pair, periods as found or the longest."""
+    """The model with further effects, periods as found or the longest."""
     shape = dict(after.shapes)
     for name in names:
         if every()[name].shape and name not in shape:
@@ -129,66 +346,168 @@ def _information(
     names = tuple(unknown.key[0] for unknown in model.unknowns)
     fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
     if shared_freedoms:
-        every = appended(model.artefact.points, places)
-        whole = shared(MeasurementModel(observe(every), model.effects, model.sigma, shapes=model.shapes))
+        joint = appended(model.artefact.points, places)
+        whole = shared(MeasurementModel(observe(joint), model.effects, model.sigma, shapes=model.shapes))
         count = len(whole.each) - len(places)
         more = len(whole.prior) - len(names)
-        return _Information(
-            (*names, *[ARTEFACT] * more), fitted, whole.each[:count].sum(axis=0), whole.each[count:], whole.prior
-        )
-    each = [
-        gram(MeasurementModel(observe(place.points), model.effects, model.sigma, shapes=model.shapes), values)
-        for place in places
-    ]
-    return _Information(names, fitted, gram(model, values), np.stack(each), certified(model.unknowns))
+        told = replace(whole, each=whole.each[count:])
+        return _Information(told, (*names, *[ARTEFACT] * more), fitted, whole.each[:count].sum(axis=0))
+    first = replace(places[0].points, measurement=np.ones(len(places[0].points), dtype=np.int64))
+    joint = appended(first, places[1:])
+    each = by_measurement(MeasurementModel(observe(joint), model.effects, model.sigma, shapes=model.shapes), values)
+    return _Information(Told(model.unknowns, each, certified(model.unknowns)), names, fitted, gram(model, values))
 
 
-def _best(
-    after: MeasurementModel, known: _Information, places: Sequence[Placing], title: Text, pair: tuple[str, str]
-) -> Suggestion | None:
-    sizes = {name: _size(after, name, pair) for name in pair}
-    before = float(_expected(known, known.recorded[None], pair, sizes)[0])
-    for repetitions in range(1, _MOST + 1):
-        log_odds = _expected(known, known.recorded + repetitions * known.each, pair, sizes)
-        best = int(np.argmax(log_odds))
-        if log_odds[best] >= np.log(ODDS):
-            odds = float(np.exp(min(log_odds[best], 50.0)))
-            times = say("once") if repetitions == 1 else say("{repetitions} times", repetitions=repetitions)
-            what = say(
-                "Place the {title} at {ends} mm in scale readings and measure it {times}: odds of {odds} : "
-                "1 for the true one are to be expected, {before} : 1 without it.",
-                title=title,
-                ends=places[best].ends,
-                times=times,
-                odds=_round(odds),
-                before=_round(float(np.exp(min(before, 50.0)))),
-            )
-            return Suggestion(pair, what, repetitions, odds)
-    return None
+def _sizes(after: MeasurementModel, groups: Sequence[_Group]) -> dict[tuple[str, str], Floats]:
+    """Size of each effect of each group, by its first and its own name, without the others of the group."""
+    return {(group.names[0], name): _size(after, name, group.names) for group in groups for name in group.names}
 
 
-def _size(after: MeasurementModel, name: str, pair: tuple[str, str]) -> Floats:
-    """Size at which one effect of a pair, without the other, explains the recording, over its prior standard deviation."""
-    others = tuple(effect for effect in after.effects if effect.name not in pair)
-    effect = every()[name]
-    shape = dict(after.shapes)
-    if effect.shape and name not in shape:
-        shape[name] = next(iter(shapes(effect, after.artefact.points)))
-    model = replace(after, effects=(*others, effect), shapes=shape)
+def _size(after: MeasurementModel, name: str, group: Sequence[str]) -> Floats:
+    """Size at which one effect of a group, without the others, explains the recording, over its prior standard deviation."""
+    others = tuple(effect for effect in after.effects if effect.name not in group)
+    model = _with_all(replace(after, effects=others), [name])
     value = model.estimate().least_squares.value / scales(model.unknowns)
     return np.asarray([v for v, u in zip(value, model.unknowns, strict=True) if u.key[0] == name], dtype=np.float64)
 
 
-def _expected(known: _Information, information: Floats, pair: tuple[str, str], sizes: Mapping[str, Floats]) -> Floats:
-    """Expected log odds (c,) of the true one of a pair over the other, the less of the two, everything else fitted."""
-    both = {name: [i for i, owner in enumerate(known.names) if owner == name] for name in pair}
-    rest = [i for i, owner in enumerate(known.names) if owner in known.fitted and owner not in pair]
-    found = []
-    for true, other in (pair, pair[::-1]):
-        left = left_of(information + known.prior, both[true], [*rest, *both[other]])
-        found.append(0.5 * np.einsum("i,cij,j->c", sizes[true], left, sizes[true]))
-    return np.asarray(np.minimum(found[0], found[1]), dtype=np.float64)
+@dataclass(frozen=True, eq=False)
+class _Aims:
+    """What a plan shall reach.
+
+    Parameters
+    ----------
+    known : information of the recording and of candidates.
+    groups : of effects to part.
+    wanted : effects to show.
+    sizes : of the effects of groups.
+    variances : of a reading and of a set-up, over that of a coordinate.
+    """
+
+    known: _Information
+    groups: Sequence[_Group]
+    wanted: tuple[Wanted, ...]
+    sizes: Mapping[tuple[str, str], Floats]
+    variances: tuple[float, float]
+    _start: dict[tuple[int, int, int], float] = field(default_factory=dict)
+
+    def added(self, repeats: int) -> Floats:
+        """Information of each candidate (c, k, k) that is measured so often."""
+        reading, set_up = self.variances
+        return np.asarray(self.known.told.each / (reading / repeats + set_up))
+
+    def after(self, chosen: Chosen, repeats: int) -> Floats:
+        """Information (k, k) of the recording and what is added to it."""
+        return np.asarray(self.start + self.added(repeats)[list(chosen.indices)].sum(axis=0))
+
+    def short(self, information: Floats) -> Floats:
+        """By how much (c,) a plan falls short of all aims together, in logarithms; 0 where it reaches them."""
+        total = np.zeros(len(information))
+        for g, group in enumerate(self.groups):
+            for a, b in group.pairs:
+                total += np.maximum(np.log(ODDS) - self._log_odds(information, g, a, b), 0.0)
+        if self.wanted:
+            goal = np.array([one.amplitude for one in self.wanted])
+            total += np.maximum(2 * np.log(self.amplitudes(information, self.wanted) / goal), 0.0).sum(axis=1)
+        return total
+
+    def partings(self, information: Floats) -> tuple[Parting, ...]:
+        """Every pair with its odds before, and with this information (k, k)."""
+        return tuple(
+            Parting(
+                (group.names[a], group.names[b]), float(np.exp(group.log_odds[a] - group.log_odds[b])),
+                float(np.exp(min(self._log_odds(information[None], g, a, b)[0], 50.0))),
+            )
+            for g, group in enumerate(self.groups)
+            for a, b in group.pairs
+        )  # fmt: skip
+
+    def shown(self, information: Floats) -> tuple[Shown, ...]:
+        """Every effect that is wanted, as it shows without and with this information (k, k)."""
+        both = np.stack([self.known.recorded, information])
+        found = self.amplitudes(both, self.wanted).T.tolist()
+        return tuple(Shown(one.effect, *amplitudes) for one, amplitudes in zip(self.wanted, found, strict=True))
+
+    def amplitudes(self, information: Floats, wanted: Sequence[Wanted]) -> Floats:
+        """Smallest amplitude (c, w) of each effect by itself that is detected, over its prior standard deviation."""
+        names = [one.effect for one in wanted]
+        rows = [self.known.rows(name)[0] for name in names]
+        left = np.einsum("...ii->...i", self.known.left(information, rows, names))
+        alone = np.einsum("...ii->...i", information)[..., rows]
+        there = left > _ROUNDING * np.maximum(alone, 1e-300)
+        length = np.array([one.length for one in wanted])
+        return np.asarray(np.where(there, length / np.sqrt(np.where(there, left, 1.0)), _NEVER))
+
+    def _log_odds(self, information: Floats, g: int, a: int, b: int) -> Floats:
+        """Expected log odds (c,) of the true one of two over the other, the less of the two cases."""
+        log_odds = self.groups[g].log_odds
+        before = float(log_odds[a] - log_odds[b])
+        return np.minimum(before + self._gain(information, g, a, b), -before + self._gain(information, g, b, a))
+
+    def _gain(self, information: Floats, g: int, true: int, other: int) -> Floats:
+        """Expected log odds (c,) for the true one that a recording's own do not contain yet."""
+        key = g, true, other
+        if key not in self._start:
+            self._start[key] = float(self._expected(self.known.recorded[None], *key)[0])
+        return self._expected(information, *key) - self._start[key]
+
+    def _expected(self, information: Floats, g: int, true: int, other: int) -> Floats:
+        names = self.groups[g].names
+        size = self.sizes[names[0], names[true]]
+        rows, others = self.known.rows(names[true]), self.known.rows(names[other])
+        left = self.known.left(information, rows, names, others)
+        return np.asarray(0.5 * np.einsum("i,cij,j->c", size, left, size))
+
+    @cached_property
+    def start(self) -> Floats:
+        """Information (k, k) of the recording."""
+        return self.known.recorded
 
 
-def _round(odds: float) -> Text:
-    return number(odds, ".0f") if odds < 1000 else say("more than 1000")
+def _within_reach(aims: _Aims) -> tuple[Chosen, int] | None:
+    """The plan for all aims but effects to show that would need too many set-ups, the one that needs most first."""
+    found = _fewest(aims)
+    while found is not None and found[0].after > 0 and aims.wanted:
+        shown = aims.amplitudes(aims.after(*found)[None], aims.wanted)[0]
+        missing = shown / np.array([one.amplitude for one in aims.wanted])
+        worst = int(np.argmax(missing))
+        if missing[worst] <= 1:
+            break
+        aims = replace(aims, wanted=aims.wanted[:worst] + aims.wanted[worst + 1 :])
+        nearer = _fewest(aims)
+        found = found if nearer is None else nearer
+    return found
+
+
+def _fewest(aims: _Aims) -> tuple[Chosen, int] | None:
+    """As few set-ups as reach all aims, each repeated no more often than that needs; what comes closest where none does."""
+
+    def chosen(count: int, repeats: int) -> Chosen:
+        told = replace(aims.known.told, each=aims.added(repeats))
+        return choose(told, aims.start, aims.short, count)
+
+    most = min(SET_UPS, len(aims.known.told.each))
+    best = chosen(most, REPEATS)
+    if best.before <= 0:
+        return None
+    if best.after > 0:
+        best = chosen(most, _HOPELESS)
+        return (best, _HOPELESS) if best.after < best.before - _WORTH else None
+    few, count = 0, most
+    while count - few > 1:
+        middle = (few + count) // 2
+        reached = chosen(middle, REPEATS).after <= 0
+        few, count = (few, middle) if reached else (middle, count)
+    few, repeats = 0, REPEATS
+    while repeats - few > 1:
+        middle = (few + repeats) // 2
+        reached = chosen(count, middle).after <= 0
+        few, repeats = (few, middle) if reached else (middle, repeats)
+    return chosen(count, repeats), repeats
+
+
+def _repeated(placing: Placing, times: int) -> Placing:
+    """Everything that often, as repeats from 1 on."""
+    n = len(placing.points)
+    again = placing.points.select(np.tile(np.arange(n), times))
+    return replace(placing, points=replace(again, repeat=np.repeat(np.arange(1, times + 1), n)))

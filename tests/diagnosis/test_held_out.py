@@ -9,6 +9,7 @@ from scipy import linalg, stats
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.held_out import FOLDS, improvement
+from cmm_uq.diagnosis.numbering import numbered_by_place
 from cmm_uq.inference.posterior import Density
 from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.ballbar.observe import Ballbar
@@ -60,7 +61,7 @@ def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Fl
     """Log predictive density of each fold and rms of its errors, µm.
 
     All observations, in units of their noise, are normal with covariance A·P·Aᵀ + σ², a placing being known to 100 mm before;
-    those that the fit has seen are taken as given (Gelman et al., *Bayesian Data Analysis*, A.1). Where placings are left out
+    those that the fit has seen are taken as given (Gelman et al., *Bayesian Data Analysis*, A.1). Where set-ups are left out
     as a whole, only combinations that their own place does not change are predicted.
     """
     estimate = model.estimate()
@@ -88,7 +89,11 @@ def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Fl
 
 def compared(before: MeasurementModel, after: MeasurementModel, groups: Ints, unseen: str) -> None:
     """All figures of an improvement against the joint distribution; its standard error is over what was left out."""
-    whole = unseen == "placings"
+    whole = unseen == "set-ups"
+    xyz, rows = before.artefact.points.xyz, before.artefact.rows
+    away = [np.mean(np.sum((xyz - xyz.mean(axis=0)) ** 2, axis=1)[rows[groups == g]]) for g in np.unique(groups)]
+    _, index = np.unique(groups, return_inverse=True)
+    groups = np.argsort(np.argsort(away))[index]  # in folds by how far they are from the middle, whatever their numbers
     (first, rms_first), (second, rms_second) = (predicted(model, groups, whole=whole) for model in (before, after))
     found = improvement(before, after)
     assert found.unseen == unseen
@@ -112,10 +117,10 @@ def test_predictions_of_bars_are_those_of_the_joint_normal_distribution(made: in
     before, after = (
         MeasurementModel(Ballbar(bar_facts(), points), effects(names)) for names in (SCALES, (*SCALES, "squareness_xy"))
     )
-    compared(before, after, after.artefact.measurement, "placings")
+    compared(before, after, after.artefact.measurement, "set-ups")
 
 
-@pytest.mark.parametrize(("lines", "unseen"), [(12, "placings"), (10, "placings"), (9, "points")])
+@pytest.mark.parametrize(("lines", "unseen"), [(12, "set-ups"), (10, "set-ups"), (9, "points")])
 def test_predictions_along_lines_are_those_of_the_joint_normal_distribution(lines: int, unseen: str) -> None:
     """Whole lines of a gauge, whose place is then open, or faces on few lines, whose place the other faces give."""
     directions = np.random.default_rng(8).standard_normal((lines, 3))
@@ -126,7 +131,7 @@ def test_predictions_along_lines_are_those_of_the_joint_normal_distribution(line
     artefact = StepGauge(facts, ideal.points.at(xyz))
     before, after = (MeasurementModel(artefact, effects(names)) for names in (SCALES, (*SCALES, "squareness_xy")))
     key = np.column_stack([artefact.measurement, artefact.points.point])
-    groups = artefact.measurement if unseen == "placings" else np.unique(key, axis=0, return_inverse=True)[1].ravel()
+    groups = artefact.measurement if unseen == "set-ups" else np.unique(key, axis=0, return_inverse=True)[1].ravel()
     compared(before, after, groups, unseen)
 
 
@@ -141,8 +146,9 @@ def test_points_of_a_few_lines_are_predicted_as_the_press_residuals_of_all_colum
     Q = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0]
     residual, hat = y - Q @ (Q.T @ y), Q @ Q.T
     artefact = model.artefact
-    key = np.column_stack([artefact.measurement, artefact.points.point[artefact.rows[:, 0]]])
-    groups = np.unique(key, axis=0, return_inverse=True)[1].ravel()
+    groups = numbered_by_place(
+        model, np.column_stack([artefact.measurement, artefact.points.point[artefact.rows[:, 0]]])
+    )
     errors = []
     for k in range(FOLDS):
         out = np.isin(groups, np.unique(groups)[k::FOLDS])

@@ -11,7 +11,7 @@ the evidence of one more explanation beside them needs nothing but the inner pro
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,11 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse, special
 
+from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
 from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.model.display import Display
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
+
+_WIDE, _KEPT = 30, 40
+"""Columns of what is given from which on what follows from it is kept, and how often."""
 
 _BLOCK, _COLUMNS = 150_000, 500
 """Numbers of a block that a processor's cache holds; columns weighed at a time."""
@@ -93,6 +97,10 @@ class Comparison:
         """(m,) what the baseline leaves of the observations."""
         return self.rest(self.observed[:, None])[:, 0]
 
+    @cached_property
+    def _standing(self) -> tuple[Ints, Floats]:
+        return standing_of(self.left, self._reached)
+
     @property
     def degrees_of_freedom(self) -> int:
         """m', how many observations that is worth."""
@@ -122,7 +130,7 @@ class Comparison:
         Where the display's steps matter, coordinates are rounded as the recording's were.
         """
         fine = kind.unrounded if self.display else None
-        found = (fine or kind).noise(random, len(sigma))
+        found = drawn(fine or kind, random, len(sigma), self.noise_scale, self._standing)
         if self.certified.size:
             found += self.certified @ random.standard_normal((self.certified.shape[1], len(sigma)))
         if not (self.display and fine):
@@ -200,18 +208,24 @@ class Comparison:
 
     @cached_property
     def _table(self) -> tuple[Floats, Floats]:
-        nodes = np.linspace(-16.0, 8.0, 1500) + np.log(float(self.left @ self.left))
+        nodes = np.linspace(-16.0, 8.0, 1500) + np.log(max(float(self.left @ self.left), 1e-300))
         exponent = (
             self.log_sigma - self.degrees_of_freedom * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
         )
         return nodes, np.asarray(special.logsumexp(exponent, axis=1), dtype=np.float64)
 
-    def noise_posterior(self) -> Floats:
-        """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline."""
+    def noise_posterior(self, left: Floats | None = None) -> Floats:
+        """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline.
+
+        Parameters
+        ----------
+        left : (m,) of the observations, by default what the baseline leaves of them.
+        """
+        every = self.squares if left is None else self._by_noise(left[:, None])[:, :, 0] @ left
         log = np.stack([
             noise.log + self.log_sigma - self.degrees_of_freedom * np.log(self.sigma)
             - 0.5 * squares / self.sigma**2
-            for noise, squares in zip(self._noises, self.squares, strict=True)
+            for noise, squares in zip(self._noises, every, strict=True)
         ])  # fmt: skip
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
@@ -240,12 +254,33 @@ class Comparison:
         given : explanations that it is conditional on.
         among : explanations that are wanted, by default all; of others the evidence may be minus infinity.
         """
-        total = np.full((len(self.explanations), 1 if left is None else left.shape[1]), -np.inf)
-        for group, each in self.each(left, given, among):
+        return self.log_evidence_of(given, left), self._total(self._beside(left, given), among)
+
+    def _total(self, known: _Beside, among: Container[int] | None = None) -> Floats:
+        """Log evidence (c, b) of each explanation, its versions and sizes summed."""
+        total = np.full((len(self.explanations), known.squares.shape[1]), -np.inf)
+        for group, each in self._each(known, among):
             gains = _log_sum(each, 1) - np.log(AMPLITUDES) + group.weight[:, None]
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
-        return self.log_evidence_of(given, left), total
+        return total
+
+    def lengths(self, columns: Floats) -> Floats:
+        """Sum of squares (k, b) of columns (m, b), of which the baseline has been taken, whitened by each kind of noise."""
+        return np.asarray(np.einsum("mb,kmb->kb", columns, self._by_noise(columns)))
+
+    def of_signal(self, signal: Floats, noise: Floats) -> Floats:
+        """Log evidence (c, b) of each explanation over nothing for signals (m, b) in noise at right angles to everything.
+
+        It is nearly what a signal shows on average.
+
+        Parameters
+        ----------
+        noise : (m,) that counts by its size alone.
+        """
+        known = self._beside(signal, ())
+        known = replace(known, squares=known.squares + self.lengths(noise[:, None]))
+        return self._total(known) - _log_sum(self.over_sigma(known.squares) + known.log[:, None], 0)
 
     def beside(
         self, given: Sequence[Version] = (), among: Container[int] | None = None
@@ -297,8 +332,10 @@ class Comparison:
         self, data: Floats | None, given: Sequence[Version], among: Container[int] | None = None
     ) -> Iterator[tuple[Group, Floats]]:
         """Log evidence (M, a, b) of members at every size beside what is given, by groups; ``among`` are wanted at least."""
+        yield from self._each(self._beside(data, given), among)
+
+    def _each(self, known: _Beside, among: Container[int] | None) -> Iterator[tuple[Group, Floats]]:
         stack, groups = self._stack
-        known = self._beside(data, given)
         kinds, b = known.squares.shape
         for group, blocks in zip(groups, self._blocks, strict=True):
             part = group.part(among)
@@ -341,6 +378,21 @@ class Comparison:
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
+        key = tuple(given)
+        if data is not None or sum(self._columns(version).shape[1] for version in key) < _WIDE:
+            return self._weigh(data, given)
+        if key not in self._besides:
+            while len(self._besides) >= _KEPT:
+                del self._besides[next(iter(self._besides))]
+            self._besides[key] = self._weigh(None, given)
+        return self._besides[key]
+
+    @cached_property
+    def _besides(self) -> dict[tuple[Version, ...], _Beside]:
+        """The recording beside what was given last, where that is many columns."""
+        return {}
+
+    def _weigh(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         plain = self.left[:, None] if data is None else data
         weighed = self._left_weighed if data is None else self._by_noise(data)
         squares = np.einsum("mb,kmb->kb", plain, weighed)

@@ -14,6 +14,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect, Nonparametric
 from cmm_uq.plugins import BrokenPluginError
@@ -24,14 +25,20 @@ EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
 UNKNOWN_SD = 0.05
 """mm, largest standard deviation of a nonparametric displacement."""
 
-_SHORTEST_PERIOD = 6.0
-"""mm."""
+_SHORTEST_PERIOD, _FINEST_PERIOD = 6.0, 2.0
+"""mm, searched, and told of besides where a longer one is found."""
+
+_STEP = 0.35
+"""Between frequencies that are tried, over one in the range of the readings."""
 
 _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
 _ROUGH = 0.25
 """Probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest."""
 
-_MOST_PERIODS = 240
+_BEYOND = 0.1
+"""How readily an effect is thought of beyond the size that it mostly keeps to (:attr:`Effect.mostly`)."""
+
+_MOST_PERIODS, _MOST_SHORTER = 240, 800
 _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
 
@@ -69,6 +76,7 @@ class Explanation:
     term : of a nonparametric one that effects may be imitated by.
     imitated_by : of an effect.
     weight : how readily it is thought of, beside others of its kind.
+    effect : that it is, if it is one.
     """
 
     name: Text
@@ -79,6 +87,7 @@ class Explanation:
     term: Nonparametric | None = None
     imitated_by: tuple[Nonparametric, ...] = ()
     weight: float = 1.0
+    effect: Effect | None = None
 
     @property
     def shaped(self) -> bool:
@@ -88,6 +97,11 @@ class Explanation:
     def could_be(self, effect: Explanation) -> bool:
         """Whether this nonparametric term could have the form of an effect."""
         return self.term is not None and self.term in effect.imitated_by
+
+
+def effect_of(explanation: Explanation) -> Effect:
+    """The effect that an explanation is; a fault of the artefact as made for this one."""
+    return every()[explanation.name] if explanation.effect is None else explanation.effect
 
 
 def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
@@ -101,8 +115,11 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
     """
     points = model.artefact.points.at(model.where(values))
     found = []
-    for effect in every().values():
-        if effect.name in named or any(column not in points.columns for column in effect.columns):
+    set_ups = len(np.unique(points.measurement))
+    for effect in considered(model.artefact):
+        if effect.name in named or effect.least_set_ups > set_ups:
+            continue
+        if any(column not in points.columns for column in effect.columns):
             continue
         try:
             members = tuple(
@@ -113,20 +130,33 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
         except CmmUqError:  # the job does not give the travel that this effect needs
             continue
         if any(np.any(member.columns) for member in members):
+            if effect.mostly < 1:
+                members = (*(replace(m, columns=effect.mostly * m.columns) for m in members),
+                           *(replace(m, weight=_BEYOND) for m in members))  # fmt: skip
             members = (*members, *_roughly(model, effect, points, values))
-            weight = effect.prior_weight
             found.append(
-                Explanation(Verbatim(effect.name), EFFECT, members, imitated_by=effect.imitated_by, weight=weight)
-            )
+                Explanation(
+                    Verbatim(effect.name), EFFECT, members, imitated_by=effect.imitated_by, weight=effect.prior_weight,
+                    effect=effect,
+                )
+            )  # fmt: skip
     return found
+
+
+def considered(artefact: Artefact) -> Iterator[Effect]:
+    """Every effect of the catalogue, and those faults of artefacts that this one can have."""
+    for effect in every().values():
+        if not effect.of_artefact:
+            yield effect
+        elif effect.name in artefact.faults:
+            yield artefact.faults[effect.name]
 
 
 def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
     """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
-    over = effect.idealised_over
-    if over is None:
+    along = effect.course(points)
+    if along is None:
         return
-    along = points.readings[over] if over in points.readings else points.column(over)
     span = float(np.ptp(along))
     if span == 0:
         return
@@ -140,7 +170,9 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
 
 def finer(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
     """An explanation with some of its shapes divided: each gives way to five about it that share its weight."""
-    effect = every()[explanation.name]
+    effect = explanation.effect
+    if effect is None:
+        return explanation
     points = model.artefact.points.at(model.where(values))
     shaped = [i for i, member in enumerate(explanation.members) if member.shape]
     even = dict(zip(shaped, evenly(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True))
@@ -155,6 +187,26 @@ def finer(model: MeasurementModel, values: Floats, explanation: Explanation, mem
     return replace(explanation, members=tuple(kept))
 
 
+def shorter(model: MeasurementModel, values: Floats, explanation: Explanation) -> Explanation:
+    """A periodic effect with the periods below those that are searched: between positions at equal distances they fit as well.
+
+    Each octave is as probable as another, so that the shorter ones, of which there are so many, do not outweigh the others.
+    """
+    effect = effect_of(explanation)
+    axis = effect.shape[0].period_along
+    if axis is None:
+        return explanation
+    points = model.artefact.points.at(model.where(values))
+    step = _STEP / float(np.ptp(points.readings[axis]))
+    first = max(1 / member.shape[0] for member in explanation.members if member.shape) + step
+    frequencies = np.arange(first, 1 / _FINEST_PERIOD, step)[:_MOST_SHORTER]
+    more = tuple(
+        Member(_seen(model, effect, points, (float(1 / f),), values), (float(1 / f),), float(first / f))
+        for f in frequencies
+    )
+    return replace(explanation, members=(*explanation.members, *more))
+
+
 def evenly(effect: Effect, shape: Floats) -> Floats:
     """An effect's nonlinear parameter on the scale on which it is tried evenly: frequency for a period, else its logarithm."""
     return 1 / shape if effect.shape[0].period_along else np.log(shape)
@@ -166,11 +218,13 @@ def unevenly(effect: Effect, value: Floats) -> Floats:
 
 
 def several(singles: Sequence[Explanation]) -> list[Explanation]:
-    """All known effects at once, each as large as the others in the observations.
+    """All known effects of the machine at once, each as large as the others in the observations.
 
     It names none of them, but lets the lack-of-fit test see those that are visible together only.
     """
-    columns = [e.members[0].columns for e in singles if not e.shaped]
+    columns = [
+        e.members[0].columns for e in singles if not e.shaped and (e.effect is None or not e.effect.of_artefact)
+    ]  # fmt: skip
     if len(columns) < 2:
         return []
     together = np.hstack(columns)
@@ -192,7 +246,7 @@ def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
     span = float(np.ptp(readings))
     if span <= 2 * _SHORTEST_PERIOD:
         return
-    step = 0.35 / span
+    step = _STEP / span
     highest = min(1 / _SHORTEST_PERIOD, _MOST_PERIODS * step)
     for frequency in np.arange(0.7 / span, highest, step):
         yield (float(1 / frequency),)

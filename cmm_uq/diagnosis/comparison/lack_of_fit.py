@@ -35,14 +35,17 @@ def log_prior(candidates: Sequence[Explanation]) -> Floats:
     return np.log([SHARES[e.kind] * e.weight / total[e.kind] for e in candidates])
 
 
-def lack_of_fit(comparison: Comparison, seed: int) -> tuple[float, Floats]:
-    """Probability, under nothing, of as much evidence for something; and the largest of a nonparametric term under nothing."""
+def lack_of_fit(comparison: Comparison, seed: int) -> tuple[float, Floats, Floats]:
+    """Probability, under nothing, of as much evidence for something.
+
+    Also what is drawn under nothing: the statistic, and the largest log evidence of a nonparametric term.
+    """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
     draws = comparison.nothing(random, DRAWS)
     statistic, odds = statistic_of(comparison, np.column_stack([comparison.left, draws]))
     unknowns = [i for i, e in enumerate(comparison.explanations) if e.kind == UNKNOWN]
     maxima = odds[unknowns, 1:].max(axis=0) if unknowns else np.zeros(0)
-    return tail_probability(statistic[1:], float(statistic[0])), maxima
+    return tail_probability(statistic[1:], float(statistic[0])), statistic[1:], maxima
 
 
 def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:

@@ -1,0 +1,143 @@
+"""What to measure next, after a diagnosis: set-ups, what they will part and show, pictures of them, and results.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.diagnosis.power import ALLOWED
+from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.plan_picture import placing_pictures
+from cmm_uq.documents.result import Diagnosed
+from cmm_uq.messages import NOTHING, Text, Verbatim, number, plural, say, semicolons, together
+from cmm_uq.physics.catalogue import every
+from cmm_uq.planning.suggestion import ODDS, NextPlan, Shown, odds_words, rounded
+
+TO_FILL_IN = "next_plan.csv"
+"""File that a diagnosis writes the set-ups to."""
+
+
+def next_section(found: Diagnosed) -> Section:
+    """The set-ups that would part what this recording cannot, or show what it could not have shown."""
+    title, plan = say("What to measure next"), found.next_plan
+    if plan is None:
+        return Section(title, ())
+    blocks: list[Block] = [Paragraph(_what(found, plan)), _set_ups(plan)]
+    if plan.partings:
+        blocks.append(_partings(plan))
+    if plan.shown:
+        blocks.append(_shown(plan))
+    return Section(title, (*blocks, *placing_pictures(plan.placings, plan.box, plan.first)))
+
+
+def next_sentence(found: Diagnosed) -> Text:
+    """The set-ups in a sentence, with the odds that they are expected to reach; nothing without any."""
+    plan = found.next_plan
+    if plan is None:
+        return NOTHING
+    ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
+    told = say(
+        "Measure next: {what} First and last point in scale readings: {ends}.", what=_what(found, plan), ends=ends
+    )
+    if not plan.partings:
+        return told
+    least = min(parting.after for parting in plan.partings)
+    return say("{told} Odds of {odds} : 1 or more for the true one are then expected.", told=told, odds=rounded(least))
+
+
+def _what(found: Diagnosed, plan: NextPlan) -> Text:
+    times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))
+    count = plural(len(plan.placings), one=say("one set-up"), many=say("{count} set-ups", count=len(plan.placings)))
+    what = say(
+        "{count:capital} more of the {artefact:small}, each measured {times}, added to this recording.", count=count,
+        artefact=found.diagnosis.before.artefact.title, times=times,
+    )  # fmt: skip
+    if plan.reached:
+        return what
+    return say("{what} They are the best that was found, but do not reach everything: see below.", what=what)
+
+
+def _set_ups(plan: NextPlan) -> Table:
+    rows = tuple(
+        (number(plan.first + i), placing.title, placing.ends, number(plan.repeats))
+        for i, placing in enumerate(plan.placings)
+    )
+    heads = (
+        Column(say("Measurement")), Column(say("Set-up"), numeric=False),
+        Column(say("First and last point, scale readings / mm"), numeric=False), Column(say("Repeats")),
+    )  # fmt: skip
+    return Table(say("Set-ups to measure"), heads, rows, (say("A CSV to fill in comes with this page."),))
+
+
+def _partings(plan: NextPlan) -> Table:
+    rows = tuple(
+        (
+            together(_title(name) for name in parting.effects),
+            odds_words(parting.before),
+            say("{odds} : 1", odds=rounded(parting.after)),
+        )
+        for parting in plan.partings
+    )  # fmt: skip
+    heads = (
+        Column(say("Cannot be told apart"), numeric=False), Column(say("Odds now, first over second")),
+        Column(say("Odds expected then")),
+    )  # fmt: skip
+    note = say(
+        "Expected are the odds of the true one of the two, whichever it is, each as large as it would have to be to explain "
+        "this recording; {odds:.0f} : 1 is aimed at.", odds=ODDS,
+    )  # fmt: skip
+    return Table(say("What the set-ups part"), heads, rows, (note,))
+
+
+def _shown(plan: NextPlan) -> Table:
+    rows = tuple((_title(one.effect), _amplitude(one, one.before), _amplitude(one, one.after)) for one in plan.shown)
+    heads = (Column(say("Error"), numeric=False), Column(say("Found from, now")), Column(say("Found from, then")))
+    note = say("One error at a time, in 90 of 100 such recordings, with everything that the model names fitted.")
+    return Table(say("What the set-ups show"), heads, rows, (note,))
+
+
+def _title(name: str) -> Text:
+    effect = every().get(name)
+    return Verbatim(name) if effect is None else effect.title
+
+
+def _amplitude(one: Shown, size: float) -> Text:
+    parameter = every()[one.effect].coefficients[0]
+    if size > ALLOWED:
+        return say("not found")
+    value = size * parameter.prior_sd
+    return say("{value}\u00a0{unit}", value=number(value, ".2g" if value < 100 else ".0f"), unit=parameter.unit)
+
+
+def next_data(plan: NextPlan | None) -> dict[str, Any] | None:
+    """The same for results.json."""
+    if plan is None:
+        return None
+    return {
+        "repeats": plan.repeats,
+        "reached": plan.reached,
+        "set_ups": [
+            {"measurement": plan.first + i, "what": placing.title, "ends": placing.ends}
+            for i, placing in enumerate(plan.placings)
+        ],
+        "parts": [
+            {"effects": list(parting.effects), "odds_before": parting.before, "odds_after": parting.after}
+            for parting in plan.partings
+        ],
+        "shows": [_shown_data(one) for one in plan.shown],
+    }  # fmt: skip
+
+
+def _shown_data(one: Shown) -> dict[str, Any]:
+    effect = every()[one.effect]
+    parameter = effect.coefficients[0]
+    before, after = (
+        size * parameter.prior_sd if np.isfinite(size) and size <= ALLOWED else None for size in (one.before, one.after)
+    )
+    return {
+        "effect": one.effect,
+        "parameter": effect.reported[0].name,
+        "detected_before": before,
+        "detected_after": after,
+    }
