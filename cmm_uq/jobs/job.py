@@ -13,6 +13,7 @@ from pydantic import Field, ValidationInfo, create_model, field_validator, model
 
 from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS
+from cmm_uq.jobs.acquire import AcquireFacts
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.as_found import AsFound
 from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
@@ -176,6 +177,8 @@ class JobFile(Table):
     """Statements of conformity: a standard, a limit and a rule each."""
     plan: PlanFacts = PlanFacts()
     """What may be measured, where, and what it should tell; read by `cmm-uq plan`."""
+    acquire: AcquireFacts = AcquireFacts()
+    """The instruments that the recording is taken from live."""
 
     @field_validator("conformity")
     @classmethod
