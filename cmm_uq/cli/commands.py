@@ -9,6 +9,7 @@ import typer
 
 from cmm_uq.cli import (
     BAD_INPUT,
+    acquire,
     budget,
     check,
     compensate,
@@ -41,6 +42,7 @@ for module, short in {
     report: "The certificate of a recording: estimates, figures, decisions.",
     diagnose: "What a recording shows that its model leaves out.",
     plan: "What to measure, and what it will tell.",
+    acquire: "A recording taken live, led by the plan.",
     simulate: "A recording drawn from known errors, as a job of its own.",
     compensate: "A recording corrected by its machine's error maps.",
     budget: "The uncertainty of any measurement model in a file.",

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from cmm_uq.jobs.table import Column, Table
+from cmm_uq.jobs.table import Column, Table, at_least
 
 
 class DeclaredSource(Table):
@@ -31,8 +31,20 @@ class DeclaredSource(Table):
 
 
 class AcquireFacts(Table):
-    """``[acquire]``: a recording taken live."""
+    """``[acquire]``: a recording taken live, by `cmm-uq acquire`."""
 
+    plan: str | None = None
+    """Plan to be measured, a CSV of `cmm-uq plan` beside job.toml; without it the one that `[plan]` asks for."""
+    folder: str | None = None
+    """Folder that the machine's program drops results into, as seen from job.toml; each file is read once it stands still."""
+    max_gap_s: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] = 10.0
+    """Longest time between two readings of an instrument that is interpolated over; in a longer one a point has no value."""
+    soak_k_per_h: Annotated[float, Field(gt=0, le=1000)] | None = None
+    """Largest change of each temperature in an hour before the measurement begins; that of `[rated_conditions]` without it."""
+    soak_min: Annotated[float, Field(gt=0, le=1e5), at_least(0.01)] = 30.0
+    """Time over which that change is taken, min."""
+    repeats_most: Annotated[int, Field(ge=1, le=100)] = 5
+    """How often a set-up is measured at most, where the scatter of its repeats asks for more."""
     source: Annotated[list[DeclaredSource], Field(max_length=100)] = []
     """The instruments, each a table of its own."""
 
