@@ -10,9 +10,11 @@ import hashlib
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
+from cmm_uq.acquisition.accepting import Accepting
 from cmm_uq.acquisition.journal import Moment
 from cmm_uq.acquisition.judging import Judge, Judged
 from cmm_uq.acquisition.lead import Lead, Run, Step
@@ -75,7 +77,6 @@ class Conductor:
     Attributes
     ----------
     said : what happened and was not read yet, oldest first.
-    ended : whether the operator has ended it.
     paused : whether points are not taken.
     """
 
@@ -91,21 +92,26 @@ class Conductor:
         machine: Callable[[Step], None] | None = None,
     ) -> None:
         self.recorder, self.lead = recorder, lead
-        self._judge, self._table, self._facts, self._limit = judge, table, facts, soak_k_per_h
+        self._table, self._facts, self._limit = table, facts, soak_k_per_h
+        self._accepting = Accepting(recorder, lead, judge, table, facts.repeats_most, self.tell)
         self._machine = machine
         self._soaks: dict[str, Soak] = {}
         self._wanted: Run | None = None
-        self._judged = Judged()
-        self._due: list[Run] = []
-        self._waiting: list[Step] = []
         self.said: deque[Text] = deque(maxlen=_SAID)
         self._log: deque[Text] = deque(maxlen=_SAID)
-        self.ended = self.paused = False
+        self._asks, self._ending = 0, False
+        self._typed_ns = 0
+        self.paused = False
 
     @property
     def story(self) -> Story:
         """All sessions so far."""
         return self.recorder.story
+
+    @property
+    def ended(self) -> bool:
+        """Whether the operator has ended it, and nothing is being measured any more."""
+        return self._ending and not self._asks
 
     @property
     def step(self) -> Step | None:
@@ -157,9 +163,9 @@ class Conductor:
         if places is None:
             return
         self.recorder.say("file", name=name, sha256=digest, kept=kept, points=len(places))
-        self._accept(
-            [(step, {**{n: row[n] for n in row if n not in _NUMBERS}}) for step, row in zip(places, rows, strict=False)],
-            moment, name, {"sha256": digest},
+        self._accepting.accept(
+            [(step, {n: row[n] for n in row if n not in _NUMBERS}) for step, row in zip(places, rows, strict=False)],
+            moment, name, {"sha256": digest, **_OF_ALL},
         )  # fmt: skip
         if len(rows) > len(places):
             self.tell(say("{name}: {more} points are more than the plan has left, and are not taken", name=Verbatim(name),
@@ -173,10 +179,7 @@ class Conductor:
         OutputError : the disk fails.
         """
         if self.recorder.tick():
-            if self._waiting:
-                waited, self._waiting = self._waiting, []
-                self._accepted(waited)
-            self._grow()
+            self._accepting.kept()
         self._listen()
 
     def finish(self) -> None:
@@ -200,25 +203,38 @@ class Conductor:
             head = say("PAUSED, {head}", head=head)
         steps = () if step is None else self.lead.steps((step.place[0], step.place[2]))
         return View(
-            head, _next(step, self.lead), picture(self.lead.plan.machine, steps, step), self._judged.shown,
-            say("REPEAT? {why}", why=self._judged.again) if self._judged.again else NOTHING,
+            head, _next(step, self.lead), picture(self.lead.plan.machine, steps, step), self._accepting.judged.shown,
+            say("REPEAT? {why}", why=self._accepting.judged.again) if self._accepting.judged.again else NOTHING,
             tuple(soak.words for soak in self._soaks.values()), tuple(self._instruments()), tuple(self._log),
         )  # fmt: skip
 
     def _probed(self, reading: Reading) -> None:
-        """A point of a coordinate measuring machine."""
+        """A point of a coordinate measuring machine; where it was asked for further ones, the next is asked for now."""
         columns = {self.recorder.column(reading.source, name): value for name, value in reading.values.items()}
         latency = self.recorder.latency_ns(reading.source)
         moment = Moment(reading.utc_ns - latency, reading.monotonic_ns - latency)
-        step = None if self.paused else self.step
-        if reading.status is not None or step is None or not all(name in columns for name in COORDINATES):
-            why = reading.status or (say("points are not taken now") if self.paused else
-                                     say("nothing is left of the plan") if step is None else say("it lacks a coordinate"))  # fmt: skip
-            self.tell(say("{source}: a point is not taken: {why}", source=Verbatim(reading.source), why=why))
-            return
-        self._accept(
-            [(step, columns)], moment, reading.source, {"reading": reading.number, "raw": reading.raw.decode("latin-1")}
-        )
+        step = self.step
+        why = self._refused(reading, columns)
+        if why is not None or step is None:
+            self.tell(say("{source}: a point is not taken: {why}", source=Verbatim(reading.source), why=why or _ALL))
+        else:
+            of = {"reading": reading.number, "raw": reading.raw.decode("latin-1")}
+            self._accepting.accept([(step, columns)], moment, reading.source, of)
+        self._asks = max(0, self._asks - 1)
+        if self._asks and self._machine is not None:
+            following = self.step
+            if following is None:
+                self._asks = 0
+            else:
+                self._machine(following)
+
+    def _refused(self, reading: Reading, columns: Mapping[str, float]) -> Text | None:
+        """Why a point of a machine is not taken; ``None`` where it is."""
+        if self.paused:
+            return say("points are not taken now")
+        if reading.status is not None:
+            return reading.status
+        return None if all(name in columns for name in COORDINATES) else say("it lacks a coordinate")
 
     def _take(self, typed: Typed) -> None:
         """The point that comes next, as typed or as the scales read."""
@@ -229,18 +245,27 @@ class Conductor:
             raise CmmUqError("nothing is left of the plan", fix="repeat, go or quit")
         if typed.word == "take":
             if self._machine is not None:
-                self._machine(step)
+                self._asks += 1
+                if self._asks == 1:
+                    self._machine(step)
                 return
             if not any(name in self.recorder.streams for name in COORDINATES):
                 raise CmmUqError(
                     "no instrument reads coordinates", fix="Type them: x y z, or a distance from the first point"
                 )
-            self._accept([(step, self.recorder.latest(COORDINATES))], now, "scales", {})
+            self._accepting.accept([(step, self.recorder.latest(COORDINATES))], now, "scales", {})
         elif len(typed.numbers) == 3:
-            self._accept([(step, dict(zip(COORDINATES, typed.numbers, strict=True)))], now, TYPED, {"raw": typed.text})
+            columns = dict(zip(COORDINATES, typed.numbers, strict=True))
+            self._accepting.accept([(step, columns)], now, TYPED, {"raw": typed.text, **self._own_time(now)})
         else:
             found = self.lead.at_distance(step, typed.numbers[0], self.story)
-            self._accept([(one, _columns(xyz)) for one, xyz in found], now, f"{TYPED} length", {"raw": typed.text})
+            points = [(one, _columns(xyz)) for one, xyz in found]
+            self._accepting.accept(points, now, f"{TYPED} length", {"raw": typed.text, **_OF_ALL})
+
+    def _own_time(self, now: Moment) -> Mapping[str, bool]:
+        """Nothing, but for points that are pasted faster than they can be measured."""
+        before, self._typed_ns = self._typed_ns, now.monotonic_ns
+        return {} if now.monotonic_ns - before > _PASTED_S * 1e9 else _OF_ALL
 
     def _warm(self, reading: Reading) -> None:
         for quantity, value in reading.values.items():
@@ -260,10 +285,13 @@ class Conductor:
         for row in rows:
             place = (int(row["measurement"]), int(row["point"]), int(row.get("repeat", 1)))
             if place not in by_place:
-                self.tell(say("{name}: measurement {m}, point {p}, repeat {r} is not open in the plan; nothing of it is taken",
-                               name=Verbatim(name), m=place[0], p=place[1], r=place[2]))  # fmt: skip
+                what = say("measurement {m}, point {p}, repeat {r}", m=place[0], p=place[1], r=place[2])
+                told = say(
+                    "{name}: {what} is not open in the plan; no point of it is taken", name=Verbatim(name), what=what
+                )
+                self.tell(told)
                 return None
-            found.append(by_place[place])
+            found.append(by_place.pop(place))
         return found
 
     def _ahead(self) -> list[Run]:
@@ -278,7 +306,7 @@ class Conductor:
         last = list(self.story.points.values())[-1]
         self.recorder.undo([last], reason)
         self._after_word()
-        self._judged, self._wanted = Judged(), (last.place[0], last.place[2])
+        self._accepting.judged, self._wanted = Judged(), (last.place[0], last.place[2])
         self.tell(say("taken back: measurement {m}, point {p}, repeat {r}: {why}", m=last.place[0], p=last.place[1],
                        r=last.place[2], why=Verbatim(reason)))  # fmt: skip
 
@@ -289,7 +317,7 @@ class Conductor:
         run = self.lead.more((last[0], last[2]), self.story)
         self.recorder.say("repeat", measurement=run[0], repeat=run[1])
         self._after_word()
-        self._wanted, self._judged = run, Judged()
+        self._wanted, self._accepting.judged = run, Judged()
 
     def _skip(self, reason: str) -> None:
         step = self.step
@@ -326,7 +354,7 @@ class Conductor:
             self.tell(say("{word} {what}", word=Verbatim(word), what=Verbatim(what)))
 
     def _quit(self, _: str) -> None:
-        self.ended = True
+        self._ending = True
 
     def _after_word(self) -> None:
         if not self.recorder.commit():
@@ -356,6 +384,13 @@ class Conductor:
         return say("not settled yet: {columns}", columns=commas(names(waiting))) if waiting else NOTHING
 
 
+_ALL = say("nothing is left of the plan")
+_OF_ALL: Mapping[str, bool] = MappingProxyType({"timed": False})
+"""Of points that share a moment which is none of theirs."""
+
+_PASTED_S = 0.6
+"""Between two points that are typed: in less nobody measures."""
+
 _NUMBERS = ("measurement", "point", "repeat")
 
 
@@ -367,5 +402,6 @@ def _next(step: Step | None, lead: Lead) -> Text:
     if step is None:
         return say("all of the plan is measured")
     at = commas(signed(value, ".1f") for value in step.xyz)
-    return say("measurement {m}, {title}, point {p}, repeat {r}, near {at} mm", m=step.place[0], title=lead.titles[step.place[0]],
-               p=step.place[1], r=step.place[2], at=at)  # fmt: skip
+    m, p, r = step.place
+    title = lead.titles[m]
+    return say("measurement {m}, {title}, point {p}, repeat {r}, near {at} mm", m=m, title=title, p=p, r=r, at=at)

@@ -155,8 +155,9 @@ class Judge:
 
 
 def _columns(rows: Sequence[Row]) -> list[str]:
-    every = [{*row.step.columns, *row.point.columns, *row.point.joined, "time_s"} - {*COORDINATES} for row in rows]
-    return sorted(set.intersection(*every))
+    every = [{*row.step.columns, *row.point.columns, *row.point.joined} - {*COORDINATES} for row in rows]
+    timed = {"time_s"} if all(row.point.timed for row in rows) else set()
+    return sorted(set.intersection(*every) | timed)
 
 
 def _against(found: Predicted, own: Ints) -> tuple[tuple[Text, ...], Text | None]:

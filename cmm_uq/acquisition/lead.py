@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.acquisition.story import Place, Story
+from cmm_uq.acquisition.story import Place, Point, Story
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, say
 from cmm_uq.points import Floats, Ints, Points
@@ -72,6 +72,11 @@ class Lead:
         ------
         CmmUqError : the plan has no such measurement.
         """
+        if run not in self._steps:
+            self._steps[run] = self._found(run)
+        return self._steps[run]
+
+    def _found(self, run: Run) -> list[Step]:
         rows = self._rows(run)
         names = [name for name in self.plan.columns if name not in self.unmeasured]
         return [
@@ -84,8 +89,7 @@ class Lead:
 
     def missing(self, run: Run, story: Story) -> list[Step]:
         """Points of it that are still to be measured."""
-        taken = story.by_place
-        return [step for step in self.steps(run) if step.place not in taken]
+        return self._left(run, story.by_place)
 
     def next(self, story: Story, wanted: Run | None = None) -> Step | None:
         """The point that comes next; ``None`` when all is measured.
@@ -98,15 +102,17 @@ class Lead:
         last = list(story.points.values())[-1].place if story.points else None
         begun = (last[0], last[2]) if last is not None else None
         first = [run for run in (wanted, begun) if run is not None and run in runs]
+        taken = story.by_place
         for run in (*first, *runs):
-            if left := self.missing(run, story):
+            if left := self._left(run, taken):
                 return left[0]
         return None
 
     def complete(self, story: Story) -> list[Run]:
         """Measurements and repeats of which every point is there."""
-        known = {(measurement, repeat) for measurement, _, repeat in story.by_place}
-        return [run for run in self.all_runs(story) if run in known and not self.missing(run, story)]
+        taken = story.by_place
+        known = {(measurement, repeat) for measurement, _, repeat in taken}
+        return [run for run in self.all_runs(story) if run in known and not self._left(run, taken)]
 
     def progress(self, story: Story) -> tuple[int, int]:
         """Set-ups with their repeats that are complete, and all."""
@@ -145,10 +151,8 @@ class Lead:
         about = np.array([other.xyz for other in steps]) - steps[0].xyz
         far = about[int(np.argmax(np.linalg.norm(about, axis=1)))]
         length = float(np.linalg.norm(far))
-        if (
-            length == 0
-            or float(np.linalg.norm(about - np.outer(about @ far, far) / length**2, axis=1).max()) > _ON_LINE * length
-        ):
+        beside = about - np.outer(about @ far, far) / (length**2 or 1.0)
+        if length == 0 or float(np.linalg.norm(beside, axis=1).max()) > _ON_LINE * length:
             raise CmmUqError("the points of this set-up lie on no line, so a distance does not say where",
                              fix="Type three coordinates: x y z")  # fmt: skip
         taken = story.by_place
@@ -158,6 +162,14 @@ class Lead:
         along = target.xyz - steps[0].xyz
         first = [] if begun is not None else [(steps[0], start)]
         return [*first, (target, start + distance_mm * along / np.linalg.norm(along))]
+
+    def _left(self, run: Run, taken: Mapping[Place, Point]) -> list[Step]:
+        return [step for step in self.steps(run) if step.place not in taken]
+
+    @cached_property
+    def _steps(self) -> dict[Run, list[Step]]:
+        """What :meth:`steps` found."""
+        return {}
 
     def _rows(self, run: Run) -> Ints:
         for repeat in (run[1], None):

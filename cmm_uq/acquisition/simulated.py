@@ -26,6 +26,9 @@ NOISE_MM = 1e-3
 ERRORS = np.array([[30e-6, 20e-6, 0.0], [0.0, -20e-6, 15e-6], [0.0, 0.0, 10e-6]])
 """What the machine indicates too much: 30, −20, 10 ppm along x, y, z, and two axes that are not square by 20 and 15 µrad."""
 
+TAKES_S = 0.7
+"""Time to measure a point."""
+
 _PLACED_MM = 5.0
 """How far off the plan the artefact is set up."""
 
@@ -110,6 +113,7 @@ class SimulatedMachine:
 
     def _probed(self, step: Step) -> Reading:
         """The same point at the same place, whenever it is asked for, but for the noise of its repeat."""
+        self._clock.sleep(TAKES_S)
         self._number += 1
         placed = _PLACED_MM * np.random.default_rng([self._seed, step.place[0]]).standard_normal(3)
         noise = NOISE_MM * np.random.default_rng([self._seed, *step.place]).standard_normal(3)

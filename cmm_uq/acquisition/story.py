@@ -29,6 +29,7 @@ class Point:
     joined : what streams had at that moment, by column.
     missing : why others had nothing, by column.
     settled : whether every stream has answered.
+    timed : whether the moment is its own; points of a file have that of the file.
     """
 
     record: int
@@ -41,6 +42,7 @@ class Point:
     joined: Mapping[str, Joined] = field(default_factory=dict)
     missing: Mapping[str, str] = field(default_factory=dict)
     settled: bool = False
+    timed: bool = True
 
 
 @dataclass
@@ -81,6 +83,8 @@ class Story:
     skipped, asked : set-ups that the operator left out, and repeats more that were asked for.
     notes : of the operator, and everything else that was said, each with its time.
     files : that were read, by SHA-256, with their names.
+    damaged : lines of journals that are not in it.
+    changes : how many records changed what counts.
     """
 
     sessions: list[Session] = field(default_factory=list)
@@ -94,6 +98,7 @@ class Story:
     notes: list[tuple[float, str]] = field(default_factory=list)
     files: dict[str, str] = field(default_factory=dict)
     damaged: list[str] = field(default_factory=list)
+    changes: int = 0
 
     @property
     def session(self) -> Session:
@@ -112,6 +117,7 @@ class Story:
         told = getattr(self, f"_{record.kind}", None)
         if told is not None:
             told(record)
+            self.changes += 1
 
     def _session(self, record: Record) -> None:
         offset = 0.0
@@ -132,7 +138,7 @@ class Story:
         measurement, number, repeat = data["place"]
         self.points[record.number] = Point(
             record.number, (measurement, number, repeat), data["columns"], moment, self.session.time_s(moment),
-            self.session.number, data["how"],
+            self.session.number, data["how"], timed=data.get("timed", True),
         )  # fmt: skip
 
     def _joined(self, record: Record) -> None:

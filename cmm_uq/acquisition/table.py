@@ -66,7 +66,7 @@ def as_recording(rows: Sequence[Row]) -> bytes:
 def _cell(row: Row, name: str) -> str:
     point = row.point
     if name == "time_s":
-        return f"{point.time_s:.6f}"
+        return f"{point.time_s:.6f}" if point.timed else ""
     value = point.columns.get(name)
     if value is None and name in point.joined:
         value = point.joined[name].value
@@ -190,6 +190,8 @@ def _columns(rows: Sequence[Row]) -> dict[str, Any]:
             "u": float(np.sqrt(np.mean(u**2))) if u.size else 0.0, "u_largest": float(u.max(initial=0.0)),
             "missing": [tuple(place) for place in missing],
         }  # fmt: skip
+    if untimed := [row.point.place for row in rows if not row.point.timed]:
+        found["time_s"] = {"u": 0.0, "u_largest": 0.0, "missing": untimed}
     return found
 
 

@@ -233,8 +233,9 @@ def _instrument(one: Instrument) -> Text:
 
 
 def _join(name: str, column: JoinedColumn) -> Text:
-    told: Text = say("{name}: u = {u:.2g} by interpolation in time, {largest:.2g} at most", name=Verbatim(name), u=column.u,
+    joined: Text = say("{name}: u = {u:.2g} by interpolation in time, {largest:.2g} at most", name=Verbatim(name), u=column.u,
                      largest=column.u_largest)  # fmt: skip
+    told = say("{name}: not known of every point", name=Verbatim(name)) if name == "time_s" else joined
     if not column.missing:
         return told
     points = [
