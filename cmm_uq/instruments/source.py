@@ -133,4 +133,6 @@ def open_source(declared: DeclaredSource, *, clock: Clock = SYSTEM, folder: Path
     ------
     CmmUqError : there is no such profile, or the port is absent, busy or forbidden.
     """
-    raise NotImplementedError
+    from cmm_uq.instruments.opening import opened  # which knows every kind of source, and those know this module
+
+    return opened(declared, clock, folder)
