@@ -99,6 +99,8 @@ class Accepting:
             self._tell(say("accepted: measurement {m}, point {p}, repeat {r}: {at}", m=step.place[0], p=step.place[1],
                            r=step.place[2], at=told))  # fmt: skip
             self.judged = self._judge.point(step, self.story, self._lead)
+            for text in self.judged.shown:
+                self._tell(text)
             self._warn(self.judged)
             run = (step.place[0], step.place[2])
             if not self._lead.missing(run, self.story) and run not in self._due:

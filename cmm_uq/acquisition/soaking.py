@@ -39,20 +39,22 @@ class Soak:
     _means: deque[tuple[float, float]] = field(default_factory=deque)
     _sum: float = 0.0
     _count: int = 0
-    _begin_s: float = 0.0
+    _times: float = 0.0
+    _begin_ns: int = 0
     _latest: float | None = None
 
     def add(self, monotonic_ns: int, value: float) -> None:
         """A reading."""
         time_s = monotonic_ns * NS
-        if self._count and time_s - self._begin_s >= _MEAN_S:
-            self._means.append((self._begin_s, self._sum / self._count))
-            self._sum, self._count = 0.0, 0
+        if self._count and monotonic_ns - self._begin_ns >= _MEAN_S / NS:
+            self._means.append((self._times / self._count, self._sum / self._count))
+            self._sum, self._times, self._count = 0.0, 0.0, 0
             while self._means[0][0] < time_s - 60 * self.over_min:
                 self._means.popleft()
         if not self._count:
-            self._begin_s = time_s
-        self._sum, self._count, self._latest = self._sum + value, self._count + 1, value
+            self._begin_ns = monotonic_ns
+        self._sum, self._times, self._count = self._sum + value, self._times + time_s, self._count + 1
+        self._latest = value
 
     @property
     def change(self) -> tuple[float, float] | None:

@@ -148,7 +148,7 @@ class Table:
         rows = rows_of(story, lead)
         content = as_recording(rows)
         own = hashlib.sha256(content).hexdigest()
-        if own == self._last or not rows:
+        if own == self._last or (self._last is None and not rows):
             return False
         hashes = [own, *([self._last] if self._last else [])]
         said = said_of(story, rows, self._folder, hashes, simulated=self._simulated)

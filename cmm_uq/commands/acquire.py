@@ -31,7 +31,8 @@ from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.instruments.source import SYSTEM, Clock, Source, open_source
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
-from cmm_uq.jobs.importing.imported import imported
+from cmm_uq.jobs.importing.imported import Imported, imported
+from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.jobs.recording import read_recording
@@ -217,7 +218,7 @@ def _rows(file: Dropped, job: Job) -> list[dict[str, float]]:
         columns = {"measurement": points.measurement, "point": points.point, "repeat": points.repeat,
                    **dict(zip(("x_mm", "y_mm", "z_mm"), points.xyz.T, strict=True)), **points.columns}  # fmt: skip
     else:
-        found = imported(file.content, where, keys)
+        found = _imported(file.content, where, keys)
         columns = dict(found.columns)
         if "measurement" not in found.recognised.columns:
             columns = {
@@ -226,6 +227,16 @@ def _rows(file: Dropped, job: Job) -> list[dict[str, float]]:
     columns.pop("time_s", None)  # by another clock
     names = list(columns)
     return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _imported(content: bytes, where: str, keys: ImportKeys) -> Imported:
+    """As any import; where nothing says which points belong together, they come in the order of the plan."""
+    try:
+        return imported(content, where, keys)
+    except CmmUqError:
+        if keys.points_per_measurement is not None:
+            raise
+        return imported(content, where, keys.model_copy(update={"points_per_measurement": "all"}))
 
 
 def _check_origin(job: Job, *, simulate: bool) -> None:
