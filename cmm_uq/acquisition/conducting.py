@@ -201,6 +201,8 @@ class Conductor:
             head = say("NOTHING IS KEPT: {why}", why=self.recorder.stalled)
         elif self.paused:
             head = say("PAUSED, {head}", head=head)
+        if waiting := unsettled(self._soaks):
+            head = say("{head}; WAIT, not settled: {columns}", head=head, columns=commas(names(waiting)))
         steps = () if step is None else self.lead.steps((step.place[0], step.place[2]))
         return View(
             head, _next(step, self.lead), picture(self.lead.plan.machine, steps, step), self._accepting.judged.shown,
@@ -378,10 +380,6 @@ class Conductor:
         self.said.append(text)
         self._log.append(text)
 
-    def before(self) -> Text:
-        """What should be waited for before the first point; nothing where temperatures have settled."""
-        waiting = unsettled(self._soaks)
-        return say("not settled yet: {columns}", columns=commas(names(waiting))) if waiting else NOTHING
 
 
 _ALL = say("nothing is left of the plan")

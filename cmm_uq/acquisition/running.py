@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from cmm_uq.acquisition.conducting import Conductor, View
 from cmm_uq.acquisition.dropped import Dropped, Watched
-from cmm_uq.instruments.source import Clock, Event, Source
-from cmm_uq.messages import Text
+from cmm_uq.instruments.source import Clock, Event, Gap, Source
+from cmm_uq.messages import Text, Verbatim, say
 
 COMMIT_S = 0.04
 """Between two commits, and two pictures: what came is on the disk after 100 ms at the latest, and seen after 50."""
@@ -70,10 +71,14 @@ class Listening:
             source.close()
 
     def _listen(self, source: Source) -> None:
-        for event in source.events(self._stop):
-            self._items.put(event)
-            if self._stop.is_set():
-                break
+        try:
+            for event in source.events(self._stop):
+                self._items.put(event)
+                if self._stop.is_set():
+                    break
+        except Exception as error:  # whatever is wrong with a source, its silence is said
+            why = say("the program's own part that listens to it failed: {what}", what=Verbatim(repr(error)))
+            self._items.put(Gap(source.name, time.time_ns(), time.monotonic_ns(), why))
 
 
 def run(

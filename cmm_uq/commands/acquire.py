@@ -31,6 +31,7 @@ from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.instruments.source import SYSTEM, Clock, Source, open_source
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
+from cmm_uq.jobs.file_names import inside
 from cmm_uq.jobs.importing.imported import Imported, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.job import Job
@@ -125,7 +126,7 @@ def begin_acquisition(
     lead = _lead(job, plan, titles)
     judge = _judge(job)
     facts = job.facts.acquire
-    watched = None if facts.folder is None else Watched(job.folder / facts.folder, clock)
+    watched = None if facts.folder is None or simulate else Watched(job.folder / facts.folder, clock)
     sources, machine = _sources(job, simulate=simulate, seed=seed, clock=clock)
     try:
         now = Moment(clock.utc_ns(), clock.monotonic_ns())
@@ -175,12 +176,21 @@ def write_trial(folder: Path, out: Path) -> Path:
     document["job"]["origin"] = SIMULATED
     left_out = {"job.toml", job.facts.recording.file, provenance_name(job.facts.recording.file)}
     out.mkdir(parents=True, exist_ok=True)
-    for name, content in job.inputs.items():
+    for name, content in {**job.inputs, **_plan_file(job)}.items():
         if name not in left_out:
             (out / name).parent.mkdir(parents=True, exist_ok=True)
             written_whole(out / name, content)
     written_whole(out / "job.toml", tomlkit.dumps(document).encode())
     return out
+
+
+def _plan_file(job: Job) -> dict[str, bytes]:
+    """The plan that a job names in a file."""
+    name = job.facts.acquire.plan
+    if name is None:
+        return {}
+    path = inside(job.folder, name, f"{job.folder / 'job.toml'}: [acquire] plan")
+    return {name: content_of(path, TABLE_BYTES, "cmm-uq plan writes plan.csv; name it in [acquire] plan")}
 
 
 class _Taking:
@@ -260,9 +270,8 @@ def _plan(job: Job, story: Story) -> tuple[str, list[str]]:
         said = story.sessions[0].said
         return said["plan"], said["titles"]
     if job.facts.acquire.plan is not None:
-        path = job.folder / job.facts.acquire.plan
-        content = content_of(path, TABLE_BYTES, "cmm-uq plan writes plan.csv; name it in [acquire] plan")
-        read_recording(content, str(path), job.points.machine)
+        ((name, content),) = _plan_file(job).items()
+        read_recording(content, str(job.folder / name), job.points.machine)
         return content.decode("utf-8-sig"), []
     from cmm_uq.commands.plan import recording_to_be
     from cmm_uq.commands.planning import make_plan

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
 import queue
 import re
 import resource
-import shutil
 import signal
 import subprocess
 import termios
@@ -79,6 +77,10 @@ class Operator:
         self.process.wait(PATIENCE_S)
         while (line := self._lines.get(timeout=PATIENCE_S)) is not None:
             self.told.append(line)
+        for pipe in (self.process.stdin, self.process.stdout):
+            assert pipe is not None
+            with suppress(BrokenPipeError):
+                pipe.close()
 
     def end(self) -> int:
         self.type("quit")
@@ -105,8 +107,7 @@ def operating(folder: Path, *options: str, limit: int | None = None) -> Iterator
         yield operator
     finally:
         if operator.process.poll() is None:
-            operator.process.kill()
-            operator.process.wait()
+            operator.signal(signal.SIGKILL)
 
 
 def places(folder: Path) -> list[str]:
@@ -121,23 +122,22 @@ def many_bars(folder: Path) -> Path:
     return job_folder(folder, plan="measurement,point,repeat,x_mm,y_mm,z_mm,time_s\n" + "\n".join(rows) + "\n")
 
 
-@pytest.mark.parametrize("after", [1, 2, 7])
-def test_what_was_shown_as_accepted_survives_a_kill_and_it_goes_on(tmp_path: Path, after: int) -> None:
+def test_what_was_shown_as_accepted_survives_a_kill_and_it_goes_on(tmp_path: Path) -> None:
+    """Once; benchmarks/acquisition/kills.py does it a thousand times."""
     folder = many_bars(tmp_path / "job")
     with operating(folder) as operator:
         operator.type(*POINTS)
-        for _ in range(after):
+        for _ in range(5):
             operator.hear("^accepted: ")
         operator.kill()
         shown = [line.rpartition(":")[0] for line in operator.accepted]
-    assert len(shown) >= after
+    assert len(shown) >= 5
     kept = places(folder)
     assert shown == kept[: len(shown)]
     with operating(folder) as operator:
         assert operator.end() == 0
         assert f"{len(kept)} points are kept" in " ".join(operator.told)
-    if len(kept) >= 2:
-        assert len(read_job(folder).points) == len(kept) // 2 * 2
+    assert len(read_job(folder).points) == len(kept) // 2 * 2
 
 
 def test_on_a_full_disk_nothing_is_accepted_and_it_goes_on_when_there_is_room(tmp_path: Path) -> None:
@@ -264,9 +264,9 @@ def test_an_interruption_ends_it_at_once_and_says_that_what_was_accepted_is_writ
 
 def test_a_trial_without_instruments_is_marked_simulated_and_can_be_reported(tmp_path: Path) -> None:
     trial = tmp_path / "trial"
-    with operating(ROOT / "examples" / "plan-ballbar", "--simulate", "--out", str(trial)) as operator:
+    with operating(job_folder(tmp_path / "job"), "--simulate", "--out", str(trial)) as operator:
         operator.type("", "")
-        operator.hear("1 of 60 set-ups")
+        operator.hear("1 of 4 set-ups")
         assert operator.end() == 0
     job = read_job(trial)
     assert (job.origin, len(job.points)) == ("simulated", 2)
@@ -301,30 +301,3 @@ def test_a_wrong_job_is_refused_in_one_line_and_nothing_is_left(tmp_path: Path, 
     assert told in ended.stderr
     assert ended.stderr.count("\n") == 1
     assert sorted(path.name for path in folder.iterdir()) == ["job.toml", "plan.csv"]
-
-
-def test_the_certificate_names_instruments_gaps_and_joins(tmp_path: Path) -> None:
-    folder = tmp_path / "job"
-    shutil.copytree(ROOT / "examples" / "iota-1102-20C", folder)
-    import hashlib
-
-    said = {
-        "schema": "cmm-uq/acquired/1", "program": "cmm-uq 1", "simulated": False,
-        "recording_sha256": [hashlib.sha256((folder / "ballbar.csv").read_bytes()).hexdigest()],
-        "sessions": [{"number": 1, "begin_utc": "2026-05-31T08:00:00Z", "journal": "acquisition/0001-events.jsonl", "sha256": ""}],
-        "instruments": [{"name": "air", "maker": "Fluke", "model": "1529", "serial": "B123", "certificate": "K-2031"}],
-        "typed": 0, "gaps": [{"instrument": "air", "since_s": 60.0, "lasted_s": 12.0, "why": "it said nothing"}],
-        "columns": {"temp_air_c": {"u": 0.002, "u_largest": 0.004, "missing": []}},
-    }  # fmt: skip
-    (folder / "ballbar.acquired.json").write_text(json.dumps(said), encoding="utf-8")
-    out = tmp_path / "out"
-    assert run("report", folder, "--out", out, "-q").returncode == 0
-    page = (out / "certificate.html").read_text(encoding="utf-8")
-    for text in ("taken live by cmm-uq 1", "air, Fluke 1529, serial number B123, certificate K-2031",
-                 "temp_air_c: u = 0.002 by interpolation in time", "air from 60 s for 12 s: it said nothing"):  # fmt: skip
-        assert text in page or text.capitalize() in page, text
-    results = json.loads((out / "results.json").read_text(encoding="utf-8"))
-    assert results["acquisition"]["instruments"][0]["certificate"] == "K-2031"
-    assert "ballbar.acquired.json" in results["job"]["inputs_sha256"]
-
-
