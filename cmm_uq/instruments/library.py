@@ -36,7 +36,7 @@ def profile_named(name: str, folder: Path = Path()) -> ProfileFile:
     if name.endswith(ENDING):
         return read_profile(folder / name)
     if name not in ready():
-        fix = f"{suggestion(name, ready())}; a profile of your own ends in .toml"
+        fix = f"{suggestion(name, ready())} A profile of your own ends in .toml"
         raise CmmUqError(f"there is no profile {name!r}", fix=fix)
     return _ready(name)
 
@@ -49,16 +49,17 @@ def read_profile(path: Path) -> ProfileFile:
     CmmUqError : it cannot be read, or contradicts itself.
     """
     content = content_of(path, JOB_BYTES, "Name a profile: cmm-uq instruments list shows those that are ready")
-    return _checked(content, path)
+    return profile_of(content, path)
 
 
 @cache
 def _ready(name: str) -> ProfileFile:
     file = _folder() / f"{name}{ENDING}"
-    return _checked(file.read_bytes(), Path(file.name))
+    return profile_of(file.read_bytes(), Path(file.name))
 
 
-def _checked(content: bytes, path: Path) -> ProfileFile:
+def profile_of(content: bytes, path: Path) -> ProfileFile:
+    """A profile of a file's bytes; see :func:`read_profile`."""
     found = checked(content, path, ProfileFile)
     check_profile(found, str(path))
     return found
