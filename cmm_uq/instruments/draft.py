@@ -13,7 +13,8 @@ from cmm_uq.instruments.control_codes import bytes_of
 NUMBER = r"[-+]?\s*\d+(?:\.\d+)?(?:[Ee][-+]?\d+)?"
 """A number in a line."""
 
-_FOUND = re.compile(r"(?<![\w.])[-+]?(?:\s(?=\d))?\d+(?:\.\d+)?(?:[Ee][-+]?\d+)?|(?<=[A-Za-z_=:+-])\d+\.\d+")
+_FOUND = re.compile(r"(?:[-+]\s*|(?<![\w.]))\d+(?:\.\d+)?(?:[Ee][-+]?\d+)?|(?<=[A-Za-z_])\d+\.\d+")
+"""The 1 of CH1 is none, the 20.1 of T20.1 is one."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,11 @@ def _lines(wanted: Drafted, pattern: str, values: Mapping[str, float]) -> list[s
 
 def _literal(text: str) -> str:
     """Text that must be there, with as many blanks as there may be."""
-    return r"\s*".join(re.escape(bytes_of(part).decode("latin-1")) for part in re.split(r"\s+", text))
+    return r"\s*".join("".join(map(_escaped, bytes_of(part))) for part in re.split(r"\s+", text))
+
+
+def _escaped(byte: int) -> str:
+    return re.escape(chr(byte)) if 32 <= byte < 127 else f"\\x{byte:02x}"
 
 
 def _text(text: str) -> str:

@@ -249,22 +249,6 @@ class ProfileFile(Table):
     facts: Facts = Facts()
     """Whence all this is known."""
 
-    @model_validator(mode="after")
-    def _whole(self) -> Self:
-        if self.protocol == "ipp":
-            return self
-        if self.parse is None:
-            raise ValueError("[parse] is missing: it says what a message means")
-        if self.frame.length and not self.frame.start and not self.send.poll:
-            raise ValueError("[frame] length without start is for instruments that are asked: nothing else ends a gap")
-        named = self.named()
-        for quantity in self.quantities:
-            if quantity not in named:
-                raise ValueError(
-                    f"[quantities.{quantity}] is no group or field of a message: {', '.join(sorted(named))}"
-                )
-        return self
-
     def named(self) -> set[str]:
         """Quantities that its messages may give."""
         if self.parse is None:
