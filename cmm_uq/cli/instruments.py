@@ -169,7 +169,7 @@ def new(
     ] = "",
     baud: Annotated[int, typer.Option(help="Bits per second.", metavar="N", min=50)] = 9600,
     bits: Annotated[int, typer.Option(help="Data bits.", metavar="N", min=5, max=8)] = 8,
-    parity: Annotated[Parity, typer.Option(help="Parity.")] = Parity.NONE,
+    parity: Annotated[Parity, typer.Option(help="Parity.", show_default="none")] = Parity.NONE,
     stop: Annotated[int, typer.Option(help="Stop bits.", metavar="N", min=1, max=2)] = 1,
 ) -> None:
     """Write a profile from an example line; on a terminal it asks for what no option says."""

@@ -10,7 +10,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.files.cells import column_problem
 from cmm_uq.instruments.control_codes import bytes_of
 
-NUMBER = r"[-+]?\s*\d+(?:\.\d+)?(?:[Ee][-+]?\d+)?"
+NUMBER = r"[-+]?\s*\d+\.?\d*(?:[Ee][-+]?\d+)?"
 """A number in a line."""
 
 _FOUND = re.compile(r"(?:[-+]\s*|(?<![\w.]))\d+(?:\.\d+)?(?:[Ee][-+]?\d+)?|(?<=[A-Za-z_])\d+\.\d+")

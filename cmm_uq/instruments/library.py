@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.content import content_of
-from cmm_uq.files.limits import JOB_BYTES
+from cmm_uq.files.limits import JOB_BYTES, TEXT
 from cmm_uq.instruments.parsing import check_profile
 from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.jobs.toml_file import checked
@@ -60,7 +60,7 @@ def _ready(name: str) -> ProfileFile:
 
 def profile_of(content: bytes, path: Path) -> ProfileFile:
     """A profile of a file's bytes; see :func:`read_profile`."""
-    found = checked(content, path, ProfileFile)
+    found = checked(content, path, ProfileFile, most_word=TEXT.most)
     check_profile(found, str(path))
     return found
 
