@@ -45,6 +45,7 @@ def files() -> dict[Path, str]:
         "plan": plan(),
         "truth": truth(),
         "budget": budget(),
+        "instrument": instrument(),
         "columns": columns(),
         "commands": commands(),
         "results": results(),
@@ -131,6 +132,31 @@ def budget() -> str:
     )  # fmt: skip
 
 
+def instrument() -> str:
+    """Every key of an instrument's profile."""
+    schema = schema_named("instrument")
+    parts = [
+        "How an instrument speaks: [profiles of instruments](../instruments/profiles.md). `cmm-uq instruments new FILE` "
+        "writes one from an example line.",
+        EDITORS.format(name="instrument"),
+        "Bytes are written as manuals write them: `<ESC>A0200<CR>`, any byte as `<0x41>`.",
+        keys_table({"properties": {name: one for name, one in schema["properties"].items() if not _is_table(one)},
+                    "required": schema["required"]}),
+    ]  # fmt: skip
+    for name, one in schema["properties"].items():
+        if _is_table(one):
+            inside = one.get("additionalProperties")
+            shown = inside if isinstance(inside, dict) else one
+            title = f"[{name}.NAME]" if shown is inside else header(name, one)
+            parts += [f"## `{title}`", one["description"], keys_table(shown)]
+    return page("Profile of an instrument, key by key", *parts)
+
+
+def _is_table(one: Mapping[str, Any]) -> bool:
+    inside = one.get("additionalProperties")
+    return "properties" in one or isinstance(inside, dict) or "properties" in one.get("items", {})
+
+
 def columns() -> str:
     """Every column of a recording."""
     begun = {name: _beginning(name) for name in known()}
@@ -182,10 +208,12 @@ def results() -> str:
 def commands() -> str:
     """Every command with its arguments and options, from the help that it prints."""
     parts = [f"{app.info.help}", *ended(str(app.info.epilog)), "`cmm-uq COMMAND --help` prints what stands here."]
-    for command in app.registered_commands:
+    groups = [(group.name, group.typer_instance) for group in app.registered_groups]
+    inside = [(f"{name} ", one) for name, group in groups if group for one in group.registered_commands]
+    for prefix, command in [*(("", one) for one in app.registered_commands), *inside]:
         rows = list(_parameters(command))
         arguments = " ".join(name for name, _, _ in rows if not name.startswith("`-"))
-        usage = f"cmm-uq {command.name} {arguments.replace('`', '')}".strip()
+        usage = f"cmm-uq {prefix}{command.name} {arguments.replace('`', '')}".strip()
         told = " ".join((inspect.getdoc(command.callback) or "").split())
         parts += [f"## `{usage}`", told, table(("argument or option", "meaning", "default"), rows)]
         parts += ended(str(command.epilog))

@@ -15,6 +15,7 @@ from cmm_uq.cli import (
     compensate,
     diagnose,
     importing,
+    instruments,
     new,
     plan,
     report,
@@ -51,6 +52,8 @@ for module, short in {
 }.items():
     name = "import" if module is importing else module.__name__.rpartition(".")[2]
     app.command(name, short_help=short, epilog=module.EXAMPLES)(module.command)
+
+app.add_typer(instruments.app, name="instruments", short_help="Instruments: ready profiles, tried at a port, new ones.")
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
 and the calibration certificates that state it.

@@ -56,7 +56,7 @@ class Conversation:
         if now < self._pause or (following == 0 and now < self._due and not self.gap):
             return None
         if following == 0:
-            self._due = max(self._due + self._every, now)
+            self._due += self._every * max(1, 1 + (now - self._due) // self._every)
         self.asked, self.waiting = following, True
         self._since = self._asked_at = now
         return self._polls[following]

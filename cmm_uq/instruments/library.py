@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.content import content_of
-from cmm_uq.files.limits import JOB_BYTES
+from cmm_uq.files.limits import JOB_BYTES, TEXT
 from cmm_uq.instruments.parsing import check_profile
 from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.jobs.toml_file import checked
@@ -36,7 +36,7 @@ def profile_named(name: str, folder: Path = Path()) -> ProfileFile:
     if name.endswith(ENDING):
         return read_profile(folder / name)
     if name not in ready():
-        fix = f"{suggestion(name, ready())}; a profile of your own ends in .toml"
+        fix = f"{suggestion(name, ready())} A profile of your own ends in .toml"
         raise CmmUqError(f"there is no profile {name!r}", fix=fix)
     return _ready(name)
 
@@ -49,17 +49,18 @@ def read_profile(path: Path) -> ProfileFile:
     CmmUqError : it cannot be read, or contradicts itself.
     """
     content = content_of(path, JOB_BYTES, "Name a profile: cmm-uq instruments list shows those that are ready")
-    return _checked(content, path)
+    return profile_of(content, path)
 
 
 @cache
 def _ready(name: str) -> ProfileFile:
     file = _folder() / f"{name}{ENDING}"
-    return _checked(file.read_bytes(), Path(file.name))
+    return profile_of(file.read_bytes(), Path(file.name))
 
 
-def _checked(content: bytes, path: Path) -> ProfileFile:
-    found = checked(content, path, ProfileFile)
+def profile_of(content: bytes, path: Path) -> ProfileFile:
+    """A profile of a file's bytes; see :func:`read_profile`."""
+    found = checked(content, path, ProfileFile, most_word=TEXT.most)
     check_profile(found, str(path))
     return found
 

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isclose
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.instruments.control_codes import bytes_of, shown
 from cmm_uq.instruments.framing import Framed, Framer
-from cmm_uq.instruments.profile import Parse, ProfileFile, Quantity
+from cmm_uq.instruments.profile import Example, Parse, ProfileFile, Quantity
 from cmm_uq.instruments.quantities import NoValueError, conversion, number_of, value_of
 from cmm_uq.jobs.sentences import unit_of
 from cmm_uq.messages import Text, Verbatim, say, semicolons
@@ -143,7 +143,7 @@ def _seen(raw: bytes) -> Text:
 
 
 def check_profile(profile: ProfileFile, where: str) -> None:
-    """Refuse a profile whose units cannot be converted, or that reads its own examples otherwise than they say.
+    """Refuse a profile that contradicts itself, or reads its own examples otherwise than they say.
 
     Parameters
     ----------
@@ -156,27 +156,44 @@ def check_profile(profile: ProfileFile, where: str) -> None:
     """
     if profile.protocol == "ipp":
         return
+    if profile.parse is None:
+        raise CmmUqError("is missing: it says what a message means", where=f"{where}: [parse]",
+                         fix="Give pattern, or fields with separator or struct")  # fmt: skip
+    if profile.frame.length and not profile.frame.start and not profile.send.poll:
+        raise CmmUqError("is for instruments that are asked: nothing else ends a message that is cut",
+                         where=f"{where}: [frame] length", fix="Give start, or [send] poll")  # fmt: skip
+    _check_quantities(profile, where)
+    parser = Parser(profile)
+    for place, example in enumerate(profile.example, 1):
+        _check_example(profile, parser, example, f"{where}: [[example]] {place}")
+
+
+def _check_quantities(profile: ProfileFile, where: str) -> None:
+    named = profile.named()
     for name, quantity in profile.quantities.items():
+        at = f"{where}: [quantities.{name}]"
+        if name not in named:
+            raise CmmUqError("is no group or field of a message", where=at, fix=suggestion(name, named))
         for unit in (quantity.unit, *quantity.units.values()):
             try:
                 conversion(unit, unit_of(name))
             except CmmUqError as error:
-                raise CmmUqError(error.problem, where=f"{where}: [quantities.{name}]", fix=error.fix) from None
-    parser = Parser(profile)
-    for place, example in enumerate(profile.example, 1):
-        framer = Framer(profile.frame)
-        raw = bytes_of(example.received)
-        messages = framer.feed(raw)
-        at = f"{where}: [[example]] {place}"
-        if len(messages) != 1 or framer.waiting:
-            raise CmmUqError(f"{shown(raw)} is {len(messages)} messages and {'a part' if framer.waiting else 'no rest'}",
-                             where=at, fix="Mend [frame], or write the message with its framing")  # fmt: skip
-        found = parser.read(messages[0], example.answers)
-        if bool(found.status) != example.ill or not _same(found.values, example.values):
-            seen = ", ".join(f"{name} = {value!r}" for name, value in found.values.items()) or found.status or "nothing"
-            wanted = ", ".join(f"{name} = {value!r}" for name, value in example.values.items())
-            raise CmmUqError(f"{shown(raw)} is read as {seen}, not as {wanted or 'what is wrong with the instrument'}",
-                             where=at, fix="Mend [parse] and [quantities], or the example")  # fmt: skip
+                raise CmmUqError(error.problem, where=at, fix=error.fix) from None
+
+
+def _check_example(profile: ProfileFile, parser: Parser, example: Example, at: str) -> None:
+    framer = Framer(profile.frame)
+    raw = bytes_of(example.received)
+    messages = framer.feed(raw)
+    if len(messages) != 1 or framer.waiting:
+        raise CmmUqError(f"{shown(raw)} is {len(messages)} messages and {'a part' if framer.waiting else 'no rest'}",
+                         where=at, fix="Mend [frame], or write the message with its framing")  # fmt: skip
+    found = parser.read(messages[0], example.answers)
+    if bool(found.status) != example.ill or not _same(found.values, example.values):
+        seen = ", ".join(f"{name} = {value!r}" for name, value in found.values.items()) or found.status or "nothing"
+        wanted = ", ".join(f"{name} = {value!r}" for name, value in example.values.items())
+        raise CmmUqError(f"{shown(raw)} is read as {seen}, not as {wanted or 'what is wrong with the instrument'}",
+                         where=at, fix="Mend [parse] and [quantities], or the example")  # fmt: skip
 
 
 def _same(found: Mapping[str, float], wanted: Mapping[str, float]) -> bool:

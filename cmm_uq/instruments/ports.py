@@ -80,6 +80,10 @@ def opener(port: str, connection: Connection, *, tcp_port: int | None = None) ->
     ------
     CmmUqError : the name is none of a port.
     """
+    if port.startswith("visa://"):
+        from cmm_uq.instruments.visa_port import VisaPort  # which knows this module
+
+        return lambda: VisaPort(port)
     if "://" not in port:
         if not port.strip():
             raise CmmUqError("no port is named", fix='Give port = "/dev/ttyUSB0", "COM3" or "socket://host:port"')
@@ -94,7 +98,7 @@ def opener(port: str, connection: Connection, *, tcp_port: int | None = None) ->
     if port.startswith(RFC2217):
         return lambda: SerialPort(port, connection)
     raise CmmUqError(f"{address['scheme']}:// is no way to an instrument", where=port,
-                     fix="Known: a serial port, socket://, tcp://, rfc2217://, file:")  # fmt: skip
+                     fix="Known: a serial port, socket://, tcp://, rfc2217://, visa://, file:")  # fmt: skip
 
 
 class SerialPort:

@@ -34,7 +34,7 @@ def _pattern(text: str) -> str:
 Bytes = Annotated[str, Field(max_length=500), AfterValidator(_codes)]
 """Bytes as manuals write them, with ``<CR>`` and ``<0x41>``."""
 
-Pattern = Annotated[str, Field(min_length=1, max_length=2000), AfterValidator(_pattern)]
+Pattern = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_pattern)]
 Unit = Annotated[str, Field(pattern=r"^[A-Za-z_°µ%/ ]*$", max_length=40)]
 Seconds = Annotated[float, Field(gt=0, le=86400)]
 
@@ -118,7 +118,7 @@ class Parse(Table):
     separator: Pattern | None = None
     """Regular expression of what stands between fields: `,` or `[,;\\s]+`."""
     struct: str | None = None
-    """Binary fields in the notation of Python's struct, the first byte and all included: `<xhhf`."""
+    """Binary fields of the message without its first and last byte, in the notation of Python's struct: `<hhf`."""
     fields: Annotated[list[str], Field(max_length=MOST_FIELDS)] = []
     """Quantities in the order of the fields; an empty name passes a field over."""
     fewer: bool = False
@@ -248,22 +248,6 @@ class ProfileFile(Table):
     """Messages with what they say."""
     facts: Facts = Facts()
     """Whence all this is known."""
-
-    @model_validator(mode="after")
-    def _whole(self) -> Self:
-        if self.protocol == "ipp":
-            return self
-        if self.parse is None:
-            raise ValueError("[parse] is missing: it says what a message means")
-        if self.frame.length and not self.frame.start and not self.send.poll:
-            raise ValueError("[frame] length without start is for instruments that are asked: nothing else ends a gap")
-        named = self.named()
-        for quantity in self.quantities:
-            if quantity not in named:
-                raise ValueError(
-                    f"[quantities.{quantity}] is no group or field of a message: {', '.join(sorted(named))}"
-                )
-        return self
 
     def named(self) -> set[str]:
         """Quantities that its messages may give."""

@@ -17,8 +17,8 @@ class DeclaredSource(Table):
     profile: Annotated[str, Field(min_length=1, max_length=200)]
     """How the instrument speaks: a ready profile (`cmm-uq instruments list`), or a TOML file of one's own beside job.toml."""
     port: Annotated[str, Field(max_length=300)] = ""
-    """Where it is: `/dev/ttyUSB0`, `COM3`, `socket://host:port`, `rfc2217://host:port`, `tcp://host:port`, or `file:NAME`
-    to replay bytes.
+    """Where it is: `/dev/ttyUSB0`, `COM3`, `socket://host:port`, `rfc2217://host:port`, `tcp://host:port`,
+    `visa://RESOURCE`, or `file:NAME` to replay bytes.
     """
     serial: str = ""
     """Serial number of the instrument; one that it gives itself must be the same."""

@@ -80,6 +80,7 @@ class Client:
     port : connected to the server.
     clock : for stamps and patience.
     confirm : asked before each command that moves the machine, with the command; ``None``: nothing ever moves.
+    within_s : usual time to each line of an answer.
 
     Attributes
     ----------
@@ -87,8 +88,10 @@ class Client:
     sent : the last lines that were sent.
     """
 
-    def __init__(self, port: Port, clock: Clock, *, confirm: Callable[[str], bool] | None = None) -> None:
-        self._port, self._clock, self._confirm = port, clock, confirm
+    def __init__(
+        self, port: Port, clock: Clock, *, confirm: Callable[[str], bool] | None = None, within_s: float = ANSWER_WITHIN_S
+    ) -> None:  # fmt: skip
+        self._port, self._clock, self._confirm, self.within_s = port, clock, confirm, within_s
         self._framer = Framer(Frame(terminator="<CR><LF>", longest=LONGEST))
         self._tag, self._event = 0, 0
         self._came: deque[Heard] = deque()
@@ -97,14 +100,14 @@ class Client:
 
     # --- transactions -------------------------------------------------------------------------------------------------------
 
-    def call(self, command: str, *, event: bool = False, within_s: float = ANSWER_WITHIN_S) -> list[Heard]:
+    def call(self, command: str, *, event: bool = False, within_s: float | None = None) -> list[Heard]:
         """Send a command and wait for the end of its transaction.
 
         Parameters
         ----------
         command : a method with its arguments.
         event : whether it is one for the fast queue, whose tag begins with E.
-        within_s : time to each line of the answer.
+        within_s : time to each line of the answer; the usual one where it is left out.
 
         Returns
         -------
@@ -123,7 +126,7 @@ class Client:
         faults: list[Fault] = []
         acknowledged = False
         while True:
-            heard = self._answer(tag, command, within_s)
+            heard = self._answer(tag, command, self.within_s if within_s is None else within_s)
             response = heard.response
             if response is None or (response.sign != ACK and not acknowledged):
                 raise NoAnswerError(f"{command} was answered {heard.raw!r} before it was acknowledged with {ACK}")

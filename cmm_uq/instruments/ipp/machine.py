@@ -10,7 +10,7 @@ from dataclasses import replace
 from cmm_uq.errors import CmmUqError
 from cmm_uq.instruments.control_codes import shown
 from cmm_uq.instruments.conversation import SECOND
-from cmm_uq.instruments.ipp.client import Client, FaultError, Heard, NoAnswerError
+from cmm_uq.instruments.ipp.client import ANSWER_WITHIN_S, Client, FaultError, Heard, NoAnswerError
 from cmm_uq.instruments.ipp.line import DATA, ERROR, BadLineError, Term, arguments_of, fault_of
 from cmm_uq.instruments.ports import NETWORK, Opened, PortLostError, opener
 from cmm_uq.instruments.profile import Connection, Positions, ProfileFile
@@ -20,6 +20,9 @@ from cmm_uq.messages import Text, Verbatim, say
 
 PORT = 1294
 """Of an I++ DME server (specification 1.4.3, section 6.1)."""
+
+AGAIN_WITHIN_S = 0.8
+"""Least time for each answer of a server that came back; more where it took more to begin the first time."""
 
 RETRY_S = 0.25
 """Between two attempts to connect; a return is to be noticed within 2 s."""
@@ -65,12 +68,14 @@ class Machine:
         self._number, self._gap_at, self._closed = 0, -1, False
         self._port = opened()
         self._connected = True
-        self.client = Client(self._port, clock)
+        self.client, began = Client(self._port, clock), clock.monotonic_ns()
         try:
             self._begin(take_over=False)
         except (NoAnswerError, FaultError, PortLostError) as error:
             self._port.close()
             raise _no_server(identity.name, error) from None
+        took_s = (clock.monotonic_ns() - began) / SECOND
+        self._again_within_s = min(max(AGAIN_WITHIN_S, took_s), ANSWER_WITHIN_S)
 
     def identity(self) -> Identity:
         """See :meth:`cmm_uq.instruments.source.Source.identity`."""
@@ -193,14 +198,14 @@ class Machine:
         except CmmUqError:
             self._clock.sleep(RETRY_S)
             return
-        self.client = Client(self._port, self._clock)
+        self.client = Client(self._port, self._clock, within_s=self._again_within_s)
         try:
             self._begin(take_over=True)
         except (NoAnswerError, FaultError, PortLostError):
             self._port.close()
             self._clock.sleep(RETRY_S)
             return
-        self._connected = True
+        self._connected, self.client.within_s = True, ANSWER_WITHIN_S
         now, gap, self._gap_at = self._clock.monotonic_ns(), self._gap_at, -1
         yield Returned(self.name, self._clock.utc_ns(), now, (now - gap) / SECOND)
 

@@ -16,6 +16,7 @@ from typing import Any, Literal, Protocol
 from cmm_uq.instruments.simulated.speakers import Speaker
 
 Way = Literal["pty", "socket", "rfc2217"]
+WAYS: tuple[Way, ...] = ("pty", "socket", "rfc2217")
 
 _TICK_S = 0.01
 
