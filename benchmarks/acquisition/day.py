@@ -94,7 +94,8 @@ def joined(recorder: Recorder) -> None:
     """Every join against what the instruments really measured at that moment."""
     worst, ratio, number = 0.0, 0.0, 0
     for point in recorder.story.points.values():
-        assert point.settled and not point.missing, point
+        assert point.settled, point
+        assert not point.missing, point
         for i in range(6):
             found = point.joined[f"temp_{i}_c"]
             moment = (point.moment.monotonic_ns - START) / S

@@ -25,6 +25,8 @@ from cmm_uq.instruments.simulated.line import simulated
 from cmm_uq.instruments.simulated.speakers import Lines
 from tests.acquisition.session import job_folder
 
+TERMINAL = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "110", "LINES": "45"}
+
 
 def main(points: int) -> None:
     machine, dice = SimulatedMachine(), random.Random(0)
@@ -35,10 +37,12 @@ def main(points: int) -> None:
             more += f'[[acquire.source]]\nname = "l{i}"\nprofile = "line-logger"\nport = "{logger.port}"\n'
             more += f'values = {{ value1 = "temp_{i}_c", value2 = "humid_{i}", value3 = "dew_{i}" }}\n'
         rows = [f"{m},{p},1,{100 if p == 1 else 600},100,-300,0" for m in range(1, points + 1) for p in (1, 2)]
-        job = job_folder(Path(folder) / "job", more, "measurement,point,repeat,x_mm,y_mm,z_mm,time_s\n" + "\n".join(rows) + "\n")
+        job = job_folder(
+            Path(folder) / "job", more, "measurement,point,repeat,x_mm,y_mm,z_mm,time_s\n" + "\n".join(rows) + "\n"
+        )
         master, slave = pty.openpty()
         with subprocess.Popen([sys.executable, "-m", "cmm_uq", "acquire", str(job)], stdin=slave, stdout=slave, stderr=slave,
-                              env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "110", "LINES": "45"}) as process:  # fmt: skip
+                              env=TERMINAL) as process:  # fmt: skip
             until(master, b"next:", 60)
             time.sleep(2)
             found = []

@@ -381,7 +381,6 @@ class Conductor:
         self._log.append(text)
 
 
-
 _ALL = say("nothing is left of the plan")
 _OF_ALL: Mapping[str, bool] = MappingProxyType({"timed": False})
 """Of points that share a moment which is none of theirs."""

@@ -289,7 +289,9 @@ def test_a_recording_that_was_changed_by_hand_says_so(tmp_path: Path, clock: Fak
         session(folder, clock)
 
 
-def test_rows_of_a_dropped_file_go_where_the_file_or_the_plan_says_and_once_only(tmp_path: Path, clock: FakeClock) -> None:
+def test_rows_of_a_dropped_file_go_where_the_file_or_the_plan_says_and_once_only(
+    tmp_path: Path, clock: FakeClock
+) -> None:
     folder = job_folder(tmp_path / "job")
     taking = session(folder, clock)
     moment = Moment(clock.utc, clock.monotonic)
@@ -301,7 +303,12 @@ def test_rows_of_a_dropped_file_go_where_the_file_or_the_plan_says_and_once_only
     taking.conductor.file("c.txt", b"b", moment, numbered, "0003-c.txt")
     clock.go(20)
     taking.conductor.tick()
-    assert [(row["measurement"], row["point"]) for row in rows(folder)] == [("1", "1"), ("1", "2"), ("3", "1"), ("3", "2")]
+    assert [(row["measurement"], row["point"]) for row in rows(folder)] == [
+        ("1", "1"),
+        ("1", "2"),
+        ("3", "1"),
+        ("3", "2"),
+    ]
     assert "c.txt holds what b.txt held, byte for byte: it is not taken again" in said(taking.conductor)
     assert "Points were read from a.txt, b.txt." in str(read_job(folder).acquired.sentence)  # type: ignore[union-attr]
 

@@ -21,7 +21,12 @@ def fed(times: list[float], value, latency_s: float = 0.0, max_gap_s: float = 10
     return stream
 
 
-@given(st.floats(-5, 5), st.floats(0, 0.5), st.floats(0.001, 8.999), st.lists(st.floats(0.05, 0.9), min_size=20, max_size=20))
+@given(
+    st.floats(-5, 5),
+    st.floats(0, 0.5),
+    st.floats(0.001, 8.999),
+    st.lists(st.floats(0.05, 0.9), min_size=20, max_size=20),
+)
 def test_a_straight_line_is_joined_exactly_whatever_the_latency(
     slope: float, latency: float, moment: float, steps: list[float]
 ) -> None:

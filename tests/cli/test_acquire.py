@@ -216,7 +216,7 @@ def test_a_folder_of_results_is_read_as_they_come(tmp_path: Path) -> None:
         assert operator.end() == 0
     job = read_job(folder)
     assert job.points.xyz[1].tolist() == [600.002, 100.0, -300.0]
-    assert list((folder / "acquisition" / "files").iterdir())[0].name == "0001-result.csv"
+    assert [path.name for path in (folder / "acquisition" / "files").iterdir()] == ["0001-result.csv"]
     assert "Points were read from result.csv." in str(job.acquired.sentence)  # type: ignore[union-attr]
 
 
@@ -228,6 +228,7 @@ def test_the_screen_takes_keys_shows_what_comes_next_and_leaves_the_terminal_as_
     before = termios.tcgetattr(slave)
     with subprocess.Popen([*COMMAND, "acquire", str(folder)], stdin=slave, stdout=slave, stderr=slave,
                           env={**ENVIRONMENT, "COLUMNS": "100", "LINES": "40"}) as process:  # fmt: skip
+
         def see(wanted: str) -> str:
             shown = until(master, wanted, time.monotonic() + PATIENCE_S)
             assert re.search(wanted, shown), shown[-2000:]

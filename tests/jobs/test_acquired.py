@@ -77,7 +77,7 @@ def test_what_is_no_such_file_is_refused(tmp_path: Path, iota: Path) -> None:
         read_job(taken(tmp_path / "a", iota, typed="two"))
     with pytest.raises(CmmUqError, match="has the layout"):
         read_job(taken(tmp_path / "b", iota, schema="cmm-uq/acquired/9"))
-    with pytest.raises(CmmUqError, match="the recording was simulated, and job.toml says measured"):
+    with pytest.raises(CmmUqError, match=r"the recording was simulated, and job\.toml says measured"):
         read_job(taken(tmp_path / "c", iota, simulated=True))
 
 
