@@ -31,8 +31,8 @@ from cmm_uq.jobs.acquire import AcquireFacts
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, say, signed
 from cmm_uq.points import Floats
 
-_SAID = 200
-"""Lines that are kept to be shown."""
+_SAID = 50
+"""Lines of what happened that a screen may show."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Conductor:
         self._machine = machine
         self._soaks: dict[str, Soak] = {}
         self._wanted: Run | None = None
-        self.said: deque[Text] = deque(maxlen=_SAID)
+        self.said: deque[Text] = deque()
         self._log: deque[Text] = deque(maxlen=_SAID)
         self._asks, self._ending = 0, False
         self._typed_ns = 0

@@ -44,6 +44,10 @@ class Watched:
     folder : that is looked into.
     clock : for the time between two looks.
 
+    Attributes
+    ----------
+    trouble : what could not be read, to be said once.
+
     Raises
     ------
     CmmUqError : it is not there.
@@ -55,6 +59,7 @@ class Watched:
         self.folder, self._clock = folder, clock
         self._seen: dict[str, tuple[int, int, int]] = {}
         self._done: dict[str, tuple[int, int]] = {}
+        self._readable = True
         self.trouble: list[Text] = []
 
     def look(self) -> list[Dropped]:
@@ -76,15 +81,23 @@ class Watched:
                 found += self._content(path, size, changed)
         return sorted(found, key=lambda one: (one.utc_ns, one.path.name))
 
+    def again(self, path: Path) -> None:
+        """A file could not be kept: read it again."""
+        self._done.pop(path.name, None)
+
     def _files(self) -> list[Path]:
         try:
-            return [
+            found = [
                 path for path in self.folder.iterdir()
                 if path.is_file() and not path.name.startswith(".") and not path.name.endswith(_UNFINISHED)
             ]  # fmt: skip
+            self._readable = True
+            return found
         except OSError as error:
-            self.trouble.append(say("the folder {folder} cannot be read: {why}", folder=Verbatim(str(self.folder)),
-                                    why=Verbatim(str(error.strerror))))  # fmt: skip
+            if self._readable:
+                self.trouble.append(say("the folder {folder} cannot be read: {why}", folder=Verbatim(str(self.folder)),
+                                        why=Verbatim(str(error.strerror))))  # fmt: skip
+            self._readable = False
             return []
 
     def _content(self, path: Path, size: int, changed: int) -> list[Dropped]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from cmm_uq.acquisition.blocks import READINGS, readings_of
-from cmm_uq.acquisition.folder import Journals
+from cmm_uq.acquisition.folder import STREAMS, Journals
 from cmm_uq.acquisition.joining import Joined, Stream
 from cmm_uq.acquisition.journal import Moment, lines_in
 from cmm_uq.acquisition.recorder import COORDINATES
@@ -30,7 +30,7 @@ def settle_earlier(journals: Journals, sources: Iterable[DeclaredSource], max_ga
     left = [point for point in story.points.values() if not point.settled and point.session != story.session.number]
     for number in dict.fromkeys(point.session for point in left):
         own = [point for point in left if point.session == number]
-        for point, streams in _streams(journals.folder / f"{number:04d}-streams.jsonl", own, declared, max_gap_s):
+        for point, streams in _streams(journals.folder / STREAMS.format(number), own, declared, max_gap_s):
             answers = {
                 stream.column: stream.at(point.moment.monotonic_ns, _EVER)
                 for stream in streams.values()

@@ -19,6 +19,9 @@ FOLDER = "acquisition"
 """Inside the job's."""
 
 LOCK = "lock"
+EVENTS, STREAMS = "{:04d}-events.jsonl", "{:04d}-streams.jsonl"
+"""Names of the two journals of a session, by its number."""
+
 _EVENTS = re.compile(r"(\d{4})-events\.jsonl")
 
 
@@ -126,10 +129,10 @@ def _begun(folder: Path, said: Mapping[str, Any], moment: Moment, skip_damaged: 
     story, following, torn, damaged = _read(folder, skip_damaged)
     known = {line for session in story.sessions for line in session.said.get("damaged", [])}
     number = 1 + max((int(path.name[:4]) for path in sessions_in(folder)), default=0)
-    streams = folder / f"{number - 1:04d}-streams.jsonl"
+    streams = folder / STREAMS.format(number - 1)
     torn += [(streams, tail)] if (tail := _torn_end(streams)) else []
-    events = Journal(folder / f"{number:04d}-events.jsonl", first=following)
-    journals = Journals(folder, events, Journal(folder / f"{number:04d}-streams.jsonl"), story, lock)
+    events = Journal(folder / EVENTS.format(number), first=following)
+    journals = Journals(folder, events, Journal(folder / STREAMS.format(number)), story, lock)
     fresh = [line for line in damaged if line not in known]
     journals.say("session", {"session": number, **said, **({"damaged": fresh} if fresh else {})}, moment)
     for path, tail in torn:

@@ -6,6 +6,7 @@ every 100 ms, which puts everything on the disk.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -225,11 +226,16 @@ class Recorder:
         for name, stream in self._fed.setdefault(source, []):
             if name == quantity:
                 return stream
-        column = self.column(source, quantity)
+        column = self._own_column(source, quantity)
         stream = Stream(column, source, latency_s=self.latency_ns(source) * NS, max_gap_s=self._max_gap_s)
         self.streams[column] = stream
         self._fed[source].append((quantity, stream))
         return stream
+
+    def _own_column(self, source: str, quantity: str) -> str:
+        """The column of a quantity; with the instrument's name before it where another one fills that of its own name."""
+        column = self.column(source, quantity)
+        return f"{re.sub(r'[^A-Za-z0-9]', '_', source)}_{column}" if column in self.streams else column
 
     def _settle(self, number: int, now_ns: int) -> bool:
         """Join a point; whether every stream has answered."""

@@ -100,28 +100,64 @@ def run(
     ------
     OutputError : the disk fails.
     """
+    turns = _Turns(conductor, screen, clock, watched, dropped)
     listening.start()
-    kept = looked = clock.monotonic_ns()
     try:
         while not conductor.ended:
             _taken(conductor, items)
-            now = clock.monotonic_ns()
-            for source in listening.sources:
-                conductor.recorder.identified(source.identity())
-            if watched is not None and dropped is not None and now - looked >= _LOOK_S * 1e9:
-                looked = now
-                for file in watched.look():
-                    dropped(file)
-            if now - kept >= COMMIT_S * 1e9:
-                kept = now
-                conductor.tick()
-            _shown(conductor, screen)
+            turns.turn(listening.sources)
     finally:
         listening.stop()
     while not items.empty():
         _taken(conductor, items)
     conductor.finish()
-    _shown(conductor, screen)
+    turns.show()
+
+
+class _Turns:
+    """What is done between events, each in its own time."""
+
+    def __init__(
+        self, conductor: Conductor, screen: Screen, clock: Clock, watched: Watched | None,
+        dropped: Callable[[Dropped], None] | None,
+    ) -> None:  # fmt: skip
+        self._conductor, self._screen, self._clock, self._watched, self._dropped = (
+            conductor,
+            screen,
+            clock,
+            watched,
+            dropped,
+        )
+        self._kept = self._looked = self._drawn = clock.monotonic_ns()
+
+    def turn(self, sources: Sequence[Source]) -> None:
+        """Everything that is due."""
+        now, wait = self._clock.monotonic_ns(), COMMIT_S * 1e9
+        if now - self._looked >= _LOOK_S * 1e9:
+            self._looked = now
+            self._look()
+        if now - self._kept >= wait:
+            self._kept = now
+            for source in sources:
+                self._conductor.recorder.identified(source.identity())
+            self._conductor.tick()
+        if self._conductor.said or now - self._drawn >= wait:
+            self._drawn = now
+            self.show()
+
+    def show(self) -> None:
+        """Say what happened, and how it stands."""
+        while self._conductor.said:
+            self._screen.tell(self._conductor.said.popleft())
+        self._screen.show(self._conductor.view())
+
+    def _look(self) -> None:
+        if self._watched is None or self._dropped is None:
+            return
+        for file in self._watched.look():
+            self._dropped(file)
+        while self._watched.trouble:
+            self._conductor.tell(self._watched.trouble.pop(0))
 
 
 def _taken(conductor: Conductor, items: queue.Queue[Item]) -> None:
@@ -140,9 +176,3 @@ def _taken(conductor: Conductor, items: queue.Queue[Item]) -> None:
             item = None if items.empty() else items.get_nowait()
     except queue.Empty:
         return
-
-
-def _shown(conductor: Conductor, screen: Screen) -> None:
-    while conductor.said:
-        screen.tell(conductor.said.popleft())
-    screen.show(conductor.view())

@@ -130,7 +130,8 @@ def simulated(
 ) -> tuple[list[SimulatedThermometer | SimulatedMachine], SimulatedMachine]:
     """In place of what a job declares, and the machine among them; a thermometer and a machine where it declares nothing."""
     found: list[SimulatedThermometer | SimulatedMachine] = []
-    machine = SimulatedMachine("machine", clock=clock, seed=seed)
+    taken = {source.name for source in declared}
+    machine = SimulatedMachine("machine" if "machine" not in taken else "simulated-machine", clock=clock, seed=seed)
     for source in declared:
         streams = [name for name in source.values if name not in COORDINATES]
         if streams:

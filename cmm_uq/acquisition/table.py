@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.acquisition.folder import FOLDER, sessions_in
+from cmm_uq.acquisition.folder import EVENTS, FOLDER
 from cmm_uq.acquisition.journal import written_whole
 from cmm_uq.acquisition.lead import Lead, Step
 from cmm_uq.acquisition.recorder import COORDINATES
@@ -87,7 +87,6 @@ def said_of(
     folder : of the sessions.
     hashes : SHA-256 of the recording, and of what it was before, lest a power cut between the two leave them apart.
     """
-    journals = sessions_in(folder)
     return {
         "program": PROGRAM,
         "simulated": simulated,
@@ -95,7 +94,8 @@ def said_of(
         "sessions": [
             {"number": session.number, "begin_utc": _utc(session.start.utc_ns), "journal": f"{FOLDER}/{path.name}",
              "sha256": sha256_of(path) or ""}
-            for session, path in zip(story.sessions, journals, strict=False)
+            for session in story.sessions
+            for path in (folder / EVENTS.format(session.number),)
         ],
         "instruments": [_plain(identity) for identity in story.identities.values()],
         "typed": sum(row.point.how.startswith(TYPED) for row in rows),

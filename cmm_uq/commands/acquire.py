@@ -25,7 +25,7 @@ from cmm_uq.acquisition.simulated import SimulatedMachine, simulated
 from cmm_uq.acquisition.story import Story
 from cmm_uq.acquisition.table import Table
 from cmm_uq.commands.reading import read_job
-from cmm_uq.errors import CmmUqError
+from cmm_uq.errors import CmmUqError, OutputError
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.instruments.source import SYSTEM, Clock, Source, open_source
@@ -36,7 +36,7 @@ from cmm_uq.jobs.importing.imported import Imported, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
-from cmm_uq.jobs.recording import read_recording
+from cmm_uq.jobs.recording import REQUIRED, read_recording
 from cmm_uq.jobs.recording_file import is_own
 from cmm_uq.kinds import kind_of
 from cmm_uq.messages import Verbatim
@@ -125,6 +125,7 @@ def begin_acquisition(
     table = Table(recording, sessions, simulated=simulate)
     lead = _lead(job, plan, titles)
     judge = _judge(job)
+    _check_columns(job)
     facts = job.facts.acquire
     watched = None if facts.folder is None or simulate else Watched(job.folder / facts.folder, clock)
     sources, machine = _sources(job, simulate=simulate, seed=seed, clock=clock)
@@ -147,7 +148,7 @@ def begin_acquisition(
         machine=None if machine is None else machine.measure,
     )  # fmt: skip
     conductor.tick()
-    dropped = None if watched is None else _Taking(job, conductor, clock)
+    dropped = None if watched is None else _Taking(job, watched, conductor, clock)
     return Acquisition(conductor, Listening(sources, items), items, clock, journals, watched, dropped, job.folder)
 
 
@@ -196,8 +197,8 @@ def _plan_file(job: Job) -> dict[str, bytes]:
 class _Taking:
     """Takes files of a folder: keeps their bytes beside the journal, and reads their points as any import does."""
 
-    def __init__(self, job: Job, conductor: Conductor, clock: Clock) -> None:
-        self._job, self._conductor, self._clock = job, conductor, clock
+    def __init__(self, job: Job, watched: Watched, conductor: Conductor, clock: Clock) -> None:
+        self._job, self._watched, self._conductor, self._clock = job, watched, conductor, clock
 
     def __call__(self, file: Dropped) -> None:
         try:
@@ -205,7 +206,12 @@ class _Taking:
         except CmmUqError as error:
             self._conductor.tell(Verbatim(str(error)))
             return
-        kept = self._kept(file)
+        try:
+            kept = self._kept(file)
+        except OutputError as error:
+            self._conductor.tell(Verbatim(str(error)))
+            self._watched.again(file.path)
+            return
         age = self._clock.utc_ns() - file.utc_ns
         moment = Moment(file.utc_ns, self._clock.monotonic_ns() - age)
         self._conductor.file(file.path.name, file.content, moment, rows, kept)
@@ -262,6 +268,21 @@ def _check_origin(job: Job, *, simulate: bool) -> None:
     if not simulate and job.origin != MEASURED:
         raise CmmUqError(f"the recording of this job is {job.origin}, not measured", where=where,
                          fix="Give --simulate, or take the instruments to a job of its own")  # fmt: skip
+
+
+def _check_columns(job: Job) -> None:
+    """That the recording which comes of it could be read: no column given twice, or in another unit than its name says."""
+    where = f"{job.folder / 'job.toml'}: [[acquire.source]] values"
+    columns = [column for source in job.facts.acquire.source for column in source.values.values()]
+    twice = next((column for column in columns if columns.count(column) > 1), None)
+    if twice is not None:
+        raise CmmUqError(f"two quantities go into the column {twice}", where=where, fix="Give each a column of its own")
+    further = [column for column in columns if column not in REQUIRED]
+    trial = ",".join([*REQUIRED, *further]) + "\n" + ",".join("1" for _ in (*REQUIRED, *further)) + "\n"
+    try:
+        read_recording(trial.encode(), where, job.points.machine)
+    except CmmUqError as error:
+        raise CmmUqError(error.problem, where=where, fix=error.fix) from None
 
 
 def _plan(job: Job, story: Story) -> tuple[str, list[str]]:

@@ -184,6 +184,22 @@ def test_a_machine_s_points_get_the_temperature_of_their_moment(tmp_path: Path, 
 
 
 @pytest.mark.usefixtures("no_instruments")
+def test_two_instruments_that_give_the_same_quantity_have_a_column_each(tmp_path: Path, clock: FakeClock) -> None:
+    folder = job_folder(tmp_path / "job")
+    taking = session(folder, clock)
+    for i in range(1, 8):
+        clock.go(0.5)
+        for source, value in (("top", 20.0), ("un-der", 21.0)):
+            taking.conductor.event(temperature(clock, i, value, source, "temp_air_c"))
+        if i in (2, 4):
+            taking.conductor.event(probed(clock, i, (50.0 + 250 * i - 450 * (i == 2), 100.0, -300.0)))
+        taking.conductor.tick()
+    clock.go(20)
+    taking.conductor.tick()
+    assert [(row["temp_air_c"], row["un_der_temp_air_c"]) for row in rows(folder)] == [("20", "21")] * 2
+
+
+@pytest.mark.usefixtures("no_instruments")
 def test_in_a_gap_a_point_has_no_temperature_and_the_column_is_not_used(tmp_path: Path, clock: FakeClock) -> None:
     folder = job_folder(tmp_path / "job", THERMOMETER)
     taking = session(folder, clock)

@@ -294,6 +294,10 @@ def test_a_trial_never_touches_a_measured_job(tmp_path: Path, options: tuple[str
     ('[[acquire.source]]\nname = "a"\nprofile = "line-logger"\nport = "/dev/none"', "/dev/none"),
     ('[[acquire.source]]\nname = "a"\nprofile = "nothing"', "there is no profile 'nothing'"),
     ("max_gap_s = 0", "max_gap_s"),
+    ('[[acquire.source]]\nname = "a"\nprofile = "line-logger"\nvalues = { value1 = "temp_x_c", value2 = "temp_x_c" }',
+     "two quantities go into the column temp_x_c"),
+    ('[[acquire.source]]\nname = "a"\nprofile = "line-logger"\nvalues = { value1 = "temp_x_k" }',
+     "the column 'temp_x_k' is not in the unit of 'temp_x_c'"),
 ])  # fmt: skip
 def test_a_wrong_job_is_refused_in_one_line_and_nothing_is_left(tmp_path: Path, more: str, told: str) -> None:
     folder = job_folder(tmp_path / "job", more)
