@@ -400,5 +400,7 @@ def _next(step: Step | None, lead: Lead) -> Text:
         return say("all of the plan is measured")
     at = commas(signed(value, ".1f") for value in step.xyz)
     m, p, r = step.place
-    title = lead.titles[m]
-    return say("measurement {m}, {title}, point {p}, repeat {r}, near {at} mm", m=m, title=title, p=p, r=r, at=at)
+    where = say("measurement {m}", m=m)
+    if (title := lead.titles.get(m)) is not None:
+        where = say("{where}, {title}", where=where, title=title)
+    return say("{where}, point {p}, repeat {r}, near {at} mm", where=where, p=p, r=r, at=at)

@@ -10,7 +10,7 @@ import numpy as np
 
 from cmm_uq.acquisition.story import Place, Point, Story
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import Text, say
+from cmm_uq.messages import Text
 from cmm_uq.points import Floats, Ints, Points
 
 _ON_LINE = 1e-6
@@ -43,7 +43,7 @@ class Lead:
     Parameters
     ----------
     plan : nominal points, in the order in which they are measured.
-    titles : of each measurement, in words.
+    titles : of measurements, in words, by their numbers.
     unmeasured : columns of the plan that say what will be measured, not what is known: times, temperatures.
     """
 
@@ -182,6 +182,5 @@ class Lead:
 
 
 def titles_of(measurements: Sequence[int], titles: Sequence[Text]) -> dict[int, Text]:
-    """Titles by the number of their measurement; its number where there is none."""
-    given = dict(zip(measurements, titles, strict=False))
-    return {number: given.get(number) or say("measurement {number}", number=number) for number in measurements}
+    """Titles by the number of their measurement, of those that have one."""
+    return {number: title for number, title in zip(measurements, titles, strict=False) if title}
