@@ -14,6 +14,8 @@ from cmm_uq.cli.commands import app
 from cmm_uq.commands.new import known
 from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
 from cmm_uq.documents.results_keys import QUANTITY, RESULTS
+from cmm_uq.instruments.library import profile_named, ready
+from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
 from cmm_uq.jobs.recording import REQUIRED
@@ -50,6 +52,7 @@ def files() -> dict[Path, str]:
         "commands": commands(),
         "results": results(),
     }
+    schemas[PAGES.parent / "instruments" / "ready.md"] = ready_profiles()
     return schemas | {PAGES / f"{name}.md": text for name, text in pages.items()}
 
 
@@ -150,6 +153,43 @@ def instrument() -> str:
             title = f"[{name}.NAME]" if shown is inside else header(name, one)
             parts += [f"## `{title}`", one["description"], keys_table(shown)]
     return page("Profile of an instrument, key by key", *parts)
+
+
+def ready_profiles() -> str:
+    """Every ready profile with what it rests on."""
+    found = [profile_named(name) for name in ready()]
+    rows = [(f"[`{one.name}`](#{one.name})", one.title, _spoken(one)) for one in found]
+    parts = [
+        "What is not found is assumed, and said. None was tried on real hardware. `cmm-uq instruments list` lists them; a "
+        "profile of your own may begin as a copy of one, from `cmm_uq/instruments/profiles`.",
+        table(("profile", "instrument", "line"), rows),
+    ]  # fmt: skip
+    for one in found:
+        quantities = ", ".join(f"`{name}`" for name in sorted(one.named(), key=_numbered))
+        asked = ", ".join(f"`{poll.send}`" for poll in one.send.poll)
+        how = f"asked {asked} every {one.send.every_s:g} s" if asked else "listened to"
+        told = [f"- {text}" for text in one.facts.sources] + [f"- Not found: {text}." for text in one.facts.not_found]
+        said = f"It is {how}." if one.protocol == "messages" else "See [I++ DME](ipp.md)."
+        parts += [
+            f"## {one.name}",
+            f"{one.title}. Quantities: {quantities}. {said} {one.facts.tried[0].upper()}{one.facts.tried[1:]}.",
+            "\n".join(told),
+        ]
+    return page("Ready profiles", *parts)
+
+
+def _spoken(one: ProfileFile) -> str:
+    line = one.connection
+    return (
+        f"{line.baud} {line.data_bits}{line.parity[0].upper()}{line.stop_bits}"
+        if one.protocol == "messages"
+        else "TCP 1294"
+    )
+
+
+def _numbered(name: str) -> tuple[str, int]:
+    digits = "".join(c for c in name if c.isdigit())
+    return name.translate({ord(c): None for c in "0123456789"}), int(digits or 0)
 
 
 def _is_table(one: Mapping[str, Any]) -> bool:

@@ -6,15 +6,18 @@ import importlib.util
 import json
 import os
 import shutil
+import subprocess
+import time
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from cmm_uq.instruments.library import ready
+from cmm_uq.instruments.library import read_profile, ready
 from cmm_uq.instruments.simulated.line import SimulatedLine, simulated
 from cmm_uq.instruments.simulated.speakers import Readout1502, Speaker, Thermocouples
-from tests.cli.process import run
+from tests.cli.process import COMMAND, run
+from tests.cli.terminal import everything
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals here")
@@ -107,6 +110,31 @@ def test_a_new_profile_from_a_line_reads_that_instrument(tmp_path: Path) -> None
         done = run("instruments", "test", own, line.port, "--seconds", "0.4", "--json")
     assert json.loads(done.stdout)["quantities"] == {"temp_scale_x_c": 20.11}
     assert "is there already" in run("instruments", "new", own, *arguments).stderr
+
+
+def test_on_a_terminal_it_asks_for_what_is_needed(tmp_path: Path) -> None:
+    """The answers are typed ahead: title, settings, question, line, and for its number a name and a range."""
+    import pty
+
+    master, slave = pty.openpty()
+    with subprocess.Popen([*COMMAND, "instruments", "new", "own.toml"], stdin=slave, stdout=slave, stderr=slave, cwd=tmp_path,
+                          env={**os.environ, "TERM": "dumb", "PYTHONPATH": str(ROOT)}) as process:  # fmt: skip
+        os.close(slave)
+        answers = ("Gauge", "4800", "7", "even", "2", "R<CR>", "+   2.1380, MM<CR><LF>", "length_mm", "-50:50")
+        os.write(master, "".join(f"{answer}\n" for answer in answers).encode())
+        shown = everything(master, time.monotonic() + 60)
+    os.close(master)
+    assert process.returncode == 0, shown
+    made = read_profile(tmp_path / "own.toml")
+    assert (made.title, made.connection.baud, made.connection.parity, made.connection.stop_bits) == (
+        "Gauge",
+        4800,
+        "even",
+        2,
+    )
+    assert made.send.poll[0].send == "R<CR>"
+    assert made.example[0].values == {"length_mm": 2.138}
+    assert made.quantities["length_mm"].range == [-50, 50]
 
 
 @pytest.mark.parametrize(("arguments", "told"), [

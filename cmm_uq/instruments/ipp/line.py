@@ -17,6 +17,9 @@ END = b"\r\n"
 LONGEST = 65536
 """Characters of a line (section 6.2)."""
 
+MOST_DIGITS = 16
+"""Of a number (section 6.1.4.2)."""
+
 UNSOLICITED = "E0000"
 """Tag of what the server says by itself."""
 
@@ -129,9 +132,20 @@ def terms_of(text: str) -> dict[str, tuple[Argument, ...]]:
     BadLineError : they are not.
     """
     found = arguments_of(text)
-    if not all(isinstance(one, Term) for one in found):
-        raise BadLineError(f"no terms with names: {text}")
-    return {one.name: one.arguments for one in found if isinstance(one, Term)}
+    return by_name(found)
+
+
+def by_name(found: tuple[Argument, ...]) -> dict[str, tuple[Argument, ...]]:
+    """Terms by their names.
+
+    Raises
+    ------
+    BadLineError : some are none, or one is there twice: which of the two would count?
+    """
+    terms = {one.name: one.arguments for one in found if isinstance(one, Term)}
+    if len(terms) < len(found):
+        raise BadLineError("not terms alone, each of a name of its own")
+    return terms
 
 
 def fault_of(rest: str) -> Fault:
@@ -179,6 +193,8 @@ def _list(tokens: list[tuple[str, str]], place: int, depth: int) -> tuple[tuple[
 def _argument(tokens: list[tuple[str, str]], place: int, depth: int) -> tuple[Argument, int]:
     kind, text = tokens[place] if place < len(tokens) else ("", "")
     if kind == "number":
+        if sum(c.isdigit() for c in re.split("[Ee]", text)[0]) > MOST_DIGITS:
+            raise BadLineError(f"a number of more than {MOST_DIGITS} digits")
         return float(text), place + 1
     if kind == "text":
         return text, place + 1

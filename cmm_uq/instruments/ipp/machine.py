@@ -11,7 +11,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.instruments.control_codes import shown
 from cmm_uq.instruments.conversation import SECOND
 from cmm_uq.instruments.ipp.client import ANSWER_WITHIN_S, Client, FaultError, Heard, NoAnswerError
-from cmm_uq.instruments.ipp.line import DATA, ERROR, BadLineError, Term, arguments_of, fault_of
+from cmm_uq.instruments.ipp.line import DATA, ERROR, BadLineError, Term, arguments_of, by_name, fault_of
 from cmm_uq.instruments.ports import NETWORK, Opened, PortLostError, opener
 from cmm_uq.instruments.profile import Connection, Positions, ProfileFile
 from cmm_uq.instruments.reading import Reading
@@ -156,14 +156,14 @@ class Machine:
 
     def _data(self, heard: Heard, rest: str) -> Reading:
         """Data of a point, a position, or something else that is no place."""
+        point = None
         try:
             found = arguments_of(rest)
+            if len(found) == 1 and isinstance(found[0], Term) and found[0].name == POINT:
+                point, found = POINT, found[0].arguments
+            terms = by_name(found)
         except BadLineError as error:
             return self._reading(heard, status=say("not understood: {why}", why=Verbatim(str(error))))
-        point = None
-        if len(found) == 1 and isinstance(found[0], Term) and found[0].name == POINT:
-            point, found = POINT, found[0].arguments
-        terms = {one.name: one.arguments for one in found if isinstance(one, Term)}
         values = {
             f"{axis.lower()}_mm": place[0]
             for axis in _REPORTED

@@ -55,11 +55,18 @@ def test_data_are_terms_with_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["X(1", "X)1(", "X(1,)", ",X(1)", "X(1) Y(2)", "X(1.2.3)", "X(+)", "1E1234", '"a', "(" * 40]
+    "text",
+    ["X(1", "X)1(", "X(1,)", ",X(1)", "X(1) Y(2)", "X(1.2.3)", "X(+)", "1E1234", "12345678901234567", '"a', "(" * 40],
 )
 def test_what_breaks_the_syntax_is_refused(text: str) -> None:
     with pytest.raises(BadLineError):
         arguments_of(text)
+
+
+@pytest.mark.parametrize("text", ["X(1), X(1)", "X(1), 2", '"X"'])
+def test_data_that_could_be_read_in_two_ways_are_refused(text: str) -> None:
+    with pytest.raises(BadLineError):
+        terms_of(text)
 
 
 @pytest.mark.parametrize("text", [
