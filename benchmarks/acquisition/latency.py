@@ -1,8 +1,9 @@
 """From a machine's point to the operator's screen: ``python benchmarks/acquisition/latency.py [POINTS]``.
 
 A simulated I++ DME server at a real socket picks points at random moments while three loggers at real sockets send ten lines a
-second; the session writes to a real disk and draws its screen on a real pseudo-terminal. The time is from the call that sends
-the point until the terminal has its coordinates, so it holds the socket, the disk and the drawing.
+second; the session writes to a real disk and draws its screen on a real pseudo-terminal. The time to
+the screen is from the stamp of the reading, when its last byte was there, until the terminal has its coordinates: it holds the
+disk and the drawing.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cmm_uq.acquisition.folder import read_story
 from cmm_uq.instruments.ipp.server import SimulatedMachine
 from cmm_uq.instruments.simulated.line import simulated
 from cmm_uq.instruments.simulated.speakers import Lines
@@ -45,21 +47,27 @@ def main(points: int) -> None:
                               env=TERMINAL) as process:  # fmt: skip
             until(master, b"next:", 60)
             time.sleep(2)
-            found = []
+            sent, seen = list[int](), list[int]()
             for i in range(points):
                 x, y = (100.0, 600.0)[i % 2] + i / 1000, 100 + i / 100
                 drain(master, dice.uniform(0.2, 0.5))
-                sent = time.perf_counter()
+                sent.append(time.time_ns())
                 machine.pick(x, y, -300.0)
                 until(master, f"{x:.4f}, {y:.4f}".encode(), 20)
-                found.append(1e3 * (time.perf_counter() - sent))
+                seen.append(time.time_ns())
             os.write(master, b"quit\r")
             drain(master, 2)
             process.wait(20)
+        came = [point.moment.utc_ns for point in read_story(job / "acquisition").points.values()]
     machine.close()
-    low, middle, high = np.percentile(found, [0, 50, 95])
-    print(f"{points} points: {middle:.1f} ms in the middle, {high:.1f} ms for 95 %, {low:.1f} to {max(found):.1f} ms; "
-          f"load of the computer {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")  # fmt: skip
+    told("from the reading to the screen", np.array(seen) - came)
+    told("from the machine to the reading", np.array(came) - sent)
+    print(f"{points} points; load of the computer {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+
+
+def told(what: str, ns: np.ndarray) -> None:
+    low, middle, high, most = np.percentile(ns / 1e6, [0, 50, 95, 100])
+    print(f"{what}: {middle:.1f} ms in the middle, {high:.1f} ms for 95 %, {low:.1f} to {most:.1f} ms")
 
 
 def until(master: int, wanted: bytes, patience_s: float) -> None:
