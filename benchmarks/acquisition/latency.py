@@ -1,4 +1,4 @@
-"""From a machine's point to the operator's screen: ``python benchmarks/acquisition/latency.py [POINTS]``.
+"""From a machine's point to the operator's screen: ``python -m benchmarks.acquisition.latency [POINTS]``.
 
 A simulated I++ DME server at a real socket picks points at random moments while three loggers at real sockets send ten lines a
 second; the session writes to a real disk and draws its screen on a real pseudo-terminal. The time to

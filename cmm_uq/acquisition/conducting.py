@@ -99,7 +99,7 @@ class Conductor:
         self._wanted: Run | None = None
         self.said: deque[Text] = deque()
         self._log: deque[Text] = deque(maxlen=_SAID)
-        self._asks, self._ending = 0, False
+        self._asks, self._ending, self._at_once = 0, False, False
         self._typed_ns = 0
         self.paused = False
 
@@ -110,8 +110,8 @@ class Conductor:
 
     @property
     def ended(self) -> bool:
-        """Whether the operator has ended it, and nothing is being measured any more."""
-        return self._ending and not self._asks
+        """Whether the operator has ended it, and nothing is being measured or waits for a reading any more."""
+        return self._ending and (self._at_once or not (self._asks or self.recorder.unsettled))
 
     @property
     def step(self) -> Step | None:
@@ -189,6 +189,7 @@ class Conductor:
         ------
         OutputError : the disk fails.
         """
+        self.recorder.finish()
         self.recorder.say("end")
         self.tick()
         self._table.finish(self.story, self.lead)
@@ -356,7 +357,9 @@ class Conductor:
             self.tell(say("{word} {what}", word=Verbatim(word), what=Verbatim(what)))
 
     def _quit(self, _: str) -> None:
-        self._ending = True
+        self._at_once, self._ending = self._ending, True
+        if not self.ended:
+            self.tell(say("it ends when every point has its readings; quit again ends it at once"))
 
     def _after_word(self) -> None:
         if not self.recorder.commit():

@@ -14,9 +14,6 @@ from cmm_uq.acquisition.story import Point
 from cmm_uq.instruments.reading import Reading
 from cmm_uq.jobs.acquire import DeclaredSource
 
-_EVER = 2**62
-"""ns, later than anything."""
-
 
 def settle_earlier(journals: Journals, sources: Iterable[DeclaredSource], max_gap_s: float, now: Moment) -> int:
     """Join what earlier sessions left open; how many points that were.
@@ -32,7 +29,7 @@ def settle_earlier(journals: Journals, sources: Iterable[DeclaredSource], max_ga
         own = [point for point in left if point.session == number]
         for point, streams in _streams(journals.folder / STREAMS.format(number), own, declared, max_gap_s):
             answers = {
-                stream.column: stream.at(point.moment.monotonic_ns, _EVER)
+                stream.column: stream.at(point.moment.monotonic_ns, None)
                 for stream in streams.values()
                 if stream.column not in (*point.columns, *COORDINATES)
             }

@@ -79,16 +79,18 @@ class Stream:
             self._times.popleft()
             self._values.popleft()
 
-    def at(self, moment_ns: int, now_ns: int) -> Joined | Text | None:
+    def at(self, moment_ns: int, now_ns: int | None) -> Joined | Text | None:
         """Value at a moment of the monotonic clock; why there is none; ``None`` while the reading behind it may still come.
 
         Parameters
         ----------
         moment_ns : of the point.
-        now_ns : up to when readings have arrived.
+        now_ns : up to when readings have arrived; ``None``: no further one will.
         """
         after = bisect_left(self._times, moment_ns)
         if after == len(self._times):
+            if now_ns is None:
+                return say("the session ended before {source} gave another reading", source=Verbatim(self.source))
             waited = (now_ns - moment_ns) * NS - self.latency_s
             return None if waited <= self.max_gap_s else self._silent(after)
         if self._times[after] == moment_ns:

@@ -169,6 +169,12 @@ class Recorder:
             stream.forget(now.monotonic_ns)
         return self.commit()
 
+    def finish(self) -> None:
+        """Join what is left, now that nothing more will come."""
+        for number in self._open:
+            self._settle(number, None)
+        self._open.clear()
+
     @property
     def unsettled(self) -> int:
         """Points whose streams have not answered yet."""
@@ -237,7 +243,7 @@ class Recorder:
         column = self.column(source, quantity)
         return f"{re.sub(r'[^A-Za-z0-9]', '_', source)}_{column}" if column in self.streams else column
 
-    def _settle(self, number: int, now_ns: int) -> bool:
+    def _settle(self, number: int, now_ns: int | None) -> bool:
         """Join a point; whether every stream has answered."""
         point = self.story.points.get(number)
         if point is None:

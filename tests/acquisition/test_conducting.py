@@ -248,6 +248,31 @@ def test_a_point_that_a_kill_left_unjoined_is_joined_by_the_next_session(tmp_pat
 
 
 @pytest.mark.usefixtures("no_instruments")
+def test_quitting_waits_for_the_reading_behind_the_last_point_and_twice_does_not(
+    tmp_path: Path, clock: FakeClock
+) -> None:
+    taking = session(job_folder(tmp_path / "job", THERMOMETER), clock)
+    conductor = taking.conductor
+    conductor.event(temperature(clock, 1, 20.0))
+    clock.go(0.1)
+    conductor.event(probed(clock, 1, (100.0, 100.0, -300.0)))
+    conductor.line("quit")
+    assert not conductor.ended
+    clock.go(0.1)
+    conductor.event(temperature(clock, 2, 20.2))
+    conductor.tick()
+    assert conductor.ended
+    conductor.event(probed(clock, 2, (600.0, 100.0, -300.0)))
+    clock.go(0.1)
+    conductor.line("quit")
+    assert conductor.ended
+    conductor.finish()
+    first, second = conductor.story.points.values()
+    assert first.joined["temp_artefact_c"].value == pytest.approx(20.1)
+    assert second.joined["temp_artefact_c"].value == pytest.approx(20.2)
+
+
+@pytest.mark.usefixtures("no_instruments")
 def test_a_point_of_a_machine_that_is_ill_or_comes_in_a_pause_is_not_taken(tmp_path: Path, clock: FakeClock) -> None:
     taking = session(job_folder(tmp_path / "job"), clock)
     type_in(taking, clock, "pause")

@@ -81,6 +81,10 @@ def test_while_the_reading_behind_the_point_may_still_come_there_is_no_answer() 
     assert "gave nothing for 10 s after the point" in str(stream.at(2 * S, 13 * S))
 
 
+def test_when_the_session_has_ended_nothing_is_waited_for() -> None:
+    assert str(fed([0.0, 1.0], lambda t: t).at(2 * S, None)) == "the session ended before t gave another reading"
+
+
 def test_a_gap_longer_than_stated_gives_no_value() -> None:
     stream = fed([0.0, 1.0, 12.0], lambda t: t)
     assert "11 s about the point" in str(stream.at(5 * S, 30 * S))
