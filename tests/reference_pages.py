@@ -16,6 +16,8 @@ from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
 from cmm_uq.documents.proof_results import KEYS as PROOF
 from cmm_uq.documents.proof_results import RATE
 from cmm_uq.documents.results_keys import QUANTITY, RESULTS
+from cmm_uq.instruments.library import profile_named, ready
+from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
 from cmm_uq.jobs.recording import REQUIRED
@@ -47,11 +49,13 @@ def files() -> dict[Path, str]:
         "plan": plan(),
         "truth": truth(),
         "budget": budget(),
+        "instrument": instrument(),
         "columns": columns(),
         "commands": commands(),
         "results": results(),
         "prove": prove(),
     }
+    schemas[PAGES.parent / "instruments" / "ready.md"] = ready_profiles()
     return schemas | {PAGES / f"{name}.md": text for name, text in pages.items()}
 
 
@@ -134,6 +138,68 @@ def budget() -> str:
     )  # fmt: skip
 
 
+def instrument() -> str:
+    """Every key of an instrument's profile."""
+    schema = schema_named("instrument")
+    parts = [
+        "How an instrument speaks: [profiles of instruments](../instruments/profiles.md). `cmm-uq instruments new FILE` "
+        "writes one from an example line.",
+        EDITORS.format(name="instrument"),
+        "Bytes are written as manuals write them: `<ESC>A0200<CR>`, any byte as `<0x41>`.",
+        keys_table({"properties": {name: one for name, one in schema["properties"].items() if not _is_table(one)},
+                    "required": schema["required"]}),
+    ]  # fmt: skip
+    for name, one in schema["properties"].items():
+        if _is_table(one):
+            inside = one.get("additionalProperties")
+            shown = inside if isinstance(inside, dict) else one
+            title = f"[{name}.NAME]" if shown is inside else header(name, one)
+            parts += [f"## `{title}`", one["description"], keys_table(shown)]
+    return page("Profile of an instrument, key by key", *parts)
+
+
+def ready_profiles() -> str:
+    """Every ready profile with what it rests on."""
+    found = [profile_named(name) for name in ready()]
+    rows = [(f"[`{one.name}`](#{one.name})", one.title, _spoken(one)) for one in found]
+    parts = [
+        "What is not found is assumed, and said. None was tried on real hardware. `cmm-uq instruments list` lists them; a "
+        "profile of your own may begin as a copy of one, from `cmm_uq/instruments/profiles`.",
+        table(("profile", "instrument", "line"), rows),
+    ]  # fmt: skip
+    for one in found:
+        quantities = ", ".join(f"`{name}`" for name in sorted(one.named(), key=_numbered))
+        asked = ", ".join(f"`{poll.send}`" for poll in one.send.poll)
+        how = f"asked {asked} every {one.send.every_s:g} s" if asked else "listened to"
+        told = [f"- {text}" for text in one.facts.sources] + [f"- Not found: {text}." for text in one.facts.not_found]
+        said = f"It is {how}." if one.protocol == "messages" else "See [I++ DME](ipp.md)."
+        parts += [
+            f"## {one.name}",
+            f"{one.title}. Quantities: {quantities}. {said} {one.facts.tried[0].upper()}{one.facts.tried[1:]}.",
+            "\n".join(told),
+        ]
+    return page("Ready profiles", *parts)
+
+
+def _spoken(one: ProfileFile) -> str:
+    line = one.connection
+    return (
+        f"{line.baud} {line.data_bits}{line.parity[0].upper()}{line.stop_bits}"
+        if one.protocol == "messages"
+        else "TCP 1294"
+    )
+
+
+def _numbered(name: str) -> tuple[str, int]:
+    digits = "".join(c for c in name if c.isdigit())
+    return name.translate({ord(c): None for c in "0123456789"}), int(digits or 0)
+
+
+def _is_table(one: Mapping[str, Any]) -> bool:
+    inside = one.get("additionalProperties")
+    return "properties" in one or isinstance(inside, dict) or "properties" in one.get("items", {})
+
+
 def columns() -> str:
     """Every column of a recording."""
     begun = {name: _beginning(name) for name in known()}
@@ -197,10 +263,12 @@ def prove() -> str:
 def commands() -> str:
     """Every command with its arguments and options, from the help that it prints."""
     parts = [f"{app.info.help}", *ended(str(app.info.epilog)), "`cmm-uq COMMAND --help` prints what stands here."]
-    for command in app.registered_commands:
+    groups = [(group.name, group.typer_instance) for group in app.registered_groups]
+    inside = [(f"{name} ", one) for name, group in groups if group for one in group.registered_commands]
+    for prefix, command in [*(("", one) for one in app.registered_commands), *inside]:
         rows = list(_parameters(command))
         arguments = " ".join(name for name, _, _ in rows if not name.startswith("`-"))
-        usage = f"cmm-uq {command.name} {arguments.replace('`', '')}".strip()
+        usage = f"cmm-uq {prefix}{command.name} {arguments.replace('`', '')}".strip()
         told = " ".join((inspect.getdoc(command.callback) or "").split())
         parts += [f"## `{usage}`", told, table(("argument or option", "meaning", "default"), rows)]
         parts += ended(str(command.epilog))

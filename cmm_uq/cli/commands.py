@@ -9,11 +9,13 @@ import typer
 
 from cmm_uq.cli import (
     BAD_INPUT,
+    acquire,
     budget,
     check,
     compensate,
     diagnose,
     importing,
+    instruments,
     new,
     plan,
     prove,
@@ -43,6 +45,7 @@ for module, short in {
     diagnose: "What a recording shows that its model leaves out.",
     plan: "What to measure, and what it will tell.",
     prove: "The diagnosis tried on sealed cases with a job's set-ups.",
+    acquire: "A recording taken live, led by the plan.",
     simulate: "A recording drawn from known errors, as a job of its own.",
     compensate: "A recording corrected by its machine's error maps.",
     budget: "The uncertainty of any measurement model in a file.",
@@ -51,6 +54,8 @@ for module, short in {
 }.items():
     name = "import" if module is importing else module.__name__.rpartition(".")[2]
     app.command(name, short_help=short, epilog=module.EXAMPLES)(module.command)
+
+app.add_typer(instruments.app, name="instruments", short_help="Instruments: ready profiles, tried at a port, new ones.")
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
 and the calibration certificates that state it.

@@ -35,6 +35,13 @@ def kinds(incomplete: str) -> list[str]:
     return [name for name in (*known(), PLAN, BUDGET) if name.startswith(incomplete)]
 
 
+def profiles(incomplete: str) -> list[str]:
+    """Ready profiles of instruments, and files in TOML."""
+    from cmm_uq.instruments.library import ready
+
+    return [*(name for name in ready() if name.startswith(incomplete)), *toml_files(incomplete)]
+
+
 def _files(incomplete: str) -> Iterator[tuple[str, str]]:
     """Folder and name of the files below the folder that is typed, each folder as it would be typed."""
     start = os.path.dirname(incomplete)  # noqa: PTH120 - a Path would drop the "./" that was typed

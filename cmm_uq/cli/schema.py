@@ -14,7 +14,9 @@ EXAMPLES = examples("schema job > job.schema.json", "schema budget", "schema tru
 
 
 def command(
-    name: Annotated[str, typer.Argument(help="job (with its plan), budget or truth.", metavar="NAME")] = "job",
+    name: Annotated[
+        str, typer.Argument(help="job (with its plan), budget, truth or instrument.", metavar="NAME")
+    ] = "job",
 ) -> None:
     """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""
     defer_scipy()

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError, OutputError
+from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.jobs.importing.imported import Imported, imported
@@ -20,6 +17,7 @@ from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.recording import WHOLE, points_of
 from cmm_uq.plugins import naming_package
 from cmm_uq.points import Machine
+from cmm_uq.writing.new_file import write_new
 
 _FIRST = ("measurement", "point", "repeat", "x_mm", "y_mm", "z_mm")
 _MARK = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*")
@@ -72,21 +70,7 @@ def write_recording(path: Path, found: Imported, out: Path) -> None:
     """
     mark = _MARK.match(content_of(path, TABLE_BYTES, "Check its name"))
     content = (mark[0].removeprefix(b"\xef\xbb\xbf") if mark else b"") + own_format(found)
-    temporary = ""
-    try:
-        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=".unfinished-", delete=False) as file:
-            temporary = file.name
-            file.write(content)
-        os.link(temporary, out)
-    except FileExistsError:
-        raise OutputError("is there already", where=str(out), fix="Name another file; nothing is overwritten") from None
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written: {error.strerror}", where=str(out), fix="Name a folder that exists"
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)  # noqa: PTH108 - may be empty
+    write_new(out, content)
 
 
 @naming_package()

@@ -44,7 +44,7 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
     document = plan_document(plan)
     return Outcome(
         plan, document, plan_results(plan), plan_summary(plan), document.warnings,
-        {TO_FILL_IN: _recording_to_be(plan)} if plan.to_measure else {},
+        {TO_FILL_IN: recording_to_be(plan)} if plan.to_measure else {},
         conforming=all(condition.met for condition in plan.conditions),
     )  # fmt: skip
 
@@ -83,8 +83,8 @@ def write_plan(
     )
 
 
-def _recording_to_be(plan: Plan) -> bytes:
-    """The placings as the CSV of a recording at nominal coordinates."""
+def recording_to_be(plan: Plan) -> bytes:
+    """The placings that are still to be measured, as the CSV of a recording at nominal coordinates."""
     from cmm_uq.commands.simulate import to_fill_in
 
     wishes = plan.setting.plan

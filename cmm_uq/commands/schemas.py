@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.schema import DRAFT, Schema, chosen_by, job_schema, schema_of
 from cmm_uq.jobs.truth import Truth
@@ -52,13 +53,20 @@ def budget() -> Schema:
     }  # fmt: skip
 
 
+def instrument() -> Schema:
+    """Of the profile of an instrument."""
+    return schema_of(ProfileFile, "instrument profile of cmm-uq")
+
+
 def _told(effect: Effect) -> str:
     """What it is, its formula, and the columns that it needs."""
     needs = f"; needs the columns {', '.join(effect.columns)}" if effect.columns else ""
     return f"{effect.title}: {effect.formula}{needs}."
 
 
-SCHEMAS: Mapping[str, Callable[[], Schema]] = MappingProxyType({"job": job, "budget": budget, "truth": truth})
+SCHEMAS: Mapping[str, Callable[[], Schema]] = MappingProxyType({
+    "job": job, "budget": budget, "truth": truth, "instrument": instrument,
+})  # fmt: skip
 """By name."""
 
 

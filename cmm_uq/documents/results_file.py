@@ -58,6 +58,7 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
             **({"altered": list(job.altered)} if job.altered else {}),
             "inputs_sha256": sha256(job.inputs),
         },
+        **({"acquisition": job.acquired.data} if job.acquired else {}),
         **({"import": [recognised.data for recognised in job.imported]} if job.imported else {}),
     }
 

@@ -9,7 +9,7 @@ from cmm_uq.jobs.artefact import Traceability
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.short_gauge import ShortGaugeFacts
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, sentences
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, semicolons, sentences
 from cmm_uq.model.artefact import Size
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
@@ -40,9 +40,21 @@ def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further
     further : blocks after the statement.
     """
     read = tuple((say("Imported file"), recognised.sentence) for recognised in job.imported)
-    facts = Facts(tuple((label, text) for label, text in (*rows, *read) if text))
+    facts = Facts(tuple((label, text) for label, text in (*rows, *read, *_acquired(job)) if text))
     said = (Paragraph(statement_of_traceability(job.facts)),) if job.origin == MEASURED else ()
     return Section(say("Artefact and traceability"), (facts, *said, *further))
+
+
+def _acquired(job: Job) -> list[tuple[Text, Text]]:
+    """By what the recording was taken live, and what it lacks."""
+    if job.acquired is None:
+        return []
+    return [
+        (say("Recording"), job.acquired.sentence),
+        (say("Instruments"), semicolons(job.acquired.instruments)),
+        (say("Joined by time"), semicolons(job.acquired.joins)),
+        (say("Gaps"), semicolons(job.acquired.gaps)),
+    ]
 
 
 def artefact_rows(job: Job, otherwise: Text) -> list[tuple[Text, Text]]:

@@ -15,6 +15,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq import __version__
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import DERIVING, MEASURED, SIMULATED
@@ -51,9 +52,10 @@ def recording_name(job: Job) -> str:
 def kept_inputs(job: Job) -> dict[str, bytes]:
     """Inputs of a job that one derived from it has too.
 
-    Not its job.toml, nor a recording that was imported, nor a file of certified values, which stand in the new recording.
+    Not its job.toml, nor how its recording was taken, nor a recording that was imported, nor a file of certified values, which
+    stand in the new recording.
     """
-    left = {"job.toml", *reference_file(job.facts.artefact)}
+    left = {"job.toml", provenance_name(job.facts.recording.file), *reference_file(job.facts.artefact)}
     left |= {job.facts.recording.file} if _was_imported(job) else set()
     return {name: content for name, content in job.inputs.items() if name not in left}
 

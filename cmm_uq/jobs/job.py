@@ -13,6 +13,8 @@ from pydantic import Field, ValidationInfo, create_model, field_validator, model
 
 from cmm_uq.errors import suggestion
 from cmm_uq.files.limits import CONFORMITY, EFFECTS
+from cmm_uq.jobs.acquire import AcquireFacts
+from cmm_uq.jobs.acquired import Provenance
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.as_found import AsFound
 from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
@@ -177,6 +179,8 @@ class JobFile(Table):
     """Statements of conformity: a standard, a limit and a rule each."""
     plan: PlanFacts = PlanFacts()
     """What may be measured, where, and what it should tell; read by `cmm-uq plan`."""
+    acquire: AcquireFacts = AcquireFacts()
+    """The instruments that the recording is taken from live."""
     prove: ProveFacts = ProveFacts()
     """By which figures the diagnosis is accepted on these set-ups; read by `cmm-uq prove`."""
 
@@ -255,6 +259,7 @@ class Job:
     prediction : of a simulation, where the job names a file of it.
     beside : files that it was read from and that lie outside its folder.
     imported : how files in another format than the project's own were read.
+    acquired : how the recording was taken live, where it was.
     """
 
     folder: Path
@@ -268,11 +273,17 @@ class Job:
     prediction: Prediction | None = None
     beside: tuple[Path, ...] = ()
     imported: tuple[Recognised, ...] = ()
+    acquired: Provenance | None = None
 
     @property
     def circumstances(self) -> Circumstances:
-        """Under which a standard's test was carried out, with the short gauge recorded beside it."""
-        return replace(self.facts.circumstances, short_gauge=self.short_gauge)
+        """Under which a standard's test was carried out, with the short gauge recorded beside it.
+
+        Of an artefact's temperature that was joined by time, what the interpolation adds is in its uncertainty.
+        """
+        stated = self.facts.circumstances
+        uncertainty = stated.uncertainty if self.acquired is None else self.acquired.with_joined(stated.uncertainty)
+        return replace(stated, short_gauge=self.short_gauge, uncertainty=uncertainty)
 
     @property
     def origin(self) -> Origin:

@@ -13,6 +13,7 @@ from pydantic import create_model
 
 from cmm_uq.errors import CmmUqError, Gathered
 from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
+from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.as_found import as_found_of
 from cmm_uq.jobs.conformity import Standards
@@ -120,7 +121,10 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     where = str(folder / facts.recording.file)
     check_mark(folder, facts.job.origin, inputs[facts.recording.file], where)
     check_examples(content, facts.job.origin, str(path))
-    points, recognised = read_recording_file(inputs[facts.recording.file], where, machine, facts.recording)
+    acquired = _acquired(facts, source, inputs)
+    points, recognised = read_recording_file(
+        inputs[facts.recording.file], where, machine, facts.recording, acquired.without if acquired else ()
+    )
     told = [recognised]
     if certificate:
         points, recognised = with_references(points, facts.artefact, inputs, folder, where)
@@ -136,7 +140,18 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     gauge = _short_gauge(facts, inputs, folder, machine)
     prediction = prediction_of(facts.simulation, inputs, folder)
     how = tuple(filter(None, told))
-    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, imported=how)
+    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, imported=how,
+               acquired=acquired)  # fmt: skip
+
+
+def _acquired(facts: JobFile, source: Source, inputs: dict[str, bytes]) -> Provenance | None:
+    """How the recording was taken live, where a file beside it says so, which is an input then."""
+    name = provenance_name(facts.recording.file)
+    if not source.has(name):
+        return None
+    inputs |= _contents(source, [name], TABLE_BYTES, written=True)
+    where = str(source.toml.parent / name)
+    return provenance_of(inputs[name], inputs[facts.recording.file], facts.job.origin, where)
 
 
 def _short_gauge(facts: JobFile, inputs: Mapping[str, bytes], folder: Path, machine: Machine) -> ShortGauge | None:

@@ -7,7 +7,7 @@ look like is listed here once; any other numeric column is kept as a covariate.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import compress
 from types import MappingProxyType
 
@@ -45,7 +45,7 @@ OTHER_UNITS = re.compile(
 )
 
 
-def read_recording(content: bytes, name: str, machine: Machine) -> Points:
+def read_recording(content: bytes, name: str, machine: Machine, without: Collection[str] = ()) -> Points:
     """Points of a recording.
 
     Parameters
@@ -53,6 +53,7 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
     content : the file's bytes, UTF-8.
     name : the file's name, for messages.
     machine : that read them.
+    without : columns that are known to have empty cells, and are left out.
 
     Raises
     ------
@@ -70,6 +71,8 @@ def read_recording(content: bytes, name: str, machine: Machine) -> Points:
         return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}")
 
     for i, column in enumerate(header):
+        if column in without:
+            continue
         with wrong.going_on():
             table[column] = column_of(i)
     return points_of(table, lines, name, machine, wrong)

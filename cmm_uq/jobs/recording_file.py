@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from cmm_uq.jobs.importing.imported import imported
@@ -14,7 +16,7 @@ _HEAD = 16_384
 
 
 def read_recording_file(
-    content: bytes, where: str, machine: Machine, keys: ImportKeys
+    content: bytes, where: str, machine: Machine, keys: ImportKeys, without: Collection[str] = ()
 ) -> tuple[Points, Recognised | None]:  # fmt: skip
     """Points of a recording, and how it was read where it is in another format than the project's own.
 
@@ -24,13 +26,14 @@ def read_recording_file(
     where : its path, for messages.
     machine : that read the points.
     keys : what the job says beside the name of the file.
+    without : columns that are known to have empty cells, and are left out.
 
     Raises
     ------
     CmmUqError : it is damaged, or of no format that is known.
     """
     if not keys.asked and is_own(content):
-        return read_recording(content, where, machine), None
+        return read_recording(content, where, machine, without), None
     found = imported(content, where, keys, reach_mm=_reach(machine))
     return points_of(found.columns, found.lines.tolist(), where, machine), found.recognised
 

@@ -16,6 +16,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq.errors import MOST_GATHERED, CmmUqError, shortened, suggestion
 from cmm_uq.files.content import text_of
+from cmm_uq.files.limits import WORD
 from cmm_uq.files.toml import toml_of
 from cmm_uq.jobs.other_units import conversion
 
@@ -31,7 +32,8 @@ _SHOWN = 60
 
 
 def checked(
-    content: bytes, path: Path, model: type[Facts] | Callable[[dict[str, Any]], type[Facts]], context: object = None
+    content: bytes, path: Path, model: type[Facts] | Callable[[dict[str, Any]], type[Facts]], context: object = None,
+    *, most_word: int = WORD.most,
 ) -> Facts:  # fmt: skip
     """The contents of a TOML file as a checked object.
 
@@ -41,6 +43,7 @@ def checked(
     path : of the file, for messages.
     model : what it must say, or what that is for a file that says this.
     context : what its checks go by beside the file.
+    most_word : characters without a blank between them.
 
     Raises
     ------
@@ -48,7 +51,7 @@ def checked(
     """
     text = text_of(content, str(path))
     try:
-        data = toml_of(text, str(path))
+        data = toml_of(text, str(path), most_word=most_word)
     except tomllib.TOMLDecodeError as error:
         raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
                          fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip

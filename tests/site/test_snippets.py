@@ -16,6 +16,7 @@ import pytest
 
 import cmm_uq
 from benchmarks.examples.screens import PAGE, complete
+from cmm_uq.instruments.library import profile_of
 from cmm_uq.uncertainty.model_file import read_model_file
 from tests.conftest import ROOT
 from tests.site.pages import PAGES, Snippet, snippets
@@ -95,6 +96,8 @@ def test_a_whole_toml_file_is_read(page: Path, project: Path) -> None:
             assert cmm_uq.read(project).facts.job.id == keys["job"]["id"]
         elif "outputs" in keys.get("model", {}):
             assert read_model_file(path).evaluate().stated
+        elif "parse" in keys:
+            assert profile_of(snippet.text.encode(), path).example
         elif "effects" in keys:
             assert cmm_uq.simulate(ROOT / "examples" / "iota-1102-20C", path).origin == "simulated"
         else:

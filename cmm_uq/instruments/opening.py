@@ -1,0 +1,41 @@
+"""A declared source made ready: its profile, its port, the instrument at it."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from cmm_uq.instruments.instrument import Instrument
+from cmm_uq.instruments.library import profile_named
+from cmm_uq.instruments.ports import FILE, NETWORK, RFC2217, opener
+from cmm_uq.instruments.profile import ProfileFile
+from cmm_uq.instruments.replay import ReplayedFile
+from cmm_uq.instruments.source import Clock, Identity, Source
+from cmm_uq.jobs.acquire import DeclaredSource
+
+
+def opened(declared: DeclaredSource, clock: Clock, folder: Path) -> Source:
+    """See :func:`cmm_uq.instruments.source.open_source`."""
+    profile = profile_named(declared.profile, folder)
+    identity = Identity(
+        declared.name, profile.maker or None, profile.model or None, declared.serial or None,
+        certificate=declared.certificate or None,
+    )  # fmt: skip
+    if profile.protocol == "ipp":
+        from cmm_uq.instruments.ipp.machine import open_machine
+
+        return open_machine(identity, profile, declared.port, clock)
+    return instrument(identity, profile, declared.port, clock, folder)
+
+
+def instrument(identity: Identity, profile: ProfileFile, port: str, clock: Clock, folder: Path) -> Instrument:
+    """An instrument that speaks as a profile says.
+
+    Raises
+    ------
+    CmmUqError : the port cannot be opened, or another instrument is there.
+    """
+    if port.startswith(FILE):
+        return Instrument(identity, profile, partial(ReplayedFile, port, folder, clock), clock)
+    far = port.startswith((*NETWORK, RFC2217))
+    return Instrument(identity, profile, opener(port, profile.connection), clock, reopen_when_silent=far)

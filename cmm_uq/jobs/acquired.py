@@ -1,0 +1,256 @@
+"""How a recording was taken live: ``NAME.acquired.json`` beside it says by which instruments, when, and what it lacks.
+
+``cmm-uq acquire`` writes it with the recording. It names the recording's SHA-256, so that one that was changed afterwards is
+told from one that was not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import hypot
+from pathlib import PurePosixPath
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.circumstances import TestUncertainty
+from cmm_uq.jobs.origin import MEASURED, SIMULATED
+from cmm_uq.messages import Text, Verbatim, commas, names, plural, say, sentences
+
+SCHEMA = "cmm-uq/acquired/1"
+ARTEFACT = "temp_artefact_c"
+_NAMED = 5
+"""Gaps and points that a certificate names one by one."""
+
+
+class _Said(BaseModel):
+    model_config = ConfigDict(strict=True, extra="ignore", frozen=True, allow_inf_nan=False)
+
+
+class Instrument(_Said):
+    """One that readings came from: what it said itself, and what the job says of it."""
+
+    name: str
+    maker: str | None = None
+    model: str | None = None
+    serial: str | None = None
+    firmware: str | None = None
+    certificate: str | None = None
+    columns: dict[str, str] = {}
+    latency_ms: float = 0.0
+
+
+class Silence(_Said):
+    """When an instrument gave nothing: since the start of the job, and for how long; to the end of its session without."""
+
+    instrument: str
+    since_s: float
+    lasted_s: float | None = None
+    why: str
+
+
+class JoinedColumn(_Said):
+    """A column that was joined by time: rms and largest standard uncertainty of interpolation, and the points without it."""
+
+    u: float
+    u_largest: float
+    missing: list[tuple[int, int, int]] = []
+
+
+class Undone(_Said):
+    """A point that was taken back."""
+
+    measurement: int
+    point: int
+    repeat: int
+    reason: str
+
+
+class SessionOf(_Said):
+    """One run of the program, and its journal."""
+
+    number: int
+    begin_utc: str
+    journal: str
+    sha256: str
+
+
+class Acquired(_Said):
+    """All of ``NAME.acquired.json``."""
+
+    schema_: str = Field(SCHEMA, alias="schema")
+    program: str
+    simulated: bool
+    recording_sha256: list[str]
+    sessions: list[SessionOf]
+    instruments: list[Instrument]
+    typed: int
+    files: dict[str, str] = {}
+    columns: dict[str, JoinedColumn] = {}
+    gaps: list[Silence] = []
+    undone: list[Undone] = []
+    clock_jumps_s: list[float] = []
+    damaged: list[str] = []
+    left_out: int = 0
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Of a job's recording.
+
+    Parameters
+    ----------
+    said : what stands in the file.
+    changed : whether the recording was changed after it was taken.
+    """
+
+    said: Acquired
+    changed: bool
+
+    @property
+    def without(self) -> tuple[str, ...]:
+        """Columns that some points have no value of."""
+        return tuple(name for name, column in self.said.columns.items() if column.missing)
+
+    @property
+    def sentence(self) -> Text:
+        """How it was taken, for a certificate."""
+        said = self.said
+        parts: list[Text] = [plural(
+            len(said.sessions), one=say("taken live by {program}", program=Verbatim(said.program)),
+            many=say("taken live by {program} in {count} sessions", program=Verbatim(said.program), count=len(said.sessions)),
+        )]  # fmt: skip
+        if said.typed:
+            parts.append(plural(said.typed, one=say("1 point was typed by the operator"),
+                                many=say("{count} points were typed by the operator", count=said.typed)))  # fmt: skip
+        if said.files:
+            parts.append(say("points were read from {files}", files=commas(names(said.files.values()))))
+        if said.undone:
+            parts.append(plural(len(said.undone), one=say("1 point was taken back, with its reason in the journal"),
+                                many=say("{count} points were taken back, with their reasons in the journal",
+                                         count=len(said.undone))))  # fmt: skip
+        if self.changed:
+            parts.append(say("the recording was changed after it was taken"))
+        if said.damaged:
+            parts.append(say("damaged lines of the journal are not in it: {lines}", lines=commas(names(said.damaged))))
+        return sentences([say("{part:capital}.", part=part) for part in parts])
+
+    @property
+    def instruments(self) -> list[Text]:
+        """Each instrument with what identifies it."""
+        return [_instrument(one) for one in self.said.instruments]
+
+    @property
+    def joins(self) -> list[Text]:
+        """Each column that was joined by time, with what that adds to its uncertainty, and what is missing of it."""
+        return [_join(name, column) for name, column in self.said.columns.items()]
+
+    @property
+    def gaps(self) -> list[Text]:
+        """When instruments were silent, the first of them one by one; and jumps of the clock."""
+        told = [_silence(gap) for gap in self.said.gaps[:_NAMED]]
+        if (more := len(self.said.gaps) - _NAMED) > 0:
+            told.append(say("{more} further gaps are in the journal", more=more))
+        jumps = [say("the computer's clock was moved by {s:.3g} s", s=s) for s in self.said.clock_jumps_s]
+        return [*told, *jumps]
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """For results.json."""
+        said = self.said
+        return {
+            "program": said.program, "simulated": said.simulated, "changed": self.changed, "sessions": len(said.sessions),
+            "instruments": [one.model_dump() for one in said.instruments], "typed": said.typed,
+            "files": dict(said.files), "gaps": [gap.model_dump() for gap in said.gaps],
+            "columns": {name: {"u": column.u, "u_largest": column.u_largest, "missing": [list(at) for at in column.missing]}
+                        for name, column in said.columns.items()},
+            "undone": [one.model_dump() for one in said.undone], "clock_jumps_s": list(said.clock_jumps_s),
+            "damaged": list(said.damaged),
+        }  # fmt: skip
+
+    def with_joined(self, stated: TestUncertainty) -> TestUncertainty:
+        """The stated uncertainty of the artefact's temperature, and that of having interpolated it, in quadrature."""
+        column = self.said.columns.get(ARTEFACT)
+        if column is None or not column.u:
+            return stated
+        return stated.model_copy(update={"u_temperature_k": hypot(stated.u_temperature_k, column.u)})
+
+
+def provenance_name(recording: str) -> str:
+    """Name of the file beside a recording: ``ballbar.csv`` has ``ballbar.acquired.json``."""
+    path = PurePosixPath(recording)
+    return str(path.with_name(f"{path.stem}.acquired.json"))
+
+
+def provenance_of(content: bytes, recording: bytes, origin: str, where: str) -> Provenance:
+    """What stands in the file.
+
+    Parameters
+    ----------
+    content : its bytes.
+    recording : bytes of the recording.
+    origin : what job.toml says of it.
+    where : the file, for messages.
+
+    Raises
+    ------
+    CmmUqError : it says nothing of the kind, or that the recording was simulated, and job.toml that it was measured.
+    """
+    fix = "Take it away, or have cmm-uq acquire write it anew"
+    try:
+        said = Acquired.model_validate_json(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise CmmUqError(f"does not say how the recording was taken: {first['msg']}", where=f"{where}: {place}",
+                         fix=fix) from None  # fmt: skip
+    if said.schema_ != SCHEMA:
+        raise CmmUqError(f"has the layout {said.schema_!r}, and {SCHEMA!r} is read", where=where, fix=fix)
+    if said.simulated and origin == MEASURED:
+        raise CmmUqError("the recording was simulated, and job.toml says measured", where=where,
+                         fix=f'Write origin = "{SIMULATED}" in [job]')  # fmt: skip
+    return Provenance(said, hashlib.sha256(recording).hexdigest() not in said.recording_sha256)
+
+
+def as_file(said: Mapping[str, Any]) -> bytes:
+    """The bytes of such a file."""
+    return (Acquired.model_validate(said).model_dump_json(indent=2, by_alias=True) + "\n").encode()
+
+
+def _instrument(one: Instrument) -> Text:
+    what = " ".join(part for part in (one.maker, one.model) if part)
+    parts: list[Text] = [Verbatim(one.name), *names(filter(None, (what,)))]
+    if one.serial:
+        parts.append(say("serial number {serial}", serial=Verbatim(one.serial)))
+    if one.firmware:
+        parts.append(say("firmware {firmware}", firmware=Verbatim(one.firmware)))
+    parts.append(say("certificate {number}", number=Verbatim(one.certificate)) if one.certificate
+                 else say("no certificate stated"))  # fmt: skip
+    return commas(parts)
+
+
+def _join(name: str, column: JoinedColumn) -> Text:
+    joined: Text = say("{name}: u = {u:.2g} by interpolation in time, {largest:.2g} at most", name=Verbatim(name), u=column.u,
+                     largest=column.u_largest)  # fmt: skip
+    told = say("{name}: not known of every point", name=Verbatim(name)) if name == "time_s" else joined
+    if not column.missing:
+        return told
+    points = [
+        say("{m}/{p}/{r}", m=measurement, p=point, r=repeat) for measurement, point, repeat in column.missing[:_NAMED]
+    ]
+    more = len(column.missing) - _NAMED
+    listed = commas([*points, *([say("{more} more", more=more)] if more > 0 else [])])
+    return say("{told}; without a value, and so not used: measurement/point/repeat {points}", told=told, points=listed)
+
+
+def _silence(gap: Silence) -> Text:
+    if gap.lasted_s is None:
+        return say("{instrument} from {since:.0f} s on: {why}", instrument=Verbatim(gap.instrument), since=gap.since_s,
+                   why=Verbatim(gap.why))  # fmt: skip
+    return say(
+        "{instrument} from {since:.0f} s for {lasted:.3g} s: {why}", instrument=Verbatim(gap.instrument),
+        since=gap.since_s, lasted=gap.lasted_s, why=Verbatim(gap.why),
+    )  # fmt: skip
