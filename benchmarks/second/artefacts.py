@@ -88,7 +88,15 @@ def gauge(random: np.random.Generator, *, equal: bool = False) -> Placed:
     if not equal:
         lines = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [1, 1, 1], [1, -1, 1]], dtype=float)
         faces = np.concatenate([[0.0], np.sort(random.choice(np.arange(1, 23) * 20.0, 5, replace=False))])
-    parts: dict[str, list] = {"true": [], "measurement": [], "point": [], "repeat": [], "node": [], "sense": [], "line": []}
+    parts: dict[str, list] = {
+        "true": [],
+        "measurement": [],
+        "point": [],
+        "repeat": [],
+        "node": [],
+        "sense": [],
+        "line": [],
+    }
     for number, line in enumerate(unit(lines), 1):
         room = np.ptp(TRAVEL, axis=1) - np.abs(line) * faces[-1]
         free = room * random.uniform(0.1, 0.9, 3)
@@ -178,7 +186,9 @@ def _read(example: str) -> tuple[np.ndarray, np.ndarray]:
     with (EXAMPLES / example / "ballbar.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if int(row["measurement"]) != COPIED]
     ends = np.array([[float(row[f"{a}_mm"]) for a in "xyz"] for row in rows]).reshape(-1, 2, 3) + ORIGIN
-    deviation = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - LENGTH  # a size of its own would be the three scales again
+    deviation = (
+        np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - LENGTH
+    )  # a size of its own would be the three scales again
     along, columns = unit(ends[:, 1] - ends[:, 0]), []
     for name in SIX:
         e = KNOWN[name](ends.reshape(-1, 3), {}).reshape(-1, 2, 3)

@@ -41,7 +41,7 @@ EFFECTS = ("one", "two", "real one", "simulation", "shuffled")
 CAUSES = (*EFFECTS, "unresolved period", *FAULTS, "outside")
 KINDS = NOTHING + CAUSES
 STANDS_IN = 4.0
-"""√λ that every known effect must leave of what is outside the catalogue: else it is a known effect for all that can be seen."""
+"""√λ that every known effect must leave of what is outside the catalogue: else it is a known effect, for all that is seen."""
 UNSEEN = 2.0
 """√λ that is left when a rival stands in an effect's place: below it nobody could tell."""
 U_SIZE = 0.2
@@ -168,8 +168,11 @@ def visible(placed: Placed) -> dict[str, Error]:
 
 
 def expanded(placed: Placed, temperature: np.ndarray) -> np.ndarray:
-    """How an artefact's points move, (n, 3) mm, at 1 µm/(m K) and temperatures (n,)."""
-    return np.asarray(1e-6 * (temperature - 20)[:, None] * np.einsum("ni,nij->nj", placed.own, placed.axes))
+    """How an artefact's points move about their middle, (n, 3) mm, at 1 µm/(m K) and temperatures (n,)."""
+    own, series = placed.own.copy(), 1000 * placed.measurement + placed.repeat
+    for each in np.unique(series):
+        own[series == each] -= own[series == each].mean(axis=0)
+    return np.asarray(1e-6 * (temperature - 20)[:, None] * np.einsum("ni,nij->nj", own, placed.axes))
 
 
 def outside(placed: Placed) -> dict[str, Error]:
@@ -217,7 +220,9 @@ def _attempt(random: np.random.Generator, kind: str, number: int) -> Case | None
     what = _design(kind, noise_kind, number)
     placed = DESIGNS[what](random)
     noise = noises.drawn(random, noise_kind, placed)
-    gone = [columns for columns in _COLUMNS if random.random() < 0.35 and not (noise_kind == "slow" and "time_s" in columns)]
+    gone = [
+        columns for columns in _COLUMNS if random.random() < 0.35 and not (noise_kind == "slow" and "time_s" in columns)
+    ]
     before = placed.recorded
     covariance = noises.of_observations(noises.of_coordinates(noise, placed), placed)
     placed.recorded = {k: v for k, v in before.items() if not any(k in columns for columns in gone)}
@@ -232,7 +237,9 @@ def _attempt(random: np.random.Generator, kind: str, number: int) -> Case | None
     truth = {"design": what, "kind": kind, "noise": noise.__dict__, "named": named, "certified": certified} | shape
     truth |= {key: value for key, value in hidden.items() if key not in ("errors", "moved")}
 
-    base = {name: float(random.normal(0, LARGEST[kind_of(name)] / 6)) for name in (named or SIX if simulated else named)}
+    base = {
+        name: float(random.normal(0, LARGEST[kind_of(name)] / 6)) for name in (named or SIX if simulated else named)
+    }
     machine = int(random.choice([0, *maps.SQUARENESS])) if simulated else 0
     known = _of_effects({name: KNOWN[name] for name in base}, base, seen.context)
     simulation = (lambda p: maps.error(p, machine)) if machine else known
@@ -265,7 +272,14 @@ def _named(random: np.random.Generator, placed: Placed) -> tuple[str, ...]:
 
 def _hidden(random: np.random.Generator, kind: str, seen: Seen) -> dict | None:
     """What is hidden and how large, or nothing where this recording cannot hide it."""
-    nothing = {"errors": {}, "sizes": {}, "hidden": {}, "wanted": {}, "rivals": {}, "moved": np.zeros_like(seen.design.true)}
+    nothing = {
+        "errors": {},
+        "sizes": {},
+        "hidden": {},
+        "wanted": {},
+        "rivals": {},
+        "moved": np.zeros_like(seen.design.true),
+    }
     if kind in NOTHING:
         return nothing
     if kind in FAULTS:
@@ -323,7 +337,9 @@ def _fault(random: np.random.Generator, kind: str, seen: Seen, nothing: dict) ->
                       "largest_um": 1e3 * size * float(np.abs(moved).max())}  # fmt: skip
 
 
-def _of_effects(errors: Mapping[str, Error], sizes: Mapping[str, float], context: dict) -> Callable[[np.ndarray], np.ndarray]:
+def _of_effects(
+    errors: Mapping[str, Error], sizes: Mapping[str, float], context: dict
+) -> Callable[[np.ndarray], np.ndarray]:
     def e(p: np.ndarray) -> np.ndarray:
         return np.asarray(sum((sizes[name] * errors[name](p, context) for name in sizes), np.zeros_like(p)))
 
@@ -345,12 +361,13 @@ def seal(truths: list[dict]) -> str:
 
 def write(one: Case, folder: Path) -> None:
     """The job folder; of a shuffled case beside it the same with its rows in order."""
-    _folder(one, folder / one.name, one.order)
+    job(one, folder / one.name, one.order)
     if one.truth["kind"] == "shuffled":
-        _folder(one, folder / f"{one.name}-in-order", np.arange(len(one.shown)))
+        job(one, folder / f"{one.name}-in-order", np.arange(len(one.shown)))
 
 
-def _folder(one: Case, folder: Path, order: np.ndarray) -> None:
+def job(one: Case, folder: Path, order: np.ndarray, decimals: int = 6) -> None:
+    """One job folder, its rows in an order, its numbers with so many decimals."""
     folder.mkdir(parents=True, exist_ok=True)
     placed = one.placed
     xyz = one.shown - placed.origin
@@ -358,12 +375,14 @@ def _folder(one: Case, folder: Path, order: np.ndarray) -> None:
     columns = {**numbers, **{f"{a}_mm": xyz[:, i] for i, a in enumerate("xyz")}, **placed.recorded}
     if placed.residuals is not None:
         del columns["repeat"]
-    _table(folder / "recording.csv", columns, order, lambda v: f"{v:.6f}".rstrip("0").rstrip("."), ",")
+    _table(folder / "recording.csv", columns, order, lambda v: f"{v:.{decimals}f}".rstrip("0").rstrip("."), ",")
     simulation = ""
     if one.predicted is not None:
         predicted = one.predicted - placed.origin
         names = {f"{a.upper()} [mm]": predicted[:, i] for i, a in enumerate("xyz")}
-        _table(folder / "predicted.csv", numbers | names, np.arange(len(xyz)), lambda v: f"{v:.9E}".replace(".", ","), ";")
+        _table(
+            folder / "predicted.csv", numbers | names, np.arange(len(xyz)), lambda v: f"{v:.9E}".replace(".", ","), ";"
+        )
         simulation = ('[simulation]\nfile = "predicted.csv"\nprogram = "a script"\n'
                       'columns = { x_mm = "X [mm]", y_mm = "Y [mm]", z_mm = "Z [mm]" }\n')  # fmt: skip
     certified = f"length_mm = {placed.length!r}\nu_um = {U_SIZE}\n" if one.certified else ""

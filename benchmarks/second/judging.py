@@ -35,7 +35,9 @@ def hit(truth: dict, found: dict) -> bool:
 def innocent(truth: dict, found: dict) -> list[str]:
     """Effects that are named and are not there, nor named together with one that is, nor all that could be seen of one."""
     rivals = set().union(*truth["rivals"].values()) if truth["rivals"] else set()
-    return [name for name in found["effects"] if not group_of(name, found) & set(truth["hidden"]) and name not in rivals]
+    return [
+        name for name in found["effects"] if not group_of(name, found) & set(truth["hidden"]) and name not in rivals
+    ]
 
 
 def machine_blamed(found: dict) -> list[str]:
@@ -70,7 +72,7 @@ def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:
     listed = []
     for name, size in truth["hidden"].items():
         said = found["effects"].get(name)
-        for parameter, (_, _, low, high) in (said["parameters"].items() if said else ()):
+        for parameter, (_, _, low, high) in said["parameters"].items() if said else ():
             value = size * UNIT.get(kind_of(name), 1.0)
             if parameter == "amplitude_um":
                 value = abs(size)
@@ -86,7 +88,9 @@ def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:
 def same(found: dict) -> bool:
     """Whether rows in order gave the same verdict, effects, groups and values to a thousandth of u."""
     other = found["in_order"]
-    if any(found[key] != other[key] for key in ("verdict", "groups")) or list(found["effects"]) != list(other["effects"]):
+    if any(found[key] != other[key] for key in ("verdict", "groups")) or list(found["effects"]) != list(
+        other["effects"]
+    ):
         return False
     return all(
         abs(row[0] - other["effects"][name]["parameters"][key][0]) <= 1e-3 * max(row[1], 1e-300)
@@ -94,7 +98,9 @@ def same(found: dict) -> bool:
     )  # fmt: skip
 
 
-def tenths(said: list[float], right: list[bool]) -> list[tuple[int, float, int, tuple[float, float], tuple[float, float]]]:
+def tenths(
+    said: list[float], right: list[bool]
+) -> list[tuple[int, float, int, tuple[float, float], tuple[float, float]]]:
     """Of each tenth of said probability: how many, their mean, how many right, the interval of the part that was right, and
     that of the mean of as many trials as were made, if each was right as often as was said (normal approximation, within
     0 and 1)."""

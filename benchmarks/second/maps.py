@@ -22,7 +22,9 @@ def tables(temperature: int) -> dict[str, np.ndarray]:
         rows = list(csv.DictReader(file))
     factors = np.array([1.0, 1e-3, 1e-3, 1e-3, SECOND, SECOND, SECOND])
     return {
-        axis: np.array([[float(row[name]) for name in ("position_mm", *COLUMNS)] for row in rows if row["axis"] == axis])
+        axis: np.array(
+            [[float(row[name]) for name in ("position_mm", *COLUMNS)] for row in rows if row["axis"] == axis]
+        )
         * factors
         for axis in "xyz"
     }

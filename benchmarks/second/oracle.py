@@ -52,7 +52,9 @@ def forms(case: Case) -> tuple[list[str], list[Forms]]:
             one.append((i, -placed.D @ among[name](placed.true, case.context).ravel()))
             continue
         for period in PERIODS if kind_of(name) == "periodic_scale" else [1.0]:
-            turned = [among[name](placed.true, case.context | {"period": period, "phase": phase}) for phase in (0, np.pi / 2)]
+            turned = [
+                among[name](placed.true, case.context | {"period": period, "phase": phase}) for phase in (0, np.pi / 2)
+            ]
             two.append((i, -placed.D @ np.column_stack([each.ravel() for each in turned])))
     found = [Forms(np.stack([c for _, c in one], axis=1)[:, :, None], np.array([i for i, _ in one]))] if one else []
     if two:
@@ -183,15 +185,20 @@ class Search:
             found.append(_independent(rest.reshape(m, many, c), columns.reshape(m, many, c)))
         return found
 
-    def _normal(self, R: np.ndarray, base: np.ndarray, white: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    def _normal(
+        self, R: np.ndarray, base: np.ndarray, white: np.ndarray
+    ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
         squares = np.sum(R**2, axis=0)
         of = (lambda s: -0.5 * s) if self.known else self.likelihood.of
         gains = [
-            of(squares - sum(np.square(P[:, :, j].T @ R) for j in range(P.shape[2]))) for P in self._projected(base, white)
+            of(squares - sum(np.square(P[:, :, j].T @ R) for j in range(P.shape[2])))
+            for P in self._projected(base, white)
         ]
         return of(squares), gains, np.sqrt(squares / self.count)
 
-    def _heavy(self, R: np.ndarray, base: np.ndarray, white: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    def _heavy(
+        self, R: np.ndarray, base: np.ndarray, white: np.ndarray
+    ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
         """Student's t: the score of each form about the fit without it, over its variance (Rao's test)."""
         dof = self.dof
         unit = np.sqrt((dof - 2) / dof)
@@ -255,7 +262,9 @@ def searched(case: Case, *, knows_noise: bool, seed: int = 0) -> Found:
 
     def search(base: np.ndarray) -> Search:
         stated = None if knows_noise else case.stated
-        return Search(base, tried, all_forms, stated, known=knows_noise, dof=case.noise.dof if knows_noise and heavy else 4.0)
+        return Search(
+            base, tried, all_forms, stated, known=knows_noise, dof=case.noise.dof if knows_noise and heavy else 4.0
+        )
 
     first = search(B)
     nothing, surprise, sizes = first.of(case.y[:, None])
@@ -274,7 +283,9 @@ def searched(case: Case, *, knows_noise: bool, seed: int = 0) -> Found:
     return Found(tuple(dict.fromkeys(found)), p)
 
 
-def _drawn(random: np.random.Generator, search: Search, nothing: np.ndarray, sizes: np.ndarray, known: bool) -> np.ndarray:
+def _drawn(
+    random: np.random.Generator, search: Search, nothing: np.ndarray, sizes: np.ndarray, known: bool
+) -> np.ndarray:
     """Noise alone (m, draws) as the recording itself says it is: of a shape by its likelihood, of the size found with it."""
     weight = np.exp(nothing - nothing.max())
     chosen = random.choice(len(weight), DRAWS, p=weight / weight.sum())
@@ -285,4 +296,3 @@ def _drawn(random: np.random.Generator, search: Search, nothing: np.ndarray, siz
             z = random.standard_t(search.dof, len(found)) / np.sqrt(search.dof / (search.dof - 2))
         found[:, i] = (1.0 if known else sizes[k]) * (search.roots[k] @ z)
     return found
-

@@ -64,7 +64,9 @@ def _found(axes: Any, both: list) -> None:
 
 
 def _said(axes: Any, pairs: list) -> None:
-    rows = [(each["probability"], judging.there(name, t, ())[0]) for t, f in pairs for name, each in f["effects"].items()]
+    rows = [
+        (each["probability"], judging.there(name, t, ())[0]) for t, f in pairs for name, each in f["effects"].items()
+    ]
     axes.plot([0, 1], [0, 1], color="0.7")
     if rows:
         tenths = judging.tenths(*map(list, zip(*rows, strict=True)))  # type: ignore[arg-type]

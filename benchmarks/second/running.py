@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +44,10 @@ def done(task: Task) -> dict[str, Any]:
 def _searched(made: Any, number: int) -> dict[str, Any]:
     from benchmarks.second.oracle import searched
 
-    by = {"estimates": searched(made, knows_noise=False, seed=number), "knows": searched(made, knows_noise=True, seed=number)}
+    by = {
+        "estimates": searched(made, knows_noise=False, seed=number),
+        "knows": searched(made, knows_noise=True, seed=number),
+    }
     return {key: {"effects": list(found.effects), "p": found.p_value} for key, found in by.items()}
 
 
@@ -107,7 +110,7 @@ def sealed(folder: Path, listed: Sequence[Task]) -> tuple[list[dict[str, Any]], 
     mark = seal(truths)
     book = folder / "sealed.txt"
     if not book.exists() or mark not in book.read_text(encoding="utf-8"):
-        when = datetime.now(timezone.utc).isoformat(timespec="seconds")
+        when = datetime.now(UTC).isoformat(timespec="seconds")
         ready = len(lines(folder / "diagnose.jsonl"))
         with book.open("a", encoding="utf-8") as out:
             out.write(f"{mark}  {len(truths)} cases, {ready} of them diagnosed before, {when}\n")

@@ -1,4 +1,4 @@
-"""The second concealed study: ``python -m benchmarks.second.study FOLDER [--cases 60] [--nulls 300] [--seed 0] [--workers 2]``.
+"""The second concealed study: ``python -m benchmarks.second.study FOLDER [--cases 60] [--nulls 300] [--seed 0]``.
 
 Cases are made first and their truth is sealed by a hash; then they are diagnosed and searched by two oracles. Every result is
 a line in ``FOLDER``, so that a run can be stopped and taken up again, and more cases added with larger numbers.
@@ -39,7 +39,9 @@ def main() -> None:
     if not chosen.page:
         for what in PARTS[1:] if chosen.only is None else {chosen.only} - {"make"}:
             kept(listed(what), chosen.folder / f"{what}.jsonl", chosen.workers)
-    found, oracles = ({record["name"]: record for record in lines(chosen.folder / f"{what}.jsonl")} for what in PARTS[1:])
+    found, oracles = (
+        {record["name"]: record for record in lines(chosen.folder / f"{what}.jsonl")} for what in PARTS[1:]
+    )
     write(truths, found, oracles, mark, (chosen.cases, chosen.nulls, chosen.seed), chosen.page)
 
 
