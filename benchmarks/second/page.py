@@ -42,15 +42,15 @@ of the package.
 - **Hidden** with √λ, the length of the signal over its noise once all else is projected out: *one* or *two* effects, *real
   one* in the real bars, *simulation* beyond a prediction, *shuffled* (the same rows in two orders), each 4.5 to 10;
   *unresolved period*, a gauge of twelve equal steps, whose periods have aliases; faults of the artefact (6 to 15): a pattern
-  of its nodes, its own geometry (out of square, stretched, bowed, bent, twisted), its temperature, the same always or another in
+  of its nodes, its own geometry (out of square, stretched, bowed, bent, twisted), its temperature, the same or another in
   every set-up; *outside* the catalogue (9 to 15; every known effect leaves at least √λ = 4 of it).
 - **The oracles** search by likelihood ratios among all effects of the catalogue, one after the other. One estimates the noise
   within the same kinds (white and one kind besides, of a few sizes, and t); the other is told the noise exactly (of real noise
   its size). Each draws 199 recordings of noise alone as it takes it to be; an alarm is what at most one of them exceeds.
 - **Found** is what is named, alone or among effects said to be indistinguishable, of all that is hidden, or else a rival that
   leaves less than √λ = 2 of it. **Innocent** is what is named and is neither. **Blamed** for an artefact's fault is an effect
-  of the machine with no word of the artefact in its group. A probability is *right* where the effect is there (of an artefact's
-  fault: an effect of the artefact); *with its group*, where one of its group is."""
+  of the machine with no word of the artefact in its group. A probability is *right* where the effect is there (of an
+  artefact's fault: an effect of the artefact); *with its group*, where one of its group is."""
 
 
 def write(truths: list[dict], found: Records, oracles: Records, mark: str, asked: tuple[int, int, int],
@@ -176,7 +176,7 @@ def _nothing(pairs: Pairs, oracles: Records) -> list[str]:
 
 def _found(both: list) -> list[str]:
     lines = ["## Effects found", "",
-             "| hidden | found | oracle | oracle that knows the noise | only found here | only by the oracle | innocent named |",
+             "| hidden | found | oracle | oracle that knows the noise | only here | only by the oracle | innocent named |",
              "| --- | --- | --- | --- | --- | --- | --- |"]  # fmt: skip
     for kinds, name in [
         *(((kind,), kind) for kind in (*EFFECTS, "unresolved period")),
