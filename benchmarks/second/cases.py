@@ -38,7 +38,7 @@ from benchmarks.second.artefacts import SIX, Placed
 NOTHING = tuple(f"nothing, {kind}" for kind in noises.KINDS)
 FAULTS = tuple(f"artefact, {kind}" for kind in faults.KINDS)
 EFFECTS = ("one", "two", "real one", "simulation", "shuffled")
-CAUSES = (*EFFECTS, "unresolved period", *FAULTS, "outside")
+CAUSES = (*EFFECTS, "unresolved period", *FAULTS, "outside", "maps")
 KINDS = NOTHING + CAUSES
 STANDS_IN = 4.0
 """√λ that every known effect must leave of what is outside the catalogue: else it is a known effect, for all that is seen."""
@@ -188,7 +188,7 @@ def outside(placed: Placed) -> dict[str, Error]:
 
 
 def case(seed: int, kind: str, number: int) -> Case:
-    """Case ``number`` of a kind.
+    """Case ``number`` of a kind; sets of error maps are made by :func:`maps.concealed`.
 
     Raises
     ------
@@ -199,6 +199,11 @@ def case(seed: int, kind: str, number: int) -> Case:
         if found is not None:
             return found
     raise RuntimeError(f"nothing to hide for {kind!r}, {number}")
+
+
+def name_of(kind: str, number: int) -> str:
+    """Of the folder of a case."""
+    return f"{KINDS.index(kind):02d}-{number}"
 
 
 def _design(kind: str, noise: str, number: int) -> str:
@@ -257,7 +262,7 @@ def _attempt(random: np.random.Generator, kind: str, number: int) -> Case | None
               "in order": bool(np.all(np.diff(order) > 0)), "observations": len(covariance)}  # fmt: skip
     away = shown - (placed.true if predicted is None else predicted)
     return Case(
-        f"{KINDS.index(kind):02d}-{number}", placed, noise, named, certified, stated and 1e-3 * stated, seen.context, shown,
+        name_of(kind, number), placed, noise, named, certified, stated and 1e-3 * stated, seen.context, shown,
         placed.D @ away.ravel(), truth, predicted, order,
     )  # fmt: skip
 

@@ -43,7 +43,8 @@ of the package.
   one* in the real bars, *simulation* beyond a prediction, *shuffled* (the same rows in two orders), each 4.5 to 10;
   *unresolved period*, a gauge of twelve equal steps, whose periods have aliases; faults of the artefact (6 to 15): a pattern
   of its nodes, its own geometry (out of square, stretched, bowed, bent, twisted), its temperature, the same or another in
-  every set-up; *outside* the catalogue (9 to 15; every known effect leaves at least √λ = 4 of it).
+  every set-up; *outside* the catalogue (9 to 15; every known effect leaves at least √λ = 4 of it). *Maps* are the real ones at
+  three temperatures, their own expansion taken off and their differences dealt anew among the temperatures.
 - **The oracles** search by likelihood ratios among all effects of the catalogue, one after the other. One estimates the noise
   within the same kinds (white and one kind besides, of a few sizes, and t); the other is told the noise exactly (of real noise
   its size). Each draws 199 recordings of noise alone as it takes it to be; an alarm is what at most one of them exceeds.
@@ -208,11 +209,17 @@ def _artefact(pairs: Pairs) -> list[str]:
 
 
 def _others(pairs: Pairs) -> list[str]:
-    out, shuffled, periods = (_of(pairs, (kind,)) for kind in ("outside", "shuffled", "unresolved period"))
+    out, shuffled, periods, sets = (
+        _of(pairs, (kind,)) for kind in ("outside", "shuffled", "unresolved period", "maps")
+    )
     explained = [f for _, f in out if f["verdict"] == "explained"]
     moved = [t["name"] for t, f in shuffled if not judging.same(f)]
     said = [(t, f) for t, f in periods if set(f["effects"]) & set(t["hidden"])]
     held = sum(all(h for name, h in judging.covered(t, f) if name == "period_mm") for t, f in said)
+    grown = [(t, f) for t, f in sets if t["hidden"]]
+    expansions = [h for t, f in grown for _, h in judging.covered(t, f)]
+    wrong = sum(bool(judging.innocent(t, f)) for t, f in sets)
+    shown = sum(judging.hit(t, f) for t, f in grown)
     return [
         "## Beside these", "",
         f"- Outside the catalogue: {_share(sum(judging.recognised(f) for _, f in out), len(out))} recognised, "
@@ -221,6 +228,8 @@ def _others(pairs: Pairs) -> list[str]:
         "groups and values" + (f"; not in {', '.join(moved[:12])}." if moved else "."),
         f"- Periods with aliases: named in {len(said)} of {len(periods)}; the interval of the period then holds the truth in "
         f"{_share(held, len(said))}.",
+        f"- Real error maps, an expansion of 3 to 15 µm/(m K) concealed: {_share(shown, len(grown))} "
+        f"named, intervals hold {_share(sum(expansions), len(expansions))}; in {wrong} of {len(sets)} another one is named.",
     ]  # fmt: skip
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.coverage.measuring import run
-from benchmarks.second.cases import CAUSES, KINDS, NOTHING, case, seal, write
+from benchmarks.second.cases import CAUSES, KINDS, NOTHING, case, name_of, seal, write
+from benchmarks.second.maps import concealed
 
 Task = tuple[str, int, str, int, str]
 """Folder, seed, kind, number, what to do: make, diagnose, or search."""
@@ -19,18 +20,20 @@ Task = tuple[str, int, str, int, str]
 def tasks(folder: Path, seed: int, cases: int, nulls: int, what: str) -> list[Task]:
     """Of every kind as many as asked, spread evenly, so that a run that is cut short has some of each."""
     many = {**dict.fromkeys(NOTHING, nulls), **dict.fromkeys(CAUSES, cases)}
-    listed = [((i + 0.5) / many[kind], k, i) for k, kind in enumerate(KINDS) for i in range(many[kind])]
+    if what == "search":
+        del many["maps"]  # oracles search recordings of artefacts
+    listed = [((i + 0.5) / many[kind], k, i) for k, kind in enumerate(KINDS) if kind in many for i in range(many[kind])]
     return [(str(folder), seed, KINDS[k], i, what) for _, k, i in sorted(listed)]
 
 
 def done(task: Task) -> dict[str, Any]:
     """Make, diagnose or search one case; a refusal or a fault is kept in words."""
     folder, seed, kind, number, what = task
-    made = case(seed, kind, number)
+    made: Any = case(seed, kind, number) if kind != "maps" else concealed(seed, number, name_of(kind, number))
     found: dict[str, Any] = {"name": made.name, "what": what}
     start = time.process_time()
     if what == "make":
-        write(made, Path(folder) / "jobs")
+        _written(made, Path(folder) / "jobs")
         return found | {"truth": made.truth}
     try:
         found |= _searched(made, number) if what == "search" else diagnosed(Path(folder) / "jobs" / made.name)
@@ -39,6 +42,15 @@ def done(task: Task) -> dict[str, Any]:
     except Exception as fault:  # a study of thousands goes on, and counts it
         found["fault"] = f"{type(fault).__name__}: {fault}"
     return found | {"seconds": time.process_time() - start}
+
+
+def _written(made: Any, folder: Path) -> None:
+    if made.truth["kind"] != "maps":
+        write(made, folder)
+        return
+    (folder / made.name).mkdir(parents=True, exist_ok=True)
+    for name, text in made.files.items():
+        (folder / made.name / name).write_text(text, encoding="utf-8")
 
 
 def _searched(made: Any, number: int) -> dict[str, Any]:
@@ -113,7 +125,7 @@ def kept(listed: Sequence[Task], file: Path, workers: int) -> None:
     from rich.progress import track
 
     ready = {record["name"] for record in lines(file)}
-    waiting = [task for task in listed if f"{KINDS.index(task[2]):02d}-{task[3]}" not in ready]
+    waiting = [task for task in listed if name_of(task[2], task[3]) not in ready]
     cut = file.exists() and not file.read_bytes().endswith(b"\n")
     with file.open("a", encoding="utf-8") as out:
         out.write("\n" * cut)
@@ -124,7 +136,7 @@ def kept(listed: Sequence[Task], file: Path, workers: int) -> None:
 
 def sealed(folder: Path, listed: Sequence[Task]) -> tuple[list[dict[str, Any]], str]:
     """Truths of all cases asked for, and their hash, which is written down with the time before anything is diagnosed."""
-    wanted = [f"{KINDS.index(kind):02d}-{number}" for _, _, kind, number, _ in listed]
+    wanted = [name_of(kind, number) for _, _, kind, number, _ in listed]
     truth = {record["name"]: record["truth"] for record in lines(folder / "make.jsonl")}
     truths = [{"name": name, **truth[name]} for name in wanted]
     mark = seal(truths)
