@@ -37,9 +37,9 @@ CONTENTS: dict[str, list[str]] = {
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],
     "What it rests on": [
-        "validation", "coverage-study", "noise-ranks", "diagnosis-study", "mutation-study", "hostile-study",
-        "uncertainty/validation", "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks", "peers", "sources",
-        "machine/source-errors", "uncertainty/harris-2004",
+        "validation", "coverage-study", "noise-ranks", "diagnosis-study", "diagnosis-second-study", "mutation-study",
+        "hostile-study", "uncertainty/validation", "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
+        "peers", "sources", "machine/source-errors", "uncertainty/harris-2004",
     ],
     "The project": ["/README", "/CHANGELOG", "/CONTRIBUTING", "layout"],
 }  # fmt: skip

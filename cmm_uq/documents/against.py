@@ -26,9 +26,8 @@ def corrections(
 ) -> dict[str, dict[str, Quantity]]:  # fmt: skip
     """What the effects that were estimated anew differ by from what the simulation contains, by effect and parameter."""
     found: dict[str, dict[str, Quantity]] = {}
-    for (owner, name), (values, of) in model.reported(posterior.draws).items():
-        if owner in simulated.refitted:
-            found.setdefault(owner, {})[name] = Quantity.of_draws(values, of)
+    for (owner, name), (values, of) in model.reported(posterior.draws, simulated.refitted).items():
+        found.setdefault(owner, {})[name] = Quantity.of_draws(values, of)
     return found
 
 

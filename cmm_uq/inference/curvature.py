@@ -147,7 +147,7 @@ def bent(posterior: NoisyPosterior, found: Bend) -> NoisyPosterior:
         return posterior
     flat = np.asarray(np.linalg.solve(found.axes, (posterior.draws - found.centre).T).T, dtype=np.float64)
     z, weight = found.bent(flat)
-    kept = _metropolis(weight, posterior.steps, posterior.seed)
+    kept = _metropolis(weight, posterior.steps // posterior.every, posterior.seed)
     draws = (found.centre + z @ found.axes.T)[kept]
     given = {field.name: getattr(posterior, field.name) for field in fields(posterior)}
     held = {"draws": draws, "sigma": posterior.sigma[kept], "sizes": posterior.sizes.at(kept)}

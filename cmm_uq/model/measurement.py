@@ -11,7 +11,7 @@ own length they add up to the column of that length, and an uncalibrated bar sho
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -121,21 +121,27 @@ class MeasurementModel:
         )
         return coefficients + sizes
 
-    def reported(self, draws: Floats) -> dict[tuple[str, str], tuple[Floats, Unit]]:
+    def reported(
+        self, draws: Floats, owners: Collection[str] | None = None
+    ) -> dict[tuple[str, str], tuple[Floats, Unit]]:
         """Draws (N,), and unit, of every parameter as it is reported, then of the artefact's sizes, by key.
 
         Parameters
         ----------
         draws : (N, k) of the unknowns.
+        owners : effects that are asked for; by default all, none of which may have a shape, and the artefact.
         """
         found, column = {}, 0
         for effect in self.effects:
             own = draws[:, column : column + len(effect.coefficients)]
             column += len(effect.coefficients)
+            if owners is not None and effect.name not in owners:
+                continue
             units = {parameter.name: parameter.unit for parameter in effect.reported}
             for name, values in effect.to_reported(own, np.zeros((len(own), 0))).items():
                 found[effect.name, name] = values, units[name]
-        for size, values in zip(self.artefact.sizes, draws[:, column:].T, strict=True):
+        sizes = self.artefact.sizes if owners is None or ARTEFACT in owners else ()
+        for size, values in zip(sizes, draws[:, column : column + len(sizes)].T, strict=True):
             found[ARTEFACT, size.name] = values, size.unit
         return found
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,14 @@ def test_bent_draws_have_the_moments_of_the_exact_posterior() -> None:
     assert np.abs(straight.draws.mean(axis=0) - mean).max() > 0.1 * sd.max()
     np.testing.assert_allclose(found.draws.mean(axis=0), mean, atol=0.03 * sd.min())
     np.testing.assert_allclose(found.draws.std(axis=0), sd, rtol=0.03)
+
+
+def test_draws_that_were_kept_of_every_third_step_are_bent_as_they_stand() -> None:
+    linear = model()
+    straight = drawn(linear, 1)
+    bending = bend(linear, np.zeros(2), SIGMA, remainder)
+    of_more = replace(straight, steps=3 * straight.steps + 1, every=3)
+    np.testing.assert_array_equal(bent(of_more, bending).draws, bent(straight, bending).draws)
 
 
 def test_bending_is_told_in_standard_deviations_of_what_it_moves() -> None:

@@ -137,3 +137,12 @@ def test_an_effect_with_a_period_needs_that_period(ballbar_points: Points) -> No
 def test_a_period_is_not_estimated_here(ballbar_points: Points) -> None:
     with pytest.raises(CmmUqError, match="nonlinear parameter period_mm"):
         MeasurementModel(Ballbar(bar_facts(), ballbar_points), effects(["periodic_scale_x"]))
+
+
+def test_draws_of_one_effect_are_reported_beside_others_whose_shape_is_not_held(ballbar_points: Points) -> None:
+    """The columns of a periodic error come before those of the squareness that is asked for."""
+    named = effects(["periodic_scale_x", "squareness_xy"])
+    model = MeasurementModel(Ballbar(bar_facts(400.0), ballbar_points), named, shapes={"periodic_scale_x": (50.0,)})
+    ((key, (values, _)),) = model.reported(np.array([[1.0, 2.0, 3.0, 4.0]]), ["squareness_xy"]).items()
+    assert key == ("squareness_xy", "angle_arcsec")
+    assert values.tolist() == [3.0]

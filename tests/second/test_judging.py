@@ -1,0 +1,103 @@
+"""What the second study counts as found, blamed, held and right."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from benchmarks.second.judging import (
+    artefact_named,
+    covered,
+    hit,
+    innocent,
+    machine_blamed,
+    proportion,
+    recognised,
+    same,
+    tenths,
+    there,
+)
+
+
+def said(*names: str, groups: tuple[tuple[str, ...], ...] = (), verdict: str = "explained") -> dict:
+    effect = {"probability": 0.9, "together": 0.9, "parameters": {}}
+    return {"verdict": verdict, "effects": dict.fromkeys(names, effect), "groups": list(groups)}
+
+
+TRUTH = {"kind": "one", "hidden": {"scale_x": 3.0}, "rivals": {"scale_x": ["rotation_x_y"]}}
+
+
+def test_an_effect_is_found_by_name_in_a_group_or_by_what_nobody_could_tell_from_it() -> None:
+    assert hit(TRUTH, said("scale_x"))
+    assert hit(TRUTH, said("drift_x", groups=(("drift_x", "scale_x"),)))
+    assert hit(TRUTH, said("rotation_x_y"))
+    assert not hit(TRUTH, said("drift_x"))
+    assert not hit(TRUTH, said())
+    assert not hit({**TRUTH, "hidden": {"scale_x": 3.0, "scale_y": 1.0}}, said("scale_x"))
+
+
+def test_innocent_is_what_is_neither_there_nor_named_with_what_is() -> None:
+    assert innocent(TRUTH, said("scale_x", "drift_y")) == ["drift_y"]
+    assert innocent(TRUTH, said("drift_y", groups=(("drift_y", "scale_x"),))) == []
+    assert innocent(TRUTH, said("rotation_x_y")) == []
+
+
+def test_the_machine_is_blamed_where_no_word_is_said_of_the_artefact() -> None:
+    assert machine_blamed(said("rotation_x_y", "artefact_pattern")) == ["rotation_x_y"]
+    alike = said("rotation_x_y", groups=(("rotation_x_y", "artefact_pattern"),))
+    assert machine_blamed(alike) == []
+    assert artefact_named(alike)
+    assert not artefact_named(said("rotation_x_y"))
+    assert machine_blamed(said("thermal_artefact")) == []
+
+
+def test_something_unknown_is_recognised_by_the_verdict() -> None:
+    assert [recognised(said(verdict=v)) for v in ("unexplained", "partial", "explained", "consistent")] == [
+        True, True, False, False]  # fmt: skip
+
+
+def test_an_effect_is_there_by_itself_or_with_its_group() -> None:
+    assert there("drift_x", TRUTH, {"drift_x", "scale_x"}) == (False, True)
+    assert there("artefact_pattern", {"kind": "artefact, pattern", "hidden": {}}, ()) == (True, True)
+
+
+def test_a_phase_is_held_on_the_circle_and_turned_half_where_the_amplitude_is_negative() -> None:
+    truth = {"hidden": {"periodic_scale_x": -2.0}, "period": 50.0, "phase": 0.1}
+    found = said("periodic_scale_x")
+    found["effects"]["periodic_scale_x"]["parameters"] = {
+        "amplitude_um": [2.1, 0.2, 1.7, 2.5],
+        "period_mm": [52.0, 0.5, 51.0, 53.0],
+        "phase_rad": [-3.0, 0.1, -3.2, -2.8],
+    }
+    assert covered(truth, found) == [("amplitude_um", True), ("period_mm", False), ("phase_rad", True)]
+    positive = {**truth, "hidden": {"periodic_scale_x": 2.0}}
+    assert covered(positive, found)[2] == ("phase_rad", False)
+
+
+def test_rows_in_another_order_are_the_same_to_a_thousandth_of_u() -> None:
+    def one(value: float) -> dict:
+        return {
+            "verdict": "explained",
+            "groups": [],
+            "effects": {"scale_x": {"parameters": {"ppm": [value, 1.0, 0, 9]}}},
+        }
+
+    assert same(one(5.0) | {"in_order": one(5.0005)})
+    assert not same(one(5.0) | {"in_order": one(5.01)})
+    assert not same(one(5.0) | {"in_order": one(5.0) | {"verdict": "partial"}})
+
+
+def test_the_exact_interval_of_a_proportion_is_that_of_the_tables() -> None:
+    """None of 20: 1 − 0.025^(1/20) = 16.84 %; 5 of 20: 8.66 to 49.10 % (Clopper & Pearson 1934)."""
+    assert proportion(0, 20) == (0.0, pytest.approx(1 - 0.025 ** (1 / 20)))
+    assert proportion(5, 20) == (pytest.approx(0.0866, abs=1e-4), pytest.approx(0.4910, abs=1e-4))
+    assert proportion(20, 20)[1] == 1.0
+
+
+def test_each_tenth_has_its_own_count_mean_and_expected_spread() -> None:
+    rows = tenths([0.95, 0.95, 0.55, 1.0], [True, False, True, True])
+    assert [(row[0], pytest.approx(row[1]), row[2]) for row in rows] == [(1, 0.55, 1), (3, 2.9 / 3, 2)]
+    low, high = rows[1][4]
+    assert low == pytest.approx(2.9 / 3 - 1.96 * math.sqrt(2 * 0.95 * 0.05) / 3)
+    assert high == 1.0
