@@ -65,7 +65,7 @@ def test_a_scale_may_depend_on_a_column_about_the_middle_of_the_volume() -> None
 
 
 def test_no_jump_parts_readings_of_one_place() -> None:
-    """Repeats of a grid differ by their noise, and where a point is placed follows its residual: between them nothing jumps."""
+    """Repeats of a grid differ by their noise, and a point is placed as its residual says: between them nothing jumps."""
     model, _ = screened_model(read_job(EXAMPLES / "plane-simulated"))
     values = model.estimate().least_squares.value
     along_y = model.artefact.points.at(model.where(values)).readings["y"]
