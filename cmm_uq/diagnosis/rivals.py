@@ -25,13 +25,13 @@ from cmm_uq.uncertainty.mixture import averaged
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import unit
 
-REMAINS = 0.02
+REMAINS = 0.01
 """Probability from which a combination of explanations remains."""
 
 SETTLED = 0.95
 """Probability of one combination from which no other remains."""
 
-_MOST = 8
+_MOST = 12
 _DRAWS = 4000
 _ROUNDS = 3
 _AS_READINGS = 12
