@@ -148,8 +148,6 @@ def _best(
 ) -> Suggestion | None:
     sizes = {name: _size(after, name, pair) for name in pair}
     before = float(_expected(known, known.recorded[None], pair, sizes)[0])
-    if before >= np.log(ODDS):  # at these sizes the recording itself parts them: no placing is needed for it
-        return None
     for repetitions in range(1, _MOST + 1):
         log_odds = _expected(known, known.recorded + repetitions * known.each, pair, sizes)
         best = int(np.argmax(log_odds))
