@@ -44,7 +44,7 @@ def costs_section(found: Diagnosed) -> Section:
     notes.append(
         say(
             "{more}They are averaged over explanations with {told} of the probability together; each of the rest has "
-            "less than 2\u00a0%.",
+            "less.",
             more=plural(
                 more, one=say("One further explanation is in results.json. "),
                 many=say("{count} further explanations are in results.json. ", count=more),
