@@ -115,9 +115,8 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
     """
     points = model.artefact.points.at(model.where(values))
     found = []
-    set_ups = len(np.unique(points.measurement))
     for effect in considered(model.artefact):
-        if effect.name in named or effect.least_set_ups > set_ups:
+        if effect.name in named or not effect.shown_in(points):
             continue
         if any(column not in points.columns for column in effect.columns):
             continue
@@ -162,7 +161,7 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
         return
     u = (2 * (along - along.min()) / span - 1)[:, None, None]
     forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
-    basis = model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
+    basis = effect.mostly * model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
     for s, t in forms:
         columns = model.seen(basis * (1 + s * u + t * (1.5 * u**2 - 0.5)), values)
         yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)

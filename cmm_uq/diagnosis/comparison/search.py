@@ -296,7 +296,9 @@ def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -
     """Compare all candidates for what a model leaves; ``seed`` is that of the null distribution."""
     values = model.estimate().about
     singles = known(model, values, tuple(effect.name for effect in model.effects))
-    candidates = singles + several(singles) + unknown(model, values)
+    known_as = {term for single in singles if single.effect is not None for term in single.effect.stands_for}
+    functions = [function for function in unknown(model, values) if function.term not in known_as]
+    candidates = singles + several(singles) + functions
     comparison = comparison_of(model, stated, candidates)
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]
