@@ -73,11 +73,12 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
         statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances)
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
+    found = diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None)
     result = Result(
         job, model, findings, estimate, posterior, named_draws(model, components, posterior),
-        parameters(model, posterior), sizes(model, posterior),
+        found.diagnosis.remaining.averaged or parameters(model, posterior), sizes(model, posterior),
         noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
-        diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None),
+        found,
     )  # fmt: skip
     for name, quantity in result.quantities():
         must_be_finite(

@@ -14,7 +14,7 @@ from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
 from cmm_uq.commands.simulate import to_fill_in
-from cmm_uq.conformity.consequences import consequences
+from cmm_uq.conformity.consequences import consequences, costs
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
 from cmm_uq.diagnosis.power import ALLOWED
 from cmm_uq.diagnosis.unseen import USUAL_LENGTH, Smallest, smallest_effects
@@ -140,7 +140,8 @@ def diagnosed(
     unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
     plan = _next(job, diagnosis, observe, _wanted(job, diagnosis, unseen) if show else ())
     next_ones = suggestions(plan, model.artefact.title)
-    return Diagnosed(job, findings, diagnosis, next_ones, changes, unseen=unseen, next_plan=plan)
+    cost = costs(job, diagnosis, made, kind.tested, seed)
+    return Diagnosed(job, findings, diagnosis, next_ones, changes, unseen=unseen, next_plan=plan, costs=cost)
 
 
 def _wanted(job: Job, diagnosis: Diagnosis, unseen: Sequence[Smallest]) -> tuple[Wanted, ...]:

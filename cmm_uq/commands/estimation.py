@@ -15,6 +15,7 @@ from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.messages import say
 from cmm_uq.model import Estimate, MeasurementModel
+from cmm_uq.model.display import of_last_digit
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.model.noise import noise_of
 from cmm_uq.points import Floats
@@ -28,8 +29,9 @@ from cmm_uq.units import MICROMETRE, unit
 def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Finding]]:
     """The model without gross outliers, and what they are; the figures of performance still count them."""
     artefact, used, found = model.artefact, model.used.copy(), []
-    chosen = np.flatnonzero(used)
-    for index, times in gross_outliers(model.estimate().linear, artefact.measurement[chosen]):
+    chosen, estimate = np.flatnonzero(used), model.estimate()
+    least = of_last_digit(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
+    for index, times in gross_outliers(estimate.linear, artefact.measurement[chosen], least):
         i = int(chosen[index])
         used[i] = False
         why = say(

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.diagnosis.numbering import numbered_by_place
 from cmm_uq.errors import CmmUqError
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Observed
@@ -45,8 +46,11 @@ def compared_on(model: MeasurementModel, observe: Observed, seed: int, most: int
     placing = artefact.measurement[used]
     # observations of several points stay with all others of their placing, of which they may be differences
     each = max(most // len(np.unique(placing)), LEAST_OF_PLACING) if artefact.rows.shape[1] == 1 else len(used)
-    within = _first_of_each(placing, points.point[first], each, random)
-    whole = _first_of_each(np.zeros_like(placing[within]), placing[within], most, random)
+    # numbered by their places: another numbering of the recording draws the same ones
+    owner = numbered_by_place(model, placing)
+    part = numbered_by_place(model, np.column_stack([placing, points.point[first]]))
+    within = _first_of_each(owner, part, each, random)
+    whole = _first_of_each(np.zeros_like(owner[within]), owner[within], most, random)
     chosen = used[within][whole]
     rows = np.zeros(len(points), dtype=bool)
     rows[artefact.rows[chosen]] = True

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import special
 
+from cmm_uq.diagnosis.asserting import Withheld, group_of, with_resolved_periods, with_sizes
 from cmm_uq.diagnosis.compared import compared_on
-from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, Found, ModelComparison, search, with_rivals
+from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, Found, ModelComparison, search, without
 from cmm_uq.diagnosis.held_out import Improvement, improvement
 from cmm_uq.diagnosis.joint import Joint, joint_posterior
 from cmm_uq.diagnosis.location import Place, located
 from cmm_uq.diagnosis.noise import named
+from cmm_uq.diagnosis.periods import Mode, modes_of
+from cmm_uq.diagnosis.rivals import Remaining, remaining
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.noise import Components
 from cmm_uq.inference.posterior import NoisyPosterior, Progress
 from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.display import of_last_digit
 from cmm_uq.model.kind import Observed
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
@@ -45,6 +49,8 @@ class LeftOut:
     explained : part of the misfit's sum of squares that it takes away.
     together : probability of it or one that these data cannot tell from it.
     points_to : what a technician should look at.
+    group : what these data cannot tell from it; with a probability below one half it is asserted as one of these.
+    modes : other periods that fit, where it has one.
     """
 
     effect: str
@@ -54,6 +60,8 @@ class LeftOut:
     explained: float
     together: float
     points_to: Text
+    group: tuple[Text, ...] = ()
+    modes: tuple[Mode, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,6 +94,8 @@ class Diagnosis:
     posterior : joint, of the model after.
     compared : observations that the candidates were compared on; what was found is estimated from all.
     found : the search that it rests on.
+    withheld : effects that are probable, and yet not asserted.
+    remaining : combinations of explanations that remain, and what they make of the named effects.
     """
 
     verdict: str
@@ -103,6 +113,8 @@ class Diagnosis:
     posterior: NoisyPosterior
     compared: int
     found: Found
+    withheld: tuple[Withheld, ...] = ()
+    remaining: Remaining = field(default_factory=Remaining)
 
 
 def diagnose(
@@ -127,22 +139,48 @@ def diagnose(
     observe : makes the artefact of points; without it a large recording is searched with all its observations.
     """
     stated = None if stated_um is None else stated_um * MICROMETRE
+    model = _with_last_digit(model)
     some = model if observe is None else compared_on(model, observe, seed)
-    found = search(some, stated, alpha=alpha, seed=seed)
-    if some is not model:
-        found = replace(found, model=replace(found.model, artefact=model.artefact, used=model.used))
+    found, joint, withheld = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
     gain = improvement(model, found.model)
     if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
-        found = replace(found, last=found.first.comparison, model=model, chosen=frozenset(), unexplained=1.0)
-        gain = improvement(model, model)
-    joint = joint_posterior(found, seed, progress, known)
+        found = _of_all(without(found, found.chosen), model)
+        gain, joint = improvement(model, model), joint_posterior(found, seed, progress, known)
     noise = _noise(found, joint, stated)
     after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     return Diagnosis(
         _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha),
         _left_out(found, joint, model), _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
-        joint.components, joint.posterior, int(some.used.sum()), found,
+        joint.components, joint.posterior, int(some.used.sum()), found, withheld,
+        remaining(found, joint, model, seed),
     )  # fmt: skip
+
+
+def _asserted(
+    found: Found, model: MeasurementModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
+) -> tuple[Found, Joint, tuple[Withheld, ...]]:
+    """What of a search may be asserted, estimated from all observations, and what is withheld."""
+    found, gone = with_resolved_periods(found)
+    while True:
+        found = _of_all(found, model)
+        joint = joint_posterior(found, seed, progress, known)
+        found, more = with_sizes(found, joint)
+        if not more:
+            return found, joint, gone
+        gone = (*gone, *more)
+
+
+def _of_all(found: Found, model: MeasurementModel) -> Found:
+    """The same, its model that of all observations."""
+    if not found.chosen or found.model.artefact is model.artefact:
+        return found if found.chosen else replace(found, model=model)
+    return replace(found, model=replace(found.model, artefact=model.artefact, used=model.used))
+
+
+def _with_last_digit(model: MeasurementModel) -> MeasurementModel:
+    """The model whose noise is no less than the last digit of what was recorded: exact figures, and copies, have no other."""
+    least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
+    return replace(model, least_noise=least) if least > model.least_noise else model
 
 
 def _verdict(found: Found, alpha: float) -> str:
@@ -161,23 +199,40 @@ def _left_out(found: Found, joint: Joint, before: MeasurementModel) -> tuple[Lef
     total = first - _squares(linear, ())
     listed = []
     for effect in (e for e in found.model.effects if e.name in found.effects):
+        probability, together, group = _probability(found, index[effect.name])
+        modes = modes_of(found, index[effect.name])
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
-        reported = effect.to_reported(draws, joint.shapes.get(effect.name, np.zeros((len(draws), 0))))
+        shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
+        if modes:  # what is reported of a period is reported of one
+            own = modes[0].holds(shapes[:, 0])
+            draws, shapes = (draws[own], shapes[own]) if own.any() else (draws, shapes)
+        reported = effect.to_reported(draws, shapes)
         units = {parameter.name: parameter.unit for parameter in effect.reported}
         share = (_squares(linear, [column[effect.name, c.name] for c in effect.coefficients]) - first + total) / first
         parameters = {
             name: Quantity.of_draws(_unwrapped(values) if name == "phase_rad" else values, units[name])
             for name, values in reported.items()
         }
-        probability = together = 0.0
-        if found.combinations is not None:
-            probability = found.combinations.of(index[effect.name])
-            together = with_rivals(found.combinations, found.chosen, index[effect.name])
-        explained = share if total > 0 else 0.0
-        listed.append(
-            LeftOut(effect.name, effect.title, probability, parameters, explained, together, effect.points_to)
+        explained = max(share, 0.0) if total > 0 else 0.0
+        item = LeftOut(
+            effect.name, effect.title, probability, parameters, explained, together, effect.points_to, group, modes[1:]
         )
+        listed.append(item)
     return tuple(sorted(listed, key=lambda item: -item.probability))
+
+
+def _probability(found: Found, index: int) -> tuple[float, float, tuple[Text, ...]]:
+    """Of an effect by itself, and with all that could stand in its place; and the names of those."""
+    combinations = found.combinations
+    if combinations is None:
+        return 0.0, 0.0, ()
+    group = group_of(combinations, found.chosen, index)
+    names = tuple(
+        combinations.explanations[i].name
+        for i in sorted(group, key=lambda i: -combinations.of(i))
+        if combinations.of(i) > 0
+    )
+    return combinations.of(index), combinations.of_any(group | {index}), names
 
 
 def _unwrapped(phase: Floats) -> Floats:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.diagnosis.numbering import numbered_by_place
 from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.posterior import Density
 from cmm_uq.messages import Text, say
@@ -100,13 +101,14 @@ def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], Text]:
     """What is left out together, and what it is: placings; of few placings their points. Each with its repeats.
 
     Without one of a few placings the rest would often determine nothing: a gauge on seven lines has one along Y.
+    Which of them are in one fold follows from where they are, not from their numbers.
     """
     artefact, used = model.artefact, model.used
     placing = artefact.measurement[used]
     if len(np.unique(placing)) >= FOLDS:
-        return (placing, say("placings"))
+        return (numbered_by_place(model, placing), say("placings"))
     key = np.column_stack([placing, artefact.points.point[artefact.rows[:, 0]][used]])
-    return (np.unique(key, axis=0, return_inverse=True)[1].ravel(), say("points"))
+    return (numbered_by_place(model, key), say("points"))
 
 
 def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:

@@ -21,6 +21,9 @@ _TAILS_DOF = 4.0
 _SHRINK = (_TAILS_DOF - 2) / _TAILS_DOF
 """Square of the t distribution's scale over its standard deviation."""
 
+_NANOMETRE = 1e-6
+"""mm: of residuals that are smaller, as of exact figures, the last bits say nothing of tails."""
+
 _STATED_IS_RIGHT = 0.9
 _STATED_SPREAD = 0.2
 _POINTS = 400
@@ -91,7 +94,7 @@ def tails(residual: Floats) -> Kind:
     evidence of this kind is never overstated. (σ stays the standard deviation of a reading.)
     """
     scale = 1.4826 * float(np.median(np.abs(residual)))
-    squares = (residual / max(scale, 1e-300)) ** 2 / _SHRINK
+    squares = (residual / max(scale, _NANOMETRE)) ** 2 / _SHRINK
     weight = (_TAILS_DOF + 1) / (_TAILS_DOF + squares)
     log_t = special.gammaln((_TAILS_DOF + 1) / 2) - special.gammaln(_TAILS_DOF / 2) - 0.5 * np.log(np.pi * _TAILS_DOF)
     log_t = log_t - 0.5 * (_TAILS_DOF + 1) * np.log1p(squares / _TAILS_DOF) - 0.5 * np.log(_SHRINK)

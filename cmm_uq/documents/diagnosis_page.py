@@ -8,6 +8,7 @@ import numpy as np
 
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.documents.against import corrections, simulation_section
+from cmm_uq.documents.diagnosis_costs import costs_section
 from cmm_uq.documents.diagnosis_next import next_section
 from cmm_uq.documents.diagnosis_unseen import unseen_section
 from cmm_uq.documents.diagnosis_words import (
@@ -27,6 +28,7 @@ from cmm_uq.documents.plots import curve_with_band, length_plot
 from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.results_file import diagnosis_data, head
+from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.messages import Text, Verbatim, commas, day, names, number, say
@@ -89,6 +91,7 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
         *_simulation(found),
         Section(say("Before and after"), _before_after(found)),
         Section(say("What a correction would change"), _consequences(found)),
+        costs_section(found),
         Section(say("Where the mismatch lives"), _where(found)),
         Section(say("Candidate explanations"), (_rivals(found),)),
         unseen_section(found),
@@ -115,7 +118,7 @@ def _simulation(found: Diagnosed) -> tuple[Section, ...]:
 def _left_out(found: Diagnosed) -> tuple[Block, ...]:
     d = found.diagnosis
     blocks: list[Block] = [Paragraph(verdict_of(found))]
-    blocks += [Paragraph(text) for text in sentences_of(found)]
+    blocks += [Paragraph(text) for text in (*sentences_of(found), *withheld_sentences(d.withheld))]
     blocks += [
         Paragraph(say("This recording cannot tell apart: {effects}.", effects=commas(names(group))), tone="warning")
         for group in d.indistinguishable

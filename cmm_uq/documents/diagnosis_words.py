@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from cmm_uq.diagnosis.comparison.search import ASSERTED
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import VERDICTS as AGAINST
@@ -12,7 +13,9 @@ from cmm_uq.documents.against import contained
 from cmm_uq.documents.diagnosis_unseen import without_power
 from cmm_uq.documents.in_short import Standing, Summary, Verdict
 from cmm_uq.documents.result import Diagnosed
-from cmm_uq.documents.wording import expanded, probability
+from cmm_uq.documents.withheld import other_periods
+from cmm_uq.documents.withheld import sentences as withheld_sentences
+from cmm_uq.documents.wording import NO_FACTOR, expanded, probability
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, day, names, say, together
 from cmm_uq.screening.finding import Finding
@@ -63,7 +66,7 @@ def sentences_of(found: Diagnosed) -> list[Text]:
 def lines(found: Diagnosed) -> list[Text]:
     """Verdict and everything that follows from it, a sentence or two each."""
     d = found.diagnosis
-    said = [verdict_of(found), *sentences_of(found)]
+    said = [verdict_of(found), *sentences_of(found), *withheld_sentences(d.withheld)]
     said += [
         say("Cannot be told apart by this recording: {effects}.", effects=commas(names(group)))
         for group in d.indistinguishable
@@ -101,7 +104,12 @@ def sentence(item: LeftOut, gain: Improvement) -> Text:
         if alike
         else NOTHING
     )
-    return say(
+    if item.probability < ASSERTED:
+        together = say(
+            ", {probability} that it is this or one that this recording cannot tell from it: {group}",
+            probability=probability(item.together), group=commas(item.group),
+        )  # fmt: skip
+    told = say(
         "{title}: {sizes}. What it points to: {points_to}. Probability {probability}{together}; "
         "explains {explained:.0f}\u00a0% of the misfit; on {unseen} that the fit had not seen the "
         "rms falls from {before:.1f} to {after:.1f}\u00a0µm.",
@@ -115,10 +123,12 @@ def sentence(item: LeftOut, gain: Improvement) -> Text:
         before=gain.heldout_rms_before_um,
         after=gain.heldout_rms_after_um,
     )
+    return after(told, other_periods(item.modes))
 
 
 def _size(name: Text, value: Text, U: Text, k: Text, quantity: Quantity) -> Text:
-    size = say("{value} ± {U}\u00a0{unit} (k\u00a0=\u00a0{k})", value=value, U=U, unit=quantity.unit, k=k)
+    factor = NOTHING if k == NO_FACTOR else say(" (k\u00a0=\u00a0{k})", k=k)
+    size = say("{value} ± {U}\u00a0{unit}{factor}", value=value, U=U, unit=quantity.unit, factor=factor)
     return say("{name} = {size}", name=name, size=size) if name else size
 
 

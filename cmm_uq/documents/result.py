@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.conformity.consequences import Consequences
+from cmm_uq.conformity.consequences import Consequences, Costs
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.conformity.tolerances import Judged
 from cmm_uq.diagnosis.diagnosis import Diagnosis
@@ -94,6 +94,7 @@ class Diagnosed:
     simulated : the simulation that the recording was compared with, if it was with one.
     unseen : the smallest amplitude of each effect that the recording would have shown.
     next_plan : the fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any.
+    costs : what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
     """
 
     job: Job
@@ -104,6 +105,7 @@ class Diagnosed:
     simulated: Simulated | None = None
     unseen: tuple[Smallest, ...] = ()
     next_plan: NextPlan | None = None
+    costs: Costs | None = None
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ class Result:
     estimate : least squares.
     posterior : draws of the model's own parameters.
     draws : of all that is reported, by name and chain.
-    parameters : reported parameters of each effect, by effect and name.
+    parameters : reported parameters of each effect, by effect and name; averaged over the explanations that remain.
     sizes : of the artefact, by name.
     noise : of a coordinate.
     accuracy : figures of the lengths, by name; empty for artefacts without lengths.

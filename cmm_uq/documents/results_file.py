@@ -13,12 +13,15 @@ from cmm_uq.conformity.statement import Decided, Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import corrections
+from cmm_uq.documents.diagnosis_costs import costs_data
 from cmm_uq.documents.diagnosis_next import next_data
 from cmm_uq.documents.diagnosis_unseen import unseen_data
 from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.program import software
+from cmm_uq.documents.quantity_data import quantity_data as quantity_data
 from cmm_uq.documents.result import Diagnosed, Result
 from cmm_uq.documents.simulated import Simulated
+from cmm_uq.documents.withheld import periods_data, withheld_data
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
@@ -113,6 +116,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
             for place in d.where
         ],
         "effects": [effect_data(item, d.improvement) for item in d.effects],
+        "withheld": withheld_data(d.withheld),
         "indistinguishable": [list(group) for group in d.indistinguishable],
         "suggested_measurements": [
             {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions, "odds": s.odds}
@@ -129,6 +133,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         "next_plan": next_data(found.next_plan),
         "unseen": unseen_data(found.unseen),
         "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
+        **costs_data(found),
         **({"compared_on": d.compared} if d.compared < int(d.before.used.sum()) else {}),
         "corrected": None if changes is None else {
             "accuracy": {
@@ -149,7 +154,8 @@ def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
     """One effect that was left out."""
     return {
         "effect": item.effect, "probability": item.probability, "probability_together": item.together,
-        "explained": item.explained, "parameters": _quantities(item.parameters), "words": sentence(item, gain),
+        "group": list(item.group), "explained": item.explained, "parameters": _quantities(item.parameters),
+        **({"other_periods_mm": periods_data(item.modes)} if item.modes else {}), "words": sentence(item, gain),
     }  # fmt: skip
 
 
@@ -169,14 +175,6 @@ def as_json(data: Mapping[str, Any]) -> bytes:
     except ValueError as error:
         raise CmmUqError(f"a figure is not finite: {error}", where="results.json",
                          fix="Look for a number in the input that no measurement gives") from error  # fmt: skip
-
-
-def quantity_data(quantity: Quantity) -> dict[str, Any]:
-    """Value, standard uncertainty, 95 % interval, expanded uncertainty, coverage factor; its unit is in the key above it."""
-    return {
-        "value": quantity.value, "u": quantity.u, "interval95": list(quantity.interval95), "U": quantity.expanded,
-        "k": quantity.coverage_factor,
-    }  # fmt: skip
 
 
 def covariance_data(covariance: Covariance) -> dict[str, Any]:

@@ -76,7 +76,15 @@ def _mismatch(result: Result) -> list[Text]:
     said = [VERDICTS[diagnosis.verdict]]
     if named:
         said.append(say("It shows: {named}.", named=listed(named)))
-    return [sentences((*said, say("The figures below hold for the named model; see the diagnosis.")))]
+    rivals = len(diagnosis.remaining.rivals)
+    holds = say("The figures below hold for the named model; see the diagnosis.")
+    if rivals and diagnosis.remaining.averaged:
+        holds = say(
+            "The error factors below are averaged over {rivals} explanations that remain, by their probabilities; all other "
+            "figures hold for the named model. See the diagnosis.",
+            rivals=rivals,
+        )
+    return [sentences((*said, holds))]
 
 
 def _noise(result: Result) -> list[Text]:

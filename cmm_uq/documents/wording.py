@@ -9,6 +9,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import NOTHING, Text, Verbatim, foreign, number, say
 from cmm_uq.model.measurement import ARTEFACT
+from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
@@ -20,14 +21,21 @@ OUTCOME_WORDS: Mapping[str, Text] = {
 """What a statement of conformity comes to, in a table."""
 
 
+NO_FACTOR = say("–")
+"""In place of a coverage factor that would mean nothing."""
+
+_ONE_HILL = 1.6
+"""Least U/u of a distribution with one hill: a rectangle has 1.645. A smaller one has several, between which nothing lies."""
+
+
 def expanded(quantity: Quantity) -> tuple[Text, Text, Text]:
     """Value, expanded uncertainty and coverage factor, as text.
 
-    The expanded uncertainty is given to two significant digits.
+    The expanded uncertainty is given to two significant digits; the factor where U/u is one.
     """
     value, uncertainty = rounded(quantity.value, quantity.expanded)
     k = quantity.coverage_factor
-    return (value, uncertainty, (say("–") if k is None else number(k, ".2f")))
+    return (value, uncertainty, (NO_FACTOR if k is None or k < _ONE_HILL else number(k, ".2f")))
 
 
 def probability(p: float) -> Text:
@@ -52,7 +60,11 @@ def title_of(key: tuple[str, str], result: Result) -> Text:
     owner, name = key
     if owner == ARTEFACT:
         return next(size.title for size in result.artefact.sizes if size.name == name)
-    effect = next(effect for effect in result.model.effects if effect.name == owner)
+    return title_of_parameter(next(effect for effect in result.model.effects if effect.name == owner), name)
+
+
+def title_of_parameter(effect: Effect, name: str) -> Text:
+    """A parameter of an effect in words: the effect alone where it has no other."""
     return (
         effect.title if len(effect.reported) == 1 else say("{title}, {name}", title=effect.title, name=Verbatim(name))
     )

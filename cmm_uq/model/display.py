@@ -11,6 +11,9 @@ from scipy import sparse
 from cmm_uq.points import Floats, Ints
 
 INCH = 25.4
+_NANOMETRE = 1e-6
+"""mm."""
+
 _EXACT = 1e-5
 """Part of a step by which a coordinate on the grid may be off, as from a unit's conversion."""
 
@@ -39,6 +42,19 @@ def display_step(xyz: Floats, scatter: float) -> float:
         if np.abs(values / step - np.round(values / step)).max() < _EXACT:
             return step
     return 0.0
+
+
+def of_last_digit(xyz: Floats, scatter: float) -> float:
+    """Standard deviation, mm, that the last digit of figures leaves open, or a nanometre; 0 where residuals show more.
+
+    Parameters
+    ----------
+    xyz : (n, 3) mm as recorded.
+    scatter : of a coordinate, mm, as the residuals show it: of figures without noise, of copies and of their differences, less
+        than the digits can tell.
+    """
+    least = max(display_step(xyz, scatter) / float(np.sqrt(12)), _NANOMETRE)
+    return least if scatter < least else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -146,12 +146,20 @@ def repeated_figures(points: Points) -> list[Finding]:
     return [_copied(points, run) for run in _runs(copies)]
 
 
-def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64]) -> list[tuple[int, float]]:
+def gross_outliers(
+    linear: LinearModel, measurement: NDArray[np.int64], least: float = 0.0
+) -> list[tuple[int, float]]:  # fmt: skip
     """Observations (index, times of their standard deviation) that noise would hardly ever put so far off.
 
     Externally studentised residuals against their t distribution, the probability multiplied by the number of
     observations (Bonferroni; Barnett & Lewis 1994, 8.2); the worst is taken out and the rest tested again, up to a tenth
     of the recording.
+
+    Parameters
+    ----------
+    linear : with its estimate's observations.
+    measurement : (m,) of each observation.
+    least : mm, noise that the observations have however little they scatter, as that of their last digit.
     """
     reduced = linear.reduced
     keep = np.ones(len(reduced.observed), dtype=bool)
@@ -167,7 +175,7 @@ def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64]) -> list[
         free = np.maximum(1 - np.einsum("ij,ij->i", U, U), 1e-12)
         rest = np.maximum(residual @ residual - residual**2 / free, 0.0)
         with np.errstate(divide="ignore"):
-            t = np.where(rest > 0, np.abs(residual) / np.sqrt(free * rest / dof), 0.0)
+            t = np.where(rest > 0, np.abs(residual) / np.sqrt(free * np.maximum(rest / dof, least**2)), 0.0)
         worst = int(np.argmax(t))
         if 2 * special.stdtr(dof, -t[worst]) * len(measurement) > GROSS:
             break

@@ -9,6 +9,7 @@ from scipy import linalg, stats
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.held_out import FOLDS, improvement
+from cmm_uq.diagnosis.numbering import numbered_by_place
 from cmm_uq.inference.posterior import Density
 from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.ballbar.observe import Ballbar
@@ -89,6 +90,10 @@ def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Fl
 def compared(before: MeasurementModel, after: MeasurementModel, groups: Ints, unseen: str) -> None:
     """All figures of an improvement against the joint distribution; its standard error is over what was left out."""
     whole = unseen == "placings"
+    xyz, rows = before.artefact.points.xyz, before.artefact.rows
+    away = [np.mean(np.sum((xyz - xyz.mean(axis=0)) ** 2, axis=1)[rows[groups == g]]) for g in np.unique(groups)]
+    _, index = np.unique(groups, return_inverse=True)
+    groups = np.argsort(np.argsort(away))[index]  # in folds by how far they are from the middle, whatever their numbers
     (first, rms_first), (second, rms_second) = (predicted(model, groups, whole=whole) for model in (before, after))
     found = improvement(before, after)
     assert found.unseen == unseen
@@ -141,8 +146,9 @@ def test_points_of_a_few_lines_are_predicted_as_the_press_residuals_of_all_colum
     Q = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0]
     residual, hat = y - Q @ (Q.T @ y), Q @ Q.T
     artefact = model.artefact
-    key = np.column_stack([artefact.measurement, artefact.points.point[artefact.rows[:, 0]]])
-    groups = np.unique(key, axis=0, return_inverse=True)[1].ravel()
+    groups = numbered_by_place(
+        model, np.column_stack([artefact.measurement, artefact.points.point[artefact.rows[:, 0]]])
+    )
     errors = []
     for k in range(FOLDS):
         out = np.isin(groups, np.unique(groups)[k::FOLDS])

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse, special
 
+from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
 from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.model.display import Display
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 
 _BLOCK, _COLUMNS = 150_000, 500
 """Numbers of a block that a processor's cache holds; columns weighed at a time."""
@@ -93,6 +94,10 @@ class Comparison:
         """(m,) what the baseline leaves of the observations."""
         return self.rest(self.observed[:, None])[:, 0]
 
+    @cached_property
+    def _standing(self) -> tuple[Ints, Floats]:
+        return standing_of(self.left, self._reached)
+
     @property
     def degrees_of_freedom(self) -> int:
         """m', how many observations that is worth."""
@@ -122,7 +127,7 @@ class Comparison:
         Where the display's steps matter, coordinates are rounded as the recording's were.
         """
         fine = kind.unrounded if self.display else None
-        found = (fine or kind).noise(random, len(sigma))
+        found = drawn(fine or kind, random, len(sigma), self.noise_scale, self._standing)
         if self.certified.size:
             found += self.certified @ random.standard_normal((self.certified.shape[1], len(sigma)))
         if not (self.display and fine):
@@ -200,7 +205,7 @@ class Comparison:
 
     @cached_property
     def _table(self) -> tuple[Floats, Floats]:
-        nodes = np.linspace(-16.0, 8.0, 1500) + np.log(float(self.left @ self.left))
+        nodes = np.linspace(-16.0, 8.0, 1500) + np.log(max(float(self.left @ self.left), 1e-300))
         exponent = (
             self.log_sigma - self.degrees_of_freedom * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
         )

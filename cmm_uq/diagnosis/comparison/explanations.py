@@ -24,14 +24,17 @@ EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
 UNKNOWN_SD = 0.05
 """mm, largest standard deviation of a nonparametric displacement."""
 
-_SHORTEST_PERIOD = 6.0
-"""mm."""
+_SHORTEST_PERIOD, _FINEST_PERIOD = 6.0, 2.0
+"""mm, searched, and told of besides where a longer one is found."""
+
+_STEP = 0.35
+"""Between frequencies that are tried, over one in the range of the readings."""
 
 _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
 _ROUGH = 0.25
 """Probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest."""
 
-_MOST_PERIODS = 240
+_MOST_PERIODS, _MOST_SHORTER = 240, 800
 _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
 
@@ -155,6 +158,26 @@ def finer(model: MeasurementModel, values: Floats, explanation: Explanation, mem
     return replace(explanation, members=tuple(kept))
 
 
+def shorter(model: MeasurementModel, values: Floats, explanation: Explanation) -> Explanation:
+    """A periodic effect with the periods below those that are searched: between positions at equal distances they fit as well.
+
+    Each octave is as probable as another, so that the shorter ones, of which there are so many, do not outweigh the others.
+    """
+    effect = every()[explanation.name]
+    axis = effect.shape[0].period_along
+    if axis is None:
+        return explanation
+    points = model.artefact.points.at(model.where(values))
+    step = _STEP / float(np.ptp(points.readings[axis]))
+    first = max(1 / member.shape[0] for member in explanation.members if member.shape) + step
+    frequencies = np.arange(first, 1 / _FINEST_PERIOD, step)[:_MOST_SHORTER]
+    more = tuple(
+        Member(_seen(model, effect, points, (float(1 / f),), values), (float(1 / f),), float(first / f))
+        for f in frequencies
+    )
+    return replace(explanation, members=(*explanation.members, *more))
+
+
 def evenly(effect: Effect, shape: Floats) -> Floats:
     """An effect's nonlinear parameter on the scale on which it is tried evenly: frequency for a period, else its logarithm."""
     return 1 / shape if effect.shape[0].period_along else np.log(shape)
@@ -192,7 +215,7 @@ def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
     span = float(np.ptp(readings))
     if span <= 2 * _SHORTEST_PERIOD:
         return
-    step = 0.35 / span
+    step = _STEP / span
     highest = min(1 / _SHORTEST_PERIOD, _MOST_PERIODS * step)
     for frequency in np.arange(0.7 / span, highest, step):
         yield (float(1 / frequency),)

@@ -15,9 +15,9 @@ from scipy import special
 
 from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.diagnosis.comparison.evidence import Comparison
-from cmm_uq.diagnosis.comparison.explanations import Explanation, finer, known, several
+from cmm_uq.diagnosis.comparison.explanations import Explanation, Member, finer, known, several, shorter
 from cmm_uq.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
-from cmm_uq.diagnosis.comparison.stack import Version
+from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Version
 from cmm_uq.diagnosis.comparison.unknown_functions import unknown
 from cmm_uq.diagnosis.noise import sigma_grid
 from cmm_uq.diagnosis.recorded_noise import noise_kinds
@@ -37,7 +37,16 @@ _MECHANISM = 0.2
 """Probability from which an effect is asserted when all that is asked is whether it has its own form or any other."""
 
 _PROBABLE = 0.02
-"""Probability from which the period in a combination is refined."""
+"""Probability of a combination from which the period in it is refined."""
+
+_SHOWN = 6.0
+"""Log evidence of a period from which shorter ones are tried besides: less shows none."""
+
+_BETWEEN = 0.12
+"""Part of the log evidence that a period may lose where it lies between two trials (sinc² at half of a step, and more)."""
+
+_IMPROBABLE = 12.0
+"""Log evidence below that of the best from which a period is not followed."""
 
 _AGAIN = 3
 """Times that everything is compared again about what was found."""
@@ -90,6 +99,7 @@ class Found:
     model : the job's model with what was left out.
     unexplained : probability that something unknown acts besides.
     rough : of the effects found, those of which another form is more probable than their own.
+    stated : standard uncertainty of a coordinate, mm, as the job states it.
     """
 
     first: ModelComparison
@@ -100,6 +110,7 @@ class Found:
     model: MeasurementModel
     unexplained: float
     rough: Key = frozenset()
+    stated: float | None = None
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -146,23 +157,37 @@ def _without(model: MeasurementModel, whole: MeasurementModel) -> Floats:
 def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: int) -> Found:
     first = model_comparison(model, stated, seed)
     if first.p_value >= alpha:
-        return Found(first, first.comparison, None, frozenset(), (), model, 0.0)
+        return Found(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)
     combinations = explore(first.comparison)
-    if shapes := _shapes(combinations):
+    if shaped := _shaped(combinations):
         explanations = [
-            finer(first.model, first.values, e, shapes[i]) if i in shapes else e
-            for i, e in enumerate(first.explanations)
+            _refined(first, combinations, i) if i in shaped else e for i, e in enumerate(first.explanations)
         ]
         first = replace(first, comparison=replace(first.comparison, explanations=explanations))
         combinations = explore(first.comparison)
     chosen = asserted(combinations)
     versions = combinations.versions(chosen)
-    found = model if not chosen else _with(first, versions, chosen)
+    found = model if not chosen else with_effects(first, versions, chosen)
     last = comparison_of(found, stated, ())
     rough = frozenset(
         i for i in chosen if _rough(first.comparison, versions, i) > ASSERTED or _less_than_function(combinations, i)
     )
-    return Found(first, last, combinations, chosen, versions, found, combinations.unknown_beside(chosen), rough)
+    beside = combinations.unknown_beside(chosen)
+    return Found(first, last, combinations, chosen, versions, found, beside, rough, stated)
+
+
+def without(found: Found, gone: Key) -> Found:
+    """The same search with some of the effects not asserted: what they stood for stays unexplained."""
+    chosen = found.chosen - gone
+    combinations = found.combinations
+    if combinations is None or not gone:
+        return found
+    versions = combinations.versions(chosen)
+    model = with_effects(found.first, versions, chosen) if chosen else found.first.model
+    last = comparison_of(model, found.stated, ()) if chosen else found.first.comparison
+    return replace(
+        found, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0, rough=found.rough - gone
+    )
 
 
 def _rough(comparison: Comparison, versions: Sequence[Version], index: int) -> float:
@@ -175,14 +200,50 @@ def _rough(comparison: Comparison, versions: Sequence[Version], index: int) -> f
     return float(weight[[member.rough for member in members]].sum())
 
 
-def _shapes(combinations: Combinations) -> dict[int, set[int]]:
-    """Members of the effects with a nonlinear parameter, by explanation, that probable combinations contain."""
-    found: dict[int, set[int]] = {}
-    for key, probability in combinations.probability.items():
-        for version in combinations.found[key].versions if probability > _PROBABLE else ():
-            if combinations.explanations[version.explanation].members[version.member].shape:
-                found.setdefault(version.explanation, set()).add(version.member)
-    return found
+def _shaped(combinations: Combinations) -> set[int]:
+    """Effects with a nonlinear parameter that probable combinations contain."""
+    return {
+        version.explanation
+        for key, probability in combinations.probability.items()
+        for version in (combinations.found[key].versions if probability > _PROBABLE else ())
+        if combinations.explanations[version.explanation].members[version.member].shape
+    }
+
+
+def _refined(first: ModelComparison, combinations: Combinations, index: int) -> Explanation:
+    """An effect with a nonlinear parameter, finer wherever that fits beside what is most probable with it, however short."""
+    most = max(
+        (key for key in combinations.found if index in key), key=lambda key: combinations.found[key].log_posterior
+    )
+    others = [v for v in combinations.found[most].versions if v.explanation != index]
+    explanation = first.explanations[index]
+    gains = _gains(first, explanation, others)
+    if gains.max() > _SHOWN:
+        explanation = shorter(first.model, first.values, explanation)
+        gains = _gains(first, explanation, others)
+    below = gains.max() - gains
+    shaped = np.array([bool(member.shape) for member in explanation.members])
+    between = _BETWEEN * max(float(gains.max()), 0.0) + 1.0
+    fits = np.flatnonzero(shaped & (below < between)).tolist()
+    refined = finer(first.model, first.values, explanation, fits)
+    # what does not fit at all keeps its weight, and costs nothing: columns of zeros are invisible
+    lost = set(np.flatnonzero(shaped & (below > max(_IMPROBABLE, between))).tolist())
+    weight = sum(explanation.members[i].weight for i in lost)
+    kept = tuple(member for i, member in enumerate(refined.members) if i not in lost)
+    nothing = Member(np.zeros((len(first.comparison.left), 1)), weight=weight)
+    return replace(refined, members=(*kept, nothing) if lost else kept)
+
+
+def _gains(first: ModelComparison, explanation: Explanation, others: Sequence[Version]) -> Floats:
+    """Log evidence (members,) of each version of an explanation beside others, over that of the others alone."""
+    beside = [replace(e, members=(e.members[v.member],)) for v in others for e in [first.explanations[v.explanation]]]
+    comparison = replace(first.comparison, explanations=[explanation, *beside])
+    given = [Version(k, 0, v.amplitude) for k, v in enumerate(others, 1)]
+    evidence = np.full(len(explanation.members), -np.inf)
+    for group, cube in comparison.each(None, given, (0,)):
+        own = group.explanation == 0
+        evidence[group.member[own]] = special.logsumexp(cube[own, :, 0], axis=1) - np.log(AMPLITUDES)
+    return np.asarray(evidence - comparison.log_evidence_of(given)[0], dtype=np.float64)
 
 
 def asserted(combinations: Combinations) -> Key:
@@ -203,7 +264,7 @@ def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
         for i, effect in enumerate(combinations.explanations):
             if not function.could_be(effect) or i in instead or combinations.of(i) < _MECHANISM:
                 continue
-            if sum(p for key, p in combinations.probability.items() if i in key or j in key) >= ASSERTED:
+            if combinations.of_any(frozenset((i, j))) >= ASSERTED:
                 found.add(i)
     return frozenset(found)
 
@@ -220,9 +281,12 @@ def _less_than_function(combinations: Combinations, index: int) -> bool:
 
 def with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
     """Probability of an effect or one that these data cannot tell from it."""
-    rivals = combinations.instead(chosen, index)
-    those = {index, *(i for i, odds in rivals.items() if odds > NOT_TOLD_APART)}
-    return float(sum(p for key, p in combinations.probability.items() if those & key))
+    return combinations.of_any(rivals_of(combinations, chosen, index) | {index})
+
+
+def rivals_of(combinations: Combinations, chosen: Key, index: int) -> Key:
+    """Known effects that these data cannot tell from one of those chosen."""
+    return frozenset(i for i, odds in combinations.instead(chosen, index).items() if odds > NOT_TOLD_APART)
 
 
 def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -> ModelComparison:
@@ -256,7 +320,7 @@ def comparison_of(model: MeasurementModel, stated: float | None, candidates: Seq
     )  # fmt: skip
 
 
-def _with(compared: ModelComparison, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
+def with_effects(compared: ModelComparison, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
     """The model with known effects more, of the shapes that are most probable together."""
     shapes, added = dict(compared.model.shapes), []
     for version in sorted(versions, key=lambda v: v.explanation):

@@ -30,7 +30,7 @@ _MANY_DIRECTIONS, _SEEN = 12, 1e-6
 _PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")
 """Beginnings of columns that belong to a point's place, or have functions of their own."""
 
-_SUDDEN = ("time_s", "row")
+_SUDDEN = ("time_s", "order")
 """Covariates of an observation at which an error may jump."""
 
 _KEPT = 1e-3
@@ -155,12 +155,16 @@ def _along(axis: int, factor: Floats) -> Floats:
 
 
 def covariates(model: MeasurementModel) -> dict[str, Floats]:
-    """What each used observation may depend on, (m,): direction, order, and the mean of every recorded column."""
-    points, artefact = model.artefact.points, model.artefact
+    """What each used observation may depend on, (m,): the mean of every recorded column, and its place in the order of time.
+
+    Without a time the order of rows says nothing: whoever sorted them is no cause.
+    """
+    points = model.artefact.points
     found = {}
     for name, values in points.columns.items():
         found[name] = mean_of(model, values)
-    found["row"] = np.arange(len(artefact.measurement), dtype=np.float64)[model.used]
+    if "time_s" in found:
+        found["order"] = np.unique(found["time_s"], return_inverse=True)[1].ravel().astype(np.float64)
     kept: dict[str, Floats] = {}
     for name, values in found.items():
         if len(np.unique(values)) < 3 or any(abs(np.corrcoef(values, other)[0, 1]) > 0.999 for other in kept.values()):

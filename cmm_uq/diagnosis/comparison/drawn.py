@@ -1,0 +1,57 @@
+"""Noise drawn so that nothing but the recording's values decides it: no order of rows, no numbering, no direction of an axis.
+
+What is drawn first is white, in the order of what the baseline leaves of the observations and along it; the symmetric root of
+the covariance turns it into noise. Rows that are exchanged, numbered anew or mirrored then have the same noise as before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from cmm_uq.diagnosis.noise import Kind
+from cmm_uq.points import Floats, Ints
+
+_DIGITS = 7
+"""Of what is left, over its root mean square, that rounding spares."""
+
+
+def drawn(
+    kind: Kind, random: np.random.Generator, draws: int, noise_scale: Floats, standing: tuple[Ints, Floats]
+) -> Floats:  # fmt: skip
+    """Noise (m, draws) of one kind, over the noise scale, a reading's standard deviation being one.
+
+    Parameters
+    ----------
+    kind : of noise.
+    random : source of the draws.
+    draws : how many.
+    noise_scale : (m,) of the observations.
+    standing : see :func:`standing_of`.
+    """
+    order, side = standing
+    white = np.empty((len(order), draws))
+    white[order] = random.standard_normal((len(order), draws))
+    white *= side[:, None]
+    # the whitening is an orthogonal matrix T between two diagonal ones: D·T·S; the root is S⁻¹·Tᵀ·D⁻¹·T
+    turned = kind.whitening @ sparse.diags_array(1 / noise_scale)
+    length = np.sqrt(np.asarray(turned.power(2).sum(axis=1)).ravel())
+    found = kind.coloured((turned @ white) / length[:, None])
+    return found + kind.slow @ random.standard_normal((kind.slow.shape[1], draws)) if kind.slow.size else found
+
+
+def standing_of(left: Floats, reached: Floats) -> tuple[Ints, Floats]:
+    """Order and side of the observations that follow from their values alone.
+
+    Parameters
+    ----------
+    left : (m,) what the baseline leaves of them.
+    reached : (m, q) orthonormal basis of what it reaches.
+
+    Returns
+    -------
+    (m,) indices by the size of what is left, equal ones by how much the baseline reaches of them; (m,) sign of what is left.
+    """
+    size = float(np.sqrt(np.mean(left**2))) or 1.0
+    keys = (left / size, np.sum(reached**2, axis=1), np.abs(left) / size)
+    return np.lexsort([np.round(key, _DIGITS) for key in keys]), np.where(left < 0, -1.0, 1.0)

@@ -1,0 +1,135 @@
+"""What the choice of an explanation costs: what each that remains makes of effects, figures and decisions, and on average."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cmm_uq.conformity.accuracy import TITLES, UNITS
+from cmm_uq.diagnosis.rivals import Named, Rival
+from cmm_uq.documents.document import Column, Section, Table
+from cmm_uq.documents.quantity_data import quantity_data
+from cmm_uq.documents.result import Diagnosed
+from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability, title_of_parameter
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, plural, say
+from cmm_uq.physics.catalogue import every
+from cmm_uq.uncertainty.quantity import Quantity
+
+_SHOWN = 4
+"""Explanations that a table has columns for."""
+
+
+def costs_section(found: Diagnosed) -> Section:
+    """A table of what remains; without blocks where one explanation is settled."""
+    title, rivals = say("What the choice of an explanation costs"), found.diagnosis.remaining.rivals
+    if not rivals:
+        return Section(title, ())
+    rows = (*_named(found), *_figures(found), *_decisions(found))
+    heads = (
+        Column(say("Quantity"), numeric=False),
+        *(
+            Column(say("{what}: {probability}", what=_what(one), probability=probability(one.probability)))
+            for one in rivals[:_SHOWN]
+        ),
+        Column(say("Averaged")), Column(say("Unit"), numeric=False),
+    )  # fmt: skip
+    notes: list[Text] = [
+        say(
+            "Each column is what follows if this explanation is the right one; figures and decisions are then corrected for "
+            "its effects. Averages are weighted by the probabilities; a certificate states those of the error factors."
+        )
+    ]
+    told = sum(one.probability for one in rivals)
+    more = max(len(rivals) - _SHOWN, 0)
+    notes.append(
+        say(
+            "{more}They are averaged over explanations with {told} of the probability together; each of the rest has "
+            "less.",
+            more=plural(
+                more, one=say("One further explanation is in results.json. "),
+                many=say("{count} further explanations are in results.json. ", count=more),
+            ) if more else NOTHING,
+            told=probability(told),
+        )
+    )  # fmt: skip
+    return Section(title, (Table(say("What follows from each explanation that remains"), heads, rows, tuple(notes)),))
+
+
+def costs_data(found: Diagnosed) -> dict[str, Any]:
+    """For results.json: what remains, and the average; nothing where one explanation is settled."""
+    remaining, costs = found.diagnosis.remaining, found.costs
+    if not remaining.rivals:
+        return {}
+    each: list[dict[str, Any]] = []
+    for i, rival in enumerate(remaining.rivals):
+        cost = None if costs is None else costs.each[i]
+        each.append({
+            "probability": rival.probability, "effects": list(rival.effects), "functions": list(rival.functions),
+            "estimates": _data(rival.named), "parameters": _data(rival.added),
+            "figures": {} if cost is None else _each(cost.figures),
+            "decisions": [] if cost is None else [one.outcome for one in cost.statements],
+        })  # fmt: skip
+    whole = {
+        "estimates": _data(remaining.averaged),
+        "figures": {} if costs is None else _each(costs.figures),
+        "decisions": [] if costs is None else [dict(one) for one in costs.decisions],
+    }
+    return {"remaining": each, "averaged": whole}
+
+
+def _what(rival: Rival) -> Text:
+    """An explanation in short."""
+    words = (*names(rival.effects), *rival.functions)
+    return commas(words) if words else say("nothing missing")
+
+
+def _named(found: Diagnosed) -> list[tuple[Text, ...]]:
+    remaining = found.diagnosis.remaining
+    return [
+        (
+            title_of_parameter(every()[effect], name),
+            *(_size(rival.named[effect][name]) for rival in remaining.rivals[:_SHOWN]), _size(quantity), quantity.unit,
+        )
+        for effect, parameters in remaining.averaged.items() for name, quantity in parameters.items()
+    ]  # fmt: skip
+
+
+def _figures(found: Diagnosed) -> list[tuple[Text, ...]]:
+    costs = found.costs
+    if costs is None:
+        return []
+    return [
+        (TITLES[name], *(_size(cost.figures[name]) for cost in costs.each[:_SHOWN]), _size(quantity), UNITS[name])
+        for name, quantity in costs.figures.items()
+    ]
+
+
+def _decisions(found: Diagnosed) -> list[tuple[Text, ...]]:
+    costs = found.costs
+    if costs is None:
+        return []
+    return [
+        (
+            say("{standard}, {quantity}", standard=Verbatim(first.facts.standard), quantity=first.quantity),
+            *(OUTCOME_WORDS[cost.statements[i].outcome] for cost in costs.each[:_SHOWN]),
+            commas(
+                say("{outcome} {probability}", outcome=OUTCOME_WORDS[outcome], probability=probability(p))
+                for outcome, p in costs.decisions[i].items()
+            ),
+            NOTHING,
+        )
+        for i, first in enumerate(costs.each[0].statements)
+    ]
+
+
+def _size(quantity: Quantity) -> Text:
+    value, U, _ = expanded(quantity)
+    return say("{value} ± {U}", value=value, U=U)
+
+
+def _data(named: Named) -> dict[str, Any]:
+    return {effect: _each(parameters) for effect, parameters in named.items()}
+
+
+def _each(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
+    return {name: quantity_data(quantity) for name, quantity in quantities.items()}

@@ -1,0 +1,66 @@
+"""Effects that are probable and yet not asserted, in words: why, and which periods fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from cmm_uq.diagnosis.asserting import Withheld
+from cmm_uq.diagnosis.periods import Mode
+from cmm_uq.documents.wording import probability
+from cmm_uq.messages import NOTHING, Text, commas, say
+from cmm_uq.uncertainty.rounding import rounded
+
+_TOLD = 8
+"""Periods that a sentence tells; results.json has all."""
+
+
+def sentences(withheld: Sequence[Withheld]) -> list[Text]:
+    """A sentence on each."""
+    return [
+        say(
+            "{title} (probability {probability}) is not asserted: {why}{periods}.",
+            title=item.title, probability=probability(item.probability), why=item.why, periods=_told(item.modes),
+        )
+        for item in withheld
+    ]  # fmt: skip
+
+
+def other_periods(modes: Sequence[Mode]) -> Text:
+    """A sentence on further periods that fit, to follow that on an effect; nothing where there are none."""
+    return say("Other periods that fit: {periods}.", periods=_listed(modes)) if modes else NOTHING
+
+
+def withheld_data(withheld: Sequence[Withheld]) -> list[dict[str, Any]]:
+    """For results.json."""
+    return [
+        {
+            "effect": item.effect, "probability": item.probability, "why": item.why,
+            "periods_mm": periods_data(item.modes),
+        }
+        for item in withheld
+    ]  # fmt: skip
+
+
+def periods_data(modes: Sequence[Mode]) -> list[dict[str, float]]:
+    """Every period that fits, for results.json."""
+    return [{"value": m.period.value, "u": m.period.u, "probability": m.probability} for m in modes]
+
+
+def _told(modes: Sequence[Mode]) -> Text:
+    return say(" ({periods})", periods=_listed(modes)) if modes else NOTHING
+
+
+def _listed(modes: Sequence[Mode]) -> Text:
+    told = [_one(mode) for mode in modes[:_TOLD]]
+    if len(modes) > _TOLD:
+        told.append(say("and {count} more", count=len(modes) - _TOLD))
+    return commas(told)
+
+
+def _one(mode: Mode) -> Text:
+    value, U = rounded(mode.period.value, mode.period.expanded)
+    return say(
+        "{value} ± {U} {unit}: {probability}",
+        value=value, U=U, unit=mode.period.unit, probability=probability(mode.probability),
+    )  # fmt: skip
