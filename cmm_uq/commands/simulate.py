@@ -63,7 +63,8 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
 
         refuse_unfit(job)
     artefact = observe(job.facts.artefact, points, where=job.recording_path)
-    acting = effects(tuple(truth.effects), where=f"{truth_path} [effects]")
+    where = f"{truth_path} [effects]"
+    acting = tuple(_acting(artefact, effect, where) for effect in effects(tuple(truth.effects), where=where))
     _refuse_unrecorded(points, acting, truth, truth_path)
     given = [_given(effect, truth, truth_path) for effect in acting]
     model = MeasurementModel(
@@ -77,6 +78,14 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     if not np.all(np.abs(drawn) <= LONGEST_MM):
         raise CmmUqError(f"the coordinates would go beyond {LONGEST_MM:g} mm", where=truth_path, fix=_FIX)
     return points.at(drawn)
+
+
+def _acting(artefact: Artefact, effect: Effect, where: str) -> Effect:
+    """An effect as it acts on this artefact."""
+    try:
+        return artefact.acting(effect)
+    except CmmUqError as error:
+        raise CmmUqError(error.problem, where=where, fix=error.fix) from None
 
 
 def _given(effect: Effect, truth: Truth, truth_path: str) -> tuple[Floats, tuple[float, ...]]:

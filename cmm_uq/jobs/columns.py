@@ -42,6 +42,7 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "speed_mm_s": "Scanning speed.",
     "gamma_deg": "Turn of the digitizer about its own axis.",
     "depth_mm": "Scan depth of the point, along the digitizer's line of sight.",
+    "turned_deg": "By how much a sphere was turned about Z against its first set-up: what turns with it is its own form.",
     "tip_x_mm": "Offset of the stylus tip from the end of the ram, along x.",
     "tip_y_mm": "Offset of the stylus tip from the end of the ram, along y.",
     "tip_z_mm": "Offset of the stylus tip from the end of the ram, along z.",

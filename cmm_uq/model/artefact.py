@@ -9,14 +9,18 @@ Along which directions does a recording speak about errors (:meth:`~Artefact.pro
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.messages import NOTHING, Text, foreign, say
+from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.units import Unit, unit
 
@@ -136,6 +140,32 @@ class Artefact(ABC):
     @abstractmethod
     def size_change(self) -> Floats:
         """Change of the observations, (m, s), for one mm of each size."""
+
+    def own_faults(self) -> Iterable[Effect]:
+        """What may be wrong with the artefact itself: effects of the catalogue, made for this one."""
+        return ()
+
+    @cached_property
+    def faults(self) -> Mapping[str, Effect]:
+        """The same by name."""
+        return {effect.name: effect for effect in self.own_faults()}
+
+    def acting(self, effect: Effect) -> Effect:
+        """An effect as it acts here: a fault of the artefact is that of this one.
+
+        Raises
+        ------
+        CmmUqError : this kind of artefact has no such fault.
+        """
+        if not effect.of_artefact or effect.belongs_to(self.points):
+            return effect
+        if effect.name not in self.faults:
+            raise CmmUqError(
+                f"a recording of kind {self.kind!r} has no {effect.name}",
+                where="job.toml [model] effects",
+                fix="Leave it out" + (f"; it has {', '.join(self.faults)}" if self.faults else ""),
+            )
+        return self.faults[effect.name]
 
     def words_of(self, observation: int) -> Text:
         """What an observation is of: a whole (measurement, repeat), or a point of one."""

@@ -73,7 +73,7 @@ class MeasurementModel:
     Parameters
     ----------
     artefact : with its recording.
-    effects : what acts.
+    effects : what acts; a fault of the artefact is taken as that of this one.
     sigma : standard uncertainty of one recorded coordinate, mm; ``None`` when it is to be estimated.
     used : (m,) which observations to use; all by default.
     shapes : nonlinear parameters, held, of the effects that have some, by the effect's name.
@@ -84,7 +84,7 @@ class MeasurementModel:
 
     Raises
     ------
-    CmmUqError : the nonlinear parameter of an effect is not given.
+    CmmUqError : the nonlinear parameter of an effect is not given, or the artefact has no such fault.
     """
 
     artefact: Artefact
@@ -96,6 +96,7 @@ class MeasurementModel:
     least_noise: float = 0.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", tuple(self.artefact.acting(effect) for effect in self.effects))
         if not len(self.used):
             object.__setattr__(self, "used", np.ones(len(self.artefact.noise_scale), dtype=bool))
         for effect in self.effects:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.geometry.rotation import nearest_rotations
 from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.artefact import Artefact
@@ -73,9 +74,7 @@ class Rigid(Artefact):
         """
         body = self.body if shape is None else shape
         moment = self.placings.sums(np.einsum("ni,nj->nij", xyz - self.placings.means(xyz), body))
-        U, _, Vt = np.linalg.svd(moment)
-        U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
-        return np.asarray((U @ Vt)[self.placings.index], dtype=np.float64)
+        return np.asarray(nearest_rotations(moment)[self.placings.index], dtype=np.float64)
 
     def words_of(self, observation: int) -> Text:
         """See :meth:`Artefact.words_of`: one coordinate of a point."""

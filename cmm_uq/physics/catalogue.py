@@ -1,7 +1,8 @@
 """Every effect by its name.
 
 ``CATALOGUE`` holds the effects that every job file may count on. ``FURTHER`` holds rarer ones: a job may name them, simulate
-them and have them estimated like the others; a diagnosis thinks of them less readily. Other packages add theirs
+them and have them estimated like the others; a diagnosis thinks of them less readily. ``OWN`` holds the faults of the artefact
+itself. Other packages add theirs
 (:mod:`cmm_uq.physics.plugins`); :func:`every` has them all.
 """
 
@@ -13,7 +14,19 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from cmm_uq.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.physics import drives, probing, reversal, rigid_body, scales, scanning, stylus, thermal, warming
+from cmm_uq.physics import (
+    drives,
+    own_errors,
+    own_states,
+    probing,
+    reversal,
+    rigid_body,
+    scales,
+    scanning,
+    stylus,
+    thermal,
+    warming,
+)
 from cmm_uq.physics.effect import Effect
 from cmm_uq.physics.plugins import EffectPlugin, outside_effects
 
@@ -30,7 +43,10 @@ FURTHER = MappingProxyType(
 )
 """Further built-in effects by name."""
 
-EVERY = MappingProxyType({**CATALOGUE, **FURTHER})
+OWN = MappingProxyType({effect.name: effect for effect in (*own_errors.EFFECTS, *own_states.EFFECTS)})
+"""Faults of the artefact itself by name: what they do follows from the artefact that has them."""
+
+EVERY = MappingProxyType({**CATALOGUE, **FURTHER, **OWN})
 """All built-in effects by name."""
 
 

@@ -20,11 +20,13 @@ from cmm_uq.messages import Text
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import Unit, unit
 
-CONTRACT, FURTHER = "contract", "further"
-"""Tiers: effects that every job file may count on, and rarer ones that only some machines and recordings show."""
+CONTRACT, FURTHER, OWN = "contract", "further", "own"
+"""Tiers: effects that every job file may count on, rarer ones that only some machines and recordings show, and faults of the
+artefact itself."""
 
-PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1}
-"""How readily an effect of a tier is thought of, beside others: a judgement of how many machines show it."""
+PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1, OWN: 0.1}
+"""How readily an effect of a tier is thought of, beside others: a judgement of how many machines show it. A fault of the
+artefact has a weight by what is known of that artefact."""
 
 TRIALS = 7
 
@@ -97,8 +99,11 @@ class Effect(ABC):
     tier : ``contract`` or ``further``: how readily it is to be thought of.
     idealised_over : axis, or column, over which its form is the simplest of many that its mechanism can have, if it is that.
     imitated_by : nonparametric terms that could pass for it.
+    stands_for : nonparametric terms that are nothing else than it.
     along_motion : carriage along whose motion e goes, however that leans; ``None`` where e keeps to the coordinates.
     plane : pair of axes whose squareness it is (``xy``, ``yz``, ``zx``), if it is one; it then gives its :meth:`lean`.
+    of_artefact : whether it is a fault of the artefact itself, which only that artefact can say in full.
+    mostly : part of its prior standard deviation that it mostly keeps to, where a certificate says so and may be wrong.
     """
 
     name: str
@@ -112,8 +117,11 @@ class Effect(ABC):
     tier: str = CONTRACT
     idealised_over: str | None = None
     imitated_by: tuple[Nonparametric, ...] = ()
+    stands_for: tuple[Nonparametric, ...] = ()
     along_motion: str | None = None
     plane: str | None = None
+    of_artefact: bool = False
+    mostly: float = 1.0
 
     @property
     def prior_weight(self) -> float:
@@ -137,6 +145,21 @@ class Effect(ABC):
         CmmUqError : a column is missing, or it is no squareness.
         """
         raise CmmUqError(f"{self.name} is no squareness")
+
+    def belongs_to(self, points: Points) -> bool:
+        """Whether a fault of an artefact is that of the artefact in these points."""
+        return False
+
+    def shown_in(self, points: Points) -> bool:
+        """Whether a recording has the set-ups that it takes to know it from an offset of each set-up."""
+        return True
+
+    def course(self, points: Points) -> Floats | None:
+        """Where each point is on the axis, or in the column, of ``idealised_over``, (n,); ``None`` without one."""
+        over = self.idealised_over
+        if over is None:
+            return None
+        return points.readings[over] if over in points.readings else points.column(over)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """Values of the shape worth trying, evenly spread in their logarithm; one empty tuple without a shape."""

@@ -48,7 +48,7 @@ class _Outside(Effect):
         self.mechanism, self.points_to = effect.mechanism, foreign(effect.points_to)
         self.coefficients, self.shape, self.columns = effect.coefficients, effect.shape, effect.columns
         self.tier, self.idealised_over, self.imitated_by = effect.tier, effect.idealised_over, effect.imitated_by
-        self.along_motion, self.plane = effect.along_motion, effect.plane
+        self.along_motion, self.plane, self.stands_for = effect.along_motion, effect.plane, effect.stands_for
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -61,6 +61,11 @@ class _Outside(Effect):
     def lean(self, points: Points) -> Floats:
         """See :meth:`Effect.lean`."""
         return np.asarray(self._plugin.attempt(lambda: self._effect.lean(points)), dtype=np.float64)
+
+    def course(self, points: Points) -> Floats | None:
+        """See :meth:`Effect.course`."""
+        found = self._plugin.attempt(lambda: self._effect.course(points))
+        return None if found is None else np.asarray(found, dtype=np.float64)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """See :meth:`Effect.trials`."""

@@ -12,7 +12,7 @@ from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.kinds import artefact_of
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
-from cmm_uq.physics.catalogue import CATALOGUE, EVERY, FURTHER
+from cmm_uq.physics.catalogue import CATALOGUE, EVERY, FURTHER, OWN
 from cmm_uq.physics.effect import Effect, Parameter, Shape
 from cmm_uq.points import Floats, Points
 from tests.recordings import with_columns
@@ -74,10 +74,14 @@ def seen_by(effect: Effect, artefact: Artefact) -> bool:
     points = artefact.points
     if any(column not in points.columns for column in effect.columns):
         return False
+    if effect.of_artefact and effect.name not in artefact.faults:
+        return False
+    sizes = [c.prior_sd for c in effect.coefficients]
+    effect = artefact.acting(effect)
     model = MeasurementModel(artefact, ())
     values = np.array([size.nominal for size in artefact.sizes])
     shape = list(effect.trials())[-4 if effect.shape else 0]
-    basis = effect.basis(points, shape) * [c.prior_sd for c in effect.coefficients]
+    basis = effect.basis(points, shape) * (sizes if len(sizes) == len(effect.coefficients) else sizes[0])
     shown = model.seen(basis, values)
     free = Freedoms.of(artefact.placing(model.placed(values))).dense()
     left = shown - free @ np.linalg.lstsq(free, shown, rcond=None)[0] if free.shape[1] else shown
@@ -114,8 +118,9 @@ def table() -> str:
     """Both tiers, and what every effect points to."""
     artefacts = {kind: recorded(kind) for kind in EXAMPLES}
     parts = []
-    for title, tier in (("Effects of every job", dict(CATALOGUE)), ("Further effects", dict(FURTHER))):
-        rows = [row(family, artefacts) for family in families(tier)]
+    tiers = {"Effects of every job": CATALOGUE, "Further effects": FURTHER, "Faults of the artefact itself": OWN}
+    for title, tier in tiers.items():
+        rows = [row(family, artefacts) for family in families(dict(tier))]
         head = "| effect | what it does | formula | parameters, prior | columns | seen by |\n|" + 6 * " --- |"
         parts.append(f"## {title}\n\n{head}\n" + "\n".join(rows))
     head = "| effect | cause in | what it points to |\n| --- | --- | --- |"

@@ -21,6 +21,7 @@ from tests.recordings import TRAVEL
 PACKAGE = ROOT / "cmm_uq"
 DEFINE = {f"physics/{name}.py" for name in (
     "rigid_body", "drives", "thermal", "probing", "reversal", "scales", "warming", "stylus", "scanning",
+    "own_errors", "own_states",
 )}  # fmt: skip
 """Modules of the effects' own classes."""
 BEGIN = re.compile(r"jobs/beginning|kinds/\w+/begin")
@@ -83,11 +84,17 @@ def test_rarer_effects_are_thought_of_a_tenth_as_readily() -> None:
 
 
 def test_only_straightness_rotation_hysteresis_and_drift_are_the_simplest_of_many_forms() -> None:
-    over = {name: effect.idealised_over for name, effect in EVERY.items() if effect.idealised_over}
+    over = {name: e.idealised_over for name, e in EVERY.items() if e.idealised_over and not e.of_artefact}
     axis_of = {name: "time_s" if name.startswith("drift") else name.split("_")[1] for name in over}
     assert over == axis_of
     assert {name.split("_")[0] for name in over} == {"straightness", "rotation", "hysteresis", "drift"}
     assert len(over) == 6 + 9 + 3 + 3
+
+
+def test_what_an_artefact_has_like_a_machine_may_have_the_same_other_forms() -> None:
+    own = {name: e.idealised_over for name, e in EVERY.items() if e.idealised_over and e.of_artefact}
+    assert own == {name: EVERY[name.removeprefix("artefact_")].idealised_over for name in own}
+    assert len(own) == 6 + 9
 
 
 @pytest.mark.parametrize(("term", "names"), [

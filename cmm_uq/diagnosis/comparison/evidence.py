@@ -26,6 +26,9 @@ from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.model.display import Display
 from cmm_uq.points import Floats, Ints
 
+_WIDE, _KEPT = 30, 40
+"""Columns of what is given from which on what follows from it is kept, and how often."""
+
 _BLOCK, _COLUMNS = 150_000, 500
 """Numbers of a block that a processor's cache holds; columns weighed at a time."""
 
@@ -375,6 +378,21 @@ class Comparison:
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
+        key = tuple(given)
+        if data is not None or sum(self._columns(version).shape[1] for version in key) < _WIDE:
+            return self._weigh(data, given)
+        if key not in self._besides:
+            while len(self._besides) >= _KEPT:
+                del self._besides[next(iter(self._besides))]
+            self._besides[key] = self._weigh(None, given)
+        return self._besides[key]
+
+    @cached_property
+    def _besides(self) -> dict[tuple[Version, ...], _Beside]:
+        """The recording beside what was given last, where that is many columns."""
+        return {}
+
+    def _weigh(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         plain = self.left[:, None] if data is None else data
         weighed = self._left_weighed if data is None else self._by_noise(data)
         squares = np.einsum("mb,kmb->kb", plain, weighed)

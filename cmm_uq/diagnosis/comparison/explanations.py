@@ -14,6 +14,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect, Nonparametric
 from cmm_uq.plugins import BrokenPluginError
@@ -33,6 +34,9 @@ _STEP = 0.35
 _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
 _ROUGH = 0.25
 """Probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest."""
+
+_BEYOND = 0.1
+"""How readily an effect is thought of beyond the size that it mostly keeps to (:attr:`Effect.mostly`)."""
 
 _MOST_PERIODS, _MOST_SHORTER = 240, 800
 _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
@@ -72,6 +76,7 @@ class Explanation:
     term : of a nonparametric one that effects may be imitated by.
     imitated_by : of an effect.
     weight : how readily it is thought of, beside others of its kind.
+    effect : that it is, if it is one.
     """
 
     name: Text
@@ -82,6 +87,7 @@ class Explanation:
     term: Nonparametric | None = None
     imitated_by: tuple[Nonparametric, ...] = ()
     weight: float = 1.0
+    effect: Effect | None = None
 
     @property
     def shaped(self) -> bool:
@@ -104,8 +110,10 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
     """
     points = model.artefact.points.at(model.where(values))
     found = []
-    for effect in every().values():
-        if effect.name in named or any(column not in points.columns for column in effect.columns):
+    for effect in considered(model.artefact):
+        if effect.name in named or not effect.shown_in(points):
+            continue
+        if any(column not in points.columns for column in effect.columns):
             continue
         try:
             members = tuple(
@@ -116,26 +124,39 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
         except CmmUqError:  # the job does not give the travel that this effect needs
             continue
         if any(np.any(member.columns) for member in members):
+            if effect.mostly < 1:
+                members = (*(replace(m, columns=effect.mostly * m.columns) for m in members),
+                           *(replace(m, weight=_BEYOND) for m in members))  # fmt: skip
             members = (*members, *_roughly(model, effect, points, values))
-            weight = effect.prior_weight
             found.append(
-                Explanation(Verbatim(effect.name), EFFECT, members, imitated_by=effect.imitated_by, weight=weight)
-            )
+                Explanation(
+                    Verbatim(effect.name), EFFECT, members, imitated_by=effect.imitated_by, weight=effect.prior_weight,
+                    effect=effect,
+                )
+            )  # fmt: skip
     return found
+
+
+def considered(artefact: Artefact) -> Iterator[Effect]:
+    """Every effect of the catalogue, and those faults of artefacts that this one can have."""
+    for effect in every().values():
+        if not effect.of_artefact:
+            yield effect
+        elif effect.name in artefact.faults:
+            yield artefact.faults[effect.name]
 
 
 def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
     """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
-    over = effect.idealised_over
-    if over is None:
+    along = effect.course(points)
+    if along is None:
         return
-    along = points.readings[over] if over in points.readings else points.column(over)
     span = float(np.ptp(along))
     if span == 0:
         return
     u = (2 * (along - along.min()) / span - 1)[:, None, None]
     forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
-    basis = model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
+    basis = effect.mostly * model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
     for s, t in forms:
         columns = model.seen(basis * (1 + s * u + t * (1.5 * u**2 - 0.5)), values)
         yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)
@@ -143,7 +164,9 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
 
 def finer(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
     """An explanation with some of its shapes divided: each gives way to five about it that share its weight."""
-    effect = every()[explanation.name]
+    effect = explanation.effect
+    if effect is None:
+        return explanation
     points = model.artefact.points.at(model.where(values))
     shaped = [i for i, member in enumerate(explanation.members) if member.shape]
     even = dict(zip(shaped, evenly(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True))
@@ -189,11 +212,13 @@ def unevenly(effect: Effect, value: Floats) -> Floats:
 
 
 def several(singles: Sequence[Explanation]) -> list[Explanation]:
-    """All known effects at once, each as large as the others in the observations.
+    """All known effects of the machine at once, each as large as the others in the observations.
 
     It names none of them, but lets the lack-of-fit test see those that are visible together only.
     """
-    columns = [e.members[0].columns for e in singles if not e.shaped]
+    columns = [
+        e.members[0].columns for e in singles if not e.shaped and (e.effect is None or not e.effect.of_artefact)
+    ]  # fmt: skip
     if len(columns) < 2:
         return []
     together = np.hstack(columns)

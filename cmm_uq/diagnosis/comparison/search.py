@@ -24,7 +24,6 @@ from cmm_uq.diagnosis.recorded_noise import noise_kinds
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.measurement import SMALL_LEAN
 from cmm_uq.model.noise import display_of
-from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 
 _MISFIT = 20.0
@@ -293,7 +292,9 @@ def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -
     """Compare all candidates for what a model leaves; ``seed`` is that of the null distribution."""
     values = model.estimate().about
     singles = known(model, values, tuple(effect.name for effect in model.effects))
-    candidates = singles + several(singles) + unknown(model, values)
+    known_as = {term for single in singles if single.effect is not None for term in single.effect.stands_for}
+    functions = [function for function in unknown(model, values) if function.term not in known_as]
+    candidates = singles + several(singles) + functions
     comparison = comparison_of(model, stated, candidates)
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]
@@ -326,7 +327,9 @@ def with_effects(compared: ModelComparison, versions: Sequence[Version], chosen:
     for version in sorted(versions, key=lambda v: v.explanation):
         if version.explanation in chosen:
             explanation = compared.explanations[version.explanation]
-            added.append(every()[explanation.name])
+            if explanation.effect is None:
+                continue
+            added.append(explanation.effect)
             if added[-1].shape:
                 shapes[explanation.name] = explanation.members[version.member].shape
     return replace(compared.model, effects=(*compared.model.effects, *added), shapes=shapes, within=None)

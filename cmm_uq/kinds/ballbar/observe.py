@@ -6,6 +6,8 @@ leaves one scale common to all axes undetermined.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +15,9 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact, Indications, Size
+from cmm_uq.model.own_faults import temperature_of
 from cmm_uq.model.recorded import check_length, expansion
+from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.units import MICROMETRE, unit
 
@@ -36,6 +40,7 @@ class Ballbar(Artefact):
 
     def __init__(self, facts: ArtefactFacts, points: Points, *, where: str | None = None) -> None:
         self.points = points
+        self._facts = facts
         self.rows = _ends(points, where)
         first = self.rows[:, 0]
         self.measurement, self.repeat = points.measurement[first], points.repeat[first]
@@ -61,6 +66,10 @@ class Ballbar(Artefact):
                     say("length"),
                 ),
             )
+
+    def own_faults(self) -> Iterable[Effect]:
+        """See :meth:`Artefact.own_faults`: a bar has one length; that of each set-up by itself is the set-up's offset."""
+        return (temperature_of(self._facts, self.points),)
 
     def lengths(self) -> Floats:
         """Indicated lengths brought to 20 °C with the bar's stated expansion, (m,) mm."""

@@ -10,6 +10,7 @@ that is the part that no number of faces averages out.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,10 +21,17 @@ from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.jobs.artefact import ReferencedFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact, Indications, Size
+from cmm_uq.model.own_faults import by_certificate, faults
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
+from cmm_uq.physics.effect import Effect
+from cmm_uq.physics.own_body import Body
+from cmm_uq.physics.own_errors import ALONG_A_LINE
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.units import unit
+
+_LAPPED_UM = 5.0
+"""Standard deviation of the faces of a gauge without a certificate from their nominal places, µm."""
 
 _SAME_FACE = 1e-6
 """mm; certified distances closer than this belong to one face."""
@@ -65,6 +73,7 @@ class StepGauge(Artefact):
 
     def __init__(self, facts: ReferencedFacts, points: Points, *, where: str | None = None) -> None:
         self.points = points
+        self._facts = facts
         self.reference = columns_needed(points, ("reference_mm",), self.title.lower(), where)[:, 0]
         self._lines = Placings.of(points.measurement)
         self._ends = _ends(self.reference, self._lines)
@@ -95,6 +104,13 @@ class StepGauge(Artefact):
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
         """See :meth:`Artefact.project`: displacement along the line."""
         return np.asarray(np.einsum("ni,nik->nk", self.directions(xyz), displacement), dtype=np.float64)
+
+    def own_faults(self) -> Iterable[Effect]:
+        """See :meth:`Artefact.own_faults`: along its line."""
+        places = np.column_stack([self.reference, np.zeros((len(self.reference), 2))])
+        body = Body.of(self.points, places, ("reference_mm",))
+        known = by_certificate(self._facts.u_um, _LAPPED_UM)
+        return faults(self._facts, self.points, body, known, axes=1, geometry=ALONG_A_LINE)
 
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`: in proportion to the distance."""

@@ -7,6 +7,8 @@ positions leave that scale free.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,11 +17,20 @@ from cmm_uq.jobs.earlier import NOISE_RATIO
 from cmm_uq.kinds.plate.facts import PlateFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Indications, Size
+from cmm_uq.model.own_faults import by_certificate, faults, since_earlier
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
 from cmm_uq.model.rigid import Rigid
+from cmm_uq.physics.effect import Effect
+from cmm_uq.physics.own_body import Body
 from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.units import unit
+
+DRILLED_UM = 30.0
+"""Standard deviation of holes from their nominal places, and of balls glued to a plate, µm."""
+
+CHANGED_UM = 2.0
+"""By how much a plate may have changed its shape between two dates, µm."""
 
 REFERENCES = ("reference_x_mm", "reference_y_mm", "reference_z_mm")
 
@@ -44,6 +55,7 @@ class Plate(Rigid):
 
     def __init__(self, facts: PlateFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(points)
+        self._facts = facts
         if NOISE_RATIO in points.columns:
             self.noise_scale = points.columns[NOISE_RATIO][self.rows[:, 0]]
         self.reference = columns_needed(points, REFERENCES, self.kind, where)
@@ -67,6 +79,13 @@ class Plate(Rigid):
     def shape(self, sizes: Floats) -> Floats:
         """See :meth:`Rigid.shape`: all positions in proportion."""
         return np.asarray(self.body * (sizes[0] / self.sizes[0].nominal), dtype=np.float64)
+
+    def own_faults(self) -> Iterable[Effect]:
+        """See :meth:`Artefact.own_faults`: by its certificate; without one as holes are drilled."""
+        earlier = NOISE_RATIO in self.points.columns
+        body = Body.of(self.points, self.reference, () if earlier else REFERENCES)
+        known = since_earlier(CHANGED_UM) if earlier else by_certificate(self._facts.u_um, DRILLED_UM)
+        return faults(self._facts, self.points, body, known)
 
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`: away from the middle of each placing, in proportion."""

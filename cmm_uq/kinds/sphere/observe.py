@@ -5,6 +5,7 @@ A sphere without a certified diameter cannot tell an error of the effective styl
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,9 +15,11 @@ from cmm_uq.geometry import fit_sphere
 from cmm_uq.kinds.sphere.facts import SphereFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Forms
+from cmm_uq.model.own_faults import form_faults
 from cmm_uq.model.placings import Placings
 from cmm_uq.model.radial import Radial
 from cmm_uq.model.recorded import expansion, place
+from cmm_uq.physics.effect import Effect
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.units import MICROMETRE
 
@@ -71,9 +74,14 @@ class Sphere(Radial):
 
     def __init__(self, facts: SphereFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(facts, points, Placings.of(points.measurement), expansion(facts, points), where)
+        self._facts = facts
         self.form = (facts.form_um or 0.0) * MICROMETRE
         if all(f"n{a}" in points.columns for a in AXES):
             self._take_normals(where)
+
+    def own_faults(self) -> Iterable[Effect]:
+        """See :meth:`Artefact.own_faults`: its form, by its certificate."""
+        return form_faults(self._facts, self._facts.form_um, self.points)
 
     def probed(self) -> ProbedSpheres:
         """Form and size of each least-squares sphere."""

@@ -6,6 +6,7 @@ yaw from scale. So ``tip_x_mm, tip_y_mm, tip_z_mm`` count for every carriage her
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -15,14 +16,22 @@ from cmm_uq.kinds.triangle.facts import TriangleFacts
 from cmm_uq.kinds.triangle.standard import DIMENSIONS, SIDES_OF_DIMENSIONS, TriangleStandard, corner_changes, corners
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Size
+from cmm_uq.model.own_faults import by_certificate, faults
 from cmm_uq.model.recorded import check_length, expansion, place
 from cmm_uq.model.rigid import Rigid
+from cmm_uq.physics.effect import Effect
+from cmm_uq.physics.own_body import Body
+from cmm_uq.physics.own_errors import AFFINE
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import unit
 
 _TITLES = (
     say("Block 1–2"), say("Block 2–3"), say("Block 3–1"), say("Cylinder 1"), say("Cylinder 2"), say("Cylinder 3"),
 )  # fmt: skip
+
+
+_WRONG_UM = 5.0
+"""By how much a side may be off whose block or cylinder is another than the job says, µm."""
 
 
 class Triangle(Rigid):
@@ -47,6 +56,7 @@ class Triangle(Rigid):
 
     def __init__(self, facts: TriangleFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(replace(points, machine=replace(points.machine, tip_on_every_carriage=True)))
+        self._facts = facts
         self.standard = TriangleStandard.of(facts)
         self.expansion = expansion(facts, points)
         _refuse_missing_corners(points, where)
@@ -67,6 +77,12 @@ class Triangle(Rigid):
         """See :meth:`Rigid.shape`: corners of the triangle that the dimensions close to."""
         body = corners(SIDES_OF_DIMENSIONS @ sizes)[self._corner] * self.expansion[:, None]
         return np.asarray(body - self.placings.means(body), dtype=np.float64)
+
+    def own_faults(self) -> Iterable[Effect]:
+        """See :meth:`Artefact.own_faults`: by the uncertainty of its blocks and cylinders."""
+        body = Body.of(self.points, corners(self.standard.sides)[self._corner])
+        u_um = float(np.hypot(self._facts.u_blocks_um, self._facts.u_cylinders_um))
+        return faults(self._facts, self.points, body, by_certificate(u_um, _WRONG_UM), geometry=AFFINE)
 
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`."""
