@@ -14,7 +14,7 @@ from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.inference.linear_model import LinearModel
-from cmm_uq.inference.noise import Sizes
+from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
@@ -91,8 +91,8 @@ def consequences(
     found = {item.effect for item in diagnosis.effects}
     if not found or not _depends(job, diagnosis):
         return None
-    drawn = _Drawn(diagnosis.posterior.draws, diagnosis.posterior.sizes)
-    correction = _Correction.of(diagnosis.after, found, drawn, observe)
+    drawn = _Drawn(diagnosis.posterior.draws, diagnosis.posterior.sizes, _noise(diagnosis))
+    correction = _Correction.of(diagnosis.after, found, diagnosis.after.estimate().about, drawn, observe)
     before, after = correction.before(seed), correction.after(seed)
     recorded = correction.statements(job, tested, correction.model.artefact, before)
     corrected = correction.statements(job, tested, correction.corrected, after)
@@ -110,10 +110,10 @@ def costs(job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[
     if not rivals or not _depends(job, diagnosis):
         return None
     some = np.linspace(0, len(diagnosis.posterior.draws) - 1, _FEW).astype(np.int64)
-    each = []
+    each, components = [], _noise(diagnosis)
     for rival in rivals:
-        posterior = _Drawn(rival.draws[:_FEW], diagnosis.posterior.sizes.at(some))
-        correction = _Correction.of(rival.model, set(rival.effects), posterior, observe)
+        posterior = _Drawn(rival.draws[:_FEW], diagnosis.posterior.sizes.at(some), components)
+        correction = _Correction.of(rival.model, set(rival.effects), rival.draws.mean(axis=0), posterior, observe)
         figures = correction.after(seed)
         each.append(Cost(rival.probability, figures, correction.statements(job, tested, correction.corrected, figures)))
     weights = diagnosis.remaining.weights
@@ -125,16 +125,22 @@ def costs(job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[
     return Costs(tuple(each), figures, decisions)
 
 
+def _noise(diagnosis: Diagnosis) -> Components:
+    """That of all observations, used or not."""
+    return noise_of(replace(diagnosis.after, used=np.ones_like(diagnosis.after.used)))
+
+
 def _depends(job: Job, diagnosis: Diagnosis) -> bool:
     return diagnosis.after.artefact.lengths() is not None or bool(job.facts.conformity)
 
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """Draws (N, k) of a model's unknowns, and the sizes of the noise that go with them."""
+    """Draws (N, k) of a model's unknowns, and the sizes of the noise of all observations that go with them."""
 
     values: Floats
     sizes: Sizes
+    components: Components
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,12 +163,13 @@ class _Correction:
     corrected: Artefact
 
     @classmethod
-    def of(cls, fitted: MeasurementModel, found: Collection[str], drawn: _Drawn, observe: Observed) -> _Correction:
-        """For the effects of these names."""
+    def of(
+        cls, fitted: MeasurementModel, found: Collection[str], value: Floats, drawn: _Drawn, observe: Observed
+    ) -> _Correction:  # fmt: skip
+        """For the effects of these names, by what a model estimates of them (k,)."""
         model = replace(fitted, used=np.ones_like(fitted.used))
-        artefact, estimate = model.artefact, fitted.estimate()
-        value = estimate.about
-        ours = np.array([unknown.key[0] in found for unknown in estimate.linear.unknowns], dtype=bool)
+        artefact = model.artefact
+        ours = np.array([unknown.key[0] in found for unknown in model.unknowns], dtype=bool)
         coefficients = np.where(ours, value, 0.0)[: len(value) - len(artefact.sizes)]
         points = artefact.points.at(artefact.points.xyz + model.errors(artefact.points.xyz, coefficients))
         return cls(model, ours, value, drawn, observe(points))
@@ -208,10 +215,9 @@ class _Correction:
         return lengths - self._whole.observed + self._draws @ self._whole.design.T
 
     def _figures(self, lengths: Floats, predicted: Floats, seed: int) -> dict[str, Quantity]:
-        artefact, components = self.model.artefact, noise_of(self.model)
-        sizes = self.drawn.sizes.at(self._some)
+        artefact, sizes = self.model.artefact, self.drawn.sizes.at(self._some)
 
         def noise(chosen: Ints, times: int, random: np.random.Generator) -> Floats:
-            return components.repeated(sizes.at(chosen), times, random)
+            return self.drawn.components.repeated(sizes.at(chosen), times, random)
 
         return with_uncertainty(lengths, predicted, noise, seed, counted_with(artefact.points)[artefact.rows[:, 0]])
