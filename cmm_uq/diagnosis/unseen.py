@@ -282,7 +282,7 @@ class _Signal:
             if length <= self.unit_length * ALLOWED:
                 named = _amplitude(thresholds.length_named(POWER), self.unit_length, parameter.prior_sd)
         periods = self._periods(length) if len(self.values) else None
-        taken_up = _imitators(view.found.first.model, self.raw, view) if share < _HIDDEN else ()
+        taken_up = _imitators(view.found.first.model, self.raw) if share < _HIDDEN else ()
         return Smallest(
             effect.name, effect.title, effect.reported[0].name, parameter.unit, ALLOWED * parameter.prior_sd, detected, named,
             share, taken_up, effect.tier == CONTRACT, periods, length if np.isfinite(length) else None,
@@ -378,16 +378,22 @@ def _aliased(view: _View, lefts: Floats, values: Floats) -> NDArray[np.bool_]:
     return np.asarray((alike & ~near).any(axis=1))
 
 
-def _imitators(model: MeasurementModel, raw: Floats, view: _View) -> tuple[str, ...]:
-    """Names of what is fitted that together looks like a column (m,): those with a share of it that counts."""
+def _imitators(model: MeasurementModel, raw: Floats) -> tuple[str, ...]:
+    """Names of what is fitted that together looks like a column (m,): those with a share of it that counts.
+
+    What the free places of the artefact take up is theirs; for the rest, of many solutions the smallest counts.
+    """
     linear = model.estimate().linear
-    free = [i for i, unknown in enumerate(linear.unknowns) if not unknown.known]
-    columns = np.hstack([linear.design[:, free], linear.freedoms.dense()]) / linear.noise_scale[:, None]
-    length = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    parts = np.linalg.lstsq(columns / length, raw, rcond=_RIDGE**0.5)[0] / max(float(np.linalg.norm(raw)), 1e-300)
-    names = [linear.unknowns[i].key[0] for i, part in zip(free, parts, strict=False) if abs(part) > _PART]
-    if np.linalg.norm(parts[len(free) :]) > _PART:
-        names.append(PLACES)
+    places = linear.freedoms.over(linear.noise_scale)
+    left = places.without(raw[:, None])[:, 0]
+    length, rest = float(np.linalg.norm(raw)), float(np.linalg.norm(left))
+    names = [PLACES] if rest < (1 - _PART) * length else []
+    if rest > _PART * length:
+        free = [i for i, unknown in enumerate(linear.unknowns) if not unknown.known]
+        columns = linear.reduced.design[:, free]
+        sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        parts = np.linalg.lstsq(columns / sizes, left / rest, rcond=_RIDGE**0.5)[0]
+        names = [linear.unknowns[i].key[0] for i, part in zip(free, parts, strict=True) if abs(part) > _PART] + names
     return tuple(dict.fromkeys(names))
 
 

@@ -9,6 +9,7 @@ from cmm_uq.diagnosis.unseen import PLACES, POWER, Periods, Smallest
 from cmm_uq.documents.document import Column, Paragraph, Section, Table
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, listed, number, say
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import every
 from cmm_uq.units import Unit
 
@@ -38,11 +39,14 @@ def _invisible(row: Smallest) -> float:
 
 
 def unseen_section(found: Diagnosed) -> Section:
-    """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not."""
+    """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not.
+
+    Faults of the artefact stand in results.json alone.
+    """
     rows = tuple(
         (row.title, _found(row, row.detected), _found(row, row.named), _size(row.allowed, row.unit), _why(row))
         for row in found.unseen
-        if row.common or not row.shown
+        if row.common or not (row.shown or _of_artefact(row))
     )
     if not rows:
         return Section(say("What would not have been seen"), ())
@@ -64,6 +68,11 @@ def unseen_section(found: Diagnosed) -> Section:
         say("What would not have been seen"),
         (*head, Table(say("Smallest errors that would have shown"), heads, rows, notes)),
     )
+
+
+def _of_artefact(row: Smallest) -> bool:
+    effect = every().get(row.effect)
+    return effect is not None and effect.of_artefact
 
 
 def _found(row: Smallest, size: float | None) -> Text:
@@ -90,12 +99,17 @@ def _why(row: Smallest) -> Text:
 
 
 def _titles(owners: Sequence[str]) -> list[Text]:
-    titles: list[Text] = []
-    for name in owners:
-        effect = every().get(name)
-        title = say("{title:small}", title=effect.title) if effect is not None else Verbatim(name)
-        titles.append(say("the place of the artefact") if name == PLACES else title)
-    return titles
+    return [_taker(name) for name in owners]
+
+
+def _taker(name: str) -> Text:
+    """What takes an error up, in words."""
+    if name == PLACES:
+        return say("the place of the artefact")
+    if name == ARTEFACT:
+        return say("the size of the artefact")
+    effect = every().get(name)
+    return Verbatim(name) if effect is None else say("{title:small}", title=effect.title)
 
 
 def _periods(periods: Periods, row: Smallest) -> Text:
