@@ -26,8 +26,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import every
-from cmm_uq.physics.common_size import CommonSize
-from cmm_uq.physics.effect import CONTRACT, Effect, Parameter
+from cmm_uq.physics.effect import CONTRACT, Effect
 from cmm_uq.points import Floats
 from cmm_uq.units import Unit
 
@@ -134,6 +133,8 @@ class Smallest:
 def smallest_effects(found: Found, alpha: float, model: MeasurementModel) -> tuple[Smallest, ...]:
     """The smallest amplitude of each effect that a recording would have shown; those that it could least come first.
 
+    Of effects of machine and surroundings: faults of the artefact are parted from them by further set-ups.
+
     Parameters
     ----------
     found : the search of the recording.
@@ -143,9 +144,9 @@ def smallest_effects(found: Found, alpha: float, model: MeasurementModel) -> tup
     view = _View.of(found)
     named = {effect.name for effect in model.effects}
     listed = [
-        (i, explanation, explanation.effect)
+        (i, explanation, effect)
         for i, explanation in enumerate(view.explanations)
-        if explanation.effect is not None and explanation.name not in named
+        if (effect := explanation.effect) is not None and not effect.of_artefact and explanation.name not in named
     ]
     signals = _signals(view, listed)
     visible = [signal for signal in signals if signal.unit_length * ALLOWED > _FAINT]
@@ -272,7 +273,7 @@ class _Signal:
 
     def smallest(self, view: _View, thresholds: Thresholds | None) -> Smallest:
         """The row of this effect."""
-        effect, parameter = self.effect, _parameter(self.effect)
+        effect, parameter = self.effect, self.effect.coefficients[0]
         whole = float(np.linalg.norm(self.raw))
         share = float(np.linalg.norm(self.column)) / whole if whole else 0.0
         detected = named = None
@@ -300,28 +301,11 @@ class _Signal:
         )
 
 
-def _column(explanation: Explanation, effect: Effect) -> Floats:
-    """What an effect as large as its prior standard deviation shows (m,): of several coefficients the first.
-
-    Of many with one size in common, as many as that size has in one draw.
-    """
-    columns = explanation.members[0].columns / effect.mostly
-    if not isinstance(effect, CommonSize):
-        return np.asarray(columns[:, 0])
-    drawn, _ = effect.from_reported({effect.size.name: effect.size.prior_sd})
-    return np.asarray(columns @ (drawn / np.array([c.prior_sd for c in effect.coefficients])))
-
-
-def _parameter(effect: Effect) -> Parameter:
-    """In which an effect is told."""
-    return effect.size if isinstance(effect, CommonSize) else effect.coefficients[0]
-
-
 def _signals(view: _View, listed: Sequence[tuple[int, Explanation, Effect]]) -> list[_Signal]:
     """What each of some effects shows; of several coefficients the first."""
     straight = [row for row in listed if not row[1].shaped]
     scale, none = view.found.first.comparison.noise_scale, np.zeros(0)
-    raws = np.column_stack([np.zeros((len(scale), 0)), *(_column(e, effect) / scale for _, e, effect in straight)])
+    raws = np.column_stack([np.zeros((len(scale), 0)), *(e.members[0].columns[:, 0] / scale for _, e, _ in straight)])
     lefts = view.rest(raws)
     there = np.linalg.norm(lefts, axis=0) > ABSORBED * np.linalg.norm(raws, axis=0)
     lefts = np.where(there, lefts, 0.0)

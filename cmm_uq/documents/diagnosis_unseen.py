@@ -39,14 +39,11 @@ def _invisible(row: Smallest) -> float:
 
 
 def unseen_section(found: Diagnosed) -> Section:
-    """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not.
-
-    Faults of the artefact stand in results.json alone.
-    """
+    """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not."""
     rows = tuple(
         (row.title, _found(row, row.detected), _found(row, row.named), _size(row.allowed, row.unit), _why(row))
         for row in found.unseen
-        if row.common or not (row.shown or _of_artefact(row))
+        if row.common or not row.shown
     )
     if not rows:
         return Section(say("What would not have been seen"), ())
@@ -68,11 +65,6 @@ def unseen_section(found: Diagnosed) -> Section:
         say("What would not have been seen"),
         (*head, Table(say("Smallest errors that would have shown"), heads, rows, notes)),
     )
-
-
-def _of_artefact(row: Smallest) -> bool:
-    effect = every().get(row.effect)
-    return effect is not None and effect.of_artefact
 
 
 def _found(row: Smallest, size: float | None) -> Text:

@@ -63,7 +63,7 @@ def test_twins_are_seen_and_never_named() -> None:
 
 
 def test_twice_the_noise_hides_effects_twice_as_large() -> None:
-    """The same draws of the noise, twice as large: all is in proportion, but for a threshold from two hundred draws each time."""
+    """The same draws of the noise, twice as large: all is in proportion, but for thresholds from two hundred draws each."""
     small, large = gauge()[1], gauge(2e-3)[1]
     for name in ("rotation_y_y", "scale_curvature_x", "straightness_x_z"):
         first, second = small[name].detected, large[name].detected
