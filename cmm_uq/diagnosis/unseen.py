@@ -23,6 +23,7 @@ from cmm_uq.diagnosis.comparison.search import Found
 from cmm_uq.diagnosis.detection import LONGEST, SHORTEST, Thresholds
 from cmm_uq.diagnosis.power import ALLOWED, CERTAIN, Naming
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import reached
 from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import every
@@ -210,7 +211,7 @@ class _View:
         ]
         fitted = np.zeros((len(scale), 0))
         if columns:
-            fitted = np.linalg.qr(comparison.rest(np.hstack(columns)))[0]
+            fitted = reached(comparison.rest(np.hstack(columns)))
         noise = comparison.left - fitted @ (fitted.T @ comparison.left)
         both = comparison.noise_posterior(noise)
         weight = both.sum(axis=1)
@@ -235,6 +236,13 @@ class _View:
         each = self.found.first.comparison.lengths(columns)
         variance = (self.weight[:, None] * self.squares[:, None] / np.maximum(each, 1e-300)).sum(axis=0)
         return np.asarray(np.where(each.min(axis=0) > 0, 1 / np.sqrt(variance), 0.0))
+
+    def taking(self, raw: Floats) -> tuple[str, ...]:
+        """Names of what takes most of a column (m,) up: what was asserted, or else what the model names."""
+        left = self.found.first.comparison.rest(raw[:, None])
+        if np.linalg.norm(left) >= _HIDDEN * np.linalg.norm(raw):
+            return self.found.effects
+        return _imitators(self.found.first.model, raw)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,7 +291,7 @@ class _Signal:
             if length <= self.unit_length * ALLOWED:
                 named = _amplitude(thresholds.length_named(POWER), self.unit_length, parameter.prior_sd)
         periods = self._periods(length) if len(self.values) else None
-        taken_up = _imitators(view.found.first.model, self.raw) if share < _HIDDEN else ()
+        taken_up = view.taking(self.raw) if share < _HIDDEN else ()
         return Smallest(
             effect.name, effect.title, effect.reported[0].name, parameter.unit, ALLOWED * parameter.prior_sd, detected, named,
             share, taken_up, effect.tier == CONTRACT, periods, length if np.isfinite(length) else None,
