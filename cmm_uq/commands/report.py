@@ -105,7 +105,9 @@ def write_diagnosis(
     stage: Stage | None = None,
     told: Told | None = None,
 ) -> Written:
-    """Diagnose a job and write ``diagnosis.html`` and ``results.json``, both or none.
+    """Diagnose a job and write ``diagnosis.html``, ``results.json``, and ``next_plan.csv`` where there is one.
+
+    All or none.
 
     Parameters
     ----------
