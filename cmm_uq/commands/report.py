@@ -105,7 +105,9 @@ def write_diagnosis(
     stage: Stage | None = None,
     told: Told | None = None,
 ) -> Written:
-    """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
+    """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf``, ``results.json``, and ``next_plan.csv`` where there is one.
+
+    All or none.
 
     Parameters
     ----------
