@@ -112,7 +112,9 @@ def test_a_command_that_keeps_what_it_has_says_so() -> None:
         "import time\nfrom cmm_uq.writing import interruption\ninterruption.watch()\n"
         "with interruption.keeping(lambda: '3 of 4 are kept'):\n    print('now', flush=True)\n    time.sleep(60)\n"
     )
-    process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == "now\n"
     process.send_signal(signal.SIGINT)
