@@ -32,11 +32,11 @@ _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
 _ROUGH = 0.25
 """Probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest."""
 
-_MOST_PERIODS = 240
-_DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
-
 _BEYOND = 0.1
 """How readily an effect is thought of beyond the size that it mostly keeps to (:attr:`Effect.mostly`)."""
+
+_MOST_PERIODS = 240
+_DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
 
 @dataclass(frozen=True, eq=False)
