@@ -13,14 +13,14 @@ from __future__ import annotations
 TYPE_CHECKING = False  # typing alone would cost ten times as much as all of this
 if TYPE_CHECKING:
     from cmm_uq.api.beginning import check, new
-    from cmm_uq.api.calls import budget, compensate, diagnose, job, plan, read, report, simulate
+    from cmm_uq.api.calls import budget, compensate, diagnose, job, plan, prove, read, report, simulate
     from cmm_uq.errors import CmmUqError
 
 __version__ = "0.4.0"
 
 __all__ = [
-    "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "job", "new", "plan", "read", "report",
-    "simulate",
+    "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "job", "new", "plan", "prove", "read",
+    "report", "simulate",
 ]  # fmt: skip
 
 

@@ -25,11 +25,13 @@ CONTENTS: dict[str, list[str]] = {
     ],
     "Reference": [
         "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
-        "reference/commands", "reference/results", "running", "api", "reference/python", "uncertainty/model-file",
+        "reference/commands", "reference/results", "reference/prove", "running",
+        "api", "reference/python", "uncertainty/model-file",
         "machine/effects", "limits", "words",
     ],
     "How it works": [
-        "certificate", "standards", "noise", "screening", "diagnosis", "planning", "selfcalibration", "artefacts/index",
+        "certificate", "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
+        "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],

@@ -13,6 +13,8 @@ from typer.models import ArgumentInfo, CommandInfo
 from cmm_uq.cli.commands import app
 from cmm_uq.commands.new import known
 from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
+from cmm_uq.documents.proof_results import KEYS as PROOF
+from cmm_uq.documents.proof_results import RATE
 from cmm_uq.documents.results_keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
@@ -48,6 +50,7 @@ def files() -> dict[Path, str]:
         "columns": columns(),
         "commands": commands(),
         "results": results(),
+        "prove": prove(),
     }
     return schemas | {PAGES / f"{name}.md": text for name, text in pages.items()}
 
@@ -176,6 +179,18 @@ def results() -> str:
         "own (`shift`, `error_map`) has some of them only.",
         "A *quantity* is a table of", table(("key", "meaning"), [(f"`{name}`", told) for name, told in QUANTITY.items()]),
         "## Keys", table(("key", "unit", "meaning"), rows),
+    )  # fmt: skip
+
+
+def prove() -> str:
+    """Every key of results.json of a proof."""
+    rows = [(f"`{name}`", told) for name, told in PROOF.items()]
+    return page(
+        "results.json of `cmm-uq prove`, key by key",
+        "Schema `cmm-uq/prove/1`. A part in capitals stands for any name, `[]` for each entry of a list. Numbers are finite; "
+        "what has no value is `null`. How it comes about: [proof on one's own set-ups](../proving.md).",
+        "A *rate* is a table of", table(("key", "meaning"), [(f"`{name}`", told) for name, told in RATE.items()]),
+        "## Keys", table(("key", "meaning"), rows),
     )  # fmt: skip
 
 

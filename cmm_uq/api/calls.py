@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.api.outcomes import Diagnosis, Plan, Report
+from cmm_uq.api.outcomes import Diagnosis, Plan, Proof, Report
 from cmm_uq.commands.reading import compared_with, read_job
 from cmm_uq.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
@@ -171,6 +171,30 @@ def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0) -> Plan:
     from cmm_uq.commands.plan import plan_outcome
 
     return Plan(plan_outcome(_job(job), power=power, seed=seed))
+
+
+def prove(
+    job: Job | str | Path, *, cases: int = 200, workers: int | None = None, seed: int = 0, alpha: float = FALSE_ALARMS
+) -> Proof:  # fmt: skip
+    """Try the diagnosis on sealed cases drawn with the set-ups, the artefact and the noise of a job.
+
+    Parameters
+    ----------
+    job : a job, or its folder; its recording may be missing where its noise is stated.
+    cases : how many to draw.
+    workers : processes at once, as many as there are processors by default; the figures do not depend on it.
+    seed : of the cases.
+    alpha : rate of false alarms that the diagnosis is asked for.
+
+    Raises
+    ------
+    CmmUqError : the job has an analysis of its own, or neither recording nor stated noise.
+    """
+    from cmm_uq.commands.prove import processes, prove_outcome
+    from cmm_uq.commands.proving import Asked
+
+    asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
+    return Proof(prove_outcome(_job(job), asked))
 
 
 def simulate(job: Job | str | Path, truth: Mapping[str, Any] | str | Path, *, seed: int | None = None) -> Job:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from cmm_uq.api.tables import quantities, quantity_frame, shown
 from cmm_uq.commands.plan import PLAN
+from cmm_uq.commands.prove import PROVE
 from cmm_uq.commands.report import DIAGNOSE, REPORT
 from cmm_uq.commands.written import Form
 from cmm_uq.documents.outcome import Outcome
@@ -208,3 +209,29 @@ class Plan(Found):
 
     def _said(self) -> str:
         return f"{len(self.placings)} placings to measure, {self.results['minutes']:.0f} min"
+
+
+class Proof(Found):
+    """What ``prove`` found."""
+
+    form = PROVE
+
+    @property
+    def sha256(self) -> str:
+        """Of the truth of all cases, sealed before the first of them was diagnosed."""
+        return str(self.results["truth_sha256"])
+
+    @cached_property
+    def rates(self) -> pd.DataFrame:
+        """Every rate by its name: count, of, rate, lower and upper end of its 95 % interval."""
+        import pandas as pd
+
+        rows = {
+            name: (each["count"], each["of"], each["rate"], *each["interval95"])
+            for name, each in {**self.results["rates"], "coverage": self.results["coverage"]["pooled"]}.items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index", columns=["count", "of", "rate", "lower", "upper"])
+
+    def _said(self) -> str:
+        standings = (f"{each['figure']} {each['standing']}" for each in self.results["acceptance"])
+        return ", ".join([f"{self.results['cases']} cases", *standings])

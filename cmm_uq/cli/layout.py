@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from rich.cells import cell_len
 
 from cmm_uq.cli.folding import folded
-from cmm_uq.documents.in_short import Standing, Summary, Verdict
+from cmm_uq.documents.document import Standing
+from cmm_uq.documents.in_short import Summary, Verdict
 from cmm_uq.errors import printable
 
 Line = tuple[tuple[str, str], ...]

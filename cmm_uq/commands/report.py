@@ -13,9 +13,9 @@ from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
 from cmm_uq.plugins import naming_package
 
-CERTIFICATE, DIAGNOSIS = ("certificate.html", "certificate.pdf"), "diagnosis.html"
+CERTIFICATE, DIAGNOSIS = ("certificate.html", "certificate.pdf"), ("diagnosis.html", "diagnosis.pdf")
 REPORT = Form("report", CERTIFICATE)
-DIAGNOSE = Form("diagnose", (DIAGNOSIS,), "diagnosis", (TO_FILL_IN,))
+DIAGNOSE = Form("diagnose", DIAGNOSIS, "diagnosis", (TO_FILL_IN,))
 
 
 @naming_package()
@@ -105,9 +105,9 @@ def write_diagnosis(
     stage: Stage | None = None,
     told: Told | None = None,
 ) -> Written:
-    """Diagnose a job and write ``diagnosis.html``, ``results.json``, and ``next_plan.csv`` where there is one.
+    """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf``, ``results.json``, all or none.
 
-    All or none.
+    With them ``next_plan.csv``, where there is one.
 
     Parameters
     ----------

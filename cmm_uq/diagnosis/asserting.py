@@ -14,13 +14,13 @@ import numpy as np
 from scipy import special, stats
 
 from cmm_uq.diagnosis.comparison.combinations import Combinations, Key
+from cmm_uq.diagnosis.comparison.explanations import effect_of
 from cmm_uq.diagnosis.comparison.search import ASSERTED, Found, rivals_of, without
 from cmm_uq.diagnosis.joint import Joint
 from cmm_uq.diagnosis.periods import Mode, modes_of, resolved
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.messages import Text, say
-from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 
@@ -69,7 +69,7 @@ def with_sizes(found: Found, joint: Joint) -> tuple[Found, tuple[Withheld, ...]]
     """Without the effects of whose size the joint posterior says too little, and these."""
     gone, shares = {}, _chance(found, joint)
     for i in sorted(found.chosen):
-        effect = every()[found.first.explanations[i].name]
+        effect = effect_of(found.first.explanations[i])
         sizes = _sizes(found, joint, effect)
         why = None
         if _holds_zero(sizes):
@@ -93,7 +93,7 @@ def group_of(combinations: Combinations, chosen: Key, index: int) -> Key:
 
 
 def _withheld(found: Found, index: int, why: Text) -> Withheld:
-    effect = every()[found.first.explanations[index].name]
+    effect = effect_of(found.first.explanations[index])
     probability = found.combinations.of(index) if found.combinations is not None else 0.0
     return Withheld(effect.name, effect.title, probability, why)
 

@@ -149,7 +149,7 @@ def diagnose(
     noise = _noise(found, joint, stated)
     after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     return Diagnosis(
-        _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha),
+        _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha, found.chosen),
         _left_out(found, joint, model), _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
         joint.components, joint.posterior, int(some.used.sum()), found, withheld,
         remaining(found, joint, model, seed),

@@ -40,7 +40,7 @@ class Improvement:
     heldout_rms_after_um: float
     elpd_gain: float
     elpd_gain_se: float
-    unseen: Text = say("placings")
+    unseen: Text = say("set-ups")
 
 
 def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvement:
@@ -106,7 +106,7 @@ def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], Text]:
     artefact, used = model.artefact, model.used
     placing = artefact.measurement[used]
     if len(np.unique(placing)) >= FOLDS:
-        return (numbered_by_place(model, placing), say("placings"))
+        return (numbered_by_place(model, placing), say("set-ups"))
     key = np.column_stack([placing, artefact.points.point[artefact.rows[:, 0]][used]])
     return (numbered_by_place(model, key), say("points"))
 

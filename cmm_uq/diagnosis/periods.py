@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from cmm_uq.diagnosis.comparison.explanations import evenly, unevenly
+from cmm_uq.diagnosis.comparison.explanations import effect_of, evenly, unevenly
 from cmm_uq.diagnosis.comparison.search import Found
-from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 
@@ -56,7 +55,7 @@ def modes_of(found: Found, index: int) -> tuple[Mode, ...]:
     index : of the effect, among the candidates.
     """
     explanation = found.first.explanations[index]
-    effect = every()[explanation.name]
+    effect = effect_of(explanation)
     if not (effect.shape and effect.shape[0].period_along):
         return ()
     given = [v for v in found.versions if v.explanation != index]
@@ -82,7 +81,7 @@ def modes_of(found: Found, index: int) -> tuple[Mode, ...]:
 
 def resolved(found: Found, index: int, modes: tuple[Mode, ...]) -> bool:
     """Whether the positions tell one period from all others, and hold a whole one."""
-    effect = every()[found.first.explanations[index].name]
+    effect = effect_of(found.first.explanations[index])
     axis = effect.shape[0].period_along if effect.shape else None
     if axis is None:
         return True

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cmm_uq.documents.document import Block, Column, Facts, Paragraph, Section, Table
+from cmm_uq.documents.effect_words import parameter_title, titles
 from cmm_uq.documents.simulated import Simulated
 from cmm_uq.documents.wording import expanded
 from cmm_uq.inference.posterior import Posterior
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, say
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, say
 from cmm_uq.model import MeasurementModel
 from cmm_uq.uncertainty.quantity import Quantity
 
@@ -39,8 +40,8 @@ def simulation_section(simulated: Simulated, refitted: Mapping[str, Mapping[str,
     rows += [(say("SHA-256"), Verbatim(value)) for value in simulated.files.values()]
     rows += [
         (say("Program"), Verbatim(simulated.program) if simulated.program else NOTHING),
-        (say("Effects that it contains"), commas(names(simulated.contains)) or say("not stated")),
-        (say("Estimated anew"), commas(names(simulated.refitted)) or say("none")),
+        (say("Effects that it contains"), commas(titles(simulated.contains)) or say("not stated")),
+        (say("Estimated anew"), commas(titles(simulated.refitted)) or say("none")),
         (say("Standard uncertainty of a predicted coordinate"), _uncertainty(simulated)),
         (say("Predicted errors, rms in the observations"), say("{rms:.1f} µm", rms=simulated.rms_predicted_um)),
     ]
@@ -69,9 +70,7 @@ def _corrections(refitted: Mapping[str, Mapping[str, Quantity]]) -> Table:
         for name, quantity in quantities.items():
             value, U, k = expanded(quantity)
             size = say("{value} ± {U}", value=value, U=U)
-            rows.append(
-                (say("{owner}, {parameter}", owner=Verbatim(owner), parameter=Verbatim(name)), size, quantity.unit, k)
-            )
+            rows.append((parameter_title(owner, name), size, quantity.unit, k))
     heads = (
         Column(say("Parameter"), numeric=False), Column(say("Machine minus simulation")),
         Column(say("Unit"), numeric=False), Column(say("k")),

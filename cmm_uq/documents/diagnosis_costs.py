@@ -8,11 +8,11 @@ from typing import Any
 from cmm_uq.conformity.accuracy import TITLES, UNITS
 from cmm_uq.diagnosis.rivals import Named, Rival
 from cmm_uq.documents.document import Column, Section, Table
+from cmm_uq.documents.effect_words import parameter_title, titles
 from cmm_uq.documents.quantity_data import quantity_data
 from cmm_uq.documents.result import Diagnosed
-from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability, title_of_parameter
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, plural, say
-from cmm_uq.physics.catalogue import every
+from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, plural, say
 from cmm_uq.uncertainty.quantity import Quantity
 
 _SHOWN = 4
@@ -79,7 +79,7 @@ def costs_data(found: Diagnosed) -> dict[str, Any]:
 
 def _what(rival: Rival) -> Text:
     """An explanation in short."""
-    words = (*names(rival.effects), *rival.functions)
+    words = (*titles(rival.effects), *rival.functions)
     return commas(words) if words else say("nothing missing")
 
 
@@ -87,7 +87,7 @@ def _named(found: Diagnosed) -> list[tuple[Text, ...]]:
     remaining = found.diagnosis.remaining
     return [
         (
-            title_of_parameter(every()[effect], name),
+            parameter_title(effect, name),
             *(_size(rival.named[effect][name]) for rival in remaining.rivals[:_SHOWN]), _size(quantity), quantity.unit,
         )
         for effect, parameters in remaining.averaged.items() for name, quantity in parameters.items()

@@ -10,7 +10,7 @@ from cmm_uq.diagnosis.power import ALLOWED
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.plan_picture import placing_pictures
 from cmm_uq.documents.result import Diagnosed
-from cmm_uq.messages import Text, Verbatim, number, plural, say, together
+from cmm_uq.messages import NOTHING, Text, Verbatim, number, plural, say, semicolons, together
 from cmm_uq.physics.catalogue import every
 from cmm_uq.planning.suggestion import ODDS, NextPlan, Shown, odds_words, rounded
 
@@ -29,6 +29,21 @@ def next_section(found: Diagnosed) -> Section:
     if plan.shown:
         blocks.append(_shown(plan))
     return Section(title, (*blocks, *placing_pictures(plan.placings, plan.box, plan.first)))
+
+
+def next_sentence(found: Diagnosed) -> Text:
+    """The set-ups in a sentence, with the odds that they are expected to reach; nothing without any."""
+    plan = found.next_plan
+    if plan is None:
+        return NOTHING
+    ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
+    told = say(
+        "Measure next: {what} First and last point in scale readings: {ends}.", what=_what(found, plan), ends=ends
+    )
+    if not plan.partings:
+        return told
+    least = min(parting.after for parting in plan.partings)
+    return say("{told} Odds of {odds} : 1 or more for the true one are then expected.", told=told, odds=rounded(least))
 
 
 def _what(found: Diagnosed, plan: NextPlan) -> Text:

@@ -9,18 +9,18 @@ from cmm_uq.diagnosis.comparison.search import ASSERTED
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import VERDICTS as AGAINST
-from cmm_uq.documents.against import contained
-from cmm_uq.documents.diagnosis_unseen import without_power
-from cmm_uq.documents.in_short import Standing, Summary, Verdict
+from cmm_uq.documents.diagnosis_next import next_sentence
+from cmm_uq.documents.diagnosis_overview import STANDING, overview_of
+from cmm_uq.documents.effect_words import effect_of, size_of, title_of, titles
+from cmm_uq.documents.in_short import Summary, Verdict
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.withheld import other_periods
 from cmm_uq.documents.withheld import sentences as withheld_sentences
-from cmm_uq.documents.wording import NO_FACTOR, expanded, probability
+from cmm_uq.documents.wording import probability
 from cmm_uq.jobs.job import JobFile
-from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, day, names, say, together
+from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, day, say
+from cmm_uq.physics.effect import Effect
 from cmm_uq.screening.finding import Finding
-from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import unit
 
 _SAME = 0.01
 """Difference of two probabilities that is not worth telling."""
@@ -46,35 +46,31 @@ VERDICTS_IN_SHORT: Mapping[str, Text] = {
 }  # fmt: skip
 """The same, to begin a summary with."""
 
-_STANDING: Mapping[str, Standing] = {
-    "consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad",
-}  # fmt: skip
-
 
 def verdict_of(found: Diagnosed) -> Text:
     """The verdict in a sentence."""
     told = VERDICTS if found.simulated is None else AGAINST
-    return after(told[found.diagnosis.verdict], without_power(found))
-
-
-def sentences_of(found: Diagnosed) -> list[Text]:
-    """A sentence or two on each effect that was left out."""
-    d = found.diagnosis
-    return [after(sentence(item, d.improvement), contained(found.simulated, item.effect)) for item in d.effects]
+    return told[found.diagnosis.verdict]
 
 
 def lines(found: Diagnosed) -> list[Text]:
-    """Verdict and everything that follows from it, a sentence or two each."""
+    """Verdict, the overview and what else follows, a sentence or two each."""
     d = found.diagnosis
-    said = [verdict_of(found), *sentences_of(found), *withheld_sentences(d.withheld)]
-    said += [
-        say("Cannot be told apart by this recording: {effects}.", effects=commas(names(group)))
-        for group in d.indistinguishable
+    own = d.after.effects
+    said = [
+        verdict_of(found),
+        *(say("{label}: {text}", label=label, text=text) for label, text in overview_of(found).rows),
+        *withheld_sentences(d.withheld),
     ]
-    said += [
-        say("To part {effects}: {what}", effects=together(names(s.separates)), what=s.what) for s in found.suggestions
-    ]
+    said += [ambiguous(titles(group, own)) for group in d.indistinguishable]
+    if told := next_sentence(found):
+        said.append(told)
     return said + list(noise_words(d, stated_um(found)))
+
+
+def ambiguous(group: Sequence[Text]) -> Text:
+    """That a recording cannot tell some effects apart."""
+    return say("This recording cannot tell apart: {effects}.", effects=commas(group))
 
 
 def stated_um(found: Diagnosed) -> float | None:
@@ -87,17 +83,18 @@ def stated_um(found: Diagnosed) -> float | None:
     )
 
 
-def sentence(item: LeftOut, gain: Improvement) -> Text:
+def sentence(item: LeftOut, gain: Improvement, own: Iterable[Effect] = ()) -> Text:
     """One left-out effect: size, cause, what it explains, and what was held out says."""
-    alone = len(item.parameters) == 1
-    parameters = {name: q.times(1e6, unit("10⁻⁶/K")) if q.unit == "1/K" else q for name, q in item.parameters.items()}
-    sizes = [(name, *expanded(quantity), quantity) for name, quantity in parameters.items()]
-    words = [
-        _size(NOTHING if alone else Verbatim(name), value, U, k, quantity)
-        if quantity.u > 0
-        else say("{name} = {value:.4g}\u00a0{unit}", name=Verbatim(name), value=quantity.value, unit=quantity.unit)
-        for name, value, U, k, quantity in sizes
-    ]
+    told = say(
+        "{title}: {size}. What it points to: {points_to}. {sure:capital}; {gain}.",
+        title=item.title, size=size_of(effect_of(item.effect, own), item.parameters), points_to=item.points_to,
+        sure=sure(item), gain=held_out(gain),
+    )  # fmt: skip
+    return after(told, other_periods(item.modes))
+
+
+def sure(item: LeftOut) -> Text:
+    """How probable an effect is, and how much of the misfit it explains."""
     alike = item.together > item.probability + _SAME
     together = (
         say(" ({probability} of it or one that cannot be told from it)", probability=probability(item.together))
@@ -107,29 +104,20 @@ def sentence(item: LeftOut, gain: Improvement) -> Text:
     if item.probability < ASSERTED:
         together = say(
             ", {probability} that it is this or one that this recording cannot tell from it: {group}",
-            probability=probability(item.together), group=commas(item.group),
+            probability=probability(item.together), group=commas(title_of(name) for name in item.group),
         )  # fmt: skip
-    told = say(
-        "{title}: {sizes}. What it points to: {points_to}. Probability {probability}{together}; "
-        "explains {explained:.0f}\u00a0% of the misfit; on {unseen} that the fit had not seen the "
-        "rms falls from {before:.1f} to {after:.1f}\u00a0µm.",
-        title=item.title,
-        sizes=commas(words),
-        points_to=item.points_to,
-        probability=probability(item.probability),
-        together=together,
-        explained=100 * item.explained,
-        unseen=gain.unseen,
-        before=gain.heldout_rms_before_um,
-        after=gain.heldout_rms_after_um,
-    )
-    return after(told, other_periods(item.modes))
+    return say(
+        "probability {probability}{together}; explains {explained:.0f}\u00a0% of the misfit",
+        probability=probability(item.probability), together=together, explained=100 * item.explained,
+    )  # fmt: skip
 
 
-def _size(name: Text, value: Text, U: Text, k: Text, quantity: Quantity) -> Text:
-    factor = NOTHING if k == NO_FACTOR else say(" (k\u00a0=\u00a0{k})", k=k)
-    size = say("{value} ± {U}\u00a0{unit}{factor}", value=value, U=U, unit=quantity.unit, factor=factor)
-    return say("{name} = {size}", name=name, size=size) if name else size
+def held_out(gain: Improvement) -> Text:
+    """What knowing an effect gains where the fit had not seen the recording."""
+    return say(
+        "on {unseen} that the fit had not seen the rms falls from {before:.1f} to {after:.1f}\u00a0µm",
+        unseen=gain.unseen, before=gain.heldout_rms_before_um, after=gain.heldout_rms_after_um,
+    )  # fmt: skip
 
 
 def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ...]:
@@ -157,20 +145,17 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ..
     return tuple(texts)
 
 
-def summary_of(
-    facts: JobFile, verdict: str, p_value: float, told: Sequence[Text], findings: Iterable[Finding]
-) -> Summary:
+def summary_of(facts: JobFile, verdict: str, told: Sequence[Text], findings: Iterable[Finding]) -> Summary:
     """Verdict and everything that follows from it, and what the screening found, for the end of a command.
 
     Parameters
     ----------
     facts : of the job.
-    verdict, p_value : of the diagnosis.
+    verdict : of the diagnosis.
     told : the verdict in a sentence, and what follows from it.
     findings : of the screening.
     """
-    subject = say("p = {p_value:.2g}. {told}", p_value=p_value, told=told[0])
-    first = Verdict(VERDICTS_IN_SHORT[verdict], _STANDING[verdict], subject, ())
+    first = Verdict(VERDICTS_IN_SHORT[verdict], STANDING[verdict], told[0], ())
     warned = tuple(say("{why:capital}.", why=finding.why) for finding in findings)
     machine = Verbatim(facts.machine.name)
     return Summary(machine, day(facts.job.date), (first,), remarks=tuple(told[1:]), warnings=warned)

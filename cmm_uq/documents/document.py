@@ -88,7 +88,21 @@ class Decision:
     kind: ClassVar[str] = "decision"
 
 
-Block = Paragraph | Facts | Table | Plot | Decision
+Standing = Literal["good", "open", "bad"]
+"""Whether nothing is left to do, something is, or the machine is not what it should be."""
+
+
+@dataclass(frozen=True)
+class Overview:
+    """What a reader with ten seconds must know: a verdict, in colour, by a sign and in words, and labelled lines on it."""
+
+    verdict: Text
+    standing: Standing
+    rows: tuple[tuple[Text, Text], ...]
+    kind: ClassVar[str] = "overview"
+
+
+Block = Paragraph | Facts | Table | Plot | Decision | Overview
 
 
 @dataclass(frozen=True)
@@ -129,6 +143,7 @@ class Document:
     language : of the text, as BCP 47 tag, for screen readers and hyphenation.
     end : the mark after the last line.
     banner : what every page must say at its head, such as that nothing was measured.
+    overview : what comes before everything else.
     """
 
     title: Text
@@ -146,6 +161,7 @@ class Document:
     language: str = "en"
     end: Text = say("End of certificate")
     banner: Text = NOTHING
+    overview: Overview | None = None
 
     def as_data(self) -> dict[str, Any]:
         """The document as plain dicts and lists of printable text, ready for JSON.

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
+from cmm_uq.documents.document import Standing
 from cmm_uq.documents.wording import expanded
 from cmm_uq.messages import NOTHING, Text, say
 from cmm_uq.uncertainty.quantity import Quantity
-
-Standing = Literal["good", "open", "bad"]
-"""Whether nothing is left to do, something is, or the machine is not what it should be."""
 
 Figure = tuple[Text, Text, Text]
 """Name of a quantity, its value with U and unit, its coverage factor."""

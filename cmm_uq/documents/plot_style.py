@@ -40,7 +40,11 @@ ACCENT = "#0b5c7a"
 """The one accent colour; 7.4 : 1 on white."""
 BAND = "#d5e4ea"
 """A stronger wash, for bands behind data."""
-COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "tint": TINT, "accent": ACCENT}
+GOOD, OPEN, BAD = "#1f6b3a", "#8a5300", "#9c2420"
+"""A verdict: nothing to do, something to do, something wrong; white on them at least 6 : 1. A sign and words go with them."""
+COLOURS = {
+    "ink": INK, "muted": MUTED, "rule": RULE, "tint": TINT, "accent": ACCENT, "good": GOOD, "open": OPEN, "bad": BAD,
+}  # fmt: skip
 """The same, for the templates."""
 DIVERGING = ("#0b5c7a", "#3f86a0", "#86b1c2", "#c3ccd0", "#e0b48a", "#cc7f3c", "#a84e08")
 """Negative to positive, parted by blue and orange, which every common kind of colour vision tells apart."""

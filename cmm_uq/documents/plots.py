@@ -66,20 +66,55 @@ def length_plot(
     reference_expanded_um : expanded uncertainty of the reference, µm: the half width of the band about zero.
     flagged : (n,) true where screening flagged the position.
     """
-    count = np.asarray(before_um).shape[0]
+    series = (
+        (before_label, before_um, expanded_before_um, MUTED),
+        (after_label, after_um, expanded_after_um, ACCENT),
+    )
+    return _panels(position, series, (reference, reference_expanded_um), flagged, position_label, caption, alternative)
+
+
+def residual_plot(
+    position: ArrayLike,
+    residual_um: ArrayLike,
+    *,
+    expanded_um: ArrayLike | float,
+    reference: Text,
+    flagged: ArrayLike | None = None,
+    position_label: Text,
+    label: Text,
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """The same in one panel, of what is not compared with anything."""
+    series = ((label, residual_um, expanded_um, ACCENT),)
+    return _panels(position, series, (reference, 0.0), flagged, position_label, caption, alternative)
+
+
+def _panels(
+    position: ArrayLike,
+    given: Sequence[tuple[Text, ArrayLike, ArrayLike | float, str]],
+    zero: tuple[Text, float],
+    flagged: ArrayLike | None,
+    position_label: Text,
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """Deviations with their expanded uncertainties by position, a panel a series."""
+    reference, reference_expanded_um = zero
+    count = np.asarray(given[0][1]).shape[0]
     x = _side_by_side(finite("position", position, (count,)))
-    series = [
-        (before_label, finite("before_um", before_um, (count,)), expanded_before_um, MUTED),
-        (after_label, finite("after_um", after_um, (count,)), expanded_after_um, ACCENT),
-    ]
+    series = [(label, finite("deviation", values, (count,)), U, colour) for label, values, U, colour in given]
     marked = np.zeros(count, dtype=bool) if flagged is None else np.asarray(flagged, dtype=bool)
     rows = shown([values for _, values, _, _ in series], marked)
     caption, x, marked = told(caption, len(rows), count), x[rows], marked[rows]
     size = float(np.clip(60.0 / count**0.75, 1.3, 4.2))
     with house_style():
-        figure = new_figure(96)
-        axes = figure.subplots(2, 1, sharex=True)
-        figure.subplots_adjust(left=0.082, right=0.995, bottom=0.105, top=0.945, hspace=0.27)
+        two = len(series) == 2
+        figure = new_figure(96 if two else 62)
+        axes = figure.subplots(len(series), 1, sharex=True, squeeze=False)[:, 0]
+        figure.subplots_adjust(
+            left=0.082, right=0.995, bottom=0.105 if two else 0.16, top=0.945 if two else 0.92, hspace=0.27
+        )
         for ax, (label, values, expanded, colour) in zip(axes, series, strict=True):
             half = finite(
                 "expanded uncertainty", np.broadcast_to(np.asarray(expanded, dtype=float), (count,)), (count,)
@@ -94,11 +129,12 @@ def length_plot(
             ax.margins(y=0.08)
             ax.set_ylabel(say("Deviation / µm"))
             ax.set_title(label, loc="left", fontsize=8, color=colour, fontweight="bold", pad=4)
-        axes[0].tick_params(bottom=False)
-        axes[1].set_xlabel(position_label)
+        for ax in axes[:-1]:
+            ax.tick_params(bottom=False)
+        axes[-1].set_xlabel(position_label)
         room = 0.8 + 0.01 * float(np.ptp(x))
-        axes[1].set_xlim(x.min() - room, x.max() + room)
-        _whole_numbers(axes[1], x)
+        axes[-1].set_xlim(x.min() - room, x.max() + room)
+        _whole_numbers(axes[-1], x)
         figure.align_ylabels(axes)
         note = _legend(reference, reference_expanded_um, flagged=bool(marked.any()))
         figure.text(0.995, 0.985, note, ha="right", va="top", fontsize=TINY, color=MUTED)

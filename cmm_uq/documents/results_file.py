@@ -112,7 +112,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         "p_value": d.p_value,
         "where": [
             {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,
-             "amplitude_um": place.amplitude_um, "what": place.what}
+             "amplitude_um": place.amplitude_um, "what": place.what, "direction": place.along, "also": list(place.also)}
             for place in d.where
         ],
         "effects": [effect_data(item, d.improvement) for item in d.effects],

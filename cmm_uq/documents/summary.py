@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.statement import Statement
-from cmm_uq.documents.in_short import Standing, Summary, Verdict, figure_row
+from cmm_uq.documents.document import Standing
+from cmm_uq.documents.in_short import Summary, Verdict, figure_row
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import OUTCOME_WORDS, measured, probability, title_of
 from cmm_uq.messages import Text, Verbatim, commas, day, lines, number, say, semicolons

@@ -57,7 +57,7 @@ def vector_plot(
             ax.set_xlabel(axis_labels[0])
             ax.locator_params(nbins=5)
         axes[0].set_ylabel(axis_labels[1])
-        unit = _round_length(longest)
+        unit = round_length(longest)
         at = (high[0] + 0.9 * margin - factor * unit, low[1] - 0.75 * margin)
         axes[-1].plot([at[0], at[0] + factor * unit], [at[1], at[1]], color=ACCENT, lw=1.6, solid_capstyle="butt")
         axes[-1].annotate(
@@ -72,7 +72,7 @@ def vector_plot(
         return drawn(figure, caption, alternative)
 
 
-def _round_length(longest: float) -> float:
+def round_length(longest: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that is not longer than the longest vector."""
     power = 10.0 ** np.floor(np.log10(longest))
     return float(max(step * power for step in _ROUND if step * power <= longest))

@@ -12,7 +12,8 @@ _BREAK = Verbatim("\x1f")
 WORDS: Mapping[str, Text] = {
     "number": say("No."), "quantity": say("Quantity"), "measured": say("Measured"), "limit": say("Limit"),
     "rule": say("Decision rule"), "missing": say("Missing"), "warning": say("Warning"), "warnings": say("Warnings"),
-    "warning_mark": say("Warning."), "particulars": say("Particulars"), "authorised": say("Authorised by"),
+    "warning_mark": say("Warning."), "in_short": say("In short"), "particulars": say("Particulars"),
+    "authorised": say("Authorised by"),
     "attachments": say("Files that belong to this document: {files}", files=_BREAK),
     "page": say("Page {page} of {pages}", page=_BREAK, pages=_BREAK),
     "replaced": say("□ stands for a character that the fonts of this file lack: {codes}. The HTML view shows it.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from cmm_uq.documents.document import Document, Facts, Section
+from cmm_uq.documents.document import Document, Facts, Overview, Section
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.messages import Text, Verbatim, say
 
@@ -20,6 +20,7 @@ def working_page(
     produced_by: Text,
     end: Text = say("End of diagnosis"),
     attachments: tuple[Text, ...] = (),
+    overview: Overview | None = None,
 ) -> Document:
     """A document about a job, without the sections that have nothing to say; see :class:`Document`."""
     return Document(
@@ -36,4 +37,5 @@ def working_page(
         produced_by=produced_by,
         date=facts.job.date,
         end=end,
+        overview=overview,
     )

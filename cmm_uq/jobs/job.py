@@ -25,6 +25,7 @@ from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.jobs.prediction import Prediction
+from cmm_uq.jobs.prove import ProveFacts
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.simulation import SimulationFacts
 from cmm_uq.jobs.table import (
@@ -176,6 +177,8 @@ class JobFile(Table):
     """Statements of conformity: a standard, a limit and a rule each."""
     plan: PlanFacts = PlanFacts()
     """What may be measured, where, and what it should tell; read by `cmm-uq plan`."""
+    prove: ProveFacts = ProveFacts()
+    """By which figures the diagnosis is accepted on these set-ups; read by `cmm-uq prove`."""
 
     @field_validator("conformity")
     @classmethod

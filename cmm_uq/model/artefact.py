@@ -129,6 +129,11 @@ class Artefact(ABC):
     repeat: Ints
     rows: Ints
 
+    @property
+    def set_up(self) -> Text:
+        """What a measurement is one of, in words, as under a picture."""
+        return say("Set-up of the {artefact:small}", artefact=self.title)
+
     @abstractmethod
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """Points (n, 3) of an artefact with these sizes (s,), placed as near to ``true_xyz`` (n, 3) as it goes, mm."""

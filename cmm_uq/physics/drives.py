@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.messages import Verbatim, say
-from cmm_uq.physics.effect import Effect, Harmonic, Nonparametric, Parameter, Shape, along
+from cmm_uq.messages import Text, Verbatim, say
+from cmm_uq.physics.effect import Amount, Effect, Harmonic, Nonparametric, Parameter, Shape, along
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import HOUR, MICROMETRE, unit
 
@@ -19,15 +19,23 @@ class PeriodicScale(Harmonic):
     mechanism = "scale"
     points_to = say("an error that repeats with the period: scale interpolation, leadscrew or rack")
 
-    amplitude = Parameter("amplitude_um", unit("µm"), 10.0)
+    amplitude = Parameter("amplitude_um", unit("µm"), 10.0, say("amplitude"))
     coefficients = (Parameter("cosine_um", unit("µm"), 10.0), Parameter("sine_um", unit("µm"), 10.0))
 
     def __init__(self, axis: str) -> None:
         self.axis = self.along_motion = axis
         self.name = f"periodic_scale_{axis}"
         self.title = say("Periodic scale error of {axis}", axis=Verbatim(axis.upper()))
-        self.shape = (Shape("period_mm", unit("mm"), 0.5, 1000.0, period_along=axis),)
+        self.shape = (Shape("period_mm", unit("mm"), 0.5, 1000.0, period_along=axis, what=say("period")),)
         self.imitated_by = (Nonparametric(f"{axis}_mm", axis),)
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amplitude, period = (amounts[parameter.name].size for parameter in (self.amplitude, self.shape[0]))
+        return say(
+            "the error of {axis} swings to either side by {amplitude} and repeats every {period}",
+            axis=Verbatim(self.axis.upper()), amplitude=amplitude, period=period,
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
@@ -55,6 +63,15 @@ class Hysteresis(Effect):
         self.idealised_over = axis
         self.imitated_by = (Nonparametric(f"approach_{axis}"),)
 
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "at the same reading {axis} stands {size} further towards {side} when it comes from minus than when "
+            "it comes from plus",
+            axis=Verbatim(self.axis.upper()), size=amount.size, side=amount.side,
+        )  # fmt: skip
+
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         return along(self.axis, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}"))
@@ -75,6 +92,14 @@ class Drift(Effect):
         self.axis = self.along_motion = axis
         self.name = f"drift_{axis}"
         self.title = say("Drift of {axis} with time", axis=Verbatim(axis.upper()))
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "at the same reading {axis} moves towards {side} by {size}",
+            axis=Verbatim(self.axis.upper()), size=amount.size, side=amount.side,
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.messages import Text
+from cmm_uq.messages import NOTHING, Text, say
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import Unit, unit
 
@@ -40,11 +40,13 @@ class Parameter:
     name : with its unit, as in results.json: ``angle_arcsec``.
     unit : as printed: ``″``.
     prior_sd : standard deviation that physics allows, about zero, in the same unit.
+    what : it is, in words, where an effect has several: ``amplitude``.
     """
 
     name: str
     unit: Unit
     prior_sd: float
+    what: Text = NOTHING
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", unit(self.unit))
@@ -62,9 +64,27 @@ class Shape:
     low: float
     high: float
     period_along: str | None = None
+    what: Text = NOTHING
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", unit(self.unit))
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much of a parameter, for a sentence: without its sign, with unit and uncertainty, as printed; and the sign."""
+
+    size: Text
+    negative: bool = False
+
+    @property
+    def side(self) -> Text:
+        """Towards which end of an axis the sign points."""
+        return say("minus") if self.negative else say("plus")
+
+    def more(self, more: Text, less: Text) -> Text:
+        """The one word for a positive amount, the other for a negative one."""
+        return less if self.negative else more
 
 
 @dataclass(frozen=True)
@@ -146,6 +166,15 @@ class Effect(ABC):
         """
         raise CmmUqError(f"{self.name} is no squareness")
 
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """What reported parameters mean at the machine, with their signs, in words; nothing where the figures say it.
+
+        Parameters
+        ----------
+        amounts : of each reported parameter, by name.
+        """
+        return NOTHING
+
     def belongs_to(self, points: Points) -> bool:
         """Whether a fault of an artefact is that of the artefact in these points."""
         return False
@@ -209,7 +238,7 @@ class Harmonic(Effect):
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:
         """Amplitude, shape, phase."""
-        return (self.amplitude, *self.shape, Parameter("phase_rad", unit("rad"), np.pi))
+        return (self.amplitude, *self.shape, Parameter("phase_rad", unit("rad"), np.pi, say("phase")))
 
     def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
         """Amplitude ≥ 0, shape, and phase in (−π, π]."""

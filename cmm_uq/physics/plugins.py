@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import foreign
-from cmm_uq.physics.effect import Effect, Parameter, Shape
+from cmm_uq.messages import Text, foreign
+from cmm_uq.physics.effect import Amount, Effect, Parameter, Shape
 from cmm_uq.plugins import EFFECTS, Plugin, offered
 from cmm_uq.points import Floats, Points
 
@@ -61,6 +61,10 @@ class _Outside(Effect):
     def lean(self, points: Points) -> Floats:
         """See :meth:`Effect.lean`."""
         return np.asarray(self._plugin.attempt(lambda: self._effect.lean(points)), dtype=np.float64)
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        return foreign(self._plugin.attempt(lambda: self._effect.meaning(amounts)))
 
     def course(self, points: Points) -> Floats | None:
         """See :meth:`Effect.course`."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.messages import say
-from cmm_uq.physics.effect import Effect, Harmonic, Parameter
+from cmm_uq.messages import Text, say
+from cmm_uq.physics.effect import Amount, Effect, Harmonic, Parameter
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import MICROMETRE, unit
 
@@ -28,6 +28,14 @@ class ProbeRadius(Effect):
     coefficients = (Parameter("um", unit("µm"), 10.0),)
     columns = ("nx", "ny", "nz")
 
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "probed surfaces are indicated {size} too {wrong}",
+            size=amount.size, wrong=amount.more(say("deep, inside the material"), say("early, outside the material")),
+        )  # fmt: skip
+
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         return MICROMETRE * normals_of(points)[:, :, None]
@@ -41,9 +49,14 @@ class ProbeLobing(Harmonic):
     formula = "true surface point = indicated + A·cos(3θ + φ)·n, θ = atan2(ny, nx)"
     mechanism = "probe"
     points_to = say("the probe's pre-travel has three lobes: qualify it in more directions")
-    amplitude = Parameter("amplitude_um", unit("µm"), 5.0)
+    amplitude = Parameter("amplitude_um", unit("µm"), 5.0, say("amplitude"))
     coefficients = (Parameter("cosine_um", unit("µm"), 5.0), Parameter("sine_um", unit("µm"), 5.0))
     columns = ("nx", "ny", "nz")
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        size = amounts[self.amplitude.name].size
+        return say("the probing error swings to either side by {size}, three times in a turn about Z", size=size)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
@@ -66,6 +79,14 @@ class ArtefactSag(Effect):
     mechanism = "artefact"
     points_to = say("the artefact sags or its supports are not at the right points")
     coefficients = (Parameter("um", unit("µm"), 10.0),)
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "lying level the artefact is {size} {wrong} than upright",
+            size=amount.size, wrong=amount.more(say("shorter"), say("longer")),
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

@@ -5,12 +5,12 @@ They share a sign: half of it each way. Hysteresis of the axis itself is in :mod
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.messages import Verbatim, say
-from cmm_uq.physics.effect import FURTHER, Effect, Parameter, along
+from cmm_uq.messages import Text, Verbatim, say
+from cmm_uq.physics.effect import FURTHER, Amount, Effect, Parameter, along
 from cmm_uq.physics.rigid_body import turned
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, unit
@@ -45,6 +45,15 @@ class Play(Effect):
             direction=Verbatim(direction.upper()),
         )
         self.columns = (f"approach_{axis}",)
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "at the same reading the probe stands {size} further towards {side} {direction} when {axis} comes "
+            "from minus than when it comes from plus",
+            axis=Verbatim(self.axis.upper()), direction=Verbatim(self.direction.upper()), size=amount.size, side=amount.side,
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

@@ -5,13 +5,13 @@ A rotation of a carriage acts on all that it carries, so its lever arm comes fro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.messages import Verbatim, say
-from cmm_uq.physics.effect import Effect, Nonparametric, Parameter, along
+from cmm_uq.messages import Text, Verbatim, say
+from cmm_uq.physics.effect import Amount, Effect, Nonparametric, Parameter, along
 from cmm_uq.physics.kinematics import Chain, carried_offset
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
@@ -34,6 +34,14 @@ class Scale(Effect):
         self.name = f"scale_{axis}"
         self.title = say("Scale error of {axis}", axis=Verbatim(axis.upper()))
         self.imitated_by = (Nonparametric(f"{axis}_mm", axis), Nonparametric("time_s", axis, scale=True))
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "lengths along {axis} are indicated {size} too {wrong}",
+            axis=Verbatim(self.axis.upper()), size=amount.size, wrong=amount.more(say("short"), say("long")),
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -68,6 +76,14 @@ class Squareness(Lean):
         self.title = say("Squareness {plane}", plane=Verbatim("–".join(plane.upper())))
         self.imitated_by = (Nonparametric(f"{self.lever}_mm", self.moved),)
 
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "the angle between {one} and {other} is 90° {side} {size}",
+            one=Verbatim(self.moved.upper()), other=Verbatim(self.lever.upper()), side=amount.side, size=amount.size,
+        )  # fmt: skip
+
     def lean(self, points: Points) -> Floats:
         """See :meth:`Effect.lean`."""
         return np.array(ARCSECOND)
@@ -92,6 +108,15 @@ class Straightness(Effect):
         )
         self.idealised_over = axis
         self.imitated_by = (Nonparametric(f"{axis}_mm", direction),)
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "as {axis} moves, the probe runs in a bow: in the middle of the travel {size} towards {side} "
+            "{direction}",
+            axis=Verbatim(self.axis.upper()), size=amount.size, side=amount.side, direction=Verbatim(self.direction.upper()),
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -118,6 +143,15 @@ class Rotation(Effect):
             "Rotation of carriage {axis} about {about}", axis=Verbatim(axis.upper()), about=Verbatim(about.upper())
         )
         self.idealised_over = axis
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "as {axis} moves towards plus, the probe turns {sense} by {size}, seen along plus {about}",
+            axis=Verbatim(self.axis.upper()), size=amount.size,
+            sense=amount.more(say("clockwise"), say("anticlockwise")), about=Verbatim(self.about.upper()),
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

@@ -6,12 +6,12 @@ place, and cannot be told from the scale error of that axis; so it is no effect 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.messages import Verbatim, say
-from cmm_uq.physics.effect import FURTHER, Effect, Parameter, along
+from cmm_uq.messages import Text, Verbatim, say
+from cmm_uq.physics.effect import FURTHER, Amount, Effect, Parameter, along
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.uncertainty.air.edlen import harris_2004
 from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
@@ -43,6 +43,14 @@ class ScaleCurvature(Effect):
             "and compensate position by a table, which one factor cannot replace",
             axis=Verbatim(axis.upper()),
         )
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "in the middle of its travel {axis} stands {size} further towards {side} than it reads",
+            axis=Verbatim(self.axis.upper()), size=amount.size, side=amount.side,
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

@@ -32,7 +32,10 @@ class DigitizerOffset(Effect):
         "the digitizer is out of alignment, or has moved in its mount: tighten the mount and align "
         "it on the reference sphere again, in every pose"
     )
-    coefficients = (Parameter("u_um", unit("µm"), 20.0), Parameter("v_um", unit("µm"), 20.0))
+    coefficients = (
+        Parameter("u_um", unit("µm"), 20.0, say("along u")),
+        Parameter("v_um", unit("µm"), 20.0, say("along v")),
+    )
     columns = ("gamma_deg",)
     tier = FURTHER
 
@@ -75,8 +78,8 @@ class DigitizerIncidence(Effect):
         "or correct its readings for the angle"
     )
     coefficients = (
-        Parameter("incident_um_per_deg", unit("µm/°"), 1.0),
-        Parameter("projected_um_per_deg", unit("µm/°"), 1.0),
+        Parameter("incident_um_per_deg", unit("µm/°"), 1.0, say("by incidence")),
+        Parameter("projected_um_per_deg", unit("µm/°"), 1.0, say("by projected angle")),
     )
     columns = ("gamma_deg", "nx", "ny", "nz")
     tier = FURTHER

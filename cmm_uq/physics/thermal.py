@@ -6,16 +6,16 @@ thermal expansion zero here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from cmm_uq.messages import Verbatim, say
-from cmm_uq.physics.effect import Effect, Parameter, along
+from cmm_uq.messages import Text, Verbatim, say
+from cmm_uq.physics.effect import Amount, Effect, Parameter, along
 from cmm_uq.physics.rigid_body import turned
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import ARCSECOND, METRE, REFERENCE_TEMPERATURE, unit
 
-EXPANSION = Parameter("cte_per_k", unit("1/K"), 12e-6)
+EXPANSION = Parameter("cte_per_k", unit("1/K"), 12e-6, say("expansion"))
 """Coefficient of thermal expansion; glass 8, steel 11.5, aluminium 23 ppm/K bound what is possible."""
 
 
@@ -33,6 +33,14 @@ class ThermalScale(Effect):
         self.name = f"thermal_scale_{axis}"
         self.title = say("Thermal expansion of scale {axis}", axis=Verbatim(axis.upper()))
         self.columns = (f"temp_{axis}_c",)
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "the scale of {axis} expands by {size} {more} than is compensated",
+            axis=Verbatim(self.axis.upper()), size=amount.size, more=amount.more(say("more"), say("less")),
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
@@ -53,6 +61,14 @@ class ThermalArtefact(Effect):
     points_to = say("the artefact expands and its temperature is not, or wrongly, compensated")
     coefficients = (EXPANSION,)
     columns = ("temp_artefact_c",)
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "the artefact expands by {size} {more} than is reckoned with",
+            size=amount.size, more=amount.more(say("more"), say("less")),
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

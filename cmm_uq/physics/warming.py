@@ -6,21 +6,21 @@ no effect of its own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from cmm_uq.messages import Text, Verbatim, say
-from cmm_uq.physics.effect import FURTHER, Effect, Parameter, Shape, along
+from cmm_uq.physics.effect import FURTHER, Amount, Effect, Parameter, Shape, along
 from cmm_uq.physics.rigid_body import Lean, turned
 from cmm_uq.physics.thermal import EXPANSION
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import ARCSECOND, HOUR, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
 
-SETTLING = Shape("settling_h", unit("h"), 0.2, 20.0)
+SETTLING = Shape("settling_h", unit("h"), 0.2, 20.0, what=say("time to settle"))
 """Time constant of warming: an electric cabinet takes minutes, a granite table a day."""
 
-LAG = Shape("lag_h", unit("h"), 0.05, 5.0)
+LAG = Shape("lag_h", unit("h"), 0.05, 5.0, what=say("lag"))
 """Time constant of an artefact behind its thermometer: a thin bar minutes, a solid one an hour or more."""
 
 
@@ -44,6 +44,14 @@ class ScaleDrift(Effect):
             axis=Verbatim(axis.upper()),
         )
 
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "lengths along {axis} are indicated ever {wrong}, by {size}",
+            axis=Verbatim(self.axis.upper()), size=amount.size, wrong=amount.more(say("shorter"), say("longer")),
+        )  # fmt: skip
+
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         hours = points.column("time_s") / HOUR
@@ -56,7 +64,7 @@ class Settling(Effect):
     formula = "e_a = A·(1 − exp(−time/τ))"
     mechanism = "temperature"
 
-    coefficients = (Parameter("um", unit("µm"), 20.0),)
+    coefficients = (Parameter("um", unit("µm"), 20.0, say("way")),)
     shape = (SETTLING,)
     columns = ("time_s",)
     tier = FURTHER
@@ -71,6 +79,14 @@ class Settling(Effect):
             axis=Verbatim(axis.upper()),
         )
 
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "at the same reading {axis} moves towards {side} by {size} in all, and settles with {settling}",
+            axis=Verbatim(self.axis.upper()), size=amount.size, side=amount.side, settling=amounts[SETTLING.name].size,
+        )  # fmt: skip
+
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
         return along(self.axis, MICROMETRE * _settled(points, shape))
@@ -82,7 +98,7 @@ class ScaleSettling(Effect):
     formula = "e_a = s·(1 − exp(−time/τ))·a"
     mechanism = "temperature"
 
-    coefficients = (Parameter("ppm", unit("ppm"), 20.0),)
+    coefficients = (Parameter("ppm", unit("ppm"), 20.0, say("change")),)
     shape = (SETTLING,)
     columns = ("time_s",)
     tier = FURTHER
@@ -96,6 +112,15 @@ class ScaleSettling(Effect):
             "it up before measuring, and look at what heats or cools it, its motor or the air supply",
             axis=Verbatim(axis.upper()),
         )
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """See :meth:`Effect.meaning`."""
+        amount = amounts[self.coefficients[0].name]
+        return say(
+            "lengths along {axis} come to be indicated {size} too {wrong}, settling with {settling}",
+            axis=Verbatim(self.axis.upper()), size=amount.size, wrong=amount.more(say("short"), say("long")),
+            settling=amounts[SETTLING.name].size,
+        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

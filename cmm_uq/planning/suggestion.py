@@ -179,12 +179,17 @@ def suggestions(plan: NextPlan | None, title: Text) -> tuple[Suggestion, ...]:
                 "Place the {title:small} at {ends} in scale readings and measure it {times}: odds of {odds} : 1 for the true "
                 "one are to be expected; by this recording they are {before} for {first} over {second}.",
                 title=title, ends=ends, times=times, odds=rounded(parting.after), before=odds_words(parting.before),
-                first=Verbatim(parting.effects[0]), second=Verbatim(parting.effects[1]),
+                first=_title(parting.effects[0]), second=_title(parting.effects[1]),
             ),
             plan.repeats, parting.after,
         )
         for parting in plan.partings
     )  # fmt: skip
+
+
+def _title(name: str) -> Text:
+    effect = every().get(name)
+    return Verbatim(name) if effect is None else say("{title:small}", title=effect.title)
 
 
 def odds_words(odds: float) -> Text:

@@ -29,6 +29,7 @@ _written: list[Path] = []
 _going_in: list[Path] = []
 _signalled: list[int] = []
 _speaking: list[Callable[[], None]] = []
+_keeping: list[Callable[[], str]] = []
 
 
 @contextlib.contextmanager
@@ -61,6 +62,16 @@ def speaking(hush: Callable[[], None]) -> Iterator[None]:
         yield
     finally:
         _speaking.remove(hush)
+
+
+@contextlib.contextmanager
+def keeping(what: Callable[[], str]) -> Iterator[None]:
+    """While a command keeps what it has on the disk already, a signal says so; ``what`` follows "interrupted; "."""
+    _keeping.append(what)
+    try:
+        yield
+    finally:
+        _keeping.remove(what)
 
 
 def written() -> tuple[Path, ...]:
@@ -120,7 +131,7 @@ def _end(number: int) -> None:
     if _written:
         said = f"interrupted; what was asked for is written in {', '.join(map(str, _written))}"
     elif alone:
-        said = "interrupted; nothing was written"
+        said = f"interrupted; {_keeping[-1]() if _keeping else 'nothing was written'}"
     else:
         where = ", ".join(map(str, _going_in))
         said = f"interrupted while files were put in place; the next command in {where} completes it or takes it back"

@@ -28,7 +28,12 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_diagnosis_is_a_page_and_results(out: Path) -> None:
-    assert sorted(path.name for path in out.iterdir()) == ["diagnosis.html", "manifest.json", "results.json"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "diagnosis.html",
+        "diagnosis.pdf",
+        "manifest.json",
+        "results.json",
+    ]
     page = (out / "diagnosis.html").read_text(encoding="utf-8")
     for text in ("Thermal expansion of scale Y", "in the map at 25 °C differs from the others", "What to measure next"):
         assert text in page

@@ -65,7 +65,9 @@ def test_told_only_of_scale_the_real_recording_shows_its_squareness() -> None:
     assert low < -173.0 < high
     assert found.improvement.heldout_rms_after_um < 0.3 * found.improvement.heldout_rms_before_um
     assert found.improvement.elpd_gain > 3 * found.improvement.elpd_gain_se
-    assert {place.covariate for place in found.where} == {"x_mm", "y_mm"}
+    (place,) = found.where
+    assert (place.covariate, place.along) == ("y_mm", "x")
+    assert place.also == ("error along Y as a function of X",)
 
 
 def test_with_all_six_factors_the_real_recording_is_consistent() -> None:

@@ -61,7 +61,7 @@ def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Fl
     """Log predictive density of each fold and rms of its errors, µm.
 
     All observations, in units of their noise, are normal with covariance A·P·Aᵀ + σ², a placing being known to 100 mm before;
-    those that the fit has seen are taken as given (Gelman et al., *Bayesian Data Analysis*, A.1). Where placings are left out
+    those that the fit has seen are taken as given (Gelman et al., *Bayesian Data Analysis*, A.1). Where set-ups are left out
     as a whole, only combinations that their own place does not change are predicted.
     """
     estimate = model.estimate()
@@ -89,7 +89,7 @@ def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Fl
 
 def compared(before: MeasurementModel, after: MeasurementModel, groups: Ints, unseen: str) -> None:
     """All figures of an improvement against the joint distribution; its standard error is over what was left out."""
-    whole = unseen == "placings"
+    whole = unseen == "set-ups"
     xyz, rows = before.artefact.points.xyz, before.artefact.rows
     away = [np.mean(np.sum((xyz - xyz.mean(axis=0)) ** 2, axis=1)[rows[groups == g]]) for g in np.unique(groups)]
     _, index = np.unique(groups, return_inverse=True)
@@ -117,10 +117,10 @@ def test_predictions_of_bars_are_those_of_the_joint_normal_distribution(made: in
     before, after = (
         MeasurementModel(Ballbar(bar_facts(), points), effects(names)) for names in (SCALES, (*SCALES, "squareness_xy"))
     )
-    compared(before, after, after.artefact.measurement, "placings")
+    compared(before, after, after.artefact.measurement, "set-ups")
 
 
-@pytest.mark.parametrize(("lines", "unseen"), [(12, "placings"), (10, "placings"), (9, "points")])
+@pytest.mark.parametrize(("lines", "unseen"), [(12, "set-ups"), (10, "set-ups"), (9, "points")])
 def test_predictions_along_lines_are_those_of_the_joint_normal_distribution(lines: int, unseen: str) -> None:
     """Whole lines of a gauge, whose place is then open, or faces on few lines, whose place the other faces give."""
     directions = np.random.default_rng(8).standard_normal((lines, 3))
@@ -131,7 +131,7 @@ def test_predictions_along_lines_are_those_of_the_joint_normal_distribution(line
     artefact = StepGauge(facts, ideal.points.at(xyz))
     before, after = (MeasurementModel(artefact, effects(names)) for names in (SCALES, (*SCALES, "squareness_xy")))
     key = np.column_stack([artefact.measurement, artefact.points.point])
-    groups = artefact.measurement if unseen == "placings" else np.unique(key, axis=0, return_inverse=True)[1].ravel()
+    groups = artefact.measurement if unseen == "set-ups" else np.unique(key, axis=0, return_inverse=True)[1].ravel()
     compared(before, after, groups, unseen)
 
 

@@ -11,6 +11,7 @@ import pytest
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.diagnosis.location import located, region_of
+from cmm_uq.physics.effect import Nonparametric
 from cmm_uq.points import Floats
 
 PLACES = 10.0 * np.arange(7)
@@ -42,17 +43,26 @@ NULL = np.linspace(0.0, 1.0, 101)
 AMPLITUDE, LEAST = 3.0, 1e-4
 
 
-def term(*members: Floats, columns: Floats | None = None, kind: str = UNKNOWN, name: str | None = "z_mm") -> Any:
+def term(
+    *members: Floats, columns: Floats | None = None, kind: str = UNKNOWN, name: str | None = "z_mm",
+    is_like: Any = None, form: Nonparametric | None = None,
+) -> Any:  # fmt: skip
     """An explanation with one version a member, each of functions (n, r) of the covariate; they act on readings ten times."""
     each = [SimpleNamespace(values=m, columns=10.0 * m if columns is None else columns) for m in members]
-    return SimpleNamespace(kind=kind, covariate_name=name, covariate=X, members=each, name=f"function of {name}")
+    return SimpleNamespace(
+        kind=kind, covariate_name=name, covariate=X, members=each, name=f"function of {name}", term=form,
+        could_be=lambda effect: effect is is_like,
+    )  # fmt: skip
 
 
 def compared(
     data: Floats, *terms: Any, log_odds: tuple[float, ...] = (50.0,), p_value: float = 0.0, without_mean: bool = False,
-    evidence: Floats | None = None,
+    evidence: Floats | None = None, beside: dict[int, dict[int, float]] | None = None,
 ) -> Any:  # fmt: skip
-    """What is read of a comparison: twice the noise on every observation, and a baseline of nothing, or of a constant."""
+    """What is read of a comparison: twice the noise on every observation, and a baseline of nothing, or of a constant.
+
+    ``beside`` says which log odds the others keep beside the one that was last given.
+    """
 
     def rest(columns: Floats) -> Floats:
         return columns - columns.mean(axis=0) if without_mean else columns
@@ -63,13 +73,25 @@ def compared(
         yield SimpleNamespace(r=1, member=np.arange(count)), cube
         yield SimpleNamespace(r=2, member=np.arange(count)), cube[::-1]
 
+    def weighed(given: Any, among: Any) -> Any:
+        kept = (beside or {}).get(given[-1].explanation, {}) if given else {}
+        return {
+            i: (kept.get(i, log_odds[i]) + (7.0 if given else 0.0), Version(i, 0, AMPLITUDE)) for i in range(len(terms))
+        }
+
     comparison = SimpleNamespace(
         noise_scale=np.full(12, 2.0), rest=rest, left=rest(data), least_noise=LEAST, each=each,
         degrees_of_freedom=12 - without_mean,
-        beside=lambda given, among: {i: (log_odds[i], Version(i, 0, AMPLITUDE)) for i in range(len(terms))},
+        beside=weighed, log_evidence_of=lambda given: np.array([7.0]),
     )  # fmt: skip
+    artefact = SimpleNamespace(rows=np.arange(12)[:, None], points=range(12))
     return SimpleNamespace(
-        p_value=p_value, explanations=terms, comparison=comparison, null_maximum=NULL, log_odds=np.array(log_odds)
+        model=SimpleNamespace(artefact=artefact, used=np.ones(12, dtype=bool)),
+        p_value=p_value,
+        explanations=terms,
+        comparison=comparison,
+        null_maximum=NULL,
+        log_odds=np.array(log_odds),
     )
 
 
@@ -95,8 +117,15 @@ def test_the_curve_is_that_of_kriging(exact: bool, sign: float) -> None:
     assert x.tolist() == np.unique(X).tolist()
     np.testing.assert_allclose(found, 1e3 * curve, rtol=1e-8)
     np.testing.assert_allclose(u, 1e3 * np.sqrt(variance), rtol=1e-6)
-    assert place.amplitude_um == pytest.approx(1e3 * np.abs(curve).max())
-    assert place.region == region_of(x, curve)
+    assert place.k == pytest.approx(
+        2.262157, abs=1e-6
+    )  # Student's t for nine degrees of freedom, 95 % (GUM table G.2: 2.26)
+    assured = np.abs(curve) > place.k * np.sqrt(variance)
+    assert place.amplitude_um == pytest.approx(1e3 * np.abs(curve)[assured].max())
+    assert place.region == region_of(x, curve, assured)
+    low, high, left = place.data
+    assert low.tolist() == high.tolist() == X.tolist()
+    np.testing.assert_allclose(left, 2e3 * data)  # what an observation leaves, not over its noise
     assert (place.covariate, place.what) == ("z_mm", "function of z_mm")
 
 
@@ -148,3 +177,46 @@ def test_functions_that_are_significant_are_told_the_most_significant_first() ->
     assert found[0].p_value < found[1].p_value < 0.05
     assert located(compared(data, *terms, effect, log_odds=(3.0, 9.0, 0.9, 9.0, 9.0), p_value=0.05), 0.05) == ()
     assert len(located(compared(data, terms[0], p_value=0.049), 0.05)) == 1
+
+
+def test_a_region_is_where_the_band_does_not_hold_zero() -> None:
+    """The largest value of all is not known to be anything; of what is, only what hangs together belongs to the region."""
+    curve = np.array([9.0, 2.0, 3.0, 4.0, 3.0, 2.5, 3.0])
+    assured = np.array([False, True, True, True, True, False, True])
+    assert region_of(PLACES, curve, assured) == (10.0, 40.0)
+
+
+def test_a_function_whose_band_holds_zero_everywhere_is_no_place() -> None:
+    noise = np.random.default_rng(11).standard_normal(12)
+    wild = 1e-2 * (noise - bent(X) @ np.linalg.lstsq(bent(X), noise, rcond=None)[0])
+    assert located(compared(wild + 1e-6 * np.sin(X), term(bent(X))), 0.01) == ()
+
+
+def test_what_fits_as_well_and_shows_nothing_more_is_named_with_the_first() -> None:
+    """Log odds of 9: within ln 20 of them 7, and not 5; neither keeps evidence beside the first."""
+    data = 1e-2 * np.sin(X)
+    terms = [term(bent(X), name=name) for name in "abc"]
+    (place,) = located(compared(data, *terms, log_odds=(7.0, 9.0, 5.0), beside={1: {0: 0.0, 2: 0.0}}), 0.05)
+    assert (place.covariate, place.also) == ("b", ("function of a",))
+
+
+def test_of_functions_that_fit_equally_well_the_one_with_the_form_of_what_was_found_is_named() -> None:
+    data, effect = 1e-2 * np.sin(X), term(bent(X), kind=EFFECT, name="effect")
+    form = Nonparametric("a", "y")
+    terms = [term(bent(X), name="a", is_like=effect, form=form), term(bent(X), name="b"), effect]
+    found = compared(data, *terms, log_odds=(7.0, 9.0, 9.0), beside={0: {1: 0.0}, 1: {0: 0.0}})
+    (place,) = located(found, 0.05, {2})
+    assert (place.covariate, place.along, place.scale, place.also) == ("a", "y", False, ("function of b",))
+    (place,) = located(found, 0.05)
+    assert (place.covariate, place.also) == ("b", ("function of a",))
+
+
+def test_a_further_place_is_told_with_what_it_carries_beside_the_first() -> None:
+    data = 1e-2 * np.sin(X)
+    terms = [term(bent(X), name=name) for name in "ab"]
+    first, second = located(compared(data, *terms, log_odds=(20.0, 19.0), beside={0: {1: 6.0}}), 0.05)
+    (alone,) = located(compared(data, terms[1], log_odds=(6.0,)), 0.05)
+    assert (first.covariate, second.covariate) == ("a", "b")
+    assert second.p_value == pytest.approx(alone.p_value)
+    assert first.p_value < second.p_value
+    assert first.also == ()

@@ -12,7 +12,7 @@ from cmm_uq.documents.document import Document, Plot
 from cmm_uq.messages import Day, Message, Number, Text, Verbatim
 from cmm_uq.units import Unit
 
-NO_TEXT = {"language", "svg", "tone", "outcome", "date", "lettering"}
+NO_TEXT = {"language", "svg", "tone", "outcome", "standing", "date", "lettering"}
 """Fields of blocks that no reader sees as text."""
 
 _WORD = re.compile(r"[^\W\d_]{2,}")

@@ -210,7 +210,7 @@ def test_the_formula_of_an_mpe_stands_with_its_limit() -> None:
 
 def test_a_diagnosis_that_the_job_asks_for_is_an_opinion(result: Result) -> None:
     asked = outcome_of(replace(result, job=changed(result.job, job={"diagnosis_on_certificate": True}))).document
-    assert [section.opinion for section in asked.sections if section.title == "What was left out"] == [True]
+    assert [section.opinion for section in asked.sections if section.title == "Diagnosis"] == [True]
 
 
 def test_the_next_calibration_is_printed_only_where_the_customer_agreed(result: Result, document: Document) -> None:

@@ -52,6 +52,7 @@ def budget(folder: str) -> Document:
 
 OTHERS: Mapping[str, Callable[[str], Document]] = {
     "diagnosis of iota-1102-20C": lambda _: diagnosed("iota-1102-20C"),
+    "diagnosis against a simulation": lambda _: diagnosed("iota-1102-20C-against-simulation"),
     "diagnosis of iota-1102-maps": lambda _: diagnosed("iota-1102-maps"),
     "plan of plan-ballbar": lambda _: planned("plan-ballbar"),
     "plan of plan-step-gauge": lambda _: planned("plan-step-gauge"),

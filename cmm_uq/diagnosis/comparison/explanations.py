@@ -99,6 +99,11 @@ class Explanation:
         return self.term is not None and self.term in effect.imitated_by
 
 
+def effect_of(explanation: Explanation) -> Effect:
+    """The effect that an explanation is; a fault of the artefact as made for this one."""
+    return every()[explanation.name] if explanation.effect is None else explanation.effect
+
+
 def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
     """Every effect of the catalogue that could act here and is not named in the model already.
 
@@ -186,7 +191,7 @@ def shorter(model: MeasurementModel, values: Floats, explanation: Explanation) -
 
     Each octave is as probable as another, so that the shorter ones, of which there are so many, do not outweigh the others.
     """
-    effect = every()[explanation.name]
+    effect = effect_of(explanation)
     axis = effect.shape[0].period_along
     if axis is None:
         return explanation

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.messages import say
+from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Indications, Size
 from cmm_uq.model.own_faults import temperature_of
 from cmm_uq.model.recorded import check_length, expansion
@@ -66,6 +66,11 @@ class Ballbar(Artefact):
                     say("length"),
                 ),
             )
+
+    @property
+    def set_up(self) -> Text:
+        """See :attr:`Artefact.set_up`."""
+        return say("Position of the bar")
 
     def own_faults(self) -> Iterable[Effect]:
         """See :meth:`Artefact.own_faults`: a bar has one length; that of each set-up by itself is the set-up's offset."""

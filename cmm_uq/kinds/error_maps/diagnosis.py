@@ -23,6 +23,9 @@ from cmm_uq.units import MICROMETRE
 _WELL_KNOWN = 0.95
 """Probability from which no other explanation is named beside one."""
 
+_BAND = 2.0
+"""Standard uncertainties of a band that is not to hold zero."""
+
 _NAMED = 0.05
 """Probability from which another explanation is named."""
 
@@ -37,7 +40,7 @@ class Difference:
     rival : the explanation in words, with the map that differs if one does.
     probability : of it.
     instead : others that could stand in its place.
-    region : of the position, mm, where it exceeds half its largest value.
+    region : of the position, mm, where it exceeds half its largest value and its band does not hold zero.
     p_value : of "these maps differ by noise alone", corrected for all errors that were compared.
     amplitude : largest value, in the column's unit.
     curve : position in mm, difference and its standard uncertainty in the column's unit, each (p,).
@@ -166,9 +169,10 @@ def _difference(compared: ColumnComparison, index: int, p_value: float) -> Diffe
     unit = column.unit[1]
     probability = compared.combinations.of(index)
     others = compared.instead(_NAMED) if probability < _WELL_KNOWN else ()
+    sure = np.abs(value) > _BAND * u
     instead = tuple(compared.rivals[i].name for i in others)
     return Difference(
-        column, rival, probability, instead, region_of(column.positions, value), p_value,
+        column, rival, probability, instead, region_of(column.positions, value, sure if sure.any() else None), p_value,
         float(np.abs(value).max()) / unit, (column.positions, value / unit, u / unit),
         rival.map is not None and turned(column, rival.map),
     )  # fmt: skip

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from cmm_uq.documents.diagnosis_words import summary_of
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
-from cmm_uq.kinds.error_maps import words
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed, diagnose_error_maps
+from cmm_uq.kinds.error_maps.overview import told
 from cmm_uq.kinds.error_maps.page import maps_document, maps_results
 
 
 def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
     """What there is to write of it."""
-    verdict, p_value = found.diagnosis.verdict, found.diagnosis.p_value
-    short = summary_of(found.job.facts, verdict, p_value, words.lines(found), found.findings)
+    verdict = found.diagnosis.verdict
+    short = summary_of(found.job.facts, verdict, told(found), found.findings)
     document = maps_document(found, seed)
     consistent = verdict == "consistent"
     return Outcome(found, document, maps_results(found, seed), short, document.warnings, conforming=consistent)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.documents.diagnosis_words import VERDICT_WORDS, sentence
+from cmm_uq.documents.diagnosis_words import held_out, sure
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.documents.effect_words import effect_of, size_of, titles
 from cmm_uq.documents.improvement_table import improvement_table
 from cmm_uq.documents.plots import curve_with_band
 from cmm_uq.documents.results_file import effect_data, finding_data, head, improvement_data, quantity_data
@@ -14,6 +15,7 @@ from cmm_uq.documents.wording import probability
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.kinds.error_maps.diagnosis import Difference
+from cmm_uq.kinds.error_maps.overview import overview_of
 from cmm_uq.kinds.error_maps.search import ColumnComparison
 from cmm_uq.kinds.error_maps.squareness import squareness_data, squareness_sections
 from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
@@ -96,35 +98,36 @@ def maps_document(found: MapsDiagnosed, seed: int) -> Document:
     )
     sections = (
         Section(say("What makes the maps differ"), _told(found)),
-        Section(say("Before and after"), (_before_after(found),)),
-        Section(say("Errors compared"), (_compared(found),)),
+        Section(say("What to measure next"), tuple(Paragraph(what) for _, what in next_words(d))),
+        Section(say("Before and after"), () if d.verdict == "consistent" else (_before_after(found),)),
         *squareness_sections(found.maps),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise_words(d))),
-        Section(say("What to measure next"), tuple(Paragraph(what) for _, what in next_words(d))),
+        Section(say("Errors compared"), (_compared(found),)),
     )
     return working_page(
         facts,
         say("Diagnosis of error maps"),
         day(facts.job.date),
+        overview=overview_of(found),
         particulars=(
             Facts(
                 (
-                    (say("Verdict"), VERDICT_WORDS[d.verdict]),
+                    (say("Machine"), Verbatim(facts.machine.name)),
                     (say("p-value of “the maps differ by noise alone”"), number(d.p_value, ".2g")),
                     (say("False-alarm rate"), say("{alpha:g} %", alpha=100 * d.alpha)),
                 )
             ),
             Facts(
                 (
-                    (say("Machine"), Verbatim(facts.machine.name)),
                     (say("Error maps"), maps),
-                    (say("Effects that the job names"), (commas(names(facts.model.effects)) or say("none"))),
+                    (say("Effects that the job names"), (commas(titles(facts.model.effects)) or say("none"))),
                 )
             ),
         ),
         warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
         sections=sections,
         produced_by=_produced_by(d.sampler, seed),
+        attachments=(*names(found.job.inputs), Verbatim("results.json")),
     )
 
 
@@ -136,7 +139,17 @@ def _produced_by(sampler: str | None, seed: int) -> Text:
 def _told(found: MapsDiagnosed) -> tuple[Block, ...]:
     d = found.diagnosis
     blocks: list[Block] = [Paragraph(VERDICTS[d.verdict])]
-    blocks += [Paragraph(sentence(item, d.improvement)) for item in d.effects]
+    blocks += [
+        Facts((
+            (say("Effect"), item.title),
+            (say("Size"), say("{size:capital}.", size=size_of(effect_of(item.effect), item.parameters))),
+            (say("Look at"), say("{what:capital}.", what=item.points_to)),
+            (say("How sure"), say("{sure:capital}.", sure=sure(item))),
+        ))
+        for item in d.effects
+    ]  # fmt: skip
+    if d.effects:
+        blocks.append(Paragraph(say("{gain:capital}.", gain=held_out(d.improvement))))
     for i, difference in enumerate(d.differences):
         blocks.append(Paragraph(difference_words(difference)))
         if i < _PICTURES:

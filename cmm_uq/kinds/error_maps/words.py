@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cmm_uq.documents.diagnosis_words import sentence
 from cmm_uq.documents.wording import probability
-from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.kinds.error_maps.diagnosis import Difference, MapsDiagnosis
 from cmm_uq.messages import Text, Verbatim, listed, number, say, semicolons, sentences
 
@@ -18,15 +16,6 @@ VERDICTS: Mapping[str, Text] = {
     ),
     "unexplained": say("The maps differ from each other, and no known effect accounts for it."),
 }
-
-
-def lines(found: MapsDiagnosed) -> list[Text]:
-    """Verdict and everything that follows from it, a sentence or two each."""
-    d = found.diagnosis
-    said: list[Text] = [VERDICTS[d.verdict]]
-    said += [sentence(item, d.improvement) for item in d.effects]
-    said += [difference_words(difference) for difference in d.differences]
-    return [*said, *noise_words(d), *(what for _, what in next_words(d))]
 
 
 def difference_words(difference: Difference) -> Text:
