@@ -29,7 +29,8 @@ from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import every, plugins
 from cmm_uq.planning.setting import Setting
 from cmm_uq.points import Points
-from cmm_uq.proving.cases import Case, Design
+from cmm_uq.proving.cases import Case
+from cmm_uq.proving.design import Design
 from cmm_uq.proving.judged import Judgement, judge
 from cmm_uq.proving.running import Kept, Record, answered
 from cmm_uq.proving.sealed import sha256_of, truth_file

@@ -105,9 +105,9 @@ def write_diagnosis(
     stage: Stage | None = None,
     told: Told | None = None,
 ) -> Written:
-    """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf``, ``results.json``, all or none.
+    """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
 
-    With them ``next_plan.csv``, where there is one.
+    Where further set-ups would tell more, ``next_plan.csv`` comes with them.
 
     Parameters
     ----------
