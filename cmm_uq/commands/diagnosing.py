@@ -137,11 +137,11 @@ def diagnosed(
         model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known, observe=made
     )  # fmt: skip
     changes = consequences(job, diagnosis, made, kind.tested, seed)
-    cost = costs(job, diagnosis, made, kind.tested, seed)
     unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
     plan = _next(job, diagnosis, observe, _wanted(job, diagnosis, unseen) if show else ())
     next_ones = suggestions(plan, model.artefact.title)
-    return Diagnosed(job, findings, diagnosis, next_ones, changes, costs=cost, unseen=unseen, next_plan=plan)
+    cost = costs(job, diagnosis, made, kind.tested, seed)
+    return Diagnosed(job, findings, diagnosis, next_ones, changes, unseen=unseen, next_plan=plan, costs=cost)
 
 
 def _wanted(job: Job, diagnosis: Diagnosis, unseen: Sequence[Smallest]) -> tuple[Wanted, ...]:

@@ -23,7 +23,8 @@ from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import every
 from cmm_uq.plugins import BrokenPluginError
 from cmm_uq.points import Floats, Points
-from cmm_uq.proving.cases import Case, Design
+from cmm_uq.proving.cases import Case
+from cmm_uq.proving.design import Design
 from cmm_uq.proving.judged import REFUSED
 from cmm_uq.proving.running import Record, serve
 from cmm_uq.uncertainty.quantity import Quantity
@@ -40,7 +41,7 @@ class CaseSetting:
     ----------
     files : of the job, by name.
     points : the set-ups.
-    values, noise, cte_per_k, dates : see :class:`~cmm_uq.proving.cases.Design`.
+    values, noise, cte_per_k, dates : see :class:`~cmm_uq.proving.design.Design`.
     seed, alpha : of the cases, and rate of false alarms.
     """
 

@@ -29,9 +29,10 @@ from cmm_uq.overflow import refusing_overflow
 from cmm_uq.physics.catalogue import every, plugins
 from cmm_uq.planning.setting import Setting
 from cmm_uq.points import Points
-from cmm_uq.proving.cases import Case, Design
-from cmm_uq.proving.judged import Judgement, judge
-from cmm_uq.proving.running import Kept, Record, answered
+from cmm_uq.proving.cases import Case
+from cmm_uq.proving.design import Design
+from cmm_uq.proving.judged import ANSWER, REFUSED, Judgement, judge
+from cmm_uq.proving.running import RECORDS, Kept, Record, answered
 from cmm_uq.proving.sealed import sha256_of, truth_file
 from cmm_uq.writing import interruption
 
@@ -125,6 +126,9 @@ def _records(
 ) -> dict[int, Record]:  # fmt: skip
     """What is said of every case, by its number."""
     records = {} if kept is None else kept.records
+    if kept is not None and any(REFUSED not in one and not one.keys() >= ANSWER for one in records.values()):
+        raise CmmUqError("holds an answer that none of these processes gave", where=str(kept.folder / RECORDS),
+                         fix="Remove the folder and begin again")  # fmt: skip
     todo = {case.number: case for case in cases if case.number not in records}
 
     def told() -> None:

@@ -107,6 +107,8 @@ def write_diagnosis(
 ) -> Written:
     """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
 
+    Where further set-ups would tell more, ``next_plan.csv`` comes with them.
+
     Parameters
     ----------
     job : the job folder.

@@ -4,22 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
-from cmm_uq.inference.noise import Sizes
+from cmm_uq.inference.linear_model import LinearModel
+from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import MeasurementModel
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import Observed
 from cmm_uq.model.noise import noise_of
 from cmm_uq.points import Floats, Ints
 from cmm_uq.screening.copies import counted_with
 from cmm_uq.uncertainty.mixture import averaged
 from cmm_uq.uncertainty.quantity import Quantity
+
+_FEW = 400
+"""Draws of each explanation that remains: enough for two digits of U."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +91,14 @@ def consequences(
     found = {item.effect for item in diagnosis.effects}
     if not found or not _depends(job, diagnosis):
         return None
-    posterior = diagnosis.posterior
-    return _corrected(job, diagnosis.after, found, posterior.draws, posterior.sizes, observe, tested, seed)
+    drawn = _Drawn(diagnosis.posterior.draws, diagnosis.posterior.sizes, _noise(diagnosis))
+    correction = _Correction.of(diagnosis.after, found, diagnosis.after.estimate().about, drawn, observe)
+    before, after = correction.before(seed), correction.after(seed)
+    recorded = correction.statements(job, tested, correction.model.artefact, before)
+    corrected = correction.statements(job, tested, correction.corrected, after)
+    return Consequences(
+        {name: (before[name], after[name]) for name in before}, tuple(zip(recorded, corrected, strict=True))
+    )
 
 
 def costs(job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int) -> Costs | None:
@@ -96,12 +109,13 @@ def costs(job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[
     rivals = diagnosis.remaining.rivals
     if not rivals or not _depends(job, diagnosis):
         return None
-    each = []
+    some = np.linspace(0, len(diagnosis.posterior.draws) - 1, _FEW).astype(np.int64)
+    each, components = [], _noise(diagnosis)
     for rival in rivals:
-        sizes = diagnosis.posterior.sizes.at(np.resize(np.arange(len(diagnosis.posterior.draws)), len(rival.draws)))
-        found = _corrected(job, rival.model, set(rival.effects), rival.draws, sizes, observe, tested, seed)
-        figures = {name: after for name, (_, after) in found.figures.items()}
-        each.append(Cost(rival.probability, figures, tuple(after for _, after in found.statements)))
+        posterior = _Drawn(rival.draws[:_FEW], diagnosis.posterior.sizes.at(some), components)
+        correction = _Correction.of(rival.model, set(rival.effects), rival.draws.mean(axis=0), posterior, observe)
+        figures = correction.after(seed)
+        each.append(Cost(rival.probability, figures, correction.statements(job, tested, correction.corrected, figures)))
     weights = diagnosis.remaining.weights
     decisions: tuple[dict[str, float], ...] = tuple({} for _ in each[0].statements)
     for cost, weight in zip(each, weights, strict=True):
@@ -111,57 +125,99 @@ def costs(job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[
     return Costs(tuple(each), figures, decisions)
 
 
+def _noise(diagnosis: Diagnosis) -> Components:
+    """That of all observations, used or not."""
+    return noise_of(replace(diagnosis.after, used=np.ones_like(diagnosis.after.used)))
+
+
 def _depends(job: Job, diagnosis: Diagnosis) -> bool:
     return diagnosis.after.artefact.lengths() is not None or bool(job.facts.conformity)
 
 
-def _corrected(
-    job: Job, fitted: MeasurementModel, found: Collection[str], drawn: Floats, noise_sizes: Sizes, observe: Observed,
-    tested: Collection[str], seed: int,
-) -> Consequences:  # fmt: skip
-    """Figures and statements as recorded, and corrected for some effects of a model.
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """Draws (N, k) of a model's unknowns, and the sizes of the noise of all observations that go with them."""
+
+    values: Floats
+    sizes: Sizes
+    components: Components
+
+
+@dataclass(frozen=True, eq=False)
+class _Correction:
+    """A recording, whole, and the same corrected for some effects of a model that was fitted to it.
 
     Parameters
     ----------
-    fitted : model with these effects.
-    found : their names.
-    drawn, noise_sizes : from its posterior.
+    model : with all observations.
+    ours : (k,) which of its unknowns are corrected for.
+    value : (k,) by which values.
+    drawn : from its posterior.
+    corrected : the artefact.
     """
-    model = replace(fitted, used=np.ones_like(fitted.used))
-    artefact = model.artefact
-    lengths = artefact.lengths()
-    estimate = fitted.estimate()
-    linear, value = estimate.linear, estimate.about
-    ours = np.array([unknown.key[0] in found for unknown in linear.unknowns])
-    coefficients = np.where(ours, value, 0.0)[: len(value) - len(artefact.sizes)]
-    points = artefact.points.at(artefact.points.xyz + model.errors(artefact.points.xyz, coefficients))
-    corrected = observe(points)
-    before: dict[str, Quantity] = {}
-    after: dict[str, Quantity] = {}
-    late = corrected.lengths()
-    if lengths is not None and late is not None:
-        some = repeated_draws(len(drawn), len(lengths))
-        draws, sizes, components = drawn[some], noise_sizes.at(some), noise_of(model)
-        whole = model.linearised(value)
-        predicted = lengths - whole.observed + draws @ whole.design.T
+
+    model: MeasurementModel
+    ours: NDArray[np.bool_]
+    value: Floats
+    drawn: _Drawn
+    corrected: Artefact
+
+    @classmethod
+    def of(
+        cls, fitted: MeasurementModel, found: Collection[str], value: Floats, drawn: _Drawn, observe: Observed
+    ) -> _Correction:  # fmt: skip
+        """For the effects of these names, by what a model estimates of them (k,)."""
+        model = replace(fitted, used=np.ones_like(fitted.used))
+        artefact = model.artefact
+        ours = np.array([unknown.key[0] in found for unknown in model.unknowns], dtype=bool)
+        coefficients = np.where(ours, value, 0.0)[: len(value) - len(artefact.sizes)]
+        points = artefact.points.at(artefact.points.xyz + model.errors(artefact.points.xyz, coefficients))
+        return cls(model, ours, value, drawn, observe(points))
+
+    def before(self, seed: int) -> dict[str, Quantity]:
+        """Figures as recorded; none of an artefact without lengths."""
+        lengths = self.model.artefact.lengths()
+        return {} if lengths is None else self._figures(lengths, self._predicted(lengths), seed)
+
+    def after(self, seed: int) -> dict[str, Quantity]:
+        """Figures corrected by the estimate, as the points were; a draw corrects by something else."""
+        lengths, late = self.model.artefact.lengths(), self.corrected.lengths()
+        if lengths is None or late is None:
+            return {}
+        own = (self._draws - self.value)[:, self.ours] @ self._whole.design[:, self.ours].T
+        return self._figures(late, self._predicted(lengths) + (late - lengths) - own, seed)
+
+    def statements(
+        self, job: Job, tested: Collection[str], artefact: Artefact, figures: Mapping[str, Quantity]
+    ) -> tuple[Statement, ...]:
+        """What the job asks for, of figures of this recording, or of it corrected."""
+        recorded = None if artefact is self.model.artefact else self.model.artefact
+        return tuple(
+            statement(wish, artefact, figures, f"[[conformity]] {i}", tested, recorded, job.circumstances)
+            for i, wish in enumerate(job.facts.conformity, 1)
+        )
+
+    @cached_property
+    def _some(self) -> Ints:
+        lengths = self.model.artefact.lengths()
+        return repeated_draws(len(self.drawn.values), 1 if lengths is None else len(lengths))
+
+    @property
+    def _draws(self) -> Floats:
+        return self.drawn.values[self._some]
+
+    @cached_property
+    def _whole(self) -> LinearModel:
+        return self.model.linearised(self.value)
+
+    def _predicted(self, lengths: Floats) -> Floats:
+        """Lengths (N, m) that draws predict."""
+        return lengths - self._whole.observed + self._draws @ self._whole.design.T
+
+    def _figures(self, lengths: Floats, predicted: Floats, seed: int) -> dict[str, Quantity]:
+        artefact, sizes = self.model.artefact, self.drawn.sizes.at(self._some)
 
         def noise(chosen: Ints, times: int, random: np.random.Generator) -> Floats:
-            return components.repeated(sizes.at(chosen), times, random)
+            return self.drawn.components.repeated(sizes.at(chosen), times, random)
 
-        same = counted_with(artefact.points)[artefact.rows[:, 0]]
-        before = with_uncertainty(lengths, predicted, noise, seed, same)
-        # corrected by the estimate, as the points were; a draw corrects by something else
-        remaining = predicted + (late - lengths) - (draws - value)[:, ours] @ whole.design[:, ours].T
-        after = with_uncertainty(late, remaining, noise, seed, same)
-    under = job.circumstances
-    return Consequences(
-        {name: (before[name], after[name]) for name in before},
-        tuple(
-            (
-                statement(wish, artefact, before, key, tested, None, under),
-                statement(wish, corrected, after, key, tested, artefact, under),
-            )
-            for i, wish in enumerate(job.facts.conformity, 1)
-            for key in [f"[[conformity]] {i}"]
-        ),
-    )
+        return with_uncertainty(lengths, predicted, noise, seed, counted_with(artefact.points)[artefact.rows[:, 0]])

@@ -10,7 +10,7 @@ from scipy import special
 
 from cmm_uq.diagnosis.asserting import Withheld, group_of, with_resolved_periods, with_sizes
 from cmm_uq.diagnosis.compared import compared_on
-from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, Found, ModelComparison, search, without
+from cmm_uq.diagnosis.comparison.search import Found, ModelComparison, search, without
 from cmm_uq.diagnosis.held_out import Improvement, improvement
 from cmm_uq.diagnosis.joint import Joint, joint_posterior
 from cmm_uq.diagnosis.location import Place, located
@@ -33,6 +33,9 @@ FALSE_ALARMS = 0.01
 """Default rate at which a recording without any fault is found to have one."""
 
 _TOLD_APART = 0.95
+_ODDS = 0.05
+"""Odds of another in the place of an effect from which both are named together: a placing is suggested that gives 20 : 1."""
+
 _UNKNOWN = 0.5
 _NOISE_KIND = 0.9
 
@@ -253,7 +256,7 @@ def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
     names, groups = [e.name for e in found.first.explanations], []
     for i in sorted(found.chosen):
         odds = found.combinations.instead(found.chosen, i)
-        rivals = sorted((r for r in odds if odds[r] > NOT_TOLD_APART), key=lambda r: -odds[r])
+        rivals = sorted((r for r in odds if odds[r] > _ODDS), key=lambda r: -odds[r])
         if rivals and found.combinations.of(i) < _TOLD_APART:
             groups.append((names[i], *(names[r] for r in rivals)))
     return tuple(groups)

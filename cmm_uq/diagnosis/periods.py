@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from cmm_uq.diagnosis.comparison.explanations import effect_of, evenly, unevenly
+from cmm_uq.diagnosis.comparison.explanations import STEP, effect_of, evenly, unevenly
 from cmm_uq.diagnosis.comparison.search import Found
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import Unit
 
 RESOLVED = 0.95
 """Probability of one mode from which a period counts as resolved."""
@@ -20,9 +21,6 @@ _LIKELY = 1e-4
 
 _APART = 0.5
 """Frequencies that are this far apart, over one in the range of the readings, with nothing likely between, are two modes."""
-
-_WHOLE = 1.0
-"""Periods that the readings must hold: less than a whole one is a bow, or any other curve."""
 
 _TOLD = 1e-3
 """Probability from which a mode is told."""
@@ -72,7 +70,7 @@ def modes_of(found: Found, index: int) -> tuple[Mode, ...]:
     parts = np.split(likely, np.flatnonzero(np.diff(frequency[likely]) > _APART / span) + 1)
     found_modes = []
     for part in parts:
-        step = _APART * 0.35 / span
+        step = 0.5 * STEP / span
         ends = unevenly(effect, np.array([frequency[part].max() + step, max(frequency[part].min() - step, 1e-9)]))
         period = _within(unevenly(effect, frequency[part]), weight[part], effect.shape[0].unit, ends)
         found_modes.append(Mode(period, float(weight[part].sum()), (float(ends[0]), float(ends[1]))))
@@ -80,22 +78,22 @@ def modes_of(found: Found, index: int) -> tuple[Mode, ...]:
 
 
 def resolved(found: Found, index: int, modes: tuple[Mode, ...]) -> bool:
-    """Whether the positions tell one period from all others, and hold a whole one."""
+    """Whether the positions tell one period from all others, and hold a whole one: less is a bow, or any other curve."""
     effect = effect_of(found.first.explanations[index])
     axis = effect.shape[0].period_along if effect.shape else None
     if axis is None:
         return True
-    return modes[0].probability >= RESOLVED and modes[0].period.interval95[1] * _WHOLE <= _span(found, axis)
+    return modes[0].probability >= RESOLVED and modes[0].period.interval95[1] <= _span(found, axis)
 
 
 def _span(found: Found, axis: str) -> float:
     return float(np.ptp(found.first.model.artefact.points.readings[axis]))
 
 
-def _within(periods: Floats, weight: Floats, unit: object, ends: Floats) -> Quantity:
+def _within(periods: Floats, weight: Floats, unit: Unit, ends: Floats) -> Quantity:
     """Mean, standard deviation and interval of periods with weights; of a single trial, as wide as trials are apart."""
     weight = weight / weight.sum()
     value = float(weight @ periods)
     own = float(np.ptp(ends)) / np.sqrt(12) / max(len(periods), 1)
     u = float(np.sqrt(weight @ (periods - value) ** 2 + own**2))
-    return Quantity(value, u, (value - 1.96 * u, value + 1.96 * u), unit)  # type: ignore[arg-type]
+    return Quantity(value, u, (value - 1.96 * u, value + 1.96 * u), unit)

@@ -13,6 +13,9 @@ from cmm_uq.diagnosis.shapes import kinds
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.noise import noise_of
 
+_FEW = 2
+"""Columns."""
+
 
 def noise_kinds(model: MeasurementModel, candidates: Sequence[Explanation]) -> list[Kind]:
     """Kinds of noise of the used observations.
@@ -23,7 +26,13 @@ def noise_kinds(model: MeasurementModel, candidates: Sequence[Explanation]) -> l
     candidates : what else could be; the known effects among them may act all at once.
     """
     estimate = model.estimate()
-    columns = [e.members[0].columns for e in candidates if e.kind == EFFECT and not e.shaped]
+    columns = [e.members[0].columns for e in candidates if e.kind == EFFECT and not e.shaped and not _doubled(e)]
     rivals = np.hstack(columns) if columns else np.zeros((len(estimate.linear.observed), 0))
     components = noise_of(replace(model, sigma=None))
     return kinds(estimate.linear, components, estimate.least_squares, rivals, estimate.least_squares.residuals)
+
+
+def _doubled(explanation: Explanation) -> bool:
+    """Whether it is a fault of the artefact that an error of the machine, or a pattern of the artefact, can be as well."""
+    effect = explanation.effect
+    return effect is not None and effect.of_artefact and len(effect.coefficients) <= _FEW

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cmm_uq.diagnosis.comparison.combinations import Combinations, Key
+from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, Prior
 from cmm_uq.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.diagnosis.comparison.search import Found, with_effects
 from cmm_uq.diagnosis.joint import Joint
@@ -25,13 +25,16 @@ from cmm_uq.uncertainty.mixture import averaged
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import unit
 
-REMAINS = 0.02
+REMAINS = 0.01
 """Probability from which a combination of explanations remains."""
 
 SETTLED = 0.95
 """Probability of one combination from which no other remains."""
 
-_MOST = 8
+_WORTH = float(np.log(3.2))
+"""Log evidence up to which an explanation more is not worth more than a bare mention (Kass & Raftery 1995, JASA 90, 777)."""
+
+_MOST = 12
 _DRAWS = 4000
 _ROUNDS = 3
 _AS_READINGS = 12
@@ -46,7 +49,7 @@ class Rival:
 
     Parameters
     ----------
-    probability : among all combinations.
+    probability : among all combinations, with what adds nothing to it.
     effects : names of the effects that it adds to the model.
     functions : what is unknown besides.
     named : parameters of the effects that the job names, under it.
@@ -95,7 +98,7 @@ def remaining(found: Found, joint: Joint, before: MeasurementModel, seed: int) -
         return Remaining()
     whole = found.first.model.artefact is before.artefact
     total: dict[Key, float] = {}
-    for key, p in combinations.probability.items():
+    for key, p in needed(combinations).items():
         # functions are known where the candidates were compared: of a large recording, on some of the observations
         own = key if whole else combinations.effects_of(key)
         total[own] = total.get(own, 0.0) + p
@@ -114,6 +117,23 @@ def remaining(found: Found, joint: Joint, before: MeasurementModel, seed: int) -
     return Remaining(rivals, named)
 
 
+def needed(combinations: Combinations) -> dict[Key, float]:
+    """Probability of every combination of which each member explains something.
+
+    One whose evidence is not three times that without a member is no other explanation than that without it: its probability
+    goes there. (A recording that is consistent leaves open as well what it does not show.)
+    """
+    prior = Prior(combinations.explanations)
+    evidence = {key: one.log_posterior - prior.log(key) for key, one in combinations.found.items()}
+    total = dict(combinations.probability)
+    for key in sorted(total, key=lambda key: -len(key)):
+        fewer = [key - {i} for i in key if key - {i} in evidence]
+        enough = [one for one in fewer if evidence[key] - evidence[one] < _WORTH]
+        if enough:
+            total[max(enough, key=lambda one: evidence[one])] += total.pop(key)
+    return total
+
+
 def _rival(
     found: Found, combinations: Combinations, joint: Joint, before: MeasurementModel, key: Key, probability: float,
     seed: int,
@@ -130,7 +150,7 @@ def _rival(
     if effects:
         model = with_effects(found.first, versions, effects)
         model = replace(model, artefact=before.artefact, used=before.used)
-    linear = replace(model.estimate().linear, sigma=None)
+    linear = replace(model.linearised(_about(model, before, found.model)), sigma=None)
     sigma = float(joint.posterior.sizes.typical.coordinate[0])
     for version in versions:
         if version.explanation in functions:
@@ -145,6 +165,17 @@ def _rival(
         {effect.name: reported[effect.name] for effect in before.effects}, {name: reported[name] for name in added},
         model, draws,
     )  # fmt: skip
+
+
+def _about(model: MeasurementModel, *estimated: MeasurementModel) -> Floats:
+    """Parameters (k,) that a model is linear about: as the last of others estimates them, else as they are known beforehand.
+
+    It is not estimated by itself: what it cannot tell apart is held by what physics allows alone.
+    """
+    values = {unknown.key: unknown.prior_mean for unknown in model.unknowns}
+    for other in estimated:
+        values |= dict(zip((unknown.key for unknown in other.unknowns), other.estimate().about, strict=True))
+    return np.array([values[unknown.key] for unknown in model.unknowns])
 
 
 def _with_columns(linear: LinearModel, columns: Floats, sd: float) -> LinearModel:

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from scipy import optimize, special
 
 from cmm_uq.diagnosis.comparison.combinations import EFFECTS
-from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, effect_of
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.diagnosis.comparison.lack_of_fit import NOTHING, log_prior, tail_probability
 from cmm_uq.diagnosis.comparison.search import Found
 from cmm_uq.diagnosis.detection import LONGEST, SHORTEST, Thresholds
 from cmm_uq.diagnosis.power import ALLOWED, CERTAIN, Naming
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.freedoms import reached
 from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import every
@@ -133,6 +134,8 @@ class Smallest:
 def smallest_effects(found: Found, alpha: float, model: MeasurementModel) -> tuple[Smallest, ...]:
     """The smallest amplitude of each effect that a recording would have shown; those that it could least come first.
 
+    Of effects of machine and surroundings: faults of the artefact are parted from them by further set-ups.
+
     Parameters
     ----------
     found : the search of the recording.
@@ -142,9 +145,9 @@ def smallest_effects(found: Found, alpha: float, model: MeasurementModel) -> tup
     view = _View.of(found)
     named = {effect.name for effect in model.effects}
     listed = [
-        (i, explanation, effect_of(explanation))
+        (i, explanation, effect)
         for i, explanation in enumerate(view.explanations)
-        if explanation.kind == EFFECT and explanation.name not in named and explanation.name in every()
+        if (effect := explanation.effect) is not None and not effect.of_artefact and explanation.name not in named
     ]
     signals = _signals(view, listed)
     visible = [signal for signal in signals if signal.unit_length * ALLOWED > _FAINT]
@@ -208,7 +211,7 @@ class _View:
         ]
         fitted = np.zeros((len(scale), 0))
         if columns:
-            fitted = np.linalg.qr(comparison.rest(np.hstack(columns)))[0]
+            fitted = reached(comparison.rest(np.hstack(columns)))
         noise = comparison.left - fitted @ (fitted.T @ comparison.left)
         both = comparison.noise_posterior(noise)
         weight = both.sum(axis=1)
@@ -233,6 +236,13 @@ class _View:
         each = self.found.first.comparison.lengths(columns)
         variance = (self.weight[:, None] * self.squares[:, None] / np.maximum(each, 1e-300)).sum(axis=0)
         return np.asarray(np.where(each.min(axis=0) > 0, 1 / np.sqrt(variance), 0.0))
+
+    def taking(self, raw: Floats) -> tuple[str, ...]:
+        """Names of what takes most of a column (m,) up: what was asserted, or else what the model names."""
+        left = self.found.first.comparison.rest(raw[:, None])
+        if np.linalg.norm(left) >= _HIDDEN * np.linalg.norm(raw):
+            return self.found.effects
+        return _imitators(self.found.first.model, raw)
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,7 +291,7 @@ class _Signal:
             if length <= self.unit_length * ALLOWED:
                 named = _amplitude(thresholds.length_named(POWER), self.unit_length, parameter.prior_sd)
         periods = self._periods(length) if len(self.values) else None
-        taken_up = _imitators(view.found.first.model, self.raw, view) if share < _HIDDEN else ()
+        taken_up = view.taking(self.raw) if share < _HIDDEN else ()
         return Smallest(
             effect.name, effect.title, effect.reported[0].name, parameter.unit, ALLOWED * parameter.prior_sd, detected, named,
             share, taken_up, effect.tier == CONTRACT, periods, length if np.isfinite(length) else None,
@@ -360,16 +370,22 @@ def _aliased(view: _View, lefts: Floats, values: Floats) -> NDArray[np.bool_]:
     return np.asarray((alike & ~near).any(axis=1))
 
 
-def _imitators(model: MeasurementModel, raw: Floats, view: _View) -> tuple[str, ...]:
-    """Names of what is fitted that together looks like a column (m,): those with a share of it that counts."""
+def _imitators(model: MeasurementModel, raw: Floats) -> tuple[str, ...]:
+    """Names of what is fitted that together looks like a column (m,): those with a share of it that counts.
+
+    What the free places of the artefact take up is theirs; for the rest, of many solutions the smallest counts.
+    """
     linear = model.estimate().linear
-    free = [i for i, unknown in enumerate(linear.unknowns) if not unknown.known]
-    columns = np.hstack([linear.design[:, free], linear.freedoms.dense()]) / linear.noise_scale[:, None]
-    length = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    parts = np.linalg.lstsq(columns / length, raw, rcond=_RIDGE**0.5)[0] / max(float(np.linalg.norm(raw)), 1e-300)
-    names = [linear.unknowns[i].key[0] for i, part in zip(free, parts, strict=False) if abs(part) > _PART]
-    if np.linalg.norm(parts[len(free) :]) > _PART:
-        names.append(PLACES)
+    places = linear.freedoms.over(linear.noise_scale)
+    left = places.without(raw[:, None])[:, 0]
+    length, rest = float(np.linalg.norm(raw)), float(np.linalg.norm(left))
+    names = [PLACES] if rest < (1 - _PART) * length else []
+    if rest > _PART * length:
+        free = [i for i, unknown in enumerate(linear.unknowns) if not unknown.known]
+        columns = linear.reduced.design[:, free]
+        sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        parts = np.linalg.lstsq(columns / sizes, left / rest, rcond=_RIDGE**0.5)[0]
+        names = [linear.unknowns[i].key[0] for i, part in zip(free, parts, strict=True) if abs(part) > _PART] + names
     return tuple(dict.fromkeys(names))
 
 

@@ -43,8 +43,7 @@ def costs_section(found: Diagnosed) -> Section:
     more = max(len(rivals) - _SHOWN, 0)
     notes.append(
         say(
-            "{more}They are averaged over explanations with {told} of the probability together; each of the rest has "
-            "less than 2\u00a0%.",
+            "{more}The averages are over explanations with {told} of the probability together; each of the rest has less.",
             more=plural(
                 more, one=say("One further explanation is in results.json. "),
                 many=say("{count} further explanations are in results.json. ", count=more),

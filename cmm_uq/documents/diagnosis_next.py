@@ -8,9 +8,10 @@ import numpy as np
 
 from cmm_uq.diagnosis.power import ALLOWED
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.documents.effect_words import title_of
 from cmm_uq.documents.plan_picture import placing_pictures
 from cmm_uq.documents.result import Diagnosed
-from cmm_uq.messages import NOTHING, Text, Verbatim, number, plural, say, semicolons, together
+from cmm_uq.messages import NOTHING, Text, number, plural, say, semicolons, together
 from cmm_uq.physics.catalogue import every
 from cmm_uq.planning.suggestion import ODDS, NextPlan, Shown, odds_words, rounded
 
@@ -73,7 +74,7 @@ def _set_ups(plan: NextPlan) -> Table:
 def _partings(plan: NextPlan) -> Table:
     rows = tuple(
         (
-            together(_title(name) for name in parting.effects),
+            together(title_of(name) for name in parting.effects),
             odds_words(parting.before),
             say("{odds} : 1", odds=rounded(parting.after)),
         )
@@ -91,15 +92,10 @@ def _partings(plan: NextPlan) -> Table:
 
 
 def _shown(plan: NextPlan) -> Table:
-    rows = tuple((_title(one.effect), _amplitude(one, one.before), _amplitude(one, one.after)) for one in plan.shown)
+    rows = tuple((title_of(one.effect), _amplitude(one, one.before), _amplitude(one, one.after)) for one in plan.shown)
     heads = (Column(say("Error"), numeric=False), Column(say("Found from, now")), Column(say("Found from, then")))
     note = say("One error at a time, in 90 of 100 such recordings, with everything that the model names fitted.")
     return Table(say("What the set-ups show"), heads, rows, (note,))
-
-
-def _title(name: str) -> Text:
-    effect = every().get(name)
-    return Verbatim(name) if effect is None else effect.title
 
 
 def _amplitude(one: Shown, size: float) -> Text:

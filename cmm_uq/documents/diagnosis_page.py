@@ -97,18 +97,16 @@ def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
 
 def _sections(found: Diagnosed) -> tuple[Section, ...]:
     """What is to be done first, what it rests on behind it, long tables last."""
-    noise, unseen = noise_words(found.diagnosis, stated_um(found)), unseen_section(found)
-    consistent = found.diagnosis.verdict == "consistent"
+    noise = noise_words(found.diagnosis, stated_um(found))
     sections = (
         Section(say("What was left out"), _left_out(found)),
         where_section(found.diagnosis),
         Section(say("What remains"), _consistent(found)),
-        *((unseen,) if consistent else ()),
         next_section(found),
         Section(say("Before and after"), _before_after(found)),
         Section(say("What a correction would change"), _consequences(found)),
         costs_section(found),
-        *(() if consistent else (unseen,)),
+        unseen_section(found),
         *_simulation(found),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise)),
         Section(say("Candidate explanations"), (_rivals(found),)),

@@ -9,6 +9,7 @@ from cmm_uq.diagnosis.unseen import PLACES, POWER, Periods, Smallest
 from cmm_uq.documents.document import Column, Paragraph, Section, Table
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, listed, number, say
+from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.physics.catalogue import every
 from cmm_uq.units import Unit
 
@@ -90,12 +91,17 @@ def _why(row: Smallest) -> Text:
 
 
 def _titles(owners: Sequence[str]) -> list[Text]:
-    titles: list[Text] = []
-    for name in owners:
-        effect = every().get(name)
-        title = say("{title:small}", title=effect.title) if effect is not None else Verbatim(name)
-        titles.append(say("the place of the artefact") if name == PLACES else title)
-    return titles
+    return [_taker(name) for name in owners]
+
+
+def _taker(name: str) -> Text:
+    """What takes an error up, in words."""
+    if name == PLACES:
+        return say("the place of the artefact")
+    if name == ARTEFACT:
+        return say("the size of the artefact")
+    effect = every().get(name)
+    return Verbatim(name) if effect is None else say("{title:small}", title=effect.title)
 
 
 def _periods(periods: Periods, row: Smallest) -> Text:

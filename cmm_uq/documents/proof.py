@@ -9,7 +9,7 @@ from typing import Any
 
 from cmm_uq.jobs.job import Job
 from cmm_uq.proving.accepted import MISSED, Accepted, accepted
-from cmm_uq.proving.cases import Design
+from cmm_uq.proving.design import Design
 from cmm_uq.proving.judged import Judgement
 from cmm_uq.proving.reach import FaultReach, Reach, fault_reaches, reaches
 from cmm_uq.proving.sealed import canonical, sha256_of

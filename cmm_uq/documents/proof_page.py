@@ -6,6 +6,7 @@ from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph,
 from cmm_uq.documents.effect_words import titles
 from cmm_uq.documents.program import program
 from cmm_uq.documents.proof import Proof
+from cmm_uq.documents.proof_method import how_to_check, method, not_covered
 from cmm_uq.documents.proof_plots import said_plot, strength_plot
 from cmm_uq.documents.proof_reach import effects_section, unseen_section
 from cmm_uq.documents.proof_words import (
@@ -23,11 +24,10 @@ from cmm_uq.documents.proof_words import (
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.proving.accepted import MISSED, OPEN
-from cmm_uq.proving.cases import KINDS, STRONGEST, WEAKEST, micrometres
+from cmm_uq.proving.cases import KINDS, STRONGEST, micrometres
 from cmm_uq.proving.intervals import Rate
 from cmm_uq.proving.judged import REFUSED, VERDICTS
 from cmm_uq.proving.running import RECORDS, TRUTH
-from cmm_uq.proving.sight import ALLOWED
 from cmm_uq.proving.smallest import FEWEST, LARGEST
 from cmm_uq.units import unit
 
@@ -54,6 +54,7 @@ def proof_document(proof: Proof) -> Document:
                     (say("Cases"), number(len(judgement.cases))),
                     (say("Seed"), number(proof.seed)),
                     (say("False-alarm rate asked for"), say("{alpha:g} %", alpha=100 * proof.alpha)),
+                    (say("Program"), program(proof.job)),
                     (say("Truth sealed by SHA-256"), Verbatim(proof.sha256)),
                 )
             ),
@@ -61,7 +62,7 @@ def proof_document(proof: Proof) -> Document:
         warnings=warnings_of(proof),
         sections=(
             Section(say("Conclusion"), _conclusion(proof)),
-            Section(say("Purpose and method"), tuple(Paragraph(text) for text in _method(proof))),
+            Section(say("Purpose and method"), tuple(Paragraph(text) for text in method())),
             Section(say("Set-ups and noise"), (_noise(proof),)),
             Section(say("What was hidden, and what was said"), _answers(proof)),
             Section(say("How strong a cause must be"), _strength(proof)),
@@ -70,8 +71,8 @@ def proof_document(proof: Proof) -> Document:
             Section(say("Kinds of noise"), (_by_noise(proof),)),
             effects_section(proof),
             unseen_section(proof),
-            Section(say("What this does not cover"), tuple(Paragraph(text) for text in _not_covered())),
-            Section(say("How to check it"), tuple(Paragraph(text) for text in _check())),
+            Section(say("What this does not cover"), tuple(Paragraph(text) for text in not_covered())),
+            Section(say("How to check it"), tuple(Paragraph(text) for text in how_to_check())),
         ),
         attachments=tuple(Verbatim(name) for name in (TRUTH, RECORDS, "results.json")),
         produced_by=say("{program}, seed {seed}", program=program(proof.job), seed=proof.seed),
@@ -138,40 +139,6 @@ def _conclusion(proof: Proof) -> tuple[Block, ...]:
         "asked for was sealed with the truth."
     )
     return (Paragraph(conclusion_of(proof)), Table(say("Acceptance"), heads, rows, (note,)))
-
-
-def _method(proof: Proof) -> tuple[Text, ...]:
-    return (
-        say(
-            "Purpose: to validate, by the systematic assessment that ISO/IEC 17025:2017, 7.2.2.1 names, that the "
-            "diagnosis of cmm-uq is fit for recordings made with these set-ups: that it finds what the job's model "
-            "leaves out, calls it by its name, stays silent where nothing is left out, and states uncertainties and "
-            "probabilities that hold."
-        ),
-        say(
-            "Cases are drawn by the forward model of the job: its artefact in its set-ups, the errors that the job "
-            "names as they were estimated, the size of the artefact within its certificate's uncertainty, and noise. "
-            "Of every ten cases three hide nothing, three an effect of the catalogue, two two effects, one a "
-            "function of place, time or set-up that no effect has, and one a fault of the artefact. Where a cause "
-            "does not show in these set-ups, another takes its place."
-        ),
-        say(
-            "A hidden cause has a strength √λ: its length in all observations over the noise, once all that the job "
-            "names, and what else is hidden, has taken what it can. Strengths are evenly distributed from {weakest:g} "
-            "to {strongest:g}, or to that of {allowed:g} standard deviations of what physics allows where an effect is "
-            "then weaker. Of a function or a fault, no single effect leaves less than {weakest:g}.",
-            weakest=WEAKEST, strongest=STRONGEST, allowed=ALLOWED,
-        ),
-        say(
-            "Every other case has the noise of the job; the others in turn each kind of noise that these set-ups "
-            "could show, as large as the job's readings."
-        ),
-        say(
-            "The truth of all cases was written down and sealed by its hash before the first of them was diagnosed. "
-            "Each recording then went through screening and diagnosis as a measured one does, with a seed of its "
-            "own."
-        ),
-    )  # fmt: skip
 
 
 def _noise(proof: Proof) -> Block:
@@ -334,38 +301,8 @@ def _by_noise(proof: Proof) -> Block:
             )
         )
     heads = (
-        Column(say("Noise"), numeric=False), Column(say("False alarms")), Column(NOTHING, unit("%")),
-        Column(say("Effects found")), Column(NOTHING, unit("%")), Column(say("Intervals that hold")),
-        Column(NOTHING, unit("%")),
+        Column(say("Noise"), numeric=False), Column(say("False alarms")), Column(say("Rate"), unit("%")),
+        Column(say("Effects found")), Column(say("Rate"), unit("%")), Column(say("Intervals that hold")),
+        Column(say("Rate"), unit("%")),
     )  # fmt: skip
     return Table(say("By kind of noise"), heads, tuple(rows))
-
-
-def _not_covered() -> tuple[Text, ...]:
-    return (
-        say(
-            "Cases are drawn by the same forward model that the diagnosis fits. What is shown is that the diagnosis "
-            "does what it says where machine and artefact behave as that model says, or have one of the strangers "
-            "that were drawn; not that this machine does. An error in the model's own equations would not show here."
-        ),
-        say(
-            "Not drawn: three and more causes at once, damaged and mistyped recordings, wrong temperatures and other "
-            "columns beside a job's own, periods shorter than 6 mm or longer than the readings reach, set-ups other "
-            "than these."
-        ),
-        say(
-            "The figures hold for the strengths and the mixture that were drawn. Another share of strong causes "
-            "would give another share of them found; the table by strength does not depend on it."
-        ),
-    )
-
-
-def _check() -> tuple[Text, ...]:
-    return (
-        say(
-            "{truth} holds the truth of every case, {records} what was said of it. The hash above is that of the "
-            "first file as it stands: sha256sum {truth} gives it again.",
-            truth=Verbatim(TRUTH), records=Verbatim(RECORDS),
-        ),
-        say("The same command with the same seed, on any number of processes, writes the same files."),
-    )  # fmt: skip

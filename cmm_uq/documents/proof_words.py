@@ -53,7 +53,7 @@ ANSWER_WORDS: Mapping[str, Text] = MappingProxyType({**VERDICT_WORDS, judged.REF
 STANDING_WORDS: Mapping[str, Text] = MappingProxyType(
     {
         accepted.MET: say("shown"),
-        accepted.OPEN: say("not decided by so many cases"),
+        accepted.OPEN: say("too few cases to decide"),
         accepted.MISSED: say("missed"),
     }
 )
@@ -99,10 +99,14 @@ def standing(one: Accepted) -> Text:
     told = STANDING_WORDS[one.standing]
     if one.standing == accepted.OPEN and one.kept and one.cases is not None and one.rate.of < one.cases:
         return say(
-            "{told}; counted within it; {needed} cases of this sort without one would show it",
+            "{told}; counted within the limit; {needed} cases of this sort without one would show it",
             told=told,
             needed=one.cases,
         )
     if one.standing == accepted.OPEN and one.rate.of:
-        return say("{told}; counted within it", told=told) if one.kept else say("{told}; counted outside it", told=told)
+        return (
+            say("{told}; counted within the limits", told=told)
+            if one.kept
+            else say("{told}; counted outside the limits", told=told)
+        )
     return told

@@ -92,9 +92,9 @@ class Diagnosed:
     suggestions : what to measure next.
     consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
     simulated : the simulation that the recording was compared with, if it was with one.
-    costs : what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
     unseen : the smallest amplitude of each effect that the recording would have shown.
     next_plan : the fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any.
+    costs : what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
     """
 
     job: Job
@@ -103,9 +103,9 @@ class Diagnosed:
     suggestions: tuple[Suggestion, ...]
     consequences: Consequences | None = None
     simulated: Simulated | None = None
-    costs: Costs | None = None
     unseen: tuple[Smallest, ...] = ()
     next_plan: NextPlan | None = None
+    costs: Costs | None = None
 
 
 @dataclass(frozen=True)

@@ -119,11 +119,11 @@ class Effect(ABC):
     tier : ``contract`` or ``further``: how readily it is to be thought of.
     idealised_over : axis, or column, over which its form is the simplest of many that its mechanism can have, if it is that.
     imitated_by : nonparametric terms that could pass for it.
+    stands_for : nonparametric terms that are nothing else than it.
     along_motion : carriage along whose motion e goes, however that leans; ``None`` where e keeps to the coordinates.
     plane : pair of axes whose squareness it is (``xy``, ``yz``, ``zx``), if it is one; it then gives its :meth:`lean`.
     of_artefact : whether it is a fault of the artefact itself, which only that artefact can say in full.
     mostly : part of its prior standard deviation that it mostly keeps to, where a certificate says so and may be wrong.
-    least_set_ups : set-ups that a recording must have to show it as an effect of its own.
     """
 
     name: str
@@ -137,10 +137,10 @@ class Effect(ABC):
     tier: str = CONTRACT
     idealised_over: str | None = None
     imitated_by: tuple[Nonparametric, ...] = ()
+    stands_for: tuple[Nonparametric, ...] = ()
     along_motion: str | None = None
     plane: str | None = None
     of_artefact: bool = False
-    least_set_ups: int = 1
     mostly: float = 1.0
 
     @property
@@ -178,6 +178,10 @@ class Effect(ABC):
     def belongs_to(self, points: Points) -> bool:
         """Whether a fault of an artefact is that of the artefact in these points."""
         return False
+
+    def shown_in(self, points: Points) -> bool:
+        """Whether a recording has the set-ups that it takes to know it from an offset of each set-up."""
+        return True
 
     def course(self, points: Points) -> Floats | None:
         """Where each point is on the axis, or in the column, of ``idealised_over``, (n,); ``None`` without one."""

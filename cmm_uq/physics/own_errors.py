@@ -16,13 +16,16 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import say
 from cmm_uq.physics.common_size import CommonSize
-from cmm_uq.physics.effect import OWN, PRIOR_WEIGHT, Effect, Parameter
+from cmm_uq.physics.effect import OWN, PRIOR_WEIGHT, Effect, Nonparametric, Parameter
 from cmm_uq.physics.own_body import Body
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.physics.scales import EFFECTS as FURTHER_OF_SCALES
 from cmm_uq.physics.scales import ScaleCurvature
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import MICROMETRE, unit
+
+_FEWEST = 3
+"""Places that were met in two set-ups, for a pattern."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +175,7 @@ class OwnPattern(OwnFault, CommonSize):
     )
     coefficients: tuple[Parameter, ...] = (Parameter("um", unit("µm"), 10.0),)
     size = Parameter("rms_um", unit("µm"), 10.0)
-    least_set_ups = 2
+    stands_for = tuple(Nonparametric(f"reference_{name}mm") for name in ("", "x_", "y_", "z_"))
     _shown: Floats
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
@@ -186,6 +189,13 @@ class OwnPattern(OwnFault, CommonSize):
         found._shown = deformations(owner)
         found.size = Parameter("rms_um", unit("µm"), owner.size)
         return found
+
+    def shown_in(self, points: Points) -> bool:
+        """See :meth:`Effect.shown_in`: half of the places, and three at least, in two set-ups."""
+        node = self.whose().body.nodes(points)
+        pairs = np.unique(np.column_stack([node, points.measurement]), axis=0)
+        again = int(np.sum(np.bincount(pairs[:, 0]) > 1))
+        return again >= max(_FEWEST, 0.5 * len(np.unique(node)))
 
     def errors(self, coefficients: Floats) -> Floats:
         """See :meth:`CommonSize.errors`: deviations of every place along every axis."""

@@ -49,7 +49,6 @@ class OfSetUps(OwnFault, CommonSize):
     """A fault with coefficients of its own in each set-up, of one common size."""
 
     each: tuple[str, ...]
-    least_set_ups = 2
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
         """See :meth:`OwnFault.sized`: those of each set-up."""
@@ -68,6 +67,10 @@ class OfSetUps(OwnFault, CommonSize):
         found.owner, found.coefficients = owner, self.sized(owner)
         found.size = Parameter(self.size.name, self.size.unit, owner.size)
         return found
+
+    def shown_in(self, points: Points) -> bool:
+        """See :meth:`Effect.shown_in`: in two set-ups."""
+        return len(np.unique(points.measurement)) > 1
 
     def by_set_up(self, points: Points, each: Floats) -> Floats:
         """Columns (n, 3, q·j) of coefficients of every set-up from those (n, 3, j) of a single one."""

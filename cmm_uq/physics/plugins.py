@@ -48,8 +48,7 @@ class _Outside(Effect):
         self.mechanism, self.points_to = effect.mechanism, foreign(effect.points_to)
         self.coefficients, self.shape, self.columns = effect.coefficients, effect.shape, effect.columns
         self.tier, self.idealised_over, self.imitated_by = effect.tier, effect.idealised_over, effect.imitated_by
-        self.along_motion, self.plane = effect.along_motion, effect.plane
-        self.least_set_ups = effect.least_set_ups
+        self.along_motion, self.plane, self.stands_for = effect.along_motion, effect.plane, effect.stands_for
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""

@@ -147,7 +147,8 @@ class Setting:
         named = {effect.name for effect in self.named}
         if self.plan.rivals is not None:
             where = "job.toml [plan] rivals"
-            chosen = effects(self.plan.rivals, where=where)
+            artefact = self.observed(points)
+            chosen = tuple(artefact.acting(effect) for effect in effects(self.plan.rivals, where=where))
             for effect in chosen:
                 if missing := [column for column in effect.columns if column not in points.columns]:
                     raise CmmUqError(f"{effect.name} needs the column {missing[0]}, which this plan does not record",

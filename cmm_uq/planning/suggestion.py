@@ -342,20 +342,22 @@ def _information(
     *,
     shared_freedoms: bool,
 ) -> _Information:
-    values = np.array([unknown.prior_mean for unknown in model.unknowns])
-    names = tuple(unknown.key[0] for unknown in model.unknowns)
     fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
+    joint = observe(appended(model.artefact.points, places))
+    together = MeasurementModel(joint, model.effects, model.sigma, shapes=model.shapes)
+    names = tuple(unknown.key[0] for unknown in together.unknowns)
     if shared_freedoms:
-        joint = appended(model.artefact.points, places)
-        whole = shared(MeasurementModel(observe(joint), model.effects, model.sigma, shapes=model.shapes))
-        count = len(whole.each) - len(places)
+        whole = shared(together)
         more = len(whole.prior) - len(names)
-        told = replace(whole, each=whole.each[count:])
-        return _Information(told, (*names, *[ARTEFACT] * more), fitted, whole.each[:count].sum(axis=0))
-    first = replace(places[0].points, measurement=np.ones(len(places[0].points), dtype=np.int64))
-    joint = appended(first, places[1:])
-    each = by_measurement(MeasurementModel(observe(joint), model.effects, model.sigma, shapes=model.shapes), values)
-    return _Information(Told(model.unknowns, each, certified(model.unknowns)), names, fitted, gram(model, values))
+    else:
+        values = np.array([unknown.prior_mean for unknown in together.unknowns])
+        whole, more = Told(together.unknowns, by_measurement(together, values), certified(together.unknowns)), 0
+    count = len(whole.each) - len(places)
+    recorded = whole.each[:count].sum(axis=0)
+    if not shared_freedoms and len(names) == len(model.unknowns):  # without observations that were set aside
+        recorded = gram(model, values)
+    told = replace(whole, each=whole.each[count:])
+    return _Information(told, (*names, *[ARTEFACT] * more), fitted, recorded)
 
 
 def _sizes(after: MeasurementModel, groups: Sequence[_Group]) -> dict[tuple[str, str], Floats]:
@@ -453,8 +455,9 @@ class _Aims:
 
     def _expected(self, information: Floats, g: int, true: int, other: int) -> Floats:
         names = self.groups[g].names
-        size = self.sizes[names[0], names[true]]
         rows, others = self.known.rows(names[true]), self.known.rows(names[other])
+        size = np.zeros(len(rows))  # further set-ups may have coefficients of their own, after those of the recording
+        size[: len(self.sizes[names[0], names[true]])] = self.sizes[names[0], names[true]]
         left = self.known.left(information, rows, names, others)
         return np.asarray(0.5 * np.einsum("i,cij,j->c", size, left, size))
 

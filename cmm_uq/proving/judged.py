@@ -25,6 +25,8 @@ from cmm_uq.proving.smallest import Found, found_by_strength
 CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED = "consistent", "explained", "partial", "unexplained"
 VERDICTS = (CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED)
 REFUSED = "refused"
+ANSWER = frozenset({"number", "verdict", "effects", "groups", "named", "heldout_um"})
+"""Keys that an answer has which is no refusal."""
 
 STATED, NAMED, NAMED_BESIDE, NAMED_GROUPED, NAMED_MISSED = (
     "found", "named, nothing hidden", "named, all found and told apart", "named, found in a group", "named, not all found",

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmm_uq.messages import Text
 from cmm_uq.physics.catalogue import every
-from cmm_uq.proving.cases import Design
+from cmm_uq.proving.design import Design
 from cmm_uq.proving.foreign import possible_faults
 from cmm_uq.proving.sight import ALLOWED, Sight, acting, remaining, unrecorded
 from cmm_uq.units import Unit

@@ -180,10 +180,10 @@ def _ended(answer: Exception) -> CmmUqError:
 
 
 def _process(program: str) -> subprocess.Popen[bytes]:
-    """With this one's packages, on one thread."""
-    place = os.pathsep.join(path for path in sys.path if path)
+    """With this one's packages, none from the folder where it happens to be called, on one thread."""
+    place = os.pathsep.join(path or os.getcwd() for path in sys.path)  # noqa: PTH109
     environment = {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONPATH": place}
-    return subprocess.Popen([sys.executable, "-m", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,  # noqa: S603
+    return subprocess.Popen([sys.executable, "-P", "-m", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,  # noqa: S603
                             stderr=subprocess.DEVNULL, env=environment)  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from cmm_uq.uncertainty.quantity import Quantity
 
 _TAIL = 0.025
 _HALVINGS = 80
+_NO_WIDTH = 1e-200
 
 
 def averaged(quantities: Sequence[Quantity], weights: Sequence[float]) -> Quantity:
@@ -45,7 +46,6 @@ def _quantile(tail: float, p: Floats, value: Floats, low: Floats, high: Floats) 
     for _ in range(_HALVINGS):
         middle = 0.5 * (below + above)
         width = np.where(middle < value, value - low, high - value) / factor
-        at = np.where(width > 0, (middle - value) / np.where(width > 0, width, 1.0), np.sign(middle - value) * np.inf)
-        reached = float(p @ special.ndtr(np.where(np.isnan(at), 0.0, at)))
+        reached = float(p @ special.ndtr((middle - value) / np.maximum(width, _NO_WIDTH)))
         below, above = (middle, above) if reached < tail else (below, middle)
     return 0.5 * (below + above)

@@ -32,12 +32,8 @@ def test_it_names_what_was_left_out_and_keeps_the_contract(told_of_scale_only: P
     assert done.returncode == 0, done.stderr
     assert "EXPLAINED" in done.stdout
     assert "Squareness X–Y" in done.stdout
-    assert sorted(path.name for path in out.iterdir()) == [
-        "diagnosis.html",
-        "diagnosis.pdf",
-        "manifest.json",
-        "results.json",
-    ]
+    names = sorted(path.name for path in out.iterdir())
+    assert names == ["diagnosis.html", "diagnosis.pdf", "manifest.json", "next_plan.csv", "results.json"]
     data = json.loads((out / "results.json").read_bytes())["diagnosis"]
     assert data["effects"][0]["effect"] == "squareness_xy"
     assert data["screening"][0]["rows"] == ["14", "18"]

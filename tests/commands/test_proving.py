@@ -105,6 +105,14 @@ def test_another_seed_is_refused_where_a_run_is_unfinished(ran: Ran, tmp_path: P
     assert (tmp_path / UNFINISHED / TRUTH).read_bytes() == ran.proof.truth
 
 
+def test_an_answer_that_nobody_gave_is_refused(ran: Ran, tmp_path: Path) -> None:
+    shutil.copytree(ran.kept, tmp_path / UNFINISHED)
+    (tmp_path / UNFINISHED / RECORDS).write_bytes(b'{"number":0,"verdict":"consistent"}\n')
+    done = run("prove", JOB, "--cases", CASES, "--out", tmp_path)
+    assert done.returncode == 2
+    assert "none of these processes gave" in done.stderr
+
+
 def test_python_gives_the_rates_as_a_table(ran: Ran) -> None:
     found = api.Proof(proof_outcome(ran.proof))
     assert found.rates.loc["false_alarms", ["count", "of"]].tolist() == [0, 1]

@@ -24,12 +24,14 @@ AS_IT_LIES, TURNED = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
 SECOND = np.pi / 648000
 
 
-def recorded(attitudes: Sequence[Sequence[float]], holes_um: Floats | None = None, yaw: float = 0.0) -> Points:
+def recorded(
+    attitudes: Sequence[Sequence[float]], holes_um: Floats | None = None, yaw: float = 0.0, side: int = 3
+) -> Points:  # fmt: skip
     """A plate of nine holes, twice in each attitude, 1 µm of noise: holes off their places, and a carriage X that yaws.
 
     The yaw, in ″/m, is written out: e_x = −y·ε, ε = yaw·x; readings count from zero, where X begins.
     """
-    once = plate(attitudes, pitch=160.0, side=3)
+    once = plate(attitudes, pitch=480.0 / side, side=side)
     true = once.xyz.copy()
     if holes_um is not None:
         for number, angles in enumerate(attitudes, 1):
@@ -46,9 +48,9 @@ def recorded(attitudes: Sequence[Sequence[float]], holes_um: Floats | None = Non
     )  # fmt: skip
 
 
-def own_pattern(sd_um: float = 6.0) -> Floats:
-    """Holes off their places, (9, 3) µm."""
-    return np.asarray(np.random.default_rng(11).normal(0, sd_um, (9, 3)))
+def own_pattern(sd_um: float = 6.0, count: int = 9) -> Floats:
+    """Holes off their places, (count, 3) µm."""
+    return np.asarray(np.random.default_rng(11).normal(0, sd_um, (count, 3)))
 
 
 def like_a_yaw(yaw: float) -> Floats:
@@ -136,8 +138,8 @@ def test_in_one_attitude_a_pattern_is_an_offset_of_each_hole_and_no_machines_err
 def test_a_plate_half_a_kelvin_cooler_on_the_later_date_is_not_a_scale_of_the_machine() -> None:
     """A plate that nobody certified, compared with itself: all distances shrink by 11.5 ppm/K."""
     facts = artefact_facts(kind="plate", cte_per_k=11.5e-6)
-    then, now = recorded([AS_IT_LIES], own_pattern(20.0)), recorded([AS_IT_LIES], own_pattern(20.0))
-    again = np.random.default_rng(8).normal(0, 1e-3, now.xyz.shape)
+    then = recorded([AS_IT_LIES], own_pattern(20.0, 25), side=5)
+    now, again = then, np.random.default_rng(8).normal(0, 1e-3, then.xyz.shape)
     middle = now.xyz.mean(axis=0)
     now = now.at(middle + (now.xyz - middle) * (1 - 0.5 * 11.5e-6) + again)
     plain = [Points(p.xyz, p.measurement, p.point, p.repeat, p.machine, {}, p.lines) for p in (now, then)]

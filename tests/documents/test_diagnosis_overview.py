@@ -26,8 +26,13 @@ IDENTIFIER = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
 
 
 @cache
-def consistent() -> Diagnosed:
+def recorded() -> Diagnosed:
     return diagnose_job(ROOT / "examples" / "iota-1102-20C")
+
+
+def consistent() -> Diagnosed:
+    """The same as if it could have shown everything, so that nothing more were to be measured."""
+    return replace(recorded(), unseen=(), next_plan=None)
 
 
 @pytest.fixture(scope="module")
@@ -68,12 +73,23 @@ def test_a_consistent_recording_has_one_picture_and_nothing_before_and_after() -
     assert document.overview is not None
     assert document.overview.standing == "good"
     assert "Before and after" not in [section.title for section in document.sections]
-    assert "Noise alone looks like this in 17 of 100 recordings." in rows(consistent())["How sure"]
+    share = f"{100 * consistent().diagnosis.p_value:.0f} of 100"
+    assert rows(consistent())["How sure"] == f"Noise alone looks like this in {share} recordings."
     assert "see the warnings" in rows(consistent())["What to do"]  # a row of it is a copy
 
 
+def test_a_consistent_one_that_could_not_have_shown_much_says_so_and_what_to_measure() -> None:
+    """Twenty bars leave bows of guideways open: no comfort in green."""
+    overview = overview_of(recorded())
+    assert (overview.standing, overview.verdict) == ("open", "Consistent, as far as this recording can show")
+    assert "this recording could not have shown: straightness of X" in rows(recorded())["How sure"]
+    assert "measure the set-ups" in rows(recorded())["What to do"]
+    titles = [str.__str__(section.title) for section in diagnosis_document(recorded()).sections]
+    assert titles.index("What to measure next") < titles.index("What would not have been seen")
+
+
 def test_an_explained_one_has_the_field_the_profile_and_each_observation(explained: Diagnosed) -> None:
-    document = diagnosis_document(explained)
+    document = diagnosis_document(replace(explained, next_plan=None))
     assert len(plots(document)) == 3
     titles = [str.__str__(section.title) for section in document.sections]
     assert titles[:2] == ["What was left out", "Where it is"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.inference.noise import display_shared
-from cmm_uq.model.display import Display, display_step
+from cmm_uq.model.display import Display, display_step, of_last_digit
 
 
 def shown(step: float, count: int = 60) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -85,3 +85,12 @@ def test_the_model_s_coordinates_are_the_recorded_ones_less_the_residuals() -> N
     residual = np.array([1e-3, -2e-3, 0.5e-3, 3e-3, 0.0])
     fitted = Display.of(5e-3, some.xyz + some.moved(residual[:, None])[:, :, 0], some.rows, some.sensitivity, residual)
     assert fitted.xyz == pytest.approx(some.xyz, abs=1e-9)
+
+
+def test_the_last_digit_leaves_a_step_over_the_root_of_twelve_where_residuals_show_less() -> None:
+    """A uniform distribution over a step of 1 µm has 0.2887 µm (JCGM 100, 4.3.7); figures without end have a nanometre."""
+    assert of_last_digit(shown(1e-3), 0.0) == pytest.approx(2.887e-4, rel=1e-3)
+    assert of_last_digit(shown(1e-3), 3e-4) == 0.0
+    endless = np.random.default_rng(2).uniform(0, 900, (60, 3))
+    assert of_last_digit(endless, 0.0) == 1e-6
+    assert of_last_digit(endless, 1e-3) == 0.0

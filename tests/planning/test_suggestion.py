@@ -139,7 +139,9 @@ def test_what_the_recording_says_already_is_no_less_than_the_odds_it_could_not_t
     (suggestion,) = suggestions(plan, found.after.artefact.title)
     assert suggestion.odds == pytest.approx(np.exp(50.0))
     assert "odds of more than 1000 : 1 for the true one" in suggestion.what
-    assert suggestion.what.endswith("by this recording they are 2 : 1 for rotation_x_z over scale_x.")
+    assert suggestion.what.endswith(
+        "by this recording they are 2 : 1 for rotation of carriage X about Z over scale error of X."
+    )
 
 
 @pytest.mark.parametrize("period", [None, 400.0])

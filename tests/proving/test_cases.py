@@ -18,7 +18,8 @@ from cmm_uq.kinds import artefact_of
 from cmm_uq.model import Noise
 from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
-from cmm_uq.proving.cases import CYCLE, KINDS, NOTHING, OUTSIDE, OWN, STRONGEST, WEAKEST, Case, Design
+from cmm_uq.proving.cases import CYCLE, KINDS, NOTHING, OUTSIDE, OWN, STRONGEST, WEAKEST, Case
+from cmm_uq.proving.design import Design
 from cmm_uq.proving.foreign import fault, nodes
 from cmm_uq.proving.sealed import sha256_of, truth_file
 from tests.conftest import ROOT
@@ -58,11 +59,16 @@ def strength(name: str, case: Case) -> float:
 
 @pytest.mark.parametrize("name", ["step-gauge-simulated", "plate-simulated"])
 def test_a_hidden_effect_is_as_strong_as_it_says(name: str) -> None:
-    """Its exact recording, fitted by least squares with what the job names: the length of the residuals over the noise."""
+    """Its exact recording, a thousandth as large so that nothing bends, fitted by least squares with what the job names."""
     single = [case for case in cases(name) if len(case.hidden) == 1 and case.noise_kind in (OWN, "white")]
     assert len(single) >= 4
     for case in single:
-        assert strength(name, case) == pytest.approx(case.hidden[0].strength, rel=5e-3)
+        (hidden,) = case.hidden
+        effect = every()[hidden.effect]
+        coefficients, shape = effect.from_reported(hidden.parameters)
+        told = effect.to_reported(1e-3 * coefficients, np.array(shape))
+        small = replace(hidden, parameters={parameter: float(value) for parameter, value in told.items()})
+        assert 1e3 * strength(name, replace(case, hidden=(small,))) == pytest.approx(hidden.strength, rel=1e-3)
 
 
 def test_a_stranger_is_as_strong_as_it_says() -> None:
@@ -74,7 +80,9 @@ def test_a_stranger_is_as_strong_as_it_says() -> None:
     assert {case.kind for case in strange} == {"outside", "artefact"}
     for case in strange:
         assert case.stranger is not None
-        assert strength("step-gauge-simulated", case) == pytest.approx(case.stranger.strength, rel=5e-3)
+        small = replace(case.stranger, size_um=1e-3 * case.stranger.size_um)
+        got = 1e3 * strength("step-gauge-simulated", replace(case, stranger=small))
+        assert got == pytest.approx(case.stranger.strength, rel=1e-3)
         assert WEAKEST <= case.stranger.left <= case.stranger.strength
 
 
@@ -180,3 +188,26 @@ def test_a_warm_artefact_is_longer_in_proportion() -> None:
             np.testing.assert_allclose(moved[rows], factors[-1] * away, atol=1e-12)
         assert factors[0] == pytest.approx(factors[-1]) if what == "warm" else factors[0] == 0 < factors[-1]
         assert np.linalg.norm(moved, axis=1).max() == pytest.approx(1e-3)
+
+
+def test_the_noise_of_two_dates_is_drawn_into_one() -> None:
+    """A difference of two recordings scatters by √2 as much as each; steps of the display and tails stay."""
+    one = design("plate-simulated")
+    case = replace(cases("plate-simulated")[0], noise=replace(NOISE, placing=2e-3, tails=5.0))
+    exact = one.recording(replace(case, noise=Noise()), 3, every()).xyz
+    single, both = (replace(one, dates=dates, sights={}).recording(case, 3, every()).xyz - exact for dates in (1, 2))
+    np.testing.assert_allclose(both, np.sqrt(2) * single, atol=1e-12)
+
+
+def test_a_coordinate_that_nobody_read_stays_as_it_stood() -> None:
+    """A plate lying flat whose z is 0 throughout: noise is drawn into x and y alone."""
+    job = read_job(ROOT / "examples" / "plate-simulated")
+    points = job.points.select(job.points.measurement == job.points.measurement[0])
+    flat = points.at(points.xyz * [1.0, 1.0, 0.0])
+    model = replace(model_on(job, flat), effects=())
+    assert model.artefact.unread().any()
+    sizes = np.array([size.nominal for size in model.artefact.sizes])
+    one = Design(model, sizes, NOISE)
+    drawn = one.recording(replace(cases("plate-simulated")[0], sizes=tuple(sizes)), 3, every())
+    assert not drawn.xyz[:, 2].any()
+    assert np.all(np.std(drawn.xyz[:, :2] - one.model.placed(one.values)[:, :2], axis=0) > 0.5 * SIGMA)

@@ -105,3 +105,18 @@ def test_a_signal_while_the_interpreter_shuts_down_changes_nothing() -> None:
     program = "\n".join(lines)
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_a_command_that_keeps_what_it_has_says_so() -> None:
+    program = (
+        "import time\nfrom cmm_uq.writing import interruption\ninterruption.watch()\n"
+        "with interruption.keeping(lambda: '3 of 4 are kept'):\n    print('now', flush=True)\n    time.sleep(60)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "now\n"
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=20)
+    assert (process.returncode, told) == (130, "cmm-uq: interrupted; 3 of 4 are kept\n")

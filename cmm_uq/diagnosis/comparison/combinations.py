@@ -101,9 +101,17 @@ class Combinations:
         }
 
 
-def explore(comparison: Comparison) -> Combinations:
-    """Follow the most probable combinations, level by level, then every exchange of one explanation of the best."""
-    search = _Search(comparison)
+def explore(comparison: Comparison, before: Combinations | None = None, changed: Key = frozenset()) -> Combinations:
+    """Follow the most probable combinations, level by level, then every exchange of one explanation of the best.
+
+    Parameters
+    ----------
+    comparison : of all explanations.
+    before : what was found of the same ones, but for some that have other versions now.
+    changed : these.
+    """
+    known = {} if before is None else {key: one for key, one in before.found.items() if not key & changed}
+    search = _Search(comparison, known)
     level: list[Key] = [frozenset()]
     while level:
         for key in level:
@@ -165,8 +173,9 @@ def _symmetric(weights: Sequence[float], count: int) -> Floats:
 class _Search:
     """Combinations settled so far, and those that wait for it with an estimate of their posterior."""
 
-    def __init__(self, comparison: Comparison) -> None:
+    def __init__(self, comparison: Comparison, known: Mapping[Key, Combination]) -> None:
         self.comparison = comparison
+        self.known = known
         self.prior = Prior(comparison.explanations)
         self.candidates = {i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)}
         self.settled: dict[Key, Combination] = {}
@@ -219,6 +228,8 @@ class _Search:
     def settle(self, versions: tuple[Version, ...]) -> None:
         """Find the best sizes of a combination, and its evidence."""
         key = keyed(versions)
+        if key in self.known and key not in self.settled:
+            self.settled[key] = self.known[key]
         if key not in self.settled:
             evidence, settled = log_evidence_together(self.comparison, versions)
             log_posterior = evidence + self.prior.log(key)

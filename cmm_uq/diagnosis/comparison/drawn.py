@@ -12,6 +12,9 @@ from scipy import sparse
 from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.points import Floats, Ints
 
+_ORTHOGONAL = 1e-9
+"""Of the largest square of a row's length, what products of rows that are at right angles come to."""
+
 _DIGITS = 7
 """Of what is left, over its root mean square, that rounding spares."""
 
@@ -33,11 +36,22 @@ def drawn(
     white = np.empty((len(order), draws))
     white[order] = random.standard_normal((len(order), draws))
     white *= side[:, None]
-    # the whitening is an orthogonal matrix T between two diagonal ones: D·T·S; the root is S⁻¹·Tᵀ·D⁻¹·T
+    # the whitening is mostly an orthogonal matrix T between two diagonal ones: D·T·S; the root is then S⁻¹·Tᵀ·D⁻¹·T
     turned = kind.whitening @ sparse.diags_array(1 / noise_scale)
-    length = np.sqrt(np.asarray(turned.power(2).sum(axis=1)).ravel())
-    found = kind.coloured((turned @ white) / length[:, None])
+    squares = turned @ turned.T
+    length = np.sqrt(squares.diagonal())
+    if abs(squares - sparse.diags_array(length**2)).max() <= _ORTHOGONAL * float(length.max()) ** 2:
+        found = kind.coloured((turned @ white) / length[:, None])
+    else:  # as of readings that follow each other
+        found = _root(kind, len(order)) @ white
     return found + kind.slow @ random.standard_normal((kind.slow.shape[1], draws)) if kind.slow.size else found
+
+
+def _root(kind: Kind, count: int) -> Floats:
+    """Symmetric root (m, m) of a kind's covariance without what is slow."""
+    half = kind.coloured(np.eye(count))
+    values, vectors = np.linalg.eigh(half @ half.T)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T, dtype=np.float64)
 
 
 def standing_of(left: Floats, reached: Floats) -> tuple[Ints, Floats]:

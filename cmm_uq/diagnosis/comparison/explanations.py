@@ -28,7 +28,7 @@ UNKNOWN_SD = 0.05
 _SHORTEST_PERIOD, _FINEST_PERIOD = 6.0, 2.0
 """mm, searched, and told of besides where a longer one is found."""
 
-_STEP = 0.35
+STEP = 0.35
 """Between frequencies that are tried, over one in the range of the readings."""
 
 _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
@@ -115,9 +115,8 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
     """
     points = model.artefact.points.at(model.where(values))
     found = []
-    set_ups = len(np.unique(points.measurement))
     for effect in considered(model.artefact):
-        if effect.name in named or effect.least_set_ups > set_ups:
+        if effect.name in named or not effect.shown_in(points):
             continue
         if any(column not in points.columns for column in effect.columns):
             continue
@@ -162,7 +161,7 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
         return
     u = (2 * (along - along.min()) / span - 1)[:, None, None]
     forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
-    basis = model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
+    basis = effect.mostly * model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
     for s, t in forms:
         columns = model.seen(basis * (1 + s * u + t * (1.5 * u**2 - 0.5)), values)
         yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)
@@ -197,7 +196,7 @@ def shorter(model: MeasurementModel, values: Floats, explanation: Explanation) -
     if axis is None:
         return explanation
     points = model.artefact.points.at(model.where(values))
-    step = _STEP / float(np.ptp(points.readings[axis]))
+    step = STEP / float(np.ptp(points.readings[axis]))
     first = max(1 / member.shape[0] for member in explanation.members if member.shape) + step
     frequencies = np.arange(first, 1 / _FINEST_PERIOD, step)[:_MOST_SHORTER]
     more = tuple(
@@ -246,7 +245,7 @@ def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
     span = float(np.ptp(readings))
     if span <= 2 * _SHORTEST_PERIOD:
         return
-    step = _STEP / span
+    step = STEP / span
     highest = min(1 / _SHORTEST_PERIOD, _MOST_PERIODS * step)
     for frequency in np.arange(0.7 / span, highest, step):
         yield (float(1 / frequency),)

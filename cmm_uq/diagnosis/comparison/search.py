@@ -41,6 +41,9 @@ _PROBABLE = 0.02
 _SHOWN = 6.0
 """Log evidence of a period from which shorter ones are tried besides: less shows none."""
 
+_FEW = 6
+"""Periods that are refined where none shows."""
+
 _BETWEEN = 0.12
 """Part of the log evidence that a period may lose where it lies between two trials (sinc² at half of a step, and more)."""
 
@@ -163,7 +166,7 @@ def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: i
             _refined(first, combinations, i) if i in shaped else e for i, e in enumerate(first.explanations)
         ]
         first = replace(first, comparison=replace(first.comparison, explanations=explanations))
-        combinations = explore(first.comparison)
+        combinations = explore(first.comparison, combinations, frozenset(shaped))
     chosen = asserted(combinations)
     versions = combinations.versions(chosen)
     found = model if not chosen else with_effects(first, versions, chosen)
@@ -217,13 +220,14 @@ def _refined(first: ModelComparison, combinations: Combinations, index: int) -> 
     others = [v for v in combinations.found[most].versions if v.explanation != index]
     explanation = first.explanations[index]
     gains = _gains(first, explanation, others)
-    if gains.max() > _SHOWN:
+    shows = bool(gains.max() > _SHOWN)
+    if shows:
         explanation = shorter(first.model, first.values, explanation)
         gains = _gains(first, explanation, others)
     below = gains.max() - gains
     shaped = np.array([bool(member.shape) for member in explanation.members])
     between = _BETWEEN * max(float(gains.max()), 0.0) + 1.0
-    fits = np.flatnonzero(shaped & (below < between)).tolist()
+    fits = [int(i) for i in np.argsort(below) if shaped[i] and below[i] < between][: None if shows else _FEW]
     refined = finer(first.model, first.values, explanation, fits)
     # what does not fit at all keeps its weight, and costs nothing: columns of zeros are invisible
     lost = set(np.flatnonzero(shaped & (below > max(_IMPROBABLE, between))).tolist())
@@ -292,7 +296,9 @@ def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -
     """Compare all candidates for what a model leaves; ``seed`` is that of the null distribution."""
     values = model.estimate().about
     singles = known(model, values, tuple(effect.name for effect in model.effects))
-    candidates = singles + several(singles) + unknown(model, values)
+    known_as = {term for single in singles if single.effect is not None for term in single.effect.stands_for}
+    functions = [function for function in unknown(model, values) if function.term not in known_as]
+    candidates = singles + several(singles) + functions
     comparison = comparison_of(model, stated, candidates)
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from cmm_uq.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD, Explanation, Member
+from cmm_uq.jobs.column_words import in_words
 from cmm_uq.messages import Verbatim, say
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.effect import Nonparametric
@@ -55,7 +56,7 @@ def unknown(model: MeasurementModel, values: Floats) -> list[Explanation]:
         term = Nonparametric(name)
         found.append(
             Explanation(
-                say("error as a function of {name}", name=Verbatim(name)), UNKNOWN, members, covariate, name, term
+                say("error as a function of {name}", name=in_words(name)), UNKNOWN, members, covariate, name, term
             )
         )
     return found
@@ -138,7 +139,7 @@ def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> I
             for f in smooth_functions(column)
         )
         yield Explanation(
-            say("scale of all axes as a function of {name}", name=Verbatim(name)), UNKNOWN, members, column, name
+            say("scale of all axes as a function of {name}", name=in_words(name)), UNKNOWN, members, column, name
         )
 
 

@@ -178,11 +178,12 @@ def column_comparison(column: MapColumn, named: Sequence[str], seed: int) -> Col
     functions = tuple(smooth_functions(place))
     changes = float(np.ptp(temperatures)) > 0
     if column.is_scale and changes:
-        effect = SCALE_EXPANSION[column.axis].name
-        excess = temperatures - REFERENCE_TEMPERATURE
-        expansion = Rival(
-            Verbatim(effect), Verbatim(effect), excess, (EXPANSION.prior_sd * place[:, None],), effect=effect
+        effect, short = (
+            SCALE_EXPANSION[column.axis].name,
+            say("{title:small}", title=SCALE_EXPANSION[column.axis].title),
         )
+        excess = temperatures - REFERENCE_TEMPERATURE
+        expansion = Rival(Verbatim(effect), short, excess, (EXPANSION.prior_sd * place[:, None],), effect=effect)
         (given if effect in named else rivals).append(expansion)
     if len(temperatures) == 2:
         short = say("difference of the two maps")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from cmm_uq.documents.effect_words import title_of
 from cmm_uq.documents.wording import probability
 from cmm_uq.kinds.error_maps.diagnosis import Difference, MapsDiagnosis
 from cmm_uq.messages import Text, Verbatim, listed, number, say, semicolons, sentences
@@ -40,7 +41,9 @@ def difference_words(difference: Difference) -> Text:
     if difference.turned:
         said.append(say("With the sign of its figures turned it would agree."))
     if difference.instead:
-        said.append(say("It could also be: {others}.", others=semicolons(difference.instead)))
+        said.append(
+            say("It could also be: {others}.", others=semicolons([title_of(name) for name in difference.instead]))
+        )
     return sentences(said)
 
 

@@ -1,0 +1,44 @@
+"""Noise that is drawn has the covariance of its kind, whatever the order in which it is drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of
+from cmm_uq.kinds.error_maps.noise import kinds_along
+from cmm_uq.points import Floats
+
+
+class Unit:
+    """In place of random numbers, one direction after the other: what is drawn of them is a root of the covariance."""
+
+    def standard_normal(self, shape: tuple[int, int]) -> Floats:
+        return np.eye(*shape)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.5, 0.9])
+def test_readings_that_follow_each_other_are_drawn_with_their_correlation(phi: float) -> None:
+    """First-order autoregression: the correlation of readings k apart is φ^k, and none between two chains."""
+    chain = np.repeat([1, 2], 6)
+    kind = kinds_along(chain, 0.5, (phi,))[1]
+    left = np.random.default_rng(8).standard_normal(12)
+    random: Any = Unit()
+    root = drawn(kind, random, 12, np.ones(12), standing_of(left, np.zeros((12, 0))))
+    apart = np.abs(np.arange(6)[:, None] - np.arange(6))
+    wanted = np.kron(np.eye(2), phi**apart)
+    np.testing.assert_allclose(root @ root.T, wanted, atol=1e-12)
+
+
+def test_exchanged_and_mirrored_readings_have_the_same_noise() -> None:
+    left = np.random.default_rng(9).standard_normal(8)
+    order, side = np.array([3, 0, 7, 1, 6, 2, 5, 4]), np.array([1.0, -1, 1, 1, -1, 1, -1, 1])
+    kind = kinds_along(np.arange(8), 0.5, (0.5,))[0]
+
+    def of(values: Floats) -> Floats:
+        random = np.random.default_rng(1)
+        return drawn(kind, random, 5, np.ones(8), standing_of(values, np.zeros((8, 0))))
+
+    np.testing.assert_allclose(of((side * left)[order]), (side[:, None] * of(left))[order], atol=1e-12)

@@ -1,0 +1,70 @@
+"""What keeps a probable effect from being asserted: each reason by draws and combinations that have it or have it not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmm_uq.diagnosis.asserting import _holds_zero, _phase_known, group_of
+from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
+from cmm_uq.diagnosis.diagnosis import LeftOut
+from cmm_uq.diagnosis.held_out import Improvement
+from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.messages import say
+from cmm_uq.physics.effect import Nonparametric
+from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.units import unit
+
+DRAWS = np.random.default_rng(2).standard_normal((20_000, 2))
+
+
+@pytest.mark.parametrize(("away", "holds"), [(1.9, True), (2.02, False), (-2.02, False)])
+def test_an_interval_of_95_percent_reaches_two_standard_deviations(away: float, *, holds: bool) -> None:
+    assert _holds_zero(DRAWS[:, :1] + away) is holds
+
+
+@pytest.mark.parametrize(("away", "holds"), [(2.40, True), (2.50, False)])
+def test_a_region_of_two_coefficients_reaches_the_root_of_chi_squared(away: float, *, holds: bool) -> None:
+    """√χ²(0.95; 2) = 2.448, in whatever direction and scale."""
+    root = np.array([[3.0, 1.0], [0.0, 0.2]])
+    assert _holds_zero((DRAWS + away * np.array([0.6, -0.8])) @ root) is holds
+
+
+@pytest.mark.parametrize(("away", "known"), [(1.5, False), (1.8, True)])
+def test_a_phase_is_known_where_95_percent_lie_within_half_a_turn(away: float, *, known: bool) -> None:
+    """Of a normal distribution 95 % lie beyond −1.645 standard deviations."""
+    assert _phase_known(DRAWS + np.array([away, 0.0])) is known
+
+
+def combinations(*members: tuple[tuple[int, ...], float]) -> Combinations:
+    member = (Member(np.ones((3, 1))),)
+    term = Nonparametric("x_mm", "y")
+    explanations = [
+        *(Explanation(say(name), EFFECT, member, imitated_by=(term,)) for name in ("one", "two", "three")),
+        Explanation(say("function"), UNKNOWN, member, term=term),
+    ]
+    return Combinations(explanations, {frozenset(key): Combination((), float(np.log(p))) for key, p in members})
+
+
+def test_a_group_is_what_could_stand_in_the_place_of_an_effect() -> None:
+    found = combinations(((0,), 0.45), ((1,), 0.4), ((2,), 0.005), ((3,), 0.145))
+    assert group_of(found, frozenset({0}), 0) == {1}
+    assert found.of_any(frozenset({0, 1})) == pytest.approx(0.85)
+
+
+def test_a_function_belongs_to_it_where_effects_alone_are_no_more_than_one_half() -> None:
+    found = combinations(((0,), 0.3), ((2,), 0.005), ((3,), 0.695))
+    assert group_of(found, frozenset({0}), 0) == {3}
+
+
+def test_below_one_half_the_sentence_names_the_group() -> None:
+    size = Quantity(12.0, 1.7, (8.6, 15.4), unit("µm"))
+    gain = Improvement(4.0, 1.0, 4.0, 1.0, 9.0, 1.0)
+    item = LeftOut(
+        "straightness_x_z", say("Straightness"), 0.37, {"bow_um": size}, 0.8, 0.96, say("a way"), (say("scale_x"),)
+    )
+    assert (
+        "Probability 37 %, 96 % that it is this or one that this recording cannot tell from it: scale_x;"
+        in sentence(item, gain).replace("\u00a0", " ")
+    )
