@@ -107,6 +107,7 @@ class Instrument:
             except PortLostError as lost:
                 if not self._closed:
                     yield from self._lost(say("the port was lost: {why}", why=Verbatim(str(lost))))
+        yield from self._rest()
 
     def _step(self, port: Port) -> Iterator[Event]:
         """Ask what is due, read what came, notice what did not."""
