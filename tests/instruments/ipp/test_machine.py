@@ -53,7 +53,10 @@ def test_positions_are_asked_for_as_often_as_is_said(machine: SimulatedMachine) 
         heard.until(
             lambda one: any("Use ClearAllErrors" in str(e.status) for e in one.of(Reading) if isinstance(e, Reading))
         )
+        time.sleep(0.6)
+        assert machine.state.error, "an emergency stop is cleared by nobody but the user"
         since = len(heard.events)
+        heard.source.clear_errors()  # type: ignore[attr-defined]
         heard.until(lambda one: one.good(since))
 
 
