@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from cmm_uq.instruments.library import ready
 from tests.conftest import ROOT
 
 
@@ -27,10 +28,11 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "site"
 
 
-def test_the_wheel_holds_the_templates_and_its_type_marker(unpacked: Path) -> None:
+def test_the_wheel_holds_the_templates_its_type_marker_and_the_profiles(unpacked: Path) -> None:
     packed = {path.name for path in (unpacked / "cmm_uq" / "templates").iterdir()}
     assert packed == {path.name for path in (ROOT / "templates").iterdir()}
     assert (unpacked / "cmm_uq" / "py.typed").is_file()
+    assert {path.stem for path in (unpacked / "cmm_uq" / "instruments" / "profiles").iterdir()} == set(ready())
     assert not (unpacked / "tests").exists()
 
 

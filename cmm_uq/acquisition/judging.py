@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +24,9 @@ from cmm_uq.screening.screened import impossible_values, screened
 from cmm_uq.screening.shape import Screening
 from cmm_uq.units import MICROMETRE
 
-_EXCHANGED = 0.5
-"""A point nearer than this part of the way to where another of its set-up is planned is taken for that one."""
+_EXCHANGED, _BETTER = 0.1, 0.25
+"""Points of a set-up are exchanged where they miss the plan, moved as a whole, by more than this part of their distance (rms),
+and by less than this part of that (squares) once they change places."""
 
 
 @dataclass(frozen=True)
@@ -77,10 +78,8 @@ class Judge:
                 "the machine did not measure", m=copied[0], p=copied[1], r=copied[2],
             ))  # fmt: skip
         steps = lead.steps((place[0], place[2]))
-        if (other := _exchanged(_xyz(own), step, steps)) is not None:
-            warnings.append(say(
-                "it lies where the plan has point {other}: points {own} and {other} seem exchanged", other=other, own=place[1]
-            ))  # fmt: skip
+        if (other := _exchanged(step, steps, taken)) is not None:
+            warnings.append(say("points {own} and {other} seem exchanged against the plan", own=place[1], other=other))
         return Judged(self._live(step, steps, story), tuple(warnings))
 
     def run(self, run: Run, rows: Sequence[Row], *, repeats_most: int) -> Judged:
@@ -200,15 +199,25 @@ def _copied(own: Point, story: Story) -> Place | None:
     return None
 
 
-def _exchanged(xyz: Floats, step: Step, steps: Sequence[Step]) -> int | None:
-    """Number of the point of the same set-up that is planned where this one lies."""
-    for other in steps:
+def _exchanged(step: Step, steps: Sequence[Step], taken: Mapping[Place, Point]) -> int | None:
+    """Number of the point of its set-up that the newest has changed places with; where the set-up stands is no matter."""
+    there = [other for other in steps if other.place in taken]
+    planned, found = np.array([other.xyz for other in there]), np.array([_xyz(taken[other.place]) for other in there])
+    missed, own = _missed(planned, found), there.index(step)
+    for i, other in enumerate(there):
         apart = float(np.linalg.norm(other.xyz - step.xyz))
-        if apart > 0 and float(np.linalg.norm(xyz - other.xyz)) < _EXCHANGED * apart < float(
-            np.linalg.norm(xyz - step.xyz)
-        ):
+        if not apart or missed <= len(there) * (_EXCHANGED * apart) ** 2:
+            continue
+        order = np.arange(len(there))
+        order[[own, i]] = order[[i, own]]
+        if _missed(planned, found[order]) < _BETTER * missed:
             return other.place[1]
     return None
+
+
+def _missed(planned: Floats, found: Floats) -> float:
+    """Sum of squares by which points miss the plan, their means laid on each other."""
+    return float(np.sum((found - found.mean(axis=0) - planned + planned.mean(axis=0)) ** 2))
 
 
 def _xyz(point: Point) -> Floats:

@@ -84,10 +84,12 @@ class SimulatedMachine:
     Parameters
     ----------
     name : in the job.
+    seed : of its noise, and of where the artefact stands.
+    noise_mm : standard deviation of a coordinate.
     """
 
-    def __init__(self, name: str, *, clock: Clock, seed: int) -> None:
-        self.name, self._clock, self._seed = name, clock, seed
+    def __init__(self, name: str, *, clock: Clock, seed: int, noise_mm: float = NOISE_MM) -> None:
+        self.name, self._clock, self._seed, self._noise_mm = name, clock, seed, noise_mm
         self._asked: queue.Queue[Step] = queue.Queue()
         self._number = 0
 
@@ -116,7 +118,7 @@ class SimulatedMachine:
         self._clock.sleep(TAKES_S)
         self._number += 1
         placed = _PLACED_MM * np.random.default_rng([self._seed, step.place[0]]).standard_normal(3)
-        noise = NOISE_MM * np.random.default_rng([self._seed, *step.place]).standard_normal(3)
+        noise = self._noise_mm * np.random.default_rng([self._seed, *step.place]).standard_normal(3)
         xyz = step.xyz + placed
         indicated = np.round(xyz + ERRORS @ xyz + noise, 5)
         raw = "PtMeas(" + ", ".join(f"{a.upper()}({v:.5f})" for a, v in zip(AXES, indicated, strict=True)) + ")\r\n"
@@ -126,12 +128,14 @@ class SimulatedMachine:
 
 
 def simulated(
-    declared: Sequence[DeclaredSource], *, clock: Clock, seed: int
+    declared: Sequence[DeclaredSource], *, clock: Clock, seed: int, noise_mm: float = NOISE_MM
 ) -> tuple[list[SimulatedThermometer | SimulatedMachine], SimulatedMachine]:
     """In place of what a job declares, and the machine among them; a thermometer and a machine where it declares nothing."""
     found: list[SimulatedThermometer | SimulatedMachine] = []
     taken = {source.name for source in declared}
-    machine = SimulatedMachine("machine" if "machine" not in taken else "simulated-machine", clock=clock, seed=seed)
+    machine = SimulatedMachine(
+        "machine" if "machine" not in taken else "simulated-machine", clock=clock, seed=seed, noise_mm=noise_mm
+    )
     for source in declared:
         streams = [name for name in source.values if name not in COORDINATES]
         if streams:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cmm_uq.messages import Text
 
 PROMPT = "> "
-_LINES = 8
+_LINES = 12
 """Of what happened, that stay on the screen."""
 
 _ERASE = ("\x7f", "\b")

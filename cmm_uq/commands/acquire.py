@@ -42,6 +42,7 @@ from cmm_uq.kinds import kind_of
 from cmm_uq.messages import Verbatim
 from cmm_uq.model.kind import Observe
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning.setting import ASSUMED_NOISE_UM
 from cmm_uq.plugins import naming_package
 from cmm_uq.points import Points
 from cmm_uq.screening.shape import Screening
@@ -329,7 +330,8 @@ def _sources(
 ) -> tuple[list[Source], SimulatedMachine | None]:  # fmt: skip
     declared = job.facts.acquire.source
     if simulate:
-        found, machine = simulated(declared, clock=clock, seed=seed)
+        stated = job.facts.recording.u_coordinate_um
+        found, machine = simulated(declared, clock=clock, seed=seed, noise_mm=(stated or ASSUMED_NOISE_UM) * MICROMETRE)
         return list(found), machine
     with ExitStack() as opened:
         sources = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -54,9 +55,8 @@ def declared(what: str, port: str, job: Path | None) -> tuple[DeclaredSource, Pa
     CmmUqError : there is no such source, or no port is named.
     """
     if job is None:
-        return DeclaredSource(
-            name=Path(what).name.removesuffix(ENDING) or "instrument", profile=what, port=port
-        ), Path()
+        name = re.sub(r"[^A-Za-z0-9._-]", "_", Path(what).name.removesuffix(ENDING))
+        return DeclaredSource.model_construct(name=name or "instrument", profile=what, port=port), Path()
     from cmm_uq.commands.reading import read_job
 
     read = read_job(job, recorded=False)

@@ -70,8 +70,9 @@ def came_about(job: Job) -> Text:
 
 def origin_warnings(job: Job) -> list[Text]:
     """What the reader must know of where the recording comes from."""
+    taken = [] if job.acquired is None else job.acquired.warnings
     if job.origin == MEASURED:
-        return []
+        return taken
     source = job.facts.job.derived_from
     what = _WHAT[job.origin]
     texts: list[Text] = [what]
@@ -83,4 +84,4 @@ def origin_warnings(job: Job) -> list[Text]:
         texts = [after(what, told)]
     if job.altered:
         texts.append(say("Changed after it was derived: {files}.", files=commas(names(job.altered))))
-    return texts
+    return [*texts, *taken]

@@ -109,7 +109,7 @@ def drafted(wanted: Drafted) -> bytes:
 def _lines(wanted: Drafted, pattern: str, values: Mapping[str, float]) -> list[str]:
     end = terminator_of(wanted.line)
     lines = [
-        f"name = {_text(wanted.name)}", f"title = {_text(wanted.title)}", "", "[connection]",
+        f"name = {_text(_plain_name(wanted.name))}", f"title = {_text(wanted.title)}", "", "[connection]",
         *(f"{key} = {_text(value) if isinstance(value, str) else value}" for key, value in (wanted.settings or {}).items()),
         "", "[frame]", f"terminator = {_text(end)}", "", "[send]",
     ]  # fmt: skip
@@ -130,6 +130,11 @@ def _lines(wanted: Drafted, pattern: str, values: Mapping[str, float]) -> list[s
         'not_found = ["what the instrument says when something is wrong: add [[ill]] for it"]', "",
     ]  # fmt: skip
     return lines
+
+
+def _plain_name(name: str) -> str:
+    """A name as profiles have it."""
+    return re.sub(r"[^a-z0-9.-]+", "-", name.lower()).strip("-.") or "instrument"
 
 
 def _literal(text: str) -> str:

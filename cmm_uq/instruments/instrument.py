@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.instruments.control_codes import bytes_of
 from cmm_uq.instruments.conversation import SECOND, Conversation
 from cmm_uq.instruments.framing import Framed, Framer
-from cmm_uq.instruments.introduction import Introduction, check_same
+from cmm_uq.instruments.introduction import Introduction, another
 from cmm_uq.instruments.parsing import Parser, Understood
 from cmm_uq.instruments.ports import Opened, Port, PortLostError
 from cmm_uq.instruments.profile import ProfileFile
@@ -22,7 +23,7 @@ from cmm_uq.messages import Text, Verbatim, say
 RETRY_S = 0.25
 """Between two attempts to open a port that is gone; a return is to be noticed within 2 s."""
 
-INTRODUCED_WITHIN_S = 1.0
+INTRODUCED_WITHIN_S = 0.7
 """Time for an instrument that came back to say which one it is."""
 
 
@@ -60,7 +61,7 @@ class Instrument:
         self._parser, self._framer = Parser(profile), Framer(profile.frame)
         self._number, self._gap_at, self._closed = 0, -1, False
         self._byte_at = clock.monotonic_ns()
-        self._told = ""
+        self._told, self._known = "", False
         self._port: Port | None = opened()
         self._conversation = self._begun()
         self._held: list[Event] = []
@@ -83,11 +84,9 @@ class Instrument:
         self._closed = True
         port, self._port = self._port, None
         if port is not None:
-            try:
+            with contextlib.suppress(PortLostError):
                 for text in self._profile.send.stop:
                     port.write(bytes_of(text))
-            except PortLostError:
-                pass
             port.close()
 
     def events(self, stop: threading.Event) -> Iterator[Event]:
@@ -102,11 +101,13 @@ class Instrument:
             try:
                 yield from self._step(port)
             except EndOfFileError as end:
+                yield from self._rest()
                 yield from self._silent(say("{why}", why=Verbatim(str(end))))
                 return
             except PortLostError as lost:
                 if not self._closed:
                     yield from self._lost(say("the port was lost: {why}", why=Verbatim(str(lost))))
+        yield from self._rest()
 
     def _step(self, port: Port) -> Iterator[Event]:
         """Ask what is due, read what came, notice what did not."""
@@ -121,23 +122,47 @@ class Instrument:
         if received:
             self._byte_at = stamp.monotonic_ns
             for framed in self._framer.feed(received):
-                yield from self._message(framed, stamp)
+                yield from self._message(framed, stamp, port)
         elif self._framer.waiting and stamp.monotonic_ns - self._byte_at > self._profile.send.answer_within_s * SECOND:
             yield from self._rest()
         if self._conversation.overdue(self._clock.monotonic_ns()):
             yield from self._overdue(port)
 
-    def _message(self, framed: Framed, stamp: Stamp) -> Iterator[Event]:
-        """What came, with the return of an instrument that was silent before it."""
+    def _message(self, framed: Framed, stamp: Stamp, port: Port | None = None) -> Iterator[Event]:
+        """What came, with the return of an instrument that was silent; with a port, that is asked first who it is."""
         understood = self._parser.read(framed, max(self._conversation.asked, 0))
         if self._conversation.several and not self._conversation.waiting and understood.answers:
             understood = Understood(status=say("comes too late, or answers no question"))
         self._conversation.heard(stamp.monotonic_ns, answer=understood.answers)
         if understood.answers and self._gap_at >= 0:
-            after_s = (stamp.monotonic_ns - self._gap_at) / SECOND
-            self._gap_at, self._told = -1, ""
-            yield Returned(self.name, stamp.utc_ns, stamp.monotonic_ns, after_s)
+            yield from self._returned(framed, understood, stamp, port)
+        else:
+            yield self._reading(framed, understood, stamp)
+
+    def _returned(self, framed: Framed, understood: Understood, stamp: Stamp, port: Port | None) -> Iterator[Event]:
+        """The first that an instrument says after a gap."""
+        gap, self._gap_at = self._gap_at, -1
+        try:
+            further = [] if self._known or port is None else list(self._introduced(port, INTRODUCED_WITHIN_S))
+        except (CmmUqError, PortLostError) as error:
+            self._gap_at, self._conversation.gap = gap, True
+            yield self._reading(framed, Understood(status=Verbatim(str(error))), stamp)
+            yield from self._refused(error)
+            return
+        self._told = ""
+        yield Returned(self.name, stamp.utc_ns, stamp.monotonic_ns, (stamp.monotonic_ns - gap) / SECOND)
         yield self._reading(framed, understood, stamp)
+        yield from further
+
+    def _refused(self, error: CmmUqError | PortLostError) -> Iterator[Event]:
+        """Another instrument is there, or the port is lost again: the gap goes on, and a new reason for it is said."""
+        port, self._port = self._port, None
+        if port is not None:
+            port.close()
+        why = error.problem if isinstance(error, CmmUqError) else str(error)
+        if self._told != why:
+            self._told, stamp = why, self._stamp()
+            yield Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, Verbatim(why))
 
     def _reading(self, framed: Framed, understood: Understood, stamp: Stamp) -> Reading:
         self._number += 1
@@ -167,7 +192,7 @@ class Instrument:
         self._conversation.gap = True
         stamp = self._stamp()
         if self._gap_at < 0:
-            self._gap_at = stamp.monotonic_ns
+            self._gap_at, self._known = stamp.monotonic_ns, False
         if not self._told:
             self._told = why
             yield Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, why)
@@ -187,20 +212,17 @@ class Instrument:
         except CmmUqError:
             self._clock.sleep(RETRY_S)
             return
-        self._conversation = self._begun()
+        self._conversation, self._port = self._begun(), port
         self._conversation.gap = True
         try:
-            events = list(self._introduced(port, INTRODUCED_WITHIN_S))
-        except (CmmUqError, PortLostError) as error:
+            yield from self._introduced(port, INTRODUCED_WITHIN_S)
+        except PortLostError:
+            self._port = None
             port.close()
             self._clock.sleep(RETRY_S)
-            if isinstance(error, CmmUqError) and self._told != error.problem:
-                self._told = error.problem
-                stamp = self._stamp()
-                yield Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, Verbatim(error.problem))
-            return
-        self._port = port
-        yield from events
+        except CmmUqError as error:
+            yield from self._refused(error)
+            self._clock.sleep(RETRY_S)
 
     def _introduced(self, port: Port, within_s: float) -> Iterator[Event]:
         """Ask which instrument it is and begin; what comes meanwhile is kept."""
@@ -210,24 +232,37 @@ class Instrument:
             introduction = Introduction(wanted)
             port.write(bytes_of(wanted.send))
             until = self._clock.monotonic_ns() + round(within_s * SECOND)
-            came: list[tuple[Framed, Stamp]] = []
-            while introduction.found is None and self._clock.monotonic_ns() < until:
-                received = port.read()
-                stamp = self._stamp()
-                for framed in self._framer.feed(received):
-                    came.append((framed, stamp))
-                    introduction.hear(framed)
-            if introduction.found is not None:
-                found = introduction.found
-                check_same(self._identity, found, self._declared)
-                self._identity = _completed(found, self._declared)
+            came, lost = self._answers(port, introduction, until)
+            found = introduction.found
+            wrong = None if found is None else another(self._identity, found, self._declared)
+            status = None if wrong is None else Verbatim(str(wrong))
             for place, (framed, stamp) in enumerate(came):
-                if introduction.tells(place):
-                    yield self._reading(framed, Understood(), stamp)
+                if introduction.tells(place) or wrong is not None:
+                    yield self._reading(framed, Understood(status=status), stamp)
                 else:
                     yield from self._message(framed, stamp)
+            if (failed := wrong or lost) is not None:
+                raise failed
+            if found is not None:
+                self._identity, self._known = _completed(found, self._declared), True
         for text in self._profile.send.start:
             port.write(bytes_of(text))
+
+    def _answers(
+        self, port: Port, introduction: Introduction, until: int
+    ) -> tuple[list[tuple[Framed, Stamp]], PortLostError | None]:  # fmt: skip
+        """What comes until the instrument has said who it is, or the time is over, or the port is lost."""
+        came: list[tuple[Framed, Stamp]] = []
+        while introduction.found is None and self._clock.monotonic_ns() < until:
+            try:
+                received = port.read()
+            except PortLostError as lost:
+                return came, lost
+            stamp = self._stamp()
+            for framed in self._framer.feed(received):
+                came.append((framed, stamp))
+                introduction.hear(framed)
+        return came, None
 
     def _begun(self) -> Conversation:
         replayed = isinstance(self._port, ReplayedFile)

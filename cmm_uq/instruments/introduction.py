@@ -42,16 +42,12 @@ class Introduction:
         return self.found is not None and self._span[0] <= place <= self._span[1]
 
 
-def check_same(known: Identity, found: Identity, declared: Identity) -> None:
-    """Refuse another instrument than the one that was meant, or that was there before.
-
-    Raises
-    ------
-    CmmUqError : the serial number is another.
-    """
+def another(known: Identity, found: Identity, declared: Identity) -> CmmUqError | None:
+    """What is wrong where the serial number is another than that of the job, or of the instrument that was there before."""
     for expected, whose in ((declared.serial, "the job names"), (known.serial, "before it was")):
         if expected and found.serial and expected.casefold() != found.serial.casefold():
-            raise CmmUqError(
+            return CmmUqError(
                 f"another instrument answers: it says serial number {found.serial!r}, {whose} {expected!r}",
                 where=declared.name, fix="Connect the right one, or correct its serial number",
             )  # fmt: skip
+    return None

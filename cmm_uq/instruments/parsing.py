@@ -65,10 +65,10 @@ class Parser:
         answers : which question was asked.
         """
         text = message.body.decode("latin-1")
-        if not message.whole:
-            return Understood(status=say("part of a message, or noise: {seen}", seen=_seen(message.raw)))
         if any(pattern.fullmatch(text) for pattern in self._ignored):
             return Understood()
+        if not message.whole:
+            return Understood(status=say("part of a message, or noise: {seen}", seen=_seen(message.raw)))
         for pattern, says in self._ill:
             if pattern.search(text):
                 told = say("the instrument says {seen}: {meaning}", seen=_seen(message.raw), meaning=Verbatim(says))

@@ -26,6 +26,9 @@ RFC2217 = "rfc2217://"
 CONNECT_WITHIN_S = 1.0
 """Time for a connection over the network: twice of it is less than what a reconnection may take."""
 
+KEPT_ALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3}
+"""So that a connection whose other side was switched off is lost after 8 s, where nothing is sent that would show it."""
+
 TICK_S = 0.05
 """Longest wait for bytes; whoever waits longer looks at the clock in between."""
 
@@ -157,6 +160,10 @@ class TcpPort:
         except OSError as error:
             raise _refused(name, error) from None
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for name, value in KEPT_ALIVE.items():
+            if hasattr(socket, name):
+                self._socket.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
     def read(self) -> bytes:
         """See :meth:`Port.read`."""

@@ -11,6 +11,9 @@ from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.instruments.reading import Reading
 from cmm_uq.instruments.source import Event, Returned
 
+_SAYS = ("the instrument says", "the machine says")
+"""How words of the instrument begin."""
+
 _LETTERS = {"none": "N", "even": "E", "odd": "O", "mark": "M", "space": "S"}
 
 
@@ -56,7 +59,7 @@ class Trial:
         if event.status is not None:
             self.wrong += 1
             self.told, self.received = str(event.status), event.raw
-            self.answers += "says" in event.status
+            self.answers += event.status.startswith(_SAYS)
         elif not self.wrong:
             self.received = event.raw
 

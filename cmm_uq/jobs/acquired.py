@@ -21,7 +21,7 @@ from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.messages import Text, Verbatim, commas, names, plural, say, sentences
 
 SCHEMA = "cmm-uq/acquired/1"
-ARTEFACT = "temp_artefact_c"
+ARTEFACT, TIME = "temp_artefact_c", "time_s"
 _NAMED = 5
 """Gaps and points that a certificate names one by one."""
 
@@ -139,6 +139,18 @@ class Provenance:
         return sentences([say("{part:capital}.", part=part) for part in parts])
 
     @property
+    def warnings(self) -> list[Text]:
+        """What a reader must know before the figures."""
+        told: list[Text] = [say("The recording was changed after it was taken live.")] if self.changed else []
+        if self.said.damaged:
+            told.append(say("Damaged lines of the journal are not in the recording."))
+        return told + [
+            say("{name} is not used: {count} of the points have no value of it.", name=Verbatim(name),
+                count=len(self.said.columns[name].missing))
+            for name in self.without if name != TIME
+        ]  # fmt: skip
+
+    @property
     def instruments(self) -> list[Text]:
         """Each instrument with what identifies it."""
         return [_instrument(one) for one in self.said.instruments]
@@ -235,7 +247,7 @@ def _instrument(one: Instrument) -> Text:
 def _join(name: str, column: JoinedColumn) -> Text:
     joined: Text = say("{name}: u = {u:.2g} by interpolation in time, {largest:.2g} at most", name=Verbatim(name), u=column.u,
                      largest=column.u_largest)  # fmt: skip
-    told = say("{name}: not known of every point", name=Verbatim(name)) if name == "time_s" else joined
+    told = say("{name}: not known of every point", name=Verbatim(name)) if name == TIME else joined
     if not column.missing:
         return told
     points = [

@@ -283,9 +283,9 @@ def test_a_point_of_a_machine_that_is_ill_or_comes_in_a_pause_is_not_taken(tmp_p
 
 def test_exchanged_balls_a_copied_reading_and_inches_are_warned_of(tmp_path: Path, clock: FakeClock) -> None:
     taking = session(job_folder(tmp_path / "job"), clock)
-    told = " ".join(type_in(taking, clock, "600 100 -300", "100 100 -300"))
-    assert "it lies where the plan has point 2: points 1 and 2 seem exchanged" in told
-    told = " ".join(type_in(taking, clock, "100 100 -300"))
+    told = " ".join(type_in(taking, clock, "607 100 -300", "107 103 -300"))  # wherever the stand is
+    assert "points 2 and 1 seem exchanged against the plan" in told
+    told = " ".join(type_in(taking, clock, "107 103 -300"))
     assert "its coordinates are those of measurement 1, point 2, repeat 1 to the last digit" in told
     type_in(taking, clock, "undo copied", "100 100.001 -300", "600.001 100 -300")
     told = " ".join(type_in(taking, clock, "3.937 3.937 -11.811", "3.937 23.622 -11.811"))

@@ -100,14 +100,16 @@ def test_an_instrument_that_answers_but_is_ill_is_said(tmp_path: Path) -> None:
 
 
 def test_a_new_profile_from_a_line_reads_that_instrument(tmp_path: Path) -> None:
-    own = tmp_path / "own.toml"
+    own = tmp_path / "my-gauge.toml"
     arguments = ("--line", "14:03:22,20.11,20.13,20.09,20.31,20.3,20.28,20.55,20.52,20.57,20.02,19.87<CR><LF>",
                  "--quantity", "temp_scale_x_c=4", "--range", "temp_scale_x_c=0:40")  # fmt: skip
     done = run("instruments", "new", own, *arguments)
     assert done.returncode == 0, done.stderr
     assert tomllib.loads(own.read_text())["quantities"]["temp_scale_x_c"]["range"] == [0, 40]
+    spaced = own.rename(tmp_path / "my gauge.toml")
     with simulated(Thermocouples(), "pty", tmp_path) as line:
-        done = run("instruments", "test", own, line.port, "--seconds", "0.4", "--json")
+        done = run("instruments", "test", spaced, line.port, "--seconds", "0.4", "--json")
+    spaced.rename(own)
     assert json.loads(done.stdout)["quantities"] == {"temp_scale_x_c": 20.11}
     assert "is there already" in run("instruments", "new", own, *arguments).stderr
 

@@ -38,6 +38,14 @@ def test_it_holds_how_the_line_is_set_and_what_is_asked() -> None:
     assert (made.send.poll[0].send, made.send.every_s) == ("T?<CR>", 0.5)
 
 
+@pytest.mark.parametrize(
+    ("name", "plain"), [("My gauge", "my-gauge"), ("a.b", "a.b"), ("Größe", "gr-e"), ("---", "instrument")]
+)
+def test_it_has_a_plain_name_whatever_its_file_is_called(name: str, plain: str) -> None:
+    made = profile_of(drafted(Drafted(name, "A", "1<CR>", {1: "x_mm"}, {})), Path("a.toml"))
+    assert made.name == plain
+
+
 NUMBERS = st.decimals(-999, 999, places=2, allow_nan=False).map(str)
 WORDS = st.sampled_from(["T=", " mm;", "(", ") [", " ' ", "*.", "CH", " %", ",", "<STX>"])
 

@@ -11,7 +11,7 @@ import pytest
 from cmm_uq.errors import CmmUqError
 from cmm_uq.instruments.reading import Reading
 from cmm_uq.instruments.simulated.line import SimulatedLine, Way, simulated
-from cmm_uq.instruments.simulated.speakers import SPEAKERS, Speaker, Thermocouples
+from cmm_uq.instruments.simulated.speakers import SPEAKERS, Readout1502, Speaker, Thermocouples
 from cmm_uq.instruments.source import Gap, Returned
 from tests.instruments.listening import Listener, hasty, listening, opened
 
@@ -130,11 +130,14 @@ def test_another_instrument_than_the_declared_one_is_refused(tmp_path: Path) -> 
     assert "it says serial number 'A24680', the job names 'B99'" in str(error.value)
 
 
-def test_another_instrument_that_comes_back_is_not_read(tmp_path: Path) -> None:
-    class Other(SPEAKERS["fluke-1502a"]):  # type: ignore[misc]
-        def answer(self, command: str) -> bytes:
-            return bytes(super().answer(command)).replace(b"A24680", b"A99999")
+class Other(Readout1502):
+    """One of the same model."""
 
+    def answer(self, command: str) -> bytes:
+        return super().answer(command).replace(b"A24680", b"A99999")
+
+
+def test_another_instrument_that_comes_back_is_not_read(tmp_path: Path) -> None:
     with (
         simulated(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line,
         listening(opened(hasty("fluke-1502a"), line.port)) as heard,
@@ -146,6 +149,21 @@ def test_another_instrument_that_comes_back_is_not_read(tmp_path: Path) -> None:
         since = len(heard.events)
         line.plug_in()
         heard.until(lambda one: any("another instrument" in str(gap.why) for gap in one.of(Gap, since)))  # type: ignore[union-attr]
+        assert not heard.good(since)
+
+
+def test_another_instrument_that_is_put_at_the_same_line_while_it_is_silent_is_not_read(tmp_path: Path) -> None:
+    """As behind a device server, where no port is lost."""
+    profile = hasty("fluke-1502a", answer_within_s=0.3)
+    with simulated(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line, listening(opened(profile, line.port)) as heard:
+        heard.until(lambda one: one.good())
+        line.mischief.hangs = True
+        heard.until(lambda one: one.of(Gap))
+        since = len(heard.events)
+        line.speaker = Other()
+        line.mischief.hangs = False
+        heard.until(lambda one: any("another instrument" in str(gap.why) for gap in one.of(Gap, since)))  # type: ignore[union-attr]
+        time.sleep(0.5)
         assert not heard.good(since)
 
 

@@ -41,8 +41,9 @@ def test_a_file_is_read_to_its_end_at_its_pace(tmp_path: Path) -> None:
     (tmp_path / "log.txt").write_bytes(b"1,2\n3,4\nhalf")
     *readings, end = events("file:log.txt?every_s=0.5", "line-logger", tmp_path, FastClock())
     found = [one for one in readings if isinstance(one, Reading)]
-    assert [one.values for one in found] == [{"value1": 1, "value2": 2}, {"value1": 3, "value2": 4}]
-    assert [one.monotonic_ns for one in found] == [500_000_000, 1_000_000_000]
+    assert [one.values for one in found] == [{"value1": 1, "value2": 2}, {"value1": 3, "value2": 4}, {}]
+    assert [one.monotonic_ns for one in found] == [500_000_000, 1_000_000_000, 1_500_000_000]
+    assert (found[2].raw, found[2].status) == (b"half", "part of a message, or noise: half")
     assert isinstance(end, Gap)
     assert end.why == "the file is at its end"
 

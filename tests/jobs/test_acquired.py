@@ -12,6 +12,7 @@ import pytest
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.documents.document import Facts
+from cmm_uq.documents.origin import origin_warnings
 from cmm_uq.documents.results_file import head
 from cmm_uq.documents.traceability_section import traceability_section
 from cmm_uq.errors import CmmUqError
@@ -53,6 +54,18 @@ def test_its_certificate_names_instruments_gaps_and_joins(tmp_path: Path, iota: 
         "Joined by time": "temp_air_c: u = 0.002 by interpolation in time, 0.004 at most",
         "Gaps": "air from 60 s for 12 s: it said nothing; the computer's clock was moved by 3.6e+03 s",
     }
+
+
+def test_what_was_changed_or_is_missing_is_warned_of_first(tmp_path: Path, iota: Path) -> None:
+    job = read_job(taken(tmp_path / "job", iota))
+    assert origin_warnings(job) == []
+    gap = {"temp_air_c": {"u": 0.0, "u_largest": 0.0, "missing": [[1, 1, 1], [2, 1, 1]]}}
+    changed = read_job(taken(tmp_path / "changed", iota, columns=gap, recording_sha256=["0" * 64], damaged=["line 3"]))
+    assert origin_warnings(changed) == [
+        "The recording was changed after it was taken live.",
+        "Damaged lines of the journal are not in the recording.",
+        "temp_air_c is not used: 2 of the points have no value of it.",
+    ]
 
 
 def test_its_results_say_the_same_and_hash_the_file(tmp_path: Path, iota: Path) -> None:

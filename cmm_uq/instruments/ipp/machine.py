@@ -10,8 +10,9 @@ from dataclasses import replace
 from cmm_uq.errors import CmmUqError
 from cmm_uq.instruments.control_codes import shown
 from cmm_uq.instruments.conversation import SECOND
-from cmm_uq.instruments.ipp.client import ANSWER_WITHIN_S, Client, FaultError, Heard, NoAnswerError
+from cmm_uq.instruments.ipp.client import Client
 from cmm_uq.instruments.ipp.line import DATA, ERROR, BadLineError, Term, arguments_of, by_name, fault_of
+from cmm_uq.instruments.ipp.transaction import ANSWER_WITHIN_S, FaultError, Heard, NoAnswerError
 from cmm_uq.instruments.ports import NETWORK, Opened, PortLostError, opener
 from cmm_uq.instruments.profile import Connection, Positions, ProfileFile
 from cmm_uq.instruments.reading import Reading
@@ -29,6 +30,9 @@ RETRY_S = 0.25
 
 ALIVE_EVERY_S = 1.0
 """How often a server that says nothing is asked whether it is in error: a connection may be dead unnoticed."""
+
+USER_NEEDED = 3
+"""Severity of an error from which on the user has to look at the machine (section 8.1): it is not cleared by a program."""
 
 POINT = "PtMeas"
 _REPORTED = ("X", "Y", "Z")
@@ -65,6 +69,7 @@ class Machine:
     def __init__(self, identity: Identity, asked: Positions, opened: Opened, clock: Clock) -> None:
         self.name, self._identity, self._asked = identity.name, identity, asked
         self._opened, self._clock = opened, clock
+        self._clear, self._user_needed = threading.Event(), False
         self._number, self._gap_at, self._closed = 0, -1, False
         self._port = opened()
         self._connected = True
@@ -80,6 +85,10 @@ class Machine:
     def identity(self) -> Identity:
         """See :meth:`cmm_uq.instruments.source.Source.identity`."""
         return self._identity
+
+    def clear_errors(self) -> None:
+        """Let the server go on after an error that needs the user, who has looked at it; from any thread."""
+        self._clear.set()
 
     def close(self) -> None:
         """See :meth:`cmm_uq.instruments.source.Source.close`; the session ends."""
@@ -119,6 +128,10 @@ class Machine:
     def _step(self) -> Iterator[Event]:
         """Ask what is due, and tell what came."""
         now = self._clock.monotonic_ns()
+        if self._clear.is_set():
+            self._clear.clear()
+            self._user_needed = False
+            self.client.clear_all_errors()
         if self._asked.every_s and now >= self._ask_at:
             self._ask_at = max(self._ask_at + round(self._asked.every_s * SECOND), now)
             yield from self._position()
@@ -132,7 +145,8 @@ class Machine:
         try:
             heard = self.client.get(*_REPORTED)
         except FaultError as error:
-            self.client.clear_all_errors()
+            if error.fault.severity < USER_NEEDED and not self._user_needed:
+                self.client.clear_all_errors()
             stamp = self._clock.utc_ns(), self._clock.monotonic_ns()
             yield self._reading(Heard(b"", None, *stamp), status=_ill(error))
             return
@@ -152,7 +166,7 @@ class Machine:
         elif response.sign == DATA:
             yield self._data(heard, response.rest)
         elif response.sign == ERROR:
-            yield self._reading(heard, status=_fault(response.rest))
+            yield self._error(heard, response.rest)
 
     def _data(self, heard: Heard, rest: str) -> Reading:
         """Data of a point, a position, or something else that is no place."""
@@ -174,6 +188,16 @@ class Machine:
                 return self._reading(heard)  # a key, a tool: nothing that is measured
             return self._reading(heard, status=say("a place without X, Y and Z: {seen}", seen=Verbatim(rest)))
         return self._reading(heard, values, point=point)
+
+    def _error(self, heard: Heard, rest: str) -> Reading:
+        try:
+            fault = fault_of(rest)
+        except BadLineError as error:
+            return self._reading(
+                heard, status=say("an error that is none of the protocol: {why}", why=Verbatim(str(error)))
+            )
+        self._user_needed = self._user_needed or fault.severity >= USER_NEEDED
+        return self._reading(heard, status=say("the machine says {what}", what=Verbatim(str(fault))))
 
     def _reading(
         self, heard: Heard, values: dict[str, float] | None = None, *, status: Text | None = None, point: str | None = None
@@ -220,10 +244,3 @@ def _no_server(name: str, error: Exception) -> CmmUqError:
 
 def _ill(error: FaultError) -> Text:
     return say("the machine says {what}", what=Verbatim(str(error.fault)))
-
-
-def _fault(rest: str) -> Text:
-    try:
-        return say("the machine says {what}", what=Verbatim(str(fault_of(rest))))
-    except BadLineError as error:
-        return say("an error that is none of the protocol: {why}", why=Verbatim(str(error)))

@@ -6,30 +6,17 @@ It follows the sections of the specification that its methods name. It is for tr
 from __future__ import annotations
 
 import contextlib
-import math
 import select
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from cmm_uq.instruments.framing import Framer
-from cmm_uq.instruments.ipp.line import LONGEST, Argument, BadLineError, Term, arguments_of, number_text
+from cmm_uq.instruments.ipp.line import LONGEST, BadLineError, Term, arguments_of
+from cmm_uq.instruments.ipp.server_methods import TEXTS, MethodError, Methods
 from cmm_uq.instruments.profile import Frame
-
-TEXTS = {
-    1: (2, "Illegal tag"), 6: (2, "Transaction aborted (Use ClearAllErrors To Continue)"), 7: (3, "Illegal character"),
-    8: (3, "Protocol error"), 500: (3, "Emergency stop"), 501: (3, "Unsupported command"), 502: (3, "Incorrect arguments"),
-    509: (3, "Bad argument"), 510: (3, "Bad property"), 511: (3, "Error processing method"), 512: (1, "No daemons are active"),
-    513: (2, "Daemon does not exist"), 514: (2, "Use ClearAllErrors to continue"), 515: (2, "Daemon already exists"),
-    1006: (2, "Surface not found"), 1502: (3, "Tool not found"), 1503: (3, "Tool not defined"),
-    2500: (3, "Machine limit encountered [Move Out Of Limits]"),
-}  # fmt: skip
-"""Severity and text of errors by their numbers (section 8.2)."""
-
-LIMIT_MM = 1000.0
-"""Of each axis, both ways."""
 
 _TICK_S = 0.02
 
@@ -58,26 +45,7 @@ class IppMischief:
     delay_s: float = 0.0
 
 
-@dataclass
-class _State:
-    """Of the machine; kept from session to session (section 6.3.1.2)."""
-
-    position: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    tool: str = "RefTool"
-    found: str = "UnDefTool"
-    homed: bool = False
-    user: bool = False
-    session: bool = False
-    error: bool = False
-    report: tuple[str, ...] = ("X", "Y", "Z")
-    daemons: dict[str, tuple[str, ...]] = field(default_factory=dict)
-
-
-class _FaultError(Exception):
-    """An error of a number, which the method answers with."""
-
-
-class SimulatedMachine:
+class SimulatedMachine(Methods):
     """A server, listening until it is closed.
 
     Parameters
@@ -87,13 +55,9 @@ class SimulatedMachine:
     version : that it says; ``None``: it does not know the question.
     """
 
-    tools = ("RefTool", "NoTool", "Probe1", "Probe2")
-
     def __init__(self, tcp_port: int = 0, *, part_c: float | None = 20.13, version: str | None = "1.4.3") -> None:
-        self.state, self.mischief = _State(), IppMischief()
-        self.part_c, self.version = part_c, version
-        self.radial = 0.0
-        """How far the surface lies from where it is expected, along the normal, mm."""
+        super().__init__(part_c=part_c, version=version)
+        self.mischief = IppMischief()
         self.lines: list[str] = []
         """All that was said, by both sides, with > and <."""
         self._sending = threading.Lock()
@@ -123,7 +87,7 @@ class SimulatedMachine:
     def pick(self, x: float, y: float, z: float) -> None:
         """The user picks a point by hand (section 9.5.3)."""
         self.state.position = [x, y, z]
-        self._send(f"E0000 # PtMeas({self._reported(self.state.report, (0, 0, 1))})")
+        self._send(f"E0000 # PtMeas({self.reported(self.state.report, (0, 0, 1))})")
 
     def press(self, key: str) -> None:
         """The user presses a key (section 9.5.1)."""
@@ -158,6 +122,10 @@ class SimulatedMachine:
                 return
             for framed in framer.feed(received):
                 self._command(framed.body)
+
+    def said(self, line: str) -> None:
+        """See :meth:`Methods.said`."""
+        self._send(line)
 
     def _send(self, line: str) -> None:
         self.lines.append(f"< {line}")
@@ -208,183 +176,20 @@ class SimulatedMachine:
         )
         try:
             if not state.session and method.name not in ("StartSession", "EndSession"):
-                raise _FaultError(8)
+                raise MethodError(8)
             if state.error and not asks:
-                raise _FaultError(514)
+                raise MethodError(514)
             act: Callable[[str, Term], Iterator[str]] | None = getattr(self, f"_do_{method.name.lower()}", None)
             if act is None:
-                raise _FaultError(501)
+                raise MethodError(501)
             for data in act(tag, method):
                 self._send(f"{tag} # {data}")
-        except _FaultError as error:
+        except MethodError as error:
             number = int(error.args[0])
             state.error = state.error or TEXTS[number][0] >= 2
             self._send(f"{tag} ! {_error(number, method.name)}")
-
-    # --- methods, each a generator of its data ------------------------------------------------------------------------------
-
-    def _do_startsession(self, tag: str, method: Term) -> Iterator[str]:
-        if self.state.session:
-            raise _FaultError(8)
-        self.state.session, self.state.error, self.state.report = True, False, ("X", "Y", "Z")
-        yield from ()
-
-    def _do_endsession(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.session = False
-        self.state.daemons.clear()
-        yield from ()
-
-    def _do_getdmeversion(self, tag: str, method: Term) -> Iterator[str]:
-        if self.version is None:
-            raise _FaultError(501)
-        yield f'DMEVersion("{self.version}")'
-
-    def _do_getmachineclass(self, tag: str, method: Term) -> Iterator[str]:
-        yield "GetMachineClass(CartCMM)"
-
-    def _do_clearallerrors(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.error = False
-        yield from ()
-
-    def _do_aborte(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.error = True
-        yield from ()
-
-    def _do_geterrstatuse(self, tag: str, method: Term) -> Iterator[str]:
-        yield f"ErrStatus({int(self.state.error)})"
-
-    def _do_getxtderrstatus(self, tag: str, method: Term) -> Iterator[str]:
-        yield f"IsHomed({int(self.state.homed)})"
-        yield f"IsUserEnabled({int(self.state.user)})"
-
-    def _do_home(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.homed, self.state.position, self.state.user = True, [0.0, 0.0, 0.0], False
-        yield from ()
-
-    def _do_ishomed(self, tag: str, method: Term) -> Iterator[str]:
-        yield f"IsHomed({int(self.state.homed)})"
-
-    def _do_enableuser(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.user = True
-        yield from ()
-
-    def _do_disableuser(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.user = False
-        yield from ()
-
-    def _do_isuserenabled(self, tag: str, method: Term) -> Iterator[str]:
-        yield f"IsUserEnabled({int(self.state.user)})"
-
-    def _do_get(self, tag: str, method: Term) -> Iterator[str]:
-        yield self._reported(_names(method.arguments, ("X", "Y", "Z", "Tool.A", "Tool.B", "Tool.C")))
-
-    def _do_onptmeasreport(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.report = _names(method.arguments, ("X", "Y", "Z", "IJK", "ER", "Q", "Tool.A", "Tool.B", "Tool.C"))
-        yield from ()
-
-    def _do_onmovereporte(self, tag: str, method: Term) -> Iterator[str]:
-        if self.state.daemons:
-            raise _FaultError(515)
-        rest = [one for one in method.arguments if not (isinstance(one, Term) and one.name in ("Time", "Dis"))]
-        self.state.daemons[tag] = _names(tuple(rest), ("X", "Y", "Z"))
-        yield from ()
-
-    def _do_stopdaemon(self, tag: str, method: Term) -> Iterator[str]:
-        if len(method.arguments) != 1 or str(method.arguments[0]) not in self.state.daemons:
-            raise _FaultError(513)
-        del self.state.daemons[str(method.arguments[0])]
-        yield from ()
-
-    def _do_stopalldaemons(self, tag: str, method: Term) -> Iterator[str]:
-        if not self.state.daemons:
-            raise _FaultError(512)
-        self.state.daemons.clear()
-        yield from ()
-
-    def _do_goto(self, tag: str, method: Term) -> Iterator[str]:
-        place, _ = _target(method, self.state.position)
-        self._move(place)
-        yield from ()
-
-    def _do_ptmeas(self, tag: str, method: Term) -> Iterator[str]:
-        place, normal = _target(method, self.state.position)
-        size = math.hypot(*normal) or 1.0
-        unit = (normal[0] / size, normal[1] / size, normal[2] / size)
-        self._move([at + self.radial * n for at, n in zip(place, unit, strict=True)])
-        yield self._reported(self.state.report, unit)
-
-    def _do_enumtools(self, tag: str, method: Term) -> Iterator[str]:
-        yield from (f'"{name}"' for name in self.tools)
-
-    def _do_findtool(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.found = self._tool(method)
-        yield from ()
-
-    def _do_changetool(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.tool, self.state.user = self._tool(method), False
-        yield from ()
-
-    def _do_settool(self, tag: str, method: Term) -> Iterator[str]:
-        self.state.tool = self._tool(method)
-        yield from ()
-
-    def _do_getprop(self, tag: str, method: Term) -> Iterator[str]:
-        told = []
-        for one in method.arguments:
-            name = one.name if isinstance(one, Term) else ""
-            if name == "Tool.Name":
-                told.append(f'Tool.Name("{self.state.tool}")')
-            elif name == "FoundTool.Name":
-                told.append(f'FoundTool.Name("{self.state.found}")')
-            elif name == "Part.Temperature" and self.part_c is not None:
-                told.append(f"Part.Temperature({number_text(self.part_c)})")
-            else:
-                raise _FaultError(510)
-        yield ", ".join(told)
-
-    # --- what they share ----------------------------------------------------------------------------------------------------
-
-    def _tool(self, method: Term) -> str:
-        if len(method.arguments) != 1 or method.arguments[0] not in self.tools:
-            raise _FaultError(1502)
-        return str(method.arguments[0])
-
-    def _move(self, place: list[float]) -> None:
-        if any(abs(value) > LIMIT_MM for value in place):
-            raise _FaultError(2500)
-        self.state.position, self.state.user = place, False
-        for tag, names in self.state.daemons.items():
-            self._send(f"{tag} # {self._reported(names)}")
-
-    def _reported(self, names: tuple[str, ...], normal: tuple[float, float, float] = (0, 0, 1)) -> str:
-        places = {axis: f"{value:.4f}" for axis, value in zip("XYZ", self.state.position, strict=True)}
-        further = {"IJK": ", ".join(map(number_text, normal)), "ER": "1.0", "Q": "0"}
-        return ", ".join(f"{name}({places.get(name) or further.get(name) or '0'})" for name in names)
 
 
 def _error(number: int, cause: str) -> str:
     severity, text = TEXTS[number]
     return f'Error({severity}, {number:04d}, "{cause}", "{text}")'
-
-
-def _names(arguments: tuple[Argument, ...], known: tuple[str, ...]) -> tuple[str, ...]:
-    names = tuple(one.name for one in arguments if isinstance(one, Term) and not one.arguments)
-    if not names or len(names) != len(arguments) or not set(names) <= set(known):
-        raise _FaultError(510)
-    return names
-
-
-def _target(method: Term, position: list[float]) -> tuple[list[float], tuple[float, float, float]]:
-    """Where a command goes, axes that it does not name staying, and the direction that it names."""
-    place, normal = list(position), (0.0, 0.0, 1.0)
-    for one in method.arguments:
-        if not isinstance(one, Term) or not all(isinstance(value, float) for value in one.arguments):
-            raise _FaultError(509)
-        numbers = [value for value in one.arguments if isinstance(value, float)]
-        if one.name in ("X", "Y", "Z") and len(numbers) == 1:
-            place["XYZ".index(one.name)] = numbers[0]
-        elif one.name == "IJK" and len(numbers) == 3:
-            normal = (numbers[0], numbers[1], numbers[2])
-        else:
-            raise _FaultError(509)
-    return place, normal

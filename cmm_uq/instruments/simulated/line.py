@@ -172,6 +172,7 @@ class _Pty:
 
         self._master, slave = pty.openpty()
         tty.setraw(slave)
+        os.set_blocking(self._master, False)  # it looks readable while nobody has the other side open, and then is not
         self._name = name
         name.unlink(missing_ok=True)
         name.symlink_to(os.ttyname(slave))

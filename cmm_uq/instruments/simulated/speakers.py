@@ -61,10 +61,11 @@ class Vaisala(Speaker):
     usual: tuple[float, ...] = (1013.21, 20.04, 45.1)
     banner = b"PTU300 / 5.02\r\n"
     letters: tuple[str, ...] = ("P", "T", "RH")
+    units = ("hPa", "'C", "%RH")
 
     def __init__(self) -> None:
         super().__init__()
-        self._form = '6.1 "P=" P " hPa T=" 3.1 T " RH=" RH #r #n'
+        self._form = '6.1 "P=" P " " U6 3.1 "T=" T " " U3 3.1 "RH=" RH " " U4 #r #n'
 
     def answer(self, command: str) -> bytes:
         """See :meth:`Speaker.answer`."""
@@ -88,7 +89,7 @@ class Vaisala(Speaker):
 
     def _sent(self) -> str:
         """The message by the FORM."""
-        said, decimals = "", 1
+        said, decimals, unit = "", 1, ""
         for word in re.findall(r'"[^"]*"|\S+', self._form):
             if word.startswith('"'):
                 said += word[1:-1]
@@ -96,10 +97,12 @@ class Vaisala(Speaker):
                 decimals = int(word[2])
             elif word.startswith("#"):
                 said += {"#r": "\r", "#n": "\n", "#rn": "\r\n", "#t": "\t"}.get(word.lower(), "")
+            elif re.fullmatch(r"U\d", word):
+                said += f"{unit:{word[1]}}"
             elif word == "ERR":
                 said += ("1" if self.ill else "0") + "0" * (self.flags - 1)
             elif word in self.letters:
-                value = self.readings[self.letters.index(word)]
+                value, unit = self.readings[self.letters.index(word)], self.units[self.letters.index(word)]
                 said += "*" * 7 if self.ill and word == "P" else f"{value:7.{decimals}f}"
         return said
 

@@ -8,9 +8,10 @@ from contextlib import contextmanager
 import pytest
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.instruments.ipp.client import Client, FaultError, NoAnswerError
+from cmm_uq.instruments.ipp.client import Client
 from cmm_uq.instruments.ipp.line import terms_of
 from cmm_uq.instruments.ipp.server import SimulatedMachine
+from cmm_uq.instruments.ipp.transaction import FaultError, NoAnswerError
 from cmm_uq.instruments.ports import PortLostError, TcpPort
 from cmm_uq.instruments.source import SYSTEM
 
@@ -109,6 +110,14 @@ def test_an_older_server_is_asked_no_more_than_it_knows() -> None:
             client.get()
     finally:
         machine.close()
+
+
+def test_an_emergency_stop_is_no_unknown_command(machine: SimulatedMachine) -> None:
+    with session(machine) as client:
+        machine.state.error = True
+        with pytest.raises(FaultError, match="Use ClearAllErrors to continue"):
+            client.version()
+        assert machine.state.error
 
 
 def test_a_session_of_another_is_not_taken_over_unless_it_was_ones_own(machine: SimulatedMachine) -> None:

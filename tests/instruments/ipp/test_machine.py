@@ -6,9 +6,14 @@ import time
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.instruments.ipp.line import BadLineError, response_of
+from cmm_uq.instruments.ipp.machine import Machine
 from cmm_uq.instruments.ipp.server import SimulatedMachine
+from cmm_uq.instruments.ipp.transaction import Heard
 from cmm_uq.instruments.reading import Reading
 from cmm_uq.instruments.source import Gap, Returned, open_source
 from cmm_uq.jobs.acquire import DeclaredSource
@@ -53,7 +58,10 @@ def test_positions_are_asked_for_as_often_as_is_said(machine: SimulatedMachine) 
         heard.until(
             lambda one: any("Use ClearAllErrors" in str(e.status) for e in one.of(Reading) if isinstance(e, Reading))
         )
+        time.sleep(0.6)
+        assert machine.state.error, "an emergency stop is cleared by nobody but the user"
         since = len(heard.events)
+        heard.source.clear_errors()  # type: ignore[attr-defined]
         heard.until(lambda one: one.good(since))
 
 
@@ -93,3 +101,32 @@ def test_what_is_no_server_is_refused(machine: SimulatedMachine) -> None:
         open_source(declared(machine))
     with pytest.raises(CmmUqError, match="is reached over the network"):
         open_source(DeclaredSource(name="cmm", profile="ipp", port="/dev/ttyUSB0"))
+
+
+LINES = st.one_of(
+    st.binary(max_size=40),
+    st.lists(
+        st.sampled_from(
+            ["E0000 ", "00001 ", "# ", "! ", "& ", "X(1)", "Y(", ")", ", ", "PtMeas(", "Z(2.5)", '"a"', "Error(3, 500, "]
+        )
+    ).map(lambda parts: "".join(parts).encode()),
+)  # fmt: skip
+
+
+def test_whatever_a_server_sends_is_told_and_no_place_is_invented(machine: SimulatedMachine) -> None:
+    source = open_source(declared(machine))
+    assert isinstance(source, Machine)
+
+    @given(LINES)
+    def told(line: bytes) -> None:
+        try:
+            response = response_of(line)
+        except BadLineError:
+            response = None
+        for event in source._told_by(Heard(line + b"\r\n", response, 0, 0)):
+            assert isinstance(event, Reading)
+            assert set(event.values) in (set(), {"x_mm", "y_mm", "z_mm"})
+            assert not (event.values and event.status)
+
+    told()
+    source.close()
