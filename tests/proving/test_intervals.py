@@ -17,7 +17,7 @@ from cmm_uq.proving.smallest import found_by_strength
     (0, 20, 0.0, 0.168), (1, 20, 0.001, 0.249), (10, 20, 0.272, 0.728), (0, 50, 0.0, 0.071),
 ])  # fmt: skip
 def test_intervals_are_those_of_the_printed_table(count: int, of: int, low: float, high: float) -> None:
-    """Confidence limits of proportions, 95 %, as tabled (Documenta Geigy, Scientific Tables, 7th ed., pp. 85–98)."""
+    """To three decimals, as tables of the binomial have them; where all or none is counted, 0.025 to the power of 1/n."""
     assert Rate(count, of).interval == pytest.approx((low, high), abs=6e-4)
 
 
