@@ -68,7 +68,7 @@ class Accepting:
         for step, columns in points:
             self._recorder.accept(step.place, columns, moment, how, of=of)
         self._waiting += [step for step, _ in points]
-        if self._recorder.commit():
+        if self._recorder.commit(streams=False):
             self._accepted()
 
     def kept(self) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -21,44 +20,19 @@ from cmm_uq.acquisition.lead import Lead, Run, Step
 from cmm_uq.acquisition.picture import picture
 from cmm_uq.acquisition.recorder import COORDINATES, Recorder
 from cmm_uq.acquisition.soaking import Soak, is_temperature, unsettled
-from cmm_uq.acquisition.story import Story
+from cmm_uq.acquisition.story import Place, Story
 from cmm_uq.acquisition.table import TYPED, Table, rows_of
 from cmm_uq.acquisition.typed import WORDS, Typed, understood
+from cmm_uq.acquisition.view import View, coming
 from cmm_uq.errors import CmmUqError
 from cmm_uq.instruments.reading import Reading
 from cmm_uq.instruments.source import Event
 from cmm_uq.jobs.acquire import AcquireFacts
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, say, signed
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, say
 from cmm_uq.points import Floats
 
 _SAID = 50
 """Lines of what happened that a screen may show."""
-
-
-@dataclass(frozen=True)
-class View:
-    """What there is to be seen.
-
-    Parameters
-    ----------
-    head : how far it is.
-    next : what comes next, with its coordinates.
-    picture : of the set-up in the machine.
-    shown : live figures of the newest point and set-up.
-    again : why a repeat is asked for.
-    temperatures : each with its change.
-    instruments : each with how many readings came, and what ails it.
-    said : what happened, newest last.
-    """
-
-    head: Text
-    next: Text
-    picture: tuple[str, ...]
-    shown: tuple[Text, ...]
-    again: Text
-    temperatures: tuple[Text, ...]
-    instruments: tuple[Text, ...]
-    said: tuple[Text, ...]
 
 
 class Conductor:
@@ -159,8 +133,9 @@ class Conductor:
             self.tell(say("{name} holds what {other} held, byte for byte: it is not taken again", name=Verbatim(name),
                            other=Verbatim(self.story.files[digest])))  # fmt: skip
             return
-        places = self._places(name, rows)
-        if places is None:
+        places = self.lead.places(self.story, self.step, [_numbers(row) for row in rows])
+        if isinstance(places, Text):
+            self.tell(say("{name}: {why}; no point of it is taken", name=Verbatim(name), why=places))
             return
         self.recorder.say("file", name=name, sha256=digest, kept=kept, points=len(places))
         self._accepting.accept(
@@ -206,7 +181,7 @@ class Conductor:
             head = say("{head}; WAIT, not settled: {columns}", head=head, columns=commas(names(waiting)))
         steps = () if step is None else self.lead.steps((step.place[0], step.place[2]))
         return View(
-            head, _next(step, self.lead), picture(self.lead.plan.machine, steps, step), self._accepting.judged.shown,
+            head, coming(step, self.lead), picture(self.lead.plan.machine, steps, step), self._accepting.judged.shown,
             say("REPEAT? {why}", why=self._accepting.judged.again) if self._accepting.judged.again else NOTHING,
             tuple(soak.words for soak in self._soaks.values()), tuple(self._instruments()), tuple(self._log),
         )  # fmt: skip
@@ -277,31 +252,6 @@ class Conductor:
                 if column not in self._soaks:
                     self._soaks[column] = Soak(column, self._limit, self._facts.soak_min)
                 self._soaks[column].add(reading.monotonic_ns, value)
-
-    def _places(self, name: str, rows: Sequence[Mapping[str, float]]) -> list[Step] | None:
-        """Where the points of a file belong; ``None``, and said, where that contradicts the plan."""
-        left = [step for run in self._ahead() for step in self.lead.missing(run, self.story)]
-        if not all("measurement" in row for row in rows):
-            return left[: len(rows)]
-        by_place = {step.place: step for step in left}
-        found = []
-        for row in rows:
-            place = (int(row["measurement"]), int(row["point"]), int(row.get("repeat", 1)))
-            if place not in by_place:
-                what = say("measurement {m}, point {p}, repeat {r}", m=place[0], p=place[1], r=place[2])
-                told = say(
-                    "{name}: {what} is not open in the plan; no point of it is taken", name=Verbatim(name), what=what
-                )
-                self.tell(told)
-                return None
-            found.append(by_place.pop(place))
-        return found
-
-    def _ahead(self) -> list[Run]:
-        """Set-ups in the order in which they come, beginning with the next."""
-        step, runs = self.step, self.lead.all_runs(self.story)
-        start = runs.index((step.place[0], step.place[2])) if step is not None else 0
-        return [*runs[start:], *runs[:start]]
 
     def _undo(self, reason: str) -> None:
         if not self.story.points:
@@ -398,12 +348,8 @@ def _columns(xyz: Floats) -> dict[str, float]:
     return dict(zip(COORDINATES, np.asarray(xyz).tolist(), strict=True))
 
 
-def _next(step: Step | None, lead: Lead) -> Text:
-    if step is None:
-        return say("all of the plan is measured")
-    at = commas(signed(value, ".1f") for value in step.xyz)
-    m, p, r = step.place
-    where = say("measurement {m}", m=m)
-    if (title := lead.titles.get(m)) is not None:
-        where = say("{where}, {title}", where=where, title=title)
-    return say("{where}, point {p}, repeat {r}, near {at} mm", where=where, p=p, r=r, at=at)
+def _numbers(row: Mapping[str, float]) -> Place | None:
+    """Measurement, point and repeat of a row of a file; ``None`` where it does not number them."""
+    if "measurement" not in row or "point" not in row:
+        return None
+    return int(row["measurement"]), int(row["point"]), int(row.get("repeat", 1))

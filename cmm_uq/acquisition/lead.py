@@ -10,7 +10,7 @@ import numpy as np
 
 from cmm_uq.acquisition.story import Place, Point, Story
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import Text
+from cmm_uq.messages import Text, say
 from cmm_uq.points import Floats, Ints, Points
 
 _ON_LINE = 1e-6
@@ -138,6 +138,31 @@ class Lead:
         raise CmmUqError(
             problem, fix=f"It has {numbers.min()} to {numbers.max()}; repeat asks for one more of the last"
         )
+
+    def places(self, story: Story, ahead: Step | None, numbers: Sequence[Place | None]) -> list[Step] | Text:
+        """Where the points of a file belong, as far as the plan has room: by their numbers, else as the plan goes on.
+
+        Parameters
+        ----------
+        ahead : what comes next.
+        numbers : measurement, point and repeat of each, where the file says so.
+
+        Returns
+        -------
+        a step for each; why not, where a number is none that is open.
+        """
+        runs, taken = self.all_runs(story), story.by_place
+        start = runs.index((ahead.place[0], ahead.place[2])) if ahead is not None else 0
+        left = [step for run in (*runs[start:], *runs[:start]) for step in self._left(run, taken)]
+        if None in numbers:
+            return left[: len(numbers)]
+        by_place, found = {step.place: step for step in left}, []
+        for place in numbers:
+            if place is None or place not in by_place:
+                m, p, r = place or (0, 0, 0)
+                return say("measurement {m}, point {p}, repeat {r} is not open in the plan", m=m, p=p, r=r)
+            found.append(by_place.pop(place))
+        return found
 
     def at_distance(self, step: Step, distance_mm: float, story: Story) -> list[tuple[Step, Floats]]:
         """Where a point lies that is so far from the first of its set-up, and the first itself where that is not there yet.

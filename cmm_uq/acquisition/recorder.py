@@ -140,24 +140,31 @@ class Recorder:
         """Write down what else happened: a note, a pause, a set-up that is left out."""
         self._journals.say(kind, data, self.now)
 
-    def commit(self) -> bool:
+    def commit(self, *, streams: bool = True) -> bool:
         """Put everything on the disk; whether that was possible. If not, it waits, and :attr:`stalled` says why.
+
+        Parameters
+        ----------
+        streams : the readings that come by themselves too; without them a point is on the disk in half the time.
 
         Raises
         ------
         OutputError : the disk fails otherwise than by being full, or has been full for too long.
         """
-        self._blocks.put(self._journals.streams, self.now)
+        if streams:
+            self._blocks.put(self._journals.streams, self.now)
         try:
-            self._journals.commit()
+            self._journals.events.commit()
+            if streams:
+                self._journals.streams.commit()
         except NoRoomError as error:
             if self.stalled is None:
                 self.told.append(Verbatim(str(error)))
             self.stalled = Verbatim(error.problem)
             return False
-        if self.stalled is not None:
+        if streams and self.stalled is not None:
             self.told.append(say("there is room on the disk again, and everything that waited is on it"))
-        self.stalled = None
+            self.stalled = None
         return True
 
     def tick(self) -> bool:

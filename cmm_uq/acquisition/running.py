@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from cmm_uq.acquisition.conducting import Conductor, View
+from cmm_uq.acquisition.conducting import Conductor
 from cmm_uq.acquisition.dropped import Dropped, Watched
+from cmm_uq.acquisition.view import View
 from cmm_uq.instruments.source import Clock, Event, Gap, Source
 from cmm_uq.messages import Text, Verbatim, say
 

@@ -49,7 +49,8 @@ def command(
     """
     defer_scipy()
     from cmm_uq.cli.operating import operated
-    from cmm_uq.commands.acquire import begin_acquisition, write_trial
+    from cmm_uq.commands.acquire import begin_acquisition
+    from cmm_uq.commands.acquire_trial import write_trial
 
     if out is not None and not simulate:
         raise CmmUqError(

@@ -16,7 +16,7 @@ from cmm_uq.writing.interruption import speaking
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from cmm_uq.acquisition.conducting import View
+    from cmm_uq.acquisition.view import View
     from cmm_uq.commands.acquire import Acquisition
     from cmm_uq.messages import Text
 

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tomlkit
-
 from cmm_uq.acquisition.conducting import Conductor
 from cmm_uq.acquisition.dropped import Dropped, Watched
 from cmm_uq.acquisition.earlier import settle_earlier
 from cmm_uq.acquisition.folder import FOLDER, Journals, begin, read_story, sessions_in
-from cmm_uq.acquisition.journal import Moment, written_whole
+from cmm_uq.acquisition.journal import Moment
 from cmm_uq.acquisition.judging import Judge
 from cmm_uq.acquisition.lead import Lead, titles_of
 from cmm_uq.acquisition.recorder import Recorder
@@ -24,20 +22,17 @@ from cmm_uq.acquisition.running import Item, Listening, Screen, run
 from cmm_uq.acquisition.simulated import SimulatedMachine, simulated
 from cmm_uq.acquisition.story import Story
 from cmm_uq.acquisition.table import Table
+from cmm_uq.commands.acquire_files import Taking
 from cmm_uq.commands.reading import read_job
-from cmm_uq.errors import CmmUqError, OutputError
+from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.instruments.source import SYSTEM, Clock, Source, open_source
-from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.file_names import inside
-from cmm_uq.jobs.importing.imported import Imported, imported
-from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.jobs.recording import REQUIRED, read_recording
-from cmm_uq.jobs.recording_file import is_own
 from cmm_uq.kinds import kind_of
 from cmm_uq.messages import Verbatim
 from cmm_uq.model.kind import Observe
@@ -149,111 +144,17 @@ def begin_acquisition(
         machine=None if machine is None else machine.measure,
     )  # fmt: skip
     conductor.tick()
-    dropped = None if watched is None else _Taking(job, watched, conductor, clock)
+    dropped = None if watched is None else Taking(job, watched, conductor, clock)
     return Acquisition(conductor, Listening(sources, items), items, clock, journals, watched, dropped, job.folder)
 
 
-def write_trial(folder: Path, out: Path) -> Path:
-    """A copy of a job in which recordings are simulated, to be tried without instruments.
-
-    Parameters
-    ----------
-    folder : of the job.
-    out : folder of the copy, which is made, or holds such a copy already.
-
-    Raises
-    ------
-    CmmUqError : something else is there.
-    OutputError : it cannot be written.
-    """
-    job = read_job(folder, recorded=False)
-    if (out / "job.toml").exists():
-        if read_job(out, recorded=False).origin != SIMULATED:
-            raise CmmUqError(
-                "is a job whose recording is measured", where=str(out), fix="Name another folder with --out"
-            )
-        return out
-    document: Any = tomlkit.parse(job.inputs["job.toml"].decode("utf-8-sig"))
-    document["job"]["id"] = f"{job.facts.job.id}-trial"
-    document["job"]["origin"] = SIMULATED
-    left_out = {"job.toml", job.facts.recording.file, provenance_name(job.facts.recording.file)}
-    out.mkdir(parents=True, exist_ok=True)
-    for name, content in {**job.inputs, **_plan_file(job)}.items():
-        if name not in left_out:
-            (out / name).parent.mkdir(parents=True, exist_ok=True)
-            written_whole(out / name, content)
-    written_whole(out / "job.toml", tomlkit.dumps(document).encode())
-    return out
-
-
-def _plan_file(job: Job) -> dict[str, bytes]:
-    """The plan that a job names in a file."""
+def plan_file(job: Job) -> dict[str, bytes]:
+    """The plan that a job names in a file, by its name; empty where it names none."""
     name = job.facts.acquire.plan
     if name is None:
         return {}
     path = inside(job.folder, name, f"{job.folder / 'job.toml'}: [acquire] plan")
     return {name: content_of(path, TABLE_BYTES, "cmm-uq plan writes plan.csv; name it in [acquire] plan")}
-
-
-class _Taking:
-    """Takes files of a folder: keeps their bytes beside the journal, and reads their points as any import does."""
-
-    def __init__(self, job: Job, watched: Watched, conductor: Conductor, clock: Clock) -> None:
-        self._job, self._watched, self._conductor, self._clock = job, watched, conductor, clock
-
-    def __call__(self, file: Dropped) -> None:
-        try:
-            rows = _rows(file, self._job)
-        except CmmUqError as error:
-            self._conductor.tell(Verbatim(str(error)))
-            return
-        try:
-            kept = self._kept(file)
-        except OutputError as error:
-            self._conductor.tell(Verbatim(str(error)))
-            self._watched.again(file.path)
-            return
-        age = self._clock.utc_ns() - file.utc_ns
-        moment = Moment(file.utc_ns, self._clock.monotonic_ns() - age)
-        self._conductor.file(file.path.name, file.content, moment, rows, kept)
-
-    def _kept(self, file: Dropped) -> str:
-        folder = self._job.folder / FOLDER / "files"
-        folder.mkdir(exist_ok=True)
-        number = 1 + sum(1 for _ in folder.iterdir())
-        path = folder / f"{number:04d}-{file.path.name}"
-        written_whole(path, file.content)
-        return path.name
-
-
-def _rows(file: Dropped, job: Job) -> list[dict[str, float]]:
-    """Points of a file; measurement, point and repeat only where the file itself numbers them."""
-    where, machine = str(file.path), job.points.machine
-    keys = job.facts.recording
-    if not keys.asked and is_own(file.content):
-        points = read_recording(file.content, where, machine)
-        columns = {"measurement": points.measurement, "point": points.point, "repeat": points.repeat,
-                   **dict(zip(("x_mm", "y_mm", "z_mm"), points.xyz.T, strict=True)), **points.columns}  # fmt: skip
-    else:
-        found = _imported(file.content, where, keys)
-        columns = dict(found.columns)
-        if "measurement" not in found.recognised.columns:
-            columns = {
-                name: values for name, values in columns.items() if name not in ("measurement", "point", "repeat")
-            }
-    columns.pop("time_s", None)  # by another clock
-    names = list(columns)
-    return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True)]
-
-
-def _imported(content: bytes, where: str, keys: ImportKeys) -> Imported:
-    """As any import; where nothing says which points belong together, they come in the order of the plan."""
-    try:
-        return imported(content, where, keys)
-    except CmmUqError:
-        if keys.points_per_measurement is not None:
-            raise
-        return imported(content, where, keys.model_copy(update={"points_per_measurement": "all"}))
 
 
 def _check_origin(job: Job, *, simulate: bool) -> None:
@@ -292,7 +193,7 @@ def _plan(job: Job, story: Story) -> tuple[str, list[str]]:
         said = story.sessions[0].said
         return said["plan"], said["titles"]
     if job.facts.acquire.plan is not None:
-        ((name, content),) = _plan_file(job).items()
+        ((name, content),) = plan_file(job).items()
         read_recording(content, str(job.folder / name), job.points.machine)
         return content.decode("utf-8-sig"), []
     from cmm_uq.commands.plan import recording_to_be
