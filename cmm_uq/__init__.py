@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cmm_uq.api.calls import budget, compensate, diagnose, job, plan, prove, read, report, simulate
     from cmm_uq.errors import CmmUqError
 
-__version__ = "0.4.0"
+__version__ = "0.5.0"
 
 __all__ = [
     "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "job", "new", "plan", "prove", "read",
