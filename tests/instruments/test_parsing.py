@@ -114,3 +114,9 @@ def test_what_an_instrument_says_when_ill_is_no_value(name: str, raw: bytes, tol
     found = Parser(profile_named(name)).read(Framed(raw, raw.rstrip(b"\r\n")))
     assert not found.values
     assert told in str(found.status)
+
+
+@pytest.mark.parametrize(("raw", "answers"), [(b"ERR3", True), (b"+0001.000", True), (b"hello", False), (b"", False)])
+def test_an_instrument_that_says_that_it_is_ill_has_answered(raw: bytes, answers: bool) -> None:
+    """So its silence is no gap; noise is no answer."""
+    assert Parser(profile_named("sylvac-rs232")).read(Framed(raw, raw)).answers is answers
