@@ -47,6 +47,7 @@ class Conductor:
     facts : ``[acquire]``.
     soak_k_per_h : largest change of a temperature in an hour; ``None``: none is stated.
     machine : has a machine measure a point, where one measures when it is asked.
+    clear : of each machine that waits for its errors to be cleared by who has looked at them.
 
     Attributes
     ----------
@@ -64,11 +65,12 @@ class Conductor:
         *,
         soak_k_per_h: float | None,
         machine: Callable[[Step], None] | None = None,
+        clear: Sequence[Callable[[], None]] = (),
     ) -> None:
         self.recorder, self.lead = recorder, lead
         self._table, self._facts, self._limit = table, facts, soak_k_per_h
         self._accepting = Accepting(recorder, lead, judge, table, facts.repeats_most, self.tell)
-        self._machine = machine
+        self._machine, self._clears = machine, tuple(clear)
         self._soaks: dict[str, Soak] = {}
         self._wanted: Run | None = None
         self.said: deque[Text] = deque()
@@ -290,6 +292,15 @@ class Conductor:
         self.recorder.say("note", text=text)
         self._after_word()
         self.tell(say("noted"))
+
+    def _clear(self, _: str) -> None:
+        if not self._clears:
+            raise CmmUqError("no machine here waits for its errors to be cleared")
+        for clear in self._clears:
+            clear()
+        self.recorder.say("note", text="errors of the machine cleared by the operator")
+        self._after_word()
+        self.tell(say("the machine is told to go on"))
 
     def _pause(self, reason: str) -> None:
         self.paused = True

@@ -14,6 +14,7 @@ WORDS = {
     "skip": "leaves the set-up out: skip REASON",
     "go": "goes on with a measurement: go 5",
     "note": "writes something down: note TEXT",
+    "clear": "lets a machine go on after an error that you have looked at",
     "pause": "stops taking points: pause REASON",
     "resume": "goes on taking points",
     "help": "says all this",

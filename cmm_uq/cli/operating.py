@@ -160,7 +160,7 @@ def _page(view: View, typed: str, height: int) -> RenderableType:
     rows.append(Styled(f"{PROMPT}{typed}▏", style="reverse"))
     rows.append(
         Styled(
-            "Enter takes the point · x y z · undo REASON · repeat · skip · go N · note · pause · help · quit",
+            "Enter takes the point · x y z · undo REASON · repeat · skip · go N · note · clear · pause · help · quit",
             style="dim",
         )
     )

@@ -27,6 +27,7 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import TABLE_BYTES
+from cmm_uq.instruments.ipp.machine import Machine
 from cmm_uq.instruments.source import SYSTEM, Clock, Source, open_source
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.file_names import inside
@@ -142,6 +143,7 @@ def begin_acquisition(
     conductor = Conductor(
         recorder, lead, judge, table, facts, soak_k_per_h=facts.soak_k_per_h or job.facts.rated_conditions.change_k_per_h,
         machine=None if machine is None else machine.measure,
+        clear=[source.clear_errors for source in sources if isinstance(source, Machine)],
     )  # fmt: skip
     conductor.tick()
     dropped = None if watched is None else Taking(job, watched, conductor, clock)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 
 from cmm_uq.acquisition.folder import read_story
 from cmm_uq.acquisition.journal import Moment
+from cmm_uq.commands.acquire import begin_acquisition
 from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
+from cmm_uq.instruments.ipp.server import SimulatedMachine
 from cmm_uq.instruments.source import Gap, Returned
 from cmm_uq.messages import Verbatim
 from tests.acquisition.session import FakeClock, job_folder, probed, said, session, temperature, type_in
@@ -373,3 +376,32 @@ def test_the_picture_has_every_point_and_a_cross_where_to_go(tmp_path: Path, clo
     drawn = "\n".join(taking.conductor.view().picture)
     assert drawn.count("1") == 2
     assert np.array([line.index("X") for line in taking.conductor.view().picture if "X" in line])[0] > 15
+
+
+def test_a_machine_goes_on_after_an_error_once_the_operator_says_so(tmp_path: Path) -> None:
+    machine = SimulatedMachine()
+    more = f'[[acquire.source]]\nname = "cmm"\nprofile = "ipp-position"\nport = "{machine.url}"\n'
+    taking = begin_acquisition(job_folder(tmp_path / "job", more))
+    (source,) = taking.listening.sources
+    stop = threading.Event()
+    try:
+        machine.trip()
+        events = source.events(stop)
+        while "Use ClearAllErrors" not in str(getattr(next(events), "status", "")):
+            assert machine.state.error
+        taking.conductor.line("clear")
+        assert said(taking.conductor)[-1] == "the machine is told to go on"
+        while not getattr(next(events), "values", None):
+            pass
+        assert not machine.state.error
+    finally:
+        stop.set()
+        source.close()
+        machine.close()
+    notes = [text for _, text in read_story(tmp_path / "job" / "acquisition").notes]
+    assert notes == ["errors of the machine cleared by the operator"]
+
+
+@pytest.mark.usefixtures("no_instruments")
+def test_where_no_machine_waits_there_is_nothing_to_clear(tmp_path: Path, clock: FakeClock) -> None:
+    assert "no machine here waits" in type_in(session(job_folder(tmp_path / "job"), clock), clock, "clear")[0]
