@@ -23,6 +23,12 @@ A_ROW = 3
 _DEPTH = 0.5 * np.array([np.cos(np.radians(38.0)), np.sin(np.radians(38.0))])
 """How the y axis runs into the picture."""
 
+_REACH, _BELOW = 0.04, 0.064
+"""Distance of the axes' names from the frame, and of that of X below it, in parts of the travel of X."""
+
+_LABEL_MM = 1.7
+"""Half the height of a name, with some room."""
+
 _TEXT_MM = 15.0
 
 
@@ -44,6 +50,10 @@ def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
     low, high = corners.min(axis=0), corners.max(axis=0)
     span = 1.22 * (high - low)
     width = WIDTH_MM / A_ROW
+    below = _BELOW * float(np.ptp(box[0])) + _LABEL_MM * float(span[0]) / width
+    span[1] = max(
+        span[1], high[1] - low[1] + 2 * below
+    )  # of a low volume the name of X needs more room than a share of it
     height = min(width * float(span[1] / span[0]), 75.0) + _TEXT_MM
     with house_style():
         figure = new_figure(height)
@@ -106,9 +116,9 @@ def _frame(ax: Axes, box: Floats) -> None:
     _line(ax, floor + np.array([0.0, 0.0, z[1] - z[0]]), RULE, 0.6)
     for i in range(4):
         _line(ax, np.vstack([floor[i], floor[i] + [0.0, 0.0, z[1] - z[0]]]), RULE, 0.6)
-    reach = 0.04 * (x[1] - x[0])
+    reach = _REACH * (x[1] - x[0])
     at = _seen(np.array([[x.mean(), y[0], z[0]], [x[1], y.mean(), z[0]], [x[0], y[0], z.mean()]]))
-    for (across, up), name, shift in zip(at, AXES, ((0.0, -1.6), (1.4, -1.0), (-1.4, 0.0)), strict=True):
+    for (across, up), name, shift in zip(at, AXES, ((0.0, -_BELOW / _REACH), (1.4, -1.0), (-1.4, 0.0)), strict=True):
         ax.text(across + shift[0] * reach, up + shift[1] * reach, name.upper(), fontsize=TINY, color=MUTED, ha="center",
                 va="center")  # fmt: skip
 

@@ -65,6 +65,6 @@ def test_below_one_half_the_sentence_names_the_group() -> None:
         "straightness_x_z", say("Straightness"), 0.37, {"bow_um": size}, 0.8, 0.96, say("a way"), (say("scale_x"),)
     )
     assert (
-        "Probability 37 %, 96 % that it is this or one that this recording cannot tell from it: scale_x;"
+        "Probability 37 %, 96 % that it is this or one that this recording cannot tell from it: Scale error of X;"
         in sentence(item, gain).replace("\u00a0", " ")
     )

@@ -15,7 +15,7 @@ from cmm_uq.documents.document import Table
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel, Noise
-from cmm_uq.physics.catalogue import effects
+from cmm_uq.physics.catalogue import EVERY, effects
 from cmm_uq.points import Machine
 from tests.recordings import TRAVEL, bar_facts, bars
 
@@ -132,7 +132,8 @@ def test_page_and_results_have_a_column_for_each(found: Diagnosed) -> None:
     (table,) = costs_section(found).blocks
     assert isinstance(table, Table)
     assert table.columns[0].heading == "Quantity"
-    assert table.columns[1].heading.startswith(", ".join(found.diagnosis.remaining.rivals[0].effects))
+    added = [EVERY[name].title for name in found.diagnosis.remaining.rivals[0].effects]
+    assert table.columns[1].heading.startswith(", ".join(added))
     titles = [row[0] for row in table.rows]
     assert titles[0] == "Squareness X–Y"
     assert any("B89" in title for title in titles)
