@@ -95,10 +95,12 @@ def diagnosed(job: Path, *, whole: bool = False) -> dict[str, Any]:
         "effects": {
             each["effect"]: {
                 "probability": each["probability"], "together": each.get("probability_together", each["probability"]),
+                "group": each.get("group", []), "periods": [p["value"] for p in each.get("other_periods_mm", [])],
                 "parameters": {k: [q["value"], q["u"], *q["interval95"]] for k, q in each["parameters"].items()},
             }
             for each in said["effects"]
         },
+        "withheld": [each["effect"] for each in said.get("withheld", [])],
     }  # fmt: skip
 
 
