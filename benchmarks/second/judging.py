@@ -23,8 +23,13 @@ def proportion(hits: int, count: int) -> tuple[float, float]:
 
 def group_of(name: str, found: dict) -> set[str]:
     """What is named and all that is said to be indistinguishable from it."""
-    own = (found["effects"].get(name) or {}).get("group", ())
+    own = found["effects"][name].get("group", ())
     return {name, *own}.union(*(group for group in found["groups"] if name in group))
+
+
+def of_oracle(found: dict) -> dict:
+    """What an oracle finds, told as a diagnosis: names alone."""
+    return {"effects": {name: {} for name in found["effects"]}, "groups": []}
 
 
 def hit(truth: dict, found: dict) -> bool:

@@ -160,7 +160,7 @@ def _ours(found: dict, oracle: dict) -> dict:
 
 
 def _oracle(which: str) -> Callable[[dict, dict], dict]:
-    return lambda found, oracle: {"effects": oracle[which]["effects"], "groups": []}
+    return lambda found, oracle: judging.of_oracle(oracle[which])
 
 
 def _nothing(pairs: Pairs, oracles: Records) -> list[str]:
@@ -227,8 +227,9 @@ def _others(pairs: Pairs) -> list[str]:
         f"{sum(f['verdict'] == 'consistent' for _, f in out)} not seen, {len(explained)} explained by an innocent effect.",
         f"- The same rows in another order: {len(shuffled) - len(moved)} of {len(shuffled)} times the same verdict, effects, "
         "groups and values" + (f"; not in {', '.join(moved[:12])}." if moved else "."),
-        f"- Periods with aliases: named in {len(said)} of {len(periods)}, and withheld as probable but not resolved in {kept_back}. "
-        f"Where one is named, its interval or another period that is said to fit holds the truth in {_share(held, len(said))}.",
+        f"- Periods with aliases: named in {len(said)} of {len(periods)}, and withheld as probable but not resolved in "
+        f"{kept_back}. Where one is named, its interval or another period that is said to fit is right in "
+        f"{_share(held, len(said))}.",
         f"- Real error maps, an expansion of 3 to 15 µm/(m K) concealed: {_share(shown, len(grown))} "
         f"named, intervals hold {_share(sum(expansions), len(expansions))}; in {wrong} of {len(sets)} another one is named.",
     ]  # fmt: skip
