@@ -23,7 +23,13 @@ def proportion(hits: int, count: int) -> tuple[float, float]:
 
 def group_of(name: str, found: dict) -> set[str]:
     """What is named and all that is said to be indistinguishable from it."""
-    return {name}.union(*(group for group in found["groups"] if name in group))
+    own = found["effects"][name].get("group", ())
+    return {name, *own}.union(*(group for group in found["groups"] if name in group))
+
+
+def of_oracle(found: dict) -> dict:
+    """What an oracle finds, told as a diagnosis: names alone."""
+    return {"effects": {name: {} for name in found["effects"]}, "groups": []}
 
 
 def hit(truth: dict, found: dict) -> bool:
@@ -83,6 +89,14 @@ def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:
                 value = low + (value - low) % (2 * np.pi)
             listed.append((parameter, bool(low <= value <= high)))
     return listed
+
+
+def period_told(truth: dict, found: dict) -> bool:
+    """Whether the interval of a hidden period holds it, or one of the others that are said to fit is within a tenth of it."""
+    (name,) = truth["hidden"]
+    held = dict(covered(truth, found)).get("period_mm", False)
+    others = found["effects"][name].get("periods", ())
+    return held or any(abs(other / truth["period"] - 1) < 0.1 for other in others)
 
 
 def same(found: dict) -> bool:

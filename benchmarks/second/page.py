@@ -160,7 +160,7 @@ def _ours(found: dict, oracle: dict) -> dict:
 
 
 def _oracle(which: str) -> Callable[[dict, dict], dict]:
-    return lambda found, oracle: {"effects": oracle[which]["effects"], "groups": []}
+    return lambda found, oracle: judging.of_oracle(oracle[which])
 
 
 def _nothing(pairs: Pairs, oracles: Records) -> list[str]:
@@ -215,7 +215,8 @@ def _others(pairs: Pairs) -> list[str]:
     explained = [f for _, f in out if f["verdict"] == "explained"]
     moved = [t["name"] for t, f in shuffled if not judging.same(f)]
     said = [(t, f) for t, f in periods if set(f["effects"]) & set(t["hidden"])]
-    held = sum(all(h for name, h in judging.covered(t, f) if name == "period_mm") for t, f in said)
+    held = sum(judging.period_told(t, f) for t, f in said)
+    kept_back = sum(bool(set(f.get("withheld", ())) & set(t["hidden"])) for t, f in periods)
     grown = [(t, f) for t, f in sets if t["hidden"]]
     expansions = [h for t, f in grown for _, h in judging.covered(t, f)]
     wrong = sum(bool(judging.innocent(t, f)) for t, f in sets)
@@ -226,7 +227,8 @@ def _others(pairs: Pairs) -> list[str]:
         f"{sum(f['verdict'] == 'consistent' for _, f in out)} not seen, {len(explained)} explained by an innocent effect.",
         f"- The same rows in another order: {len(shuffled) - len(moved)} of {len(shuffled)} times the same verdict, effects, "
         "groups and values" + (f"; not in {', '.join(moved[:12])}." if moved else "."),
-        f"- Periods with aliases: named in {len(said)} of {len(periods)}; the interval of the period then holds the truth in "
+        f"- Periods with aliases: named in {len(said)} of {len(periods)}, and withheld as probable but not resolved in "
+        f"{kept_back}. Where one is named, its interval or another period that is said to fit is right in "
         f"{_share(held, len(said))}.",
         f"- Real error maps, an expansion of 3 to 15 µm/(m K) concealed: {_share(shown, len(grown))} "
         f"named, intervals hold {_share(sum(expansions), len(expansions))}; in {wrong} of {len(sets)} another one is named.",

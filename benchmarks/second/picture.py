@@ -51,8 +51,8 @@ def _found(axes: Any, both: list) -> None:
     weakest = np.array([min(t["wanted"].values()) for t, *_ in both])
     ways = {
         "found": lambda f, o: f,
-        "oracle": lambda f, o: {"effects": o["estimates"]["effects"], "groups": []},
-        "oracle, noise known": lambda f, o: {"effects": o["knows"]["effects"], "groups": []},
+        "oracle": lambda f, o: judging.of_oracle(o["estimates"]),
+        "oracle, noise known": lambda f, o: judging.of_oracle(o["knows"]),
     }
     for i, (name, way) in enumerate(ways.items()):
         hits = np.array([judging.hit(t, way(f, o)) for t, f, o in both], dtype=bool)

@@ -87,7 +87,7 @@ def diagnosed(job: Path, *, whole: bool = False) -> dict[str, Any]:
         diagnosis.joint_posterior = sampled if whole else stopped
         said = cmm_uq.diagnose(job).results["diagnosis"]
     except ConsistentError as found:
-        return {"verdict": "consistent", "p": float(found.args[0]), "groups": [], "effects": {}}
+        return {"verdict": "consistent", "p": float(found.args[0]), "groups": [], "effects": {}, "withheld": []}
     finally:
         diagnosis.joint_posterior = sampled
     return {
@@ -95,10 +95,12 @@ def diagnosed(job: Path, *, whole: bool = False) -> dict[str, Any]:
         "effects": {
             each["effect"]: {
                 "probability": each["probability"], "together": each.get("probability_together", each["probability"]),
+                "group": each.get("group", []), "periods": [p["value"] for p in each.get("other_periods_mm", [])],
                 "parameters": {k: [q["value"], q["u"], *q["interval95"]] for k, q in each["parameters"].items()},
             }
             for each in said["effects"]
         },
+        "withheld": [each["effect"] for each in said.get("withheld", [])],
     }  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from benchmarks.second.judging import (
     hit,
     innocent,
     machine_blamed,
+    period_told,
     proportion,
     recognised,
     same,
@@ -32,6 +33,9 @@ def test_an_effect_is_found_by_name_in_a_group_or_by_what_nobody_could_tell_from
     assert hit(TRUTH, said("scale_x"))
     assert hit(TRUTH, said("drift_x", groups=(("drift_x", "scale_x"),)))
     assert hit(TRUTH, said("rotation_x_y"))
+    told = said("drift_x")
+    told["effects"]["drift_x"] = {**told["effects"]["drift_x"], "group": ["scale_x", "scale_z"]}
+    assert hit(TRUTH, told)
     assert not hit(TRUTH, said("drift_x"))
     assert not hit(TRUTH, said())
     assert not hit({**TRUTH, "hidden": {"scale_x": 3.0, "scale_y": 1.0}}, said("scale_x"))
@@ -73,6 +77,16 @@ def test_a_phase_is_held_on_the_circle_and_turned_half_where_the_amplitude_is_ne
     assert covered(truth, found) == [("amplitude_um", True), ("period_mm", False), ("phase_rad", True)]
     positive = {**truth, "hidden": {"periodic_scale_x": 2.0}}
     assert covered(positive, found)[2] == ("phase_rad", False)
+
+
+def test_a_period_is_told_by_its_interval_or_among_the_others_that_fit() -> None:
+    truth = {"hidden": {"periodic_scale_x": 2.0}, "period": 50.0, "phase": 0.1}
+    found = said("periodic_scale_x")
+    parameters = {"period_mm": [30.0, 0.5, 29.0, 31.0]}
+    found["effects"]["periodic_scale_x"] = {**found["effects"]["periodic_scale_x"], "parameters": parameters}
+    assert not period_told(truth, found)
+    found["effects"]["periodic_scale_x"]["periods"] = [75.0, 50.4]
+    assert period_told(truth, found)
 
 
 def test_rows_in_another_order_are_the_same_to_a_thousandth_of_u() -> None:
