@@ -82,7 +82,10 @@ def tail_probability(draws: Floats, value: float) -> float:
     there it is no steeper than Markov's inequality has it. The odds of what is not there have a mean of one, and so
     reach e^x in no more than e^−x of all cases.
     """
-    start, largest = float(np.quantile(draws, _TAIL)), float(draws.max())
+    largest = float(draws.max())
+    if np.isneginf(largest):  # nothing that is thought of could show at all
+        return 1.0
+    start = float(np.quantile(draws, _TAIL))
     if value <= start:
         return float((np.sum(draws >= value) + 1) / (len(draws) + 1))
     excess = float((draws[draws > start] - start).mean())

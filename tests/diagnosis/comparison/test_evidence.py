@@ -291,3 +291,8 @@ def test_a_least_noise_cuts_the_integral_off_below_it(least: float, stated: floa
     c = replace(comparison(), sigma=sigma[sigma >= least], log_sigma=log_sigma[sigma >= least])
     cut = replace(comparison(), sigma=sigma, log_sigma=log_sigma)
     assert cut.log_evidence()[0][0] == pytest.approx(direct(c, None), abs=0.02)
+
+
+def test_where_nothing_that_is_thought_of_could_show_nothing_is_missing() -> None:
+    """As of a single placing of a triangle, whose freedoms take up all that is observed."""
+    assert tail_probability(np.full(50, -np.inf), -np.inf) == 1.0
