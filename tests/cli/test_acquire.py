@@ -27,7 +27,7 @@ from tests.conftest import ROOT
 
 resource, termios = pytest.importorskip("resource"), pytest.importorskip("termios")  # of POSIX
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm-256color"}
 POINTS = [f"{x} 100 {-300 - i / 1000:.3f}" for i in range(40) for x in (100, 600)]
 
