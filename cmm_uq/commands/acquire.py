@@ -177,13 +177,26 @@ def write_trial(folder: Path, out: Path) -> Path:
     document["job"]["id"] = f"{job.facts.job.id}-trial"
     document["job"]["origin"] = SIMULATED
     left_out = {"job.toml", job.facts.recording.file, provenance_name(job.facts.recording.file)}
-    out.mkdir(parents=True, exist_ok=True)
+    _make(out)
     for name, content in {**job.inputs, **_plan_file(job)}.items():
         if name not in left_out:
-            (out / name).parent.mkdir(parents=True, exist_ok=True)
+            _make((out / name).parent)
             written_whole(out / name, content)
     written_whole(out / "job.toml", tomlkit.dumps(document).encode())
     return out
+
+
+def _make(folder: Path) -> None:
+    """Make a folder, and those above it, that may be there already.
+
+    Raises
+    ------
+    OutputError : it cannot be made, or is a file.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot be made: {error.strerror}", where=str(folder), fix="Name another folder") from None
 
 
 def _plan_file(job: Job) -> dict[str, bytes]:
@@ -219,7 +232,7 @@ class _Taking:
 
     def _kept(self, file: Dropped) -> str:
         folder = self._job.folder / FOLDER / "files"
-        folder.mkdir(exist_ok=True)
+        _make(folder)
         number = 1 + sum(1 for _ in folder.iterdir())
         path = folder / f"{number:04d}-{file.path.name}"
         written_whole(path, file.content)

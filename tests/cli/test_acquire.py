@@ -287,6 +287,17 @@ def test_a_trial_never_touches_a_measured_job(tmp_path: Path, options: tuple[str
     assert not (folder / "acquisition").exists()
 
 
+def test_a_trial_where_no_folder_can_be_is_refused_in_a_line(tmp_path: Path) -> None:
+    job = job_folder(tmp_path / "job")
+    (tmp_path / "taken").write_text("mine", encoding="utf-8")
+    for out in ("taken", "taken/x"):
+        ended = run("acquire", job, "--simulate", "--out", out, cwd=tmp_path)
+        assert ended.returncode == 3
+        assert ended.stderr.startswith(f"cmm-uq: {out}: cannot be made: ")
+        assert len(ended.stderr.splitlines()) == 1
+    assert (tmp_path / "taken").read_text(encoding="utf-8") == "mine"
+
+
 @pytest.mark.parametrize(("more", "told"), [
     ('plan_ = "x"', "plan"), ('folder = "none"', "is no folder"),
     ('[[acquire.source]]\nname = "a"\nprofile = "line-logger"\nport = "/dev/none"', "/dev/none"),
