@@ -1,9 +1,7 @@
 """Several ensembles of emcee on one density, until the autocorrelation time says enough.
 
-The walkers move in coordinates whitened by an approximation of the density, so that most steps are independence
-proposals from a multivariate t distribution; differential-evolution steps repair what the approximation misses. (emcee's
-snooker move is not used: its normalisation is wrong in release 3.1.6.) Walkers of one ensemble are not independent, so
-the ensembles are compared with each other.
+The walkers move in coordinates whitened by an approximation of the density (:mod:`cmm_uq.inference.side_by_side`). Walkers
+of one ensemble are not independent, so the ensembles are compared with each other.
 """
 
 from __future__ import annotations
@@ -16,6 +14,7 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.inference.proposals import LogDensity, Proposal
+from cmm_uq.inference.side_by_side import SideBySide
 from cmm_uq.points import Floats
 
 ENSEMBLES = 4
@@ -100,30 +99,17 @@ def run_ensembles(
     def whitened(z: Floats) -> Floats:
         return density(proposal.parameters(z))
 
-    def independence(z: Floats, random: Any) -> tuple[Floats, Floats]:
-        """A proposal that does not depend on where the walkers are, with its Hastings ratio."""
-        proposed = proposal.draws(len(z), random)
-        before, after = np.split(proposal.log_density(np.vstack([z, proposed])), 2)
-        return proposed, before - after
-
-    samplers, states = [], []
-    for child in np.random.SeedSequence(seed).spawn(ENSEMBLES):
-        sampler = emcee.EnsembleSampler(
-            walkers, d, whitened, vectorize=True,
-            moves=[(emcee.moves.MHMove(independence), 0.9), (emcee.moves.DEMove(), 0.1)],
-        )  # fmt: skip
-        random = np.random.RandomState(np.random.MT19937(child))
-        sampler.random_state = random.get_state()
-        states.append(sampler.run_mcmc(_start(whitened, proposal, walkers, random), BURN_IN, store=False))
-        samplers.append(sampler)
-    steps = 0
+    randoms = [
+        np.random.RandomState(np.random.MT19937(child)) for child in np.random.SeedSequence(seed).spawn(ENSEMBLES)
+    ]
+    begin = np.vstack([_start(whitened, proposal, walkers, random) for random in randoms])
+    move = SideBySide(proposal, randoms)
+    sampler = emcee.EnsembleSampler(len(begin), d, whitened, vectorize=True, moves=[move])
+    state, steps = sampler.run_mcmc(begin, BURN_IN, store=False), 0
     while True:
-        states = [
-            sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
-            for sampler, state in zip(samplers, states, strict=True)
-        ]
+        state = sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
         steps += steps_at_once
-        chains = np.stack([sampler.get_chain() for sampler in samplers])
+        chains = np.ascontiguousarray(sampler.get_chain().reshape(steps, ENSEMBLES, walkers, d).swapaxes(0, 1))
         time, effective = _effective_samples(chains)
         if progress:
             progress(min(1.0, effective / effective_samples))
