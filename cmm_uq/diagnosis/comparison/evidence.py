@@ -398,15 +398,52 @@ class Comparison:
         squares = np.einsum("mb,kmb->kb", plain, weighed)
         log = np.array([noise.log for noise in self._noises])
         if given:
-            taken = np.hstack([version.amplitude * self._columns(version) for version in given])
-            other = np.concatenate([v.amplitude * self._weighed_columns(v) for v in given], axis=2)
-            factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ other)
-            rows = np.linalg.solve(factor, other.swapaxes(1, 2))
+            rows, logs = self._rows(given)
             seen = rows @ plain
-            log = log - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+            log = log - logs
             squares = squares - np.sum(seen**2, axis=1)
             weighed = np.concatenate([weighed - rows.swapaxes(1, 2) @ seen, rows.swapaxes(1, 2)], axis=2)
         return _Beside(weighed.transpose(1, 0, 2).reshape(len(plain), -1), squares, log)
+
+    def _rows(self, given: Sequence[Version]) -> tuple[Floats, Floats]:
+        """Rows (k, g, m) of what is given (see :class:`_Beside`), and half the logarithm (k,) of its determinant.
+
+        The widest comes first and by its principal axes, of which a search, that gives it again and again at several sizes,
+        needs another length only; to what it leaves the others are added by Cholesky's factors.
+        """
+        kinds, m = len(self._noises), len(self.left)
+        rows, logs = np.zeros((kinds, 0, m)), np.zeros(kinds)
+        others = list(given)
+        widest = max(others, key=lambda version: self._columns(version).shape[1])
+        if self._columns(widest).shape[1] >= _WIDE:
+            others.remove(widest)
+            strengths, axes = self._principal_axes(widest)
+            ratio = widest.amplitude**2 * strengths
+            rows = (widest.amplitude / np.sqrt(1 + ratio))[:, :, None] * axes
+            logs = 0.5 * np.log1p(ratio).sum(axis=1)
+        if not others:
+            return rows, logs
+        taken = np.hstack([version.amplitude * self._columns(version) for version in others])
+        weighed = np.concatenate([v.amplitude * self._weighed_columns(v) for v in others], axis=2)
+        weighed = weighed - rows.swapaxes(1, 2) @ (rows @ taken)
+        factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ weighed)
+        more = np.linalg.solve(factor, weighed.swapaxes(1, 2))
+        logs = logs + np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        return np.concatenate([rows, more], axis=1), logs
+
+    def _principal_axes(self, version: Version) -> tuple[Floats, Floats]:
+        """Eigenvalues (k, r) of a version's inner products by kind of noise, and its weighed columns along them (k, r, m)."""
+        key = version.explanation, version.member
+        if key not in self._axes:
+            weighed = self._weighed_columns(version)
+            strengths, turn = np.linalg.eigh(self._columns(version).T @ weighed)
+            self._axes[key] = np.maximum(strengths, 0.0), turn.swapaxes(1, 2) @ weighed.swapaxes(1, 2)
+        return self._axes[key]
+
+    @cached_property
+    def _axes(self) -> dict[tuple[int, int], tuple[Floats, Floats]]:
+        """Principal axes of wide members that were ever given."""
+        return {}
 
     def _columns(self, version: Version) -> Floats:
         return self._stack[0][:, self._where[version.explanation, version.member]]
@@ -441,7 +478,7 @@ class _Beside:
     ``seen_by`` (m, k·(b + g)): of each kind Σ⁻¹·data and the rows of what is given, side by side; ``squares`` (k, b)
     dataᵀ·Σ⁻¹·data; ``log`` (k,) probability of the noise less that of its determinant.
 
-    With Σ = N + C·Cᵀ and rows = chol(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
+    With Σ = N + C·Cᵀ and rows = root(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, any square root, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
     """
 
     seen_by: Floats
