@@ -27,6 +27,10 @@ EFFECTIVE_SAMPLES = 4000
 
 LEAST_EFFECTIVE_SAMPLES = 1000
 LARGEST_RHAT = 1.01
+
+_WINDOW = 5.0
+"""Autocorrelation times that are summed over."""
+
 Progress = Callable[[float], None]
 
 
@@ -99,11 +103,8 @@ def run_ensembles(
     def whitened(z: Floats) -> Floats:
         return density(proposal.parameters(z))
 
-    randoms = [
-        np.random.RandomState(np.random.MT19937(child)) for child in np.random.SeedSequence(seed).spawn(ENSEMBLES)
-    ]
-    begin = np.vstack([_start(whitened, proposal, walkers, random) for random in randoms])
-    move = SideBySide(proposal, randoms)
+    begin = np.vstack([_start(whitened, proposal, walkers, random) for random in _randoms(seed)])
+    move = SideBySide(proposal, _randoms(seed))
     sampler = emcee.EnsembleSampler(len(begin), d, whitened, vectorize=True, moves=[move])
     state, steps = sampler.run_mcmc(begin, BURN_IN, store=False), 0
     while True:
@@ -119,6 +120,11 @@ def run_ensembles(
     return Chains(draws, f"emcee {emcee.__version__}", effective, rhat(chains.reshape(ENSEMBLES, -1, d)), steps, time)
 
 
+def _randoms(seed: int) -> list[Any]:
+    """Random numbers of each ensemble, from their beginning."""
+    return [np.random.RandomState(np.random.MT19937(child)) for child in np.random.SeedSequence(seed).spawn(ENSEMBLES)]
+
+
 def _start(density: LogDensity, proposal: Proposal, walkers: int, random: Any) -> Floats:
     """Where the walkers begin: draws that the density does not forbid."""
     z = proposal.draws(walkers, random)
@@ -132,14 +138,25 @@ def _start(density: LogDensity, proposal: Proposal, walkers: int, random: Any) -
 
 def _effective_samples(chains: Floats) -> tuple[float, float]:
     """Longest integrated autocorrelation time, and the effective samples that follow, over all parameters."""
-    from emcee.autocorr import integrated_time
-
     ensembles, steps, walkers, d = chains.shape
     merged = chains.transpose(1, 0, 2, 3).reshape(steps, ensembles * walkers, d)
     if (np.ptp(merged, axis=0) == 0).any():  # a walker that never moved has no autocorrelation time yet
         return float(steps), float(ensembles * walkers)
-    time = float(np.max(np.maximum(integrated_time(merged, quiet=True, tol=0), 1.0)))
+    time = max(1.0, *(autocorrelation_time(values) for values in merged.transpose(2, 1, 0)))
     return time, steps * ensembles * walkers / time
+
+
+def autocorrelation_time(chains: Floats) -> float:
+    """Integrated autocorrelation time of one parameter in chains (c, n), in steps: emcee's estimate, all chains at once.
+
+    The window is the first that is five times as long as the time up to it (Sokal 1997, section 3; emcee averages the chains).
+    """
+    n = chains.shape[1]
+    waves = np.fft.rfft(chains - chains.mean(axis=1, keepdims=True), 1 << n.bit_length() + 1, axis=1)
+    covariance = np.fft.irfft(waves.real**2 + waves.imag**2, axis=1)[:, :n]
+    times = 2 * np.cumsum(np.mean(covariance / covariance[:, :1], axis=0)) - 1
+    beyond = np.flatnonzero(np.arange(n) >= _WINDOW * times)
+    return float(times[beyond[0] if len(beyond) else -1])
 
 
 def rhat(chains: Floats, scores: Floats | None = None) -> float:

@@ -245,7 +245,10 @@ class Marginal:
             # the parameters stand last before the observations: the lower right of the factor is all that they need
             own, mean = factors[:, -1 - k : -1, -1 - k : -1], factors[:, -1, -1 - k : -1]
             normal = mean + random.standard_normal(mean.shape)
-            found[part] = np.linalg.solve(own.transpose(0, 2, 1), normal[:, :, None])[:, :, 0]
+            for i in reversed(range(k)):  # back substitution
+                normal[:, i] /= own[:, i, i]
+                normal[:, :i] -= own[:, i, :i] * normal[:, i : i + 1]
+            found[part] = normal
         return np.asarray(self.estimate.value + found / self._length[-1 - k : -1])
 
 

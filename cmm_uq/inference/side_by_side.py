@@ -1,4 +1,4 @@
-"""The step of several ensembles side by side in one sampler of emcee, each with random numbers of its own, as if it were alone.
+"""The step of several ensembles side by side in one sampler of emcee, each with random numbers of its own, as if alone.
 
 Most steps are independence proposals from an approximation of the density; differential-evolution steps repair what the
 approximation misses. (emcee's snooker move is not used: its normalisation is wrong in release 3.1.6.) The density is asked for
@@ -42,9 +42,9 @@ class SideBySide:
         of_ensemble = np.arange(len(accepted)).reshape(len(self._randoms), -1)
         chosen = np.array([random.choice(len(SHARES), p=SHARES) for random in self._randoms])
         together = np.flatnonzero(chosen == 0)
-        steps = [(self._differences, of_ensemble[i], self._randoms[i]) for i in np.flatnonzero(chosen == 1)]
+        steps = [(self._differences, of_ensemble[i], self._randoms[i]) for i in np.flatnonzero(chosen == 1).tolist()]
         if len(together):
-            several = _Together([self._randoms[i] for i in together])
+            several = _Together([self._randoms[i] for i in together.tolist()])
             steps.append((self._independence, of_ensemble[together].ravel(), several))
         for move, rows, random in steps:
             part = type(state)(state.coords[rows], log_prob=state.log_prob[rows])

@@ -26,8 +26,11 @@ from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.model.display import Display
 from cmm_uq.points import Floats, Ints
 
-_WIDE, _KEPT = 30, 40
-"""Columns of what is given from which on what follows from it is kept, and how often."""
+_WIDE = 30
+"""Columns of a version from which on its principal axes are kept where it is given."""
+
+_KEPT = 8_000_000
+"""Numbers that are kept of what follows from what was given last."""
 
 _BLOCK, _COLUMNS = 150_000, 500
 """Numbers of a block that a processor's cache holds; columns weighed at a time."""
@@ -367,29 +370,33 @@ class Comparison:
         if blocks.shape[3] == 1:
             strengths = blocks[..., 0]
         else:
-            strengths, turn = np.linalg.eigh(blocks)
+            strengths, turn = _eigen(blocks)
             shown = turn.swapaxes(2, 3) @ shown
         variance = (amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
-        squares = known.squares[:, None, None, :] - (variance / (1 + ratio)) @ shown**2
+        gain, square = variance / (1 + ratio), shown**2
+        explained = np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None] if b == 1 else gain @ square
+        squares = known.squares[:, None, None, :] - explained
         log = self.over_sigma(squares)
         log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
         return np.asarray(np.logaddexp.reduce(log, axis=0), dtype=np.float64)
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
-        key = tuple(given)
-        if data is not None or sum(self._columns(version).shape[1] for version in key) < _WIDE:
+        if data is not None:
             return self._weigh(data, given)
-        if key not in self._besides:
-            while len(self._besides) >= _KEPT:
-                del self._besides[next(iter(self._besides))]
-            self._besides[key] = self._weigh(None, given)
-        return self._besides[key]
+        kept, key = self._besides, frozenset(given)
+        if key not in kept:
+            new = self._weigh(None, given)
+            most = max(1, _KEPT // new.seen_by.size)
+            while len(kept) >= most:
+                del kept[next(iter(kept))]
+            kept[key] = new
+        return kept[key]
 
     @cached_property
-    def _besides(self) -> dict[tuple[Version, ...], _Beside]:
-        """The recording beside what was given last, where that is many columns."""
+    def _besides(self) -> dict[frozenset[Version], _Beside]:
+        """The recording beside what was given last: a search comes back to it within some steps."""
         return {}
 
     def _weigh(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
@@ -425,7 +432,8 @@ class Comparison:
             return rows, logs
         taken = np.hstack([version.amplitude * self._columns(version) for version in others])
         weighed = np.concatenate([v.amplitude * self._weighed_columns(v) for v in others], axis=2)
-        weighed = weighed - rows.swapaxes(1, 2) @ (rows @ taken)
+        if rows.shape[1]:
+            weighed = weighed - rows.swapaxes(1, 2) @ (rows @ taken)
         factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ weighed)
         more = np.linalg.solve(factor, weighed.swapaxes(1, 2))
         logs = logs + np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
@@ -465,6 +473,24 @@ def _log_sum(log: Floats, axis: int) -> Floats:
     count = most.sum(axis=axis, keepdims=True, dtype=np.float64)
     others = np.exp(np.where(most, -np.inf, log) - largest).sum(axis=axis, keepdims=True)
     return np.asarray((np.log1p(others / count) + np.log(count) + largest).squeeze(axis), dtype=np.float64)
+
+
+def _eigen(blocks: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (…, r) of symmetric matrices and their eigenvectors (…, r, r); of two columns, which abound, by a rotation.
+
+    The rotation is Jacobi's (Golub, Van Loan 2013, Matrix Computations, section 8.5.2), as exact as what is iterated.
+    """
+    if blocks.shape[-1] != 2:
+        strengths, turn = np.linalg.eigh(blocks)
+        return np.asarray(strengths), np.asarray(turn)
+    first, second, twice = blocks[..., 0, 0], blocks[..., 1, 1], blocks[..., 0, 1] + blocks[..., 1, 0]
+    apart = second - first
+    length = np.abs(apart) + np.hypot(apart, twice)
+    tangent = np.where(apart < 0, -twice, twice) / np.maximum(length, 1e-300)
+    cosine = 1 / np.sqrt(1 + tangent**2)
+    sine, shift = tangent * cosine, 0.5 * tangent * twice
+    turn = np.stack([np.stack([cosine, sine], axis=-1), np.stack([-sine, cosine], axis=-1)], axis=-2)
+    return np.stack([first - shift, second + shift], axis=-1), turn
 
 
 def _log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
