@@ -168,15 +168,11 @@ def _against(found: Predicted, own: Ints) -> tuple[tuple[Text, ...], Text | None
     worst = int(own[int(np.argmax(off))])
     value, expected = found.measured[worst], found.expected[worst]
     half = found.factor * found.u[worst]
-    said: dict[str, Text | float] = {
-        "value": signed(value, "+.1f"), "expected": signed(expected, "+.1f"), "half": number(half, ".1f"),
-        "level": 100 * LEVEL,
-    }  # fmt: skip
-    if len(own) == 1:
-        shown = say("deviation {value} µm; expected {expected} ± {half} µm ({level:.0f} %)", **said)
-    else:
-        shown = say("worst of {count} deviations {value} µm; expected {expected} ± {half} µm ({level:.0f} %)", count=len(own),
-                    **said)  # fmt: skip
+    which = say("deviation") if len(own) == 1 else say("worst of {count} deviations", count=len(own))
+    shown = say(
+        "{which} {value} µm; expected {expected} ± {half} µm ({level:.0f} %)", which=which, value=signed(value, "+.1f"),
+        expected=signed(expected, "+.1f"), half=number(half, ".1f"), level=100 * LEVEL,
+    )  # fmt: skip
     chance = min(1.0, len(own) * 2 * float(special.ndtr(-off.max() * special.ndtri(0.5 + LEVEL / 2) / found.factor)))
     if chance >= RARE:
         return (shown,), None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import queue
 import threading
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,7 +11,7 @@ from typing import Protocol
 from cmm_uq.acquisition.conducting import Conductor
 from cmm_uq.acquisition.dropped import Dropped, Watched
 from cmm_uq.acquisition.view import View
-from cmm_uq.instruments.source import Clock, Event, Gap, Source
+from cmm_uq.instruments.source import SYSTEM, Clock, Event, Gap, Source
 from cmm_uq.messages import Text, Verbatim, say
 
 COMMIT_S = 0.04
@@ -79,7 +78,7 @@ class Listening:
                     break
         except Exception as error:  # whatever is wrong with a source, its silence is said
             why = say("the program's own part that listens to it failed: {what}", what=Verbatim(repr(error)))
-            self._items.put(Gap(source.name, time.time_ns(), time.monotonic_ns(), why))
+            self._items.put(Gap(source.name, SYSTEM.utc_ns(), SYSTEM.monotonic_ns(), why))
 
 
 def run(

@@ -228,8 +228,9 @@ def _show(event: Any) -> None:
 def _wait(seconds: float | None) -> None:
     import time
 
-    until = None if seconds is None else time.monotonic() + seconds
-    while until is None or time.monotonic() < until:
+    if seconds is not None:
+        time.sleep(seconds)
+    while seconds is None:
         time.sleep(0.1)
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
 from cmm_uq.points import Floats
 
@@ -88,4 +88,6 @@ def _reached(probability: Callable[[Floats], Floats], power: float) -> float:
 
     if short(LONGEST) < 0:
         return float(np.inf)
+    from scipy import optimize  # takes its time, and most commands need none of it
+
     return float(optimize.brentq(short, SHORTEST, LONGEST, xtol=1e-4)) if short(SHORTEST) < 0 else SHORTEST

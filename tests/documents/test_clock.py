@@ -24,8 +24,12 @@ CLOCKS = {
     "monotonic",
     "process_time",
 }
-READ = {"cmm_uq/writing/staging.py": {"monotonic"}, "cmm_uq/commands/new.py": {"now"}}
-"""How long a command waits for another one's lock; the date that a new job begins with, for its reader to change."""
+READ = {
+    "cmm_uq/writing/staging.py": {"monotonic"}, "cmm_uq/commands/new.py": {"now"},
+    "cmm_uq/instruments/source.py": {"time_ns"}, "cmm_uq/instruments/simulated/line.py": {"monotonic"},
+}  # fmt: skip
+"""How long a command waits for another one's lock; the date that a new job begins with, for its reader to change; when a
+reading came, and when a simulated instrument sends one."""
 
 
 def clocks(source: str) -> set[str]:
