@@ -15,12 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.units import HOUR
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 AXES = "xyz"
 """Of coordinates, and of the carriages of a Cartesian machine."""
+
+_NO_START = 1e6
+"""s: a first reading this long after time 0, twelve days, is of a clock that did not start with the job, as a computer's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +96,7 @@ class Points:
     lines : (n,) line of each point in its file, for messages; 0 where there is no file.
     directions : (3, 3) or (n, 3, 3) unit vectors of the motions of carriages x, y, z, a row each; ``None`` where they are
         taken as the axes of the coordinates.
+    start_s : what ``time_s`` was at the start; by default 0 or, by a clock that began long before, at the first reading.
     """
 
     xyz: Floats
@@ -102,6 +107,7 @@ class Points:
     columns: Mapping[str, Floats] = field(default_factory=dict)
     lines: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     directions: Floats | None = None
+    start_s: float | None = None
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -174,6 +180,24 @@ class Points:
             )
         return self.columns[name]
 
+    @cached_property
+    def start(self) -> float:
+        """What ``time_s`` was at the start, s."""
+        if self.start_s is not None:
+            return self.start_s
+        first = float(self.columns["time_s"].min(initial=np.inf)) if "time_s" in self.columns else 0.0
+        return first if _NO_START < abs(first) < np.inf else 0.0
+
+    @cached_property
+    def hours(self) -> Floats:
+        """Time since the start (n,), h.
+
+        Raises
+        ------
+        CmmUqError : the recording has no time.
+        """
+        return np.asarray((self.column("time_s") - self.start) / HOUR)
+
     def at(self, xyz: Floats) -> Points:
         """The same points at other coordinates (n, 3), mm."""
         return replace(self, xyz=xyz)
@@ -189,6 +213,7 @@ class Points:
             {name: values[rows] for name, values in self.columns.items()},
             self.lines[rows] if len(self.lines) else self.lines,
             self.directions if self.directions is None or self.directions.ndim == 2 else self.directions[rows],
+            self.start,
         )
 
     def group_means(self, values: Floats) -> Floats:

@@ -108,6 +108,8 @@ half_width = 0.5
 COLUMNS = ("time_s", "temp_x_c", "temp_y_c", "temp_z_c", "temp_artefact_c", "temp_table_top_c",
            "temp_table_bottom_c", "temp_air_c", "pressure_hpa", "humidity_pct", "speed_mm_s",
            "tip_x_mm", "tip_y_mm", "tip_z_mm", "covariate")  # fmt: skip
+USUAL = {"pressure_hpa": 1000.0, "humidity_pct": 40.0}
+"""About which a column varies, where that is not 20."""
 
 FULL = ("report", "diagnose", "plan", "simulate")
 COMMANDS = {"iota-1102-maps": ("diagnose",), "plan-ballbar": ("plan",), "plan-step-gauge": ("plan",),
@@ -149,7 +151,8 @@ def _with_columns(iota: Seed) -> Seed:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([*rows[0], *COLUMNS])
     for i, row in enumerate(rows[1:]):
-        writer.writerow([*row, 60 * i, *(f"{20 + 0.1 * ((i * k) % 7):.1f}" for k in range(1, len(COLUMNS)))])
+        other = (USUAL.get(name, 20.0) + 0.1 * ((i * k) % 7) for k, name in enumerate(COLUMNS[1:], 1))
+        writer.writerow([*row, 60 * i, *(f"{value:.1f}" for value in other)])
     toml = iota.files["job.toml"].replace(b'"squareness_zx"]', b'"squareness_zx", "thermal_scale_x", "drift_y"]')
     return Seed("with-columns", {**iota.files, "job.toml": toml, "ballbar.csv": text.getvalue().encode()}, "job", FULL)
 

@@ -264,6 +264,19 @@ def _keep_name(folder: Path) -> None:
         os.close(descriptor)
 
 
+def made_folder(folder: Path) -> None:
+    """Make a folder, and those above it, that may be there already.
+
+    Raises
+    ------
+    OutputError : it cannot be made, or is a file.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot be made: {error.strerror}", where=str(folder), fix="Name another folder") from None
+
+
 def written_whole(path: Path, content: bytes) -> None:
     """Write a file, or write it anew: whoever reads it finds the old content or the new one, also after a power cut.
 

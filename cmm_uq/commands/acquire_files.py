@@ -5,7 +5,7 @@ from __future__ import annotations
 from cmm_uq.acquisition.conducting import Conductor
 from cmm_uq.acquisition.dropped import Dropped, Watched
 from cmm_uq.acquisition.folder import FOLDER
-from cmm_uq.acquisition.journal import Moment, written_whole
+from cmm_uq.acquisition.journal import Moment, made_folder, written_whole
 from cmm_uq.errors import CmmUqError, OutputError
 from cmm_uq.instruments.source import Clock
 from cmm_uq.jobs.importing.imported import Imported, imported
@@ -41,7 +41,7 @@ class Taking:
 
     def _kept(self, file: Dropped) -> str:
         folder = self._job.folder / FOLDER / "files"
-        folder.mkdir(exist_ok=True)
+        made_folder(folder)
         number = 1 + sum(1 for _ in folder.iterdir())
         path = folder / f"{number:04d}-{file.path.name}"
         written_whole(path, file.content)

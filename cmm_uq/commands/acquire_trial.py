@@ -7,7 +7,7 @@ from typing import Any
 
 import tomlkit
 
-from cmm_uq.acquisition.journal import written_whole
+from cmm_uq.acquisition.journal import made_folder, written_whole
 from cmm_uq.commands.acquire import plan_file
 from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
@@ -39,10 +39,10 @@ def write_trial(folder: Path, out: Path) -> Path:
     document["job"]["id"] = f"{job.facts.job.id}-trial"
     document["job"]["origin"] = SIMULATED
     left_out = {"job.toml", job.facts.recording.file, provenance_name(job.facts.recording.file)}
-    out.mkdir(parents=True, exist_ok=True)
+    made_folder(out)
     for name, content in {**job.inputs, **plan_file(job)}.items():
         if name not in left_out:
-            (out / name).parent.mkdir(parents=True, exist_ok=True)
+            made_folder((out / name).parent)
             written_whole(out / name, content)
     written_whole(out / "job.toml", tomlkit.dumps(document).encode())
     return out

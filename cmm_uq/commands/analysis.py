@@ -74,9 +74,11 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
     found = diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None)
+    averaged = found.diagnosis.remaining.draws
+    values = posterior.draws if averaged is None else averaged
     result = Result(
-        job, model, findings, estimate, posterior, named_draws(model, components, posterior),
-        found.diagnosis.remaining.averaged or parameters(model, posterior), sizes(model, posterior),
+        job, model, findings, estimate, posterior, values, named_draws(model, components, posterior, values),
+        parameters(model, values), sizes(model, values),
         noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
         found,
     )  # fmt: skip

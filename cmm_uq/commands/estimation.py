@@ -10,7 +10,7 @@ from scipy import special
 
 from cmm_uq.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.documents.result import LACK_OF_FIT, Component, Noise
-from cmm_uq.inference.draws import Draws, by_chain
+from cmm_uq.inference.draws import Draws, by_chain, by_ensemble, evenly
 from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.messages import say
@@ -56,33 +56,44 @@ def with_noise(model: MeasurementModel) -> tuple[MeasurementModel, Estimate, flo
     return model, estimate, p_value
 
 
-def parameters(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
-    """Reported parameters of each effect, by effect and name."""
-    found = _quantities(model, posterior)
+def parameters(model: MeasurementModel, values: Floats) -> dict[str, dict[str, Quantity]]:
+    """Reported parameters of each effect, by effect and name, of draws (N, k) of the unknowns."""
+    found = _quantities(model, values)
     return {effect.name: found[effect.name] for effect in model.effects}
 
 
-def named_draws(model: MeasurementModel, components: Components, posterior: NoisyPosterior) -> Draws:
-    """The posterior of all that is reported: of each effect, of the artefact's sizes, and of the noise."""
-    units, columns = {}, []
-    for (owner, name), (draws, own) in model.reported(posterior.draws).items():
+def named_draws(
+    model: MeasurementModel, components: Components, posterior: NoisyPosterior, values: Floats
+) -> Draws:  # fmt: skip
+    """Draws of all that is reported: of each effect, of the artefact's sizes, and of the noise.
+
+    Parameters
+    ----------
+    values : (N, k) of the model's unknowns: those of the posterior; or of a mixture, row after row independent, which go with
+        no size of the noise: those are then taken evenly from the posterior, and an ensemble is a chain.
+    """
+    units, columns, steps = {}, [], posterior.steps // posterior.every
+    for (owner, name), (draws, own) in model.reported(values).items():
         units[f"{owner}.{name}"] = own
         columns.append(draws)
-    for name, values in sizes_of_noise(components, posterior).items():
-        units[f"noise.{name}_um"] = unit("µm")
-        columns.append(values / MICROMETRE)
-    values = np.column_stack(columns) if columns else np.zeros((len(posterior.draws), 0))
-    return Draws(units, by_chain(values, posterior.steps // posterior.every), posterior.every)
+    noise = {name: each / MICROMETRE for name, each in sizes_of_noise(components, posterior).items()}
+    units |= {f"noise.{name}_um": unit("µm") for name in noise}
+    if values is posterior.draws:
+        return Draws(units, by_chain(np.column_stack([*columns, *noise.values()]), steps), posterior.every)
+    kept = evenly(len(posterior.draws), len(values))
+    chains = by_ensemble(np.column_stack([each[kept] for each in noise.values()]), steps, len(posterior.draws))
+    mixture = [each.reshape(*chains.shape[:2], 1) for each in columns]
+    return Draws(units, np.concatenate([*mixture, chains], axis=2))
 
 
-def sizes(model: MeasurementModel, posterior: Posterior) -> dict[str, Quantity]:
-    """Sizes of the artefact, by name."""
-    return _quantities(model, posterior).get(ARTEFACT, {})
+def sizes(model: MeasurementModel, values: Floats) -> dict[str, Quantity]:
+    """Sizes of the artefact, by name, of draws (N, k) of the unknowns."""
+    return _quantities(model, values).get(ARTEFACT, {})
 
 
-def _quantities(model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
+def _quantities(model: MeasurementModel, values: Floats) -> dict[str, dict[str, Quantity]]:
     found: dict[str, dict[str, Quantity]] = {}
-    for (owner, name), (draws, own) in model.reported(posterior.draws).items():
+    for (owner, name), (draws, own) in model.reported(values).items():
         found.setdefault(owner, {})[name] = Quantity.of_draws(draws, own)
     return found
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from cmm_uq.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.diagnosis.comparison.explanations import effect_of
@@ -124,7 +124,7 @@ def _holds_zero(draws: Floats) -> bool:
         return bool(low <= 0 <= high)
     mean = draws.mean(axis=0)
     distance = float(mean @ np.linalg.solve(np.cov(draws, rowvar=False), mean))
-    return distance < float(stats.chi2.ppf(_COVERED, draws.shape[1]))
+    return distance < 2 * float(special.gammaincinv(draws.shape[1] / 2, _COVERED))  # quantile of χ²
 
 
 def _phase_known(draws: Floats) -> bool:

@@ -2,12 +2,13 @@
 
 Where one combination of explanations is not well enough known to be the right one, an estimate under it alone is too sure: the
 next may put another value on a scale. Of every combination that remains the posterior of all that is linear is exact, given
-the noise; the averages are mixtures of these, weighted by the probabilities of the combinations.
+the noise; the average is the mixture of these, weighted by the probabilities of the combinations. It is kept as draws, so that
+estimates, how they vary together, and what is computed from them are of one distribution.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from cmm_uq.inference.posterior import Density
 from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.points import Floats
-from cmm_uq.uncertainty.mixture import averaged
+from cmm_uq.uncertainty.mixture import mixed
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import unit
 
@@ -72,10 +73,17 @@ class Remaining:
     """All combinations that remain, the most probable first, and what they make of the named effects on average.
 
     Empty where one is settled, or nothing is missing.
+
+    Parameters
+    ----------
+    rivals : each.
+    averaged : parameters of the effects that the job names, over all of them.
+    draws : (N, k) of the unknowns of the job's model, over all of them; ``None`` where there are none.
     """
 
     rivals: tuple[Rival, ...] = ()
     averaged: Named = field(default_factory=dict)
+    draws: Floats | None = None
 
     @property
     def weights(self) -> list[float]:
@@ -106,15 +114,18 @@ def remaining(found: Found, joint: Joint, before: MeasurementModel, seed: int) -
     if not order or total[order[0]] >= SETTLED or len(order) < 2:
         return Remaining()
     rivals = tuple(_rival(found, combinations, joint, before, key, total[key], seed) for key in order)
-    weights = [rival.probability for rival in rivals]
-    named = {
-        effect.name: {
-            parameter: averaged([rival.named[effect.name][parameter] for rival in rivals], weights)
-            for parameter in rivals[0].named[effect.name]
-        }
-        for effect in before.effects
-    }
-    return Remaining(rivals, named)
+    draws = _over_all(rivals, before, seed)
+    return Remaining(rivals, _reported(before, draws), draws)
+
+
+def _over_all(rivals: Sequence[Rival], before: MeasurementModel, seed: int) -> Floats:
+    """Draws (N, k) of the unknowns of the job's model, whichever explanation is the right one."""
+    keys, each = [unknown.key for unknown in before.unknowns], []
+    for rival in rivals:
+        own = {unknown.key: column for column, unknown in enumerate(rival.model.unknowns)}
+        each.append(rival.draws[:, [own[key] for key in keys]])
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(18,)))
+    return mixed(each, [rival.probability for rival in rivals], random)
 
 
 def needed(combinations: Combinations) -> dict[Key, float]:

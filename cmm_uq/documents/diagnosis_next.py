@@ -12,7 +12,9 @@ from cmm_uq.documents.effect_words import title_of
 from cmm_uq.documents.plan_picture import placing_pictures
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.messages import NOTHING, Text, number, plural, say, semicolons, together
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import every
+from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.suggestion import ODDS, NextPlan, Shown, odds_words, rounded
 
 TO_FILL_IN = "next_plan.csv"
@@ -28,7 +30,7 @@ def next_section(found: Diagnosed) -> Section:
     if plan.partings:
         blocks.append(_partings(plan))
     if plan.shown:
-        blocks.append(_shown(plan))
+        blocks.append(_shown(plan, found.diagnosis.after.artefact))
     return Section(title, (*blocks, *placing_pictures(plan.placings, plan.box, plan.first)))
 
 
@@ -91,22 +93,30 @@ def _partings(plan: NextPlan) -> Table:
     return Table(say("What the set-ups part"), heads, rows, (note,))
 
 
-def _shown(plan: NextPlan) -> Table:
-    rows = tuple((title_of(one.effect), _amplitude(one, one.before), _amplitude(one, one.after)) for one in plan.shown)
+def _shown(plan: NextPlan, artefact: Artefact) -> Table:
+    rows = []
+    for one in plan.shown:
+        effect = _acting(one, artefact)
+        rows.append((effect.title, _amplitude(effect, one.before), _amplitude(effect, one.after)))
     heads = (Column(say("Error"), numeric=False), Column(say("Found from, now")), Column(say("Found from, then")))
     note = say("One error at a time, in 90 of 100 such recordings, with everything that the model names fitted.")
-    return Table(say("What the set-ups show"), heads, rows, (note,))
+    return Table(say("What the set-ups show"), heads, tuple(rows), (note,))
 
 
-def _amplitude(one: Shown, size: float) -> Text:
-    parameter = every()[one.effect].coefficients[0]
+def _acting(one: Shown, artefact: Artefact) -> Effect:
+    """The effect with the sizes that this artefact allows it, where it is a fault of its own."""
+    return artefact.acting(every()[one.effect])
+
+
+def _amplitude(effect: Effect, size: float) -> Text:
+    parameter = effect.coefficients[0]
     if size > ALLOWED:
         return say("not found")
     value = size * parameter.prior_sd
     return say("{value}\u00a0{unit}", value=number(value, ".2g" if value < 100 else ".0f"), unit=parameter.unit)
 
 
-def next_data(plan: NextPlan | None) -> dict[str, Any] | None:
+def next_data(plan: NextPlan | None, artefact: Artefact) -> dict[str, Any] | None:
     """The same for results.json."""
     if plan is None:
         return None
@@ -121,12 +131,11 @@ def next_data(plan: NextPlan | None) -> dict[str, Any] | None:
             {"effects": list(parting.effects), "odds_before": parting.before, "odds_after": parting.after}
             for parting in plan.partings
         ],
-        "shows": [_shown_data(one) for one in plan.shown],
+        "shows": [_shown_data(one, _acting(one, artefact)) for one in plan.shown],
     }  # fmt: skip
 
 
-def _shown_data(one: Shown) -> dict[str, Any]:
-    effect = every()[one.effect]
+def _shown_data(one: Shown, effect: Effect) -> dict[str, Any]:
     parameter = effect.coefficients[0]
     before, after = (
         size * parameter.prior_sd if np.isfinite(size) and size <= ALLOWED else None for size in (one.before, one.after)

@@ -19,10 +19,13 @@ def posterior_section(result: Result) -> Section:
     shown = [i for i, unknown in enumerate(posterior.unknowns) if unknown.key not in set_up]
     if not shown:
         return Section(say("Posterior distribution"), ())
-    titles, draws = [title_of(posterior.unknowns[i].key, result) for i in shown], posterior.draws[:, shown]
+    titles, draws = [title_of(posterior.unknowns[i].key, result) for i in shown], result.values[:, shown]
     plot = corner_plot(
         draws, titles, units=[posterior.unknowns[i].unit for i in shown], estimates=draws.mean(axis=0),
-        caption=say("Posterior distribution: each parameter, and each pair."),
+        caption=say("Posterior distribution: each parameter, and each pair.") if not result.averaged else say(
+            "Posterior distribution, averaged over {rivals} explanations that remain: each parameter, and each pair.",
+            rivals=result.averaged,
+        ),
         alternative=say("Marginal and pairwise posterior densities of {names}.", names=listed(titles)),
     )  # fmt: skip
     return Section(say("Posterior distribution"), (plot,))
@@ -69,6 +72,7 @@ def method(result: Result) -> Section:
         (say("Noise"), noise_found(noise)),
         (say("Sampler"), sampler),
         (say("Convergence"), _convergence(posterior)),
+        (say("Averaged"), _averaged(result)),
     )
     text = Paragraph(
         say(
@@ -80,6 +84,18 @@ def method(result: Result) -> Section:
         )
     )
     return Section(say("Method"), (text, Facts(tuple((label, value) for label, value in rows if value))))
+
+
+def _averaged(result: Result) -> Text:
+    """What the estimates are averaged over, if they are, and what is not averaged."""
+    if not result.averaged:
+        return NOTHING
+    return say(
+        "estimates, their covariance and draws are of the mixture of {rivals} explanations that remain, {count} draws, of "
+        "each as many as it is probable; residuals, noise, least squares and the sampler are of the named model, where what "
+        "it leaves out counts as noise",
+        rivals=result.averaged, count=len(result.values),
+    )  # fmt: skip
 
 
 def _convergence(posterior: Posterior) -> Text:

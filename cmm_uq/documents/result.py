@@ -126,12 +126,14 @@ class Result:
     job, model : what was analysed.
     findings : of the screening.
     estimate : least squares.
-    posterior : draws of the model's own parameters.
+    posterior : of the model's own parameters and of its noise.
+    values : (N, k) draws of the model's unknowns that all estimates are taken from, and all that is computed from these: those
+        of the posterior; where several explanations remain, those of the mixture of all.
     draws : of all that is reported, by name and chain.
-    parameters : reported parameters of each effect, by effect and name; averaged over the explanations that remain.
+    parameters : reported parameters of each effect, by effect and name.
     sizes : of the artefact, by name.
-    noise : of a coordinate.
-    accuracy : figures of the lengths, by name; empty for artefacts without lengths.
+    noise : of a coordinate, about the named model.
+    accuracy : figures of the lengths as recorded, by name; empty for artefacts without lengths.
     statements : of conformity, in the job's order.
     diagnosed : what the job's model leaves out, if anything.
     stating : how a certificate states it; ``None`` of a result as evaluated.
@@ -142,6 +144,7 @@ class Result:
     findings: tuple[Finding, ...]
     estimate: Estimate
     posterior: NoisyPosterior
+    values: Floats
     draws: Draws
     parameters: Mapping[str, Mapping[str, Quantity]]
     sizes: Mapping[str, Quantity]
@@ -168,6 +171,11 @@ class Result:
         yield from self.accuracy.items()
 
     @property
+    def averaged(self) -> int:
+        """Over how many explanations that remain the estimates are averaged; 0 where they are those of the named model."""
+        return len(self.diagnosed.diagnosis.remaining.rivals)
+
+    @property
     def artefact(self) -> Artefact:
         """The artefact with its recording."""
         return self.model.artefact
@@ -179,7 +187,7 @@ class Result:
 
     @cached_property
     def residuals(self) -> Floats:
-        """What the posterior mean leaves unexplained of every observation, used or not, (m,) mm."""
+        """What the named model at its posterior mean leaves unexplained of every observation, used or not, (m,) mm."""
         return self.model.residuals(self.posterior.draws.mean(axis=0))
 
     @cached_property
@@ -203,7 +211,7 @@ class Result:
         columns = {unknown.key: i for i, unknown in enumerate(self.posterior.unknowns)}
         units = {unknown.key: unknown.unit for unknown in self.posterior.unknowns}
         alike = [key for key in combination if units[key] == units[combination[0]]]
-        draws = self.posterior.draws
+        draws = self.values
         stating, found = Stating.of(self.job), []
         for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False):
             quantity = Quantity.of_draws(draws[:, columns[second]] - draws[:, columns[first]], units[first])
@@ -213,7 +221,7 @@ class Result:
     @cached_property
     def covariance(self) -> Covariance:
         """Of all reported parameters and the artefact's sizes."""
-        reported = self.model.reported(self.posterior.draws)
+        reported = self.model.reported(self.values)
         return Covariance.of_draws({".".join(key): values for key, values in reported.items()})
 
     @cached_property
@@ -237,7 +245,7 @@ class Result:
         return found
 
     def prior_share(self, key: tuple[str, str]) -> float:
-        """How much of a parameter's variance is left of the prior's: 0 all from the recording, 1 all assumed."""
+        """How much of a parameter's variance under the named model is left of the prior's: 0 all recorded, 1 all assumed."""
         i = [u.key for u in self.posterior.unknowns].index(key)
         prior = self.posterior.unknowns[i].prior_sd
         return float(min(1.0, self.posterior.covariance[i, i] / prior**2)) if prior > 0 else 1.0

@@ -131,7 +131,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         },
         "screening": [finding_data(f, found.job.facts.recording.file) for f in found.findings],
         "improvement": improvement_data(d.improvement),
-        "next_plan": next_data(found.next_plan),
+        "next_plan": next_data(found.next_plan, found.diagnosis.after.artefact),
         "unseen": unseen_data(found.unseen),
         "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
         **costs_data(found),

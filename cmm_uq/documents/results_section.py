@@ -47,7 +47,7 @@ def error_factors(result: Result) -> Section:
         Column(say("Estimate")),
         Column(say("U")),
         Column(say("k")),
-        Column(say("Least squares")),
+        Column(say("Least squares, named model") if result.averaged else say("Least squares")),
         Column(say("Unit"), numeric=False),
     )
     notes = (SIGN, UNCERTAINTY)

@@ -76,13 +76,12 @@ def _mismatch(result: Result) -> list[Text]:
     said = [VERDICTS[diagnosis.verdict]]
     if named:
         said.append(say("It shows: {named}.", named=listed(named)))
-    rivals = len(diagnosis.remaining.rivals)
     holds = say("The figures below hold for the named model; see the diagnosis.")
-    if rivals and diagnosis.remaining.averaged:
+    if result.averaged:
         holds = say(
-            "The error factors below are averaged over {rivals} explanations that remain, by their probabilities; all other "
-            "figures hold for the named model. See the diagnosis.",
-            rivals=rivals,
+            "Estimates below, and what is computed from them, are averaged over {rivals} explanations that remain, by their "
+            "probabilities; noise, and figures of the readings as recorded, hold for the named model. See the diagnosis.",
+            rivals=result.averaged,
         )
     return [sentences((*said, holds))]
 
@@ -125,7 +124,7 @@ def _expansion(result: Result) -> list[Text]:
 def _implausible(result: Result) -> list[Text]:
     """Parameters far beyond what was known of them: a certified length that is wrong looks like scale errors of all axes."""
     texts: list[Text] = []
-    means = result.posterior.draws.mean(axis=0)
+    means = result.values.mean(axis=0)
     for unknown, mean in zip(result.posterior.unknowns, means, strict=True):
         off = mean - unknown.prior_mean
         if 0 < unknown.prior_sd < abs(off) / IMPLAUSIBLE:

@@ -1,9 +1,7 @@
 """Several ensembles of emcee on one density, until the autocorrelation time says enough.
 
-The walkers move in coordinates whitened by an approximation of the density, so that most steps are independence
-proposals from a multivariate t distribution; differential-evolution steps repair what the approximation misses. (emcee's
-snooker move is not used: its normalisation is wrong in release 3.1.6.) Walkers of one ensemble are not independent, so
-the ensembles are compared with each other.
+The walkers move in coordinates whitened by an approximation of the density (:mod:`cmm_uq.inference.side_by_side`). Walkers
+of one ensemble are not independent, so the ensembles are compared with each other.
 """
 
 from __future__ import annotations
@@ -16,6 +14,7 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.inference.proposals import LogDensity, Proposal
+from cmm_uq.inference.side_by_side import SideBySide
 from cmm_uq.points import Floats
 
 ENSEMBLES = 4
@@ -28,6 +27,10 @@ EFFECTIVE_SAMPLES = 4000
 
 LEAST_EFFECTIVE_SAMPLES = 1000
 LARGEST_RHAT = 1.01
+
+_WINDOW = 5.0
+"""Autocorrelation times that are summed over."""
+
 Progress = Callable[[float], None]
 
 
@@ -100,30 +103,14 @@ def run_ensembles(
     def whitened(z: Floats) -> Floats:
         return density(proposal.parameters(z))
 
-    def independence(z: Floats, random: Any) -> tuple[Floats, Floats]:
-        """A proposal that does not depend on where the walkers are, with its Hastings ratio."""
-        proposed = proposal.draws(len(z), random)
-        before, after = np.split(proposal.log_density(np.vstack([z, proposed])), 2)
-        return proposed, before - after
-
-    samplers, states = [], []
-    for child in np.random.SeedSequence(seed).spawn(ENSEMBLES):
-        sampler = emcee.EnsembleSampler(
-            walkers, d, whitened, vectorize=True,
-            moves=[(emcee.moves.MHMove(independence), 0.9), (emcee.moves.DEMove(), 0.1)],
-        )  # fmt: skip
-        random = np.random.RandomState(np.random.MT19937(child))
-        sampler.random_state = random.get_state()
-        states.append(sampler.run_mcmc(_start(whitened, proposal, walkers, random), BURN_IN, store=False))
-        samplers.append(sampler)
-    steps = 0
+    begin = np.vstack([_start(whitened, proposal, walkers, random) for random in _randoms(seed)])
+    move = SideBySide(proposal, _randoms(seed))
+    sampler = emcee.EnsembleSampler(len(begin), d, whitened, vectorize=True, moves=[move])
+    state, steps = sampler.run_mcmc(begin, BURN_IN, store=False), 0
     while True:
-        states = [
-            sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
-            for sampler, state in zip(samplers, states, strict=True)
-        ]
+        state = sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
         steps += steps_at_once
-        chains = np.stack([sampler.get_chain() for sampler in samplers])
+        chains = np.ascontiguousarray(sampler.get_chain().reshape(steps, ENSEMBLES, walkers, d).swapaxes(0, 1))
         time, effective = _effective_samples(chains)
         if progress:
             progress(min(1.0, effective / effective_samples))
@@ -131,6 +118,11 @@ def run_ensembles(
             break
     draws = proposal.parameters(chains.reshape(-1, d))
     return Chains(draws, f"emcee {emcee.__version__}", effective, rhat(chains.reshape(ENSEMBLES, -1, d)), steps, time)
+
+
+def _randoms(seed: int) -> list[Any]:
+    """Random numbers of each ensemble, from their beginning."""
+    return [np.random.RandomState(np.random.MT19937(child)) for child in np.random.SeedSequence(seed).spawn(ENSEMBLES)]
 
 
 def _start(density: LogDensity, proposal: Proposal, walkers: int, random: Any) -> Floats:
@@ -146,14 +138,25 @@ def _start(density: LogDensity, proposal: Proposal, walkers: int, random: Any) -
 
 def _effective_samples(chains: Floats) -> tuple[float, float]:
     """Longest integrated autocorrelation time, and the effective samples that follow, over all parameters."""
-    from emcee.autocorr import integrated_time
-
     ensembles, steps, walkers, d = chains.shape
     merged = chains.transpose(1, 0, 2, 3).reshape(steps, ensembles * walkers, d)
     if (np.ptp(merged, axis=0) == 0).any():  # a walker that never moved has no autocorrelation time yet
         return float(steps), float(ensembles * walkers)
-    time = float(np.max(np.maximum(integrated_time(merged, quiet=True, tol=0), 1.0)))
+    time = max(1.0, *(autocorrelation_time(values) for values in merged.transpose(2, 1, 0)))
     return time, steps * ensembles * walkers / time
+
+
+def autocorrelation_time(chains: Floats) -> float:
+    """Integrated autocorrelation time of one parameter in chains (c, n), in steps: emcee's estimate, all chains at once.
+
+    The window is the first that is five times as long as the time up to it (Sokal 1997, section 3; emcee averages the chains).
+    """
+    n = chains.shape[1]
+    waves = np.fft.rfft(chains - chains.mean(axis=1, keepdims=True), 1 << n.bit_length() + 1, axis=1)
+    covariance = np.fft.irfft(waves.real**2 + waves.imag**2, axis=1)[:, :n]
+    times = 2 * np.cumsum(np.mean(covariance / covariance[:, :1], axis=0)) - 1
+    beyond = np.flatnonzero(np.arange(n) >= _WINDOW * times)
+    return float(times[beyond[0] if len(beyond) else -1])
 
 
 def rhat(chains: Floats, scores: Floats | None = None) -> float:

@@ -18,6 +18,12 @@ from cmm_uq.points import Floats
 RANK_TOLERANCE = 1e-7
 """Singular values below this part of the largest are zero: rounding leaves about 1e-13, fitted placings of spheres 1e-8."""
 
+_NOTHING = 1e-8
+"""Part of a parameter in a free combination, over its typical size, that is rounding."""
+
+_ROUGHLY = 100.0
+"""Up to how many times its singular value over the largest noise turns a combination that only noise shows."""
+
 
 @dataclass(frozen=True, eq=False)
 class LeastSquares:
@@ -37,6 +43,7 @@ class LeastSquares:
     residual_sd : mm, √(sum of squares / degrees of freedom); ``None`` without degrees of freedom.
     sigma : mm, standard uncertainty of one coordinate that the covariance uses.
     sigma_of_residuals : mm, the same from the residuals alone; that in use where no degrees of freedom are left.
+    spread : (k,) standard deviation that the noise gives to ``value``, of undetermined parameters too.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -51,10 +58,17 @@ class LeastSquares:
     residual_sd: float | None
     sigma: float
     sigma_of_residuals: float
+    spread: Floats
 
 
-def solve(model: LinearModel) -> LeastSquares:
+def solve(model: LinearModel, most: int | None = None) -> LeastSquares:
     """Least-squares estimate; certified parameters are held, physical priors are not used.
+
+    Parameters
+    ----------
+    model : linear in its parameters.
+    most : combinations to take as determined; fewer than the design's rank where the design itself is not known well enough
+        for the last of them, as where it follows the noise of fitted placings.
 
     Raises
     ------
@@ -69,6 +83,9 @@ def solve(model: LinearModel) -> LeastSquares:
     target = reduced.observed - reduced.design @ value
     U, s, Vt = linalg.svd(reduced.design[:, free] * scale, full_matrices=False)
     rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s.size and s[0] > 0 else 0
+    nothing = _NOTHING
+    if most is not None and most < rank:
+        nothing, rank = _ROUGHLY * float(s[most] / s[0]), most
     forward = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T * scale[:, None]
     value[free] += forward @ target
     whitened = reduced.observed - reduced.design @ value
@@ -78,7 +95,7 @@ def solve(model: LinearModel) -> LeastSquares:
     from_residuals = float(np.sqrt(sum_of_squares / dof)) if dof > 0 else stated
     sigma = stated or from_residuals
     null_space = np.zeros((len(unknowns), len(free) - rank))
-    null_space[free] = _simplest(Vt[rank:].T) * scale[:, None]
+    null_space[free] = _simplest(Vt[rank:].T, nothing) * scale[:, None]
     for column in null_space.T:
         column /= column[np.flatnonzero(column)[0]]
     determined = np.ones(len(unknowns), dtype=bool)
@@ -87,6 +104,7 @@ def solve(model: LinearModel) -> LeastSquares:
         unknowns, value, _covariance(model, forward, free, held, sigma, determined), determined, null_space,
         rank, float(s[0] / s[rank - 1]) if rank else float("inf"), whitened * model.noise_scale, dof,
         _residual_sd(whitened * model.noise_scale, dof), sigma, from_residuals,
+        _spread(forward, free, sigma, len(unknowns)),
     )  # fmt: skip
 
 
@@ -117,6 +135,12 @@ def _residual_sd(residuals: Floats, dof: int) -> float | None:
     return float(np.sqrt(residuals @ residuals / dof)) if dof > 0 else None
 
 
+def _spread(forward: Floats, free: np.ndarray[tuple[int], np.dtype[np.int64]], sigma: float, count: int) -> Floats:
+    spread = np.zeros(count)
+    spread[free] = sigma * np.sqrt(np.sum(forward**2, axis=1))
+    return spread
+
+
 def _covariance(
     model: LinearModel,
     forward: Floats,
@@ -138,11 +162,14 @@ def _covariance(
     return covariance
 
 
-def _simplest(null_space: Floats) -> Floats:
-    """The same space, each column with a one where no other has anything: reads as few parameters as possible."""
+def _simplest(null_space: Floats, nothing: float) -> Floats:
+    """The same space, each column with a one where no other has anything: reads as few parameters as possible.
+
+    Parts up to ``nothing`` are zero.
+    """
     if null_space.shape[1] == 0:
         return null_space
     _, _, order = linalg.qr(null_space.T, mode="economic", pivoting=True)
     pivots = order[: null_space.shape[1]]
     columns = null_space @ linalg.inv(null_space[pivots])
-    return np.where(np.abs(columns) < 1e-8, 0.0, columns)
+    return np.where(np.abs(columns) < nothing, 0.0, columns)

@@ -169,7 +169,8 @@ class Marginal:
             return self._without_slow_noise(self._slow_first, v, slow)
         products, prior, blocks = self._without_slow if absent else (self._products, self._prior.ravel(), self._blocks)
         P = len(self._length) - absent * slow.shape[1]
-        whole = ((1 / v) @ products + prior).reshape(-1, P, P)
+        whole = ((1 / v) @ products).reshape(-1, P, P)
+        whole += prior.reshape(P, P)
         log = -0.5 * np.log(v) @ self._counts
         c = slow.shape[1]
         if absent:  # what is left of slow noise whose variance goes to zero
@@ -179,8 +180,7 @@ class Marginal:
             least = np.maximum(slow, (1e-6 * self._scale) ** 2)
             whole[:, at, at] += 1 / (least * self._length[at] ** 2)
             log -= 0.5 * np.log(least).sum(axis=1)
-        diagonal = np.arange(P)
-        whole[:, diagonal, diagonal] *= 1 + _JITTER
+        whole.reshape(len(whole), -1)[:, :: P + 1] *= 1 + _JITTER
         if self._freedoms.count:
             lost, own = self._eliminated(v, blocks)
             whole -= lost
@@ -245,7 +245,10 @@ class Marginal:
             # the parameters stand last before the observations: the lower right of the factor is all that they need
             own, mean = factors[:, -1 - k : -1, -1 - k : -1], factors[:, -1, -1 - k : -1]
             normal = mean + random.standard_normal(mean.shape)
-            found[part] = np.linalg.solve(own.transpose(0, 2, 1), normal[:, :, None])[:, :, 0]
+            for i in reversed(range(k)):  # back substitution
+                normal[:, i] /= own[:, i, i]
+                normal[:, :i] -= own[:, i, :i] * normal[:, i : i + 1]
+            found[part] = normal
         return np.asarray(self.estimate.value + found / self._length[-1 - k : -1])
 
 

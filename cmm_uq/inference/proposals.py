@@ -76,7 +76,7 @@ class Proposal:
     def log_density(self, z: Floats) -> Floats:
         """(w,) up to a constant."""
         log, _ = self.log_each(z)
-        return log[:, 0] if len(self.weights) == 1 else np.asarray(special.logsumexp(log, axis=1))
+        return log[:, 0] if len(self.weights) == 1 else np.asarray(np.logaddexp.reduce(log, axis=1))
 
     def log_probability(self, parameters: Floats) -> Floats:
         """Logarithm of the density (w,) of parameters (w, d), with its constant."""
@@ -90,13 +90,19 @@ class Proposal:
         if len(self.weights) == 1:
             squares = np.einsum("wi,wi->w", z, z)[:, None]
         else:
-            squares = np.sum(np.einsum("kij,wkj->wki", self._inverse, z[:, None] - self.centres) ** 2, axis=2)
+            own = (z @ self._inverse.reshape(-1, z.shape[1]).T).reshape(len(z), *self.centres.shape) - self._centre
+            squares = np.einsum("wki,wki->wk", own, own)
         log = -0.5 * (_DOF + z.shape[1]) * np.log1p(squares / _DOF)
         return log + self._log_weight, squares
 
     @cached_property
     def _inverse(self) -> Floats:
         return np.asarray(np.linalg.inv(self.factors))
+
+    @cached_property
+    def _centre(self) -> Floats:
+        """(K, d) of each distribution in its own coordinates."""
+        return np.asarray(np.einsum("kij,kj->ki", self._inverse, self.centres))
 
     @cached_property
     def _log_weight(self) -> Floats:

@@ -25,7 +25,7 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "nx": "Outward unit normal at the probed point, along x.",
     "ny": "Outward unit normal at the probed point, along y.",
     "nz": "Outward unit normal at the probed point, along z.",
-    "time_s": "Time since the start of the job.",
+    "time_s": "Time since the start of the job, or by a clock that began more than 12 days before.",
     "temp_x_c": "Temperature of the scale of x.",
     "temp_y_c": "Temperature of the scale of y.",
     "temp_z_c": "Temperature of the scale of z.",

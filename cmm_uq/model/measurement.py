@@ -47,6 +47,12 @@ _NO_LEAN = 1.0
 _MOVED = 10 * ARCSECOND
 """rad: about an angle this far away a model is as linear."""
 
+_NO_SQUARENESS = 0.1
+"""rad: a squareness of which no more is known than this, six degrees, is not determined."""
+
+_ILL_CONDITIONED = 1e3
+"""Condition up to which a design, in typical sizes of the parameters, is not made of the noise of the placings."""
+
 _ROUNDS = 20
 
 _SIZE_SCALE = 0.1
@@ -192,11 +198,11 @@ class MeasurementModel:
             whole, keys = self.within.estimate(), [unknown.key for unknown in self.within.unknowns]
             own = [keys.index(unknown.key) for unknown in self.unknowns]
             linear = whole.linear.only(own)
-            return Estimate(solve(linear), linear, whole.about[own])
+            return Estimate(self._solved(linear), linear, whole.about[own])
         values = np.array([u.prior_mean for u in self.unknowns])
         for _ in range(10):
             linear = self.linearised(values)
-            result = solve(linear)
+            result = self._solved(linear)
             scale = np.array([u.scale for u in self.unknowns])
             change = np.abs(result.value - values) / scale
             values = result.value
@@ -204,6 +210,19 @@ class MeasurementModel:
                 break  # nothing but noise says how an angle stands: another step would go farther still
         about = self._likeliest(linear, values, result)
         return Estimate(result, linear if about is values else self.linearised(about), about)
+
+    def _solved(self, linear: LinearModel) -> LeastSquares:
+        """Least squares, without angles that the recording would show only if its placings were known without noise.
+
+        The squarenesses YZ and ZX of a plate that lies flat move it along its own plane by what the noise of its attitude
+        makes of them: their estimates would be radians, about which nothing is linear.
+        """
+        found, still = solve(linear), np.zeros(len(linear.unknowns))
+        while found.condition > _ILL_CONDITIONED and found.rank > 1:
+            if not self.leans_beyond(still, found.spread, _NO_SQUARENESS):
+                break
+            found = solve(linear, found.rank - 1)
+        return found
 
     def _likeliest(self, linear: LinearModel, values: Floats, found: LeastSquares) -> Floats:
         """Where the posterior is to be linear: the estimate, unless priors know angles much better than the recording does."""

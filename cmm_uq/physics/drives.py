@@ -9,7 +9,7 @@ import numpy as np
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.physics.effect import Amount, Effect, Harmonic, Nonparametric, Parameter, Shape, along
 from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import HOUR, MICROMETRE, unit
+from cmm_uq.units import MICROMETRE, unit
 
 
 class PeriodicScale(Harmonic):
@@ -103,7 +103,7 @@ class Drift(Effect):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        return along(self.axis, MICROMETRE * points.column("time_s") / HOUR)
+        return along(self.axis, MICROMETRE * points.hours)
 
 
 EFFECTS: tuple[Effect, ...] = (

@@ -15,7 +15,7 @@ from cmm_uq.physics.effect import FURTHER, Amount, Effect, Parameter, Shape, alo
 from cmm_uq.physics.rigid_body import Lean, turned
 from cmm_uq.physics.thermal import EXPANSION
 from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import ARCSECOND, HOUR, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
+from cmm_uq.units import ARCSECOND, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
 
 SETTLING = Shape("settling_h", unit("h"), 0.2, 20.0, what=say("time to settle"))
 """Time constant of warming: an electric cabinet takes minutes, a granite table a day."""
@@ -54,8 +54,7 @@ class ScaleDrift(Effect):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """See :meth:`Effect.basis`."""
-        hours = points.column("time_s") / HOUR
-        return along(self.axis, PPM * hours * points.readings[self.axis])
+        return along(self.axis, PPM * points.hours * points.readings[self.axis])
 
 
 class Settling(Effect):
@@ -212,7 +211,7 @@ class ArtefactLag(Effect):
         """See :meth:`Effect.basis`."""
         (lag,) = shape
         temperature = points.column("temp_artefact_c")
-        behind = lagging(points.column("time_s") / HOUR, temperature, lag) - temperature
+        behind = lagging(points.hours, temperature, lag) - temperature
         return (-behind[:, None] * (points.xyz - points.group_means(points.xyz)))[:, :, None]
 
 
@@ -231,7 +230,7 @@ def lagging(hours: Floats, temperature: Floats, lag: float) -> Floats:
 
 def _settled(points: Points, shape: Sequence[float]) -> Floats:
     (settling,) = shape
-    return np.asarray(-np.expm1(-points.column("time_s") / HOUR / settling), dtype=np.float64)
+    return np.asarray(-np.expm1(-points.hours / settling), dtype=np.float64)
 
 
 EFFECTS: tuple[Effect, ...] = (

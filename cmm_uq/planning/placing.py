@@ -171,7 +171,7 @@ def _concatenated(parts: Sequence[Points]) -> Points:
     return Points(
         np.vstack([p.xyz for p in parts]), np.concatenate([p.measurement for p in parts]),
         np.concatenate([p.point for p in parts]), np.concatenate([p.repeat for p in parts]), parts[0].machine,
-        {name: np.concatenate([p.columns[name] for p in parts]) for name in names},
+        {name: np.concatenate([p.columns[name] for p in parts]) for name in names}, start_s=parts[0].start,
     )  # fmt: skip
 
 

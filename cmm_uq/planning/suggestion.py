@@ -54,6 +54,9 @@ _HOPELESS = 3
 _WORTH = 0.1
 """Least gain in the logarithm of odds for which a plan that does not reach everything is told."""
 
+_SAME_ODDS = 1e-9
+"""Of their logarithm, by rounding."""
+
 _CANDIDATES = 120
 _TURNED = 12
 """Of the candidates, how many are tried turned besides."""
@@ -215,7 +218,10 @@ class _Group:
 
     @property
     def pairs(self) -> list[tuple[int, int]]:
-        return list(combinations(range(len(self.names)), 2))
+        """Those that the recording does not part already by the odds that a plan aims at."""
+        log_odds = self.log_odds.tolist()
+        all_pairs = combinations(range(len(self.names)), 2)
+        return [(a, b) for a, b in all_pairs if abs(log_odds[a] - log_odds[b]) < np.log(ODDS) + _SAME_ODDS]
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,7 +315,7 @@ def _groups(diagnosis: Diagnosis) -> list[_Group]:
             instead = combinations_found.instead(diagnosis.found.chosen, index[names[0]])
         odds = [1.0, *(instead.get(index.get(name, -1), 1.0) for name in taken[1:])]
         found.append(_Group(taken, np.log(odds)))
-    return found
+    return [group for group in found if group.pairs]
 
 
 def _variances(diagnosis: Diagnosis) -> tuple[float, float]:
@@ -328,8 +334,9 @@ def _with_all(after: MeasurementModel, names: Sequence[str]) -> MeasurementModel
     """The model with further effects, periods as found or the longest."""
     shape = dict(after.shapes)
     for name in names:
-        if every()[name].shape and name not in shape:
-            shape[name] = next(iter(shapes(every()[name], after.artefact.points)))
+        effect = after.artefact.acting(every()[name])
+        if effect.shape and name not in shape:
+            shape[name] = next(iter(shapes(effect, after.artefact.points)))
     others = tuple(effect for effect in after.effects if effect.name not in names)
     return replace(after, effects=(*others, *(every()[name] for name in names)), shapes=shape)
 

@@ -1,4 +1,4 @@
-"""One quantity that several models give, averaged over them by their probabilities.
+"""What several models give, averaged over them by their probabilities: one quantity, or draws of several together.
 
 The distribution is the mixture of theirs (Bayesian model averaging: Hoeting et al. 1999, *Statistical Science* 14, 382); its
 variance is the mean of the variances and the variance of the means. Each is taken as normal on either side of its value,
@@ -36,6 +36,23 @@ def averaged(quantities: Sequence[Quantity], weights: Sequence[float]) -> Quanti
     spread = float(np.sqrt(p @ (u**2 + (value - mean) ** 2)))
     ends = (_quantile(_TAIL, p, value, low, high), _quantile(1 - _TAIL, p, value, low, high))
     return Quantity(mean, spread, ends, quantities[0].unit)
+
+
+def mixed(draws: Sequence[Floats], weights: Sequence[float], random: np.random.Generator) -> Floats:
+    """Draws (N, k) of the mixture: row i is row i of one of the models, each as often as its probability has it.
+
+    Parameters
+    ----------
+    draws : (N, k) under each model, of the same quantities in the same order; row after row independent.
+    weights : probability of each, up to a factor.
+    random : which row is of which model.
+    """
+    count = len(draws[0])
+    wanted = count * np.array(weights) / np.sum(weights)
+    times = np.floor(wanted).astype(np.int64)
+    times[np.argsort(times - wanted, kind="stable")[: count - times.sum()]] += 1
+    model = random.permutation(np.repeat(np.arange(len(draws)), times))
+    return np.asarray(np.stack(draws)[model, np.arange(count)])
 
 
 def _quantile(tail: float, p: Floats, value: Floats, low: Floats, high: Floats) -> float:

@@ -27,7 +27,7 @@ from tests.conftest import ROOT
 
 resource, termios = pytest.importorskip("resource"), pytest.importorskip("termios")  # of POSIX
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm-256color"}
 POINTS = [f"{x} 100 {-300 - i / 1000:.3f}" for i in range(40) for x in (100, 600)]
 
@@ -285,6 +285,17 @@ def test_a_trial_never_touches_a_measured_job(tmp_path: Path, options: tuple[str
     assert ended.returncode == 2
     assert told in ended.stderr
     assert not (folder / "acquisition").exists()
+
+
+def test_a_trial_where_no_folder_can_be_is_refused_in_a_line(tmp_path: Path) -> None:
+    job = job_folder(tmp_path / "job")
+    (tmp_path / "taken").write_text("mine", encoding="utf-8")
+    for out in ("taken", "taken/x"):
+        ended = run("acquire", job, "--simulate", "--out", out, cwd=tmp_path)
+        assert ended.returncode == 3
+        assert ended.stderr.startswith(f"cmm-uq: {out}: cannot be made: ")
+        assert len(ended.stderr.splitlines()) == 1
+    assert (tmp_path / "taken").read_text(encoding="utf-8") == "mine"
 
 
 @pytest.mark.parametrize(("more", "told"), [

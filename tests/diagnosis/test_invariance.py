@@ -93,6 +93,16 @@ def test_a_mirrored_axis_changes_no_verdict_and_no_figure_that_is_printed() -> N
     assert one.parameters["gap_um"].value == pytest.approx(other.parameters["gap_um"].value, rel=1e-4)
 
 
+@pytest.mark.parametrize(("factor", "start"), [(1.0, 1.7e9), (60.0, 0.0)], ids=["epoch", "minutes"])
+def test_a_clock_that_started_long_ago_or_counts_in_minutes_changes_no_verdict(factor: float, start: float) -> None:
+    points = recording()
+    found = diagnosed(with_columns(points, time_s=factor * points.columns["time_s"] + start))
+    assert found.verdict == plainly().verdict
+    (one,), (other,) = found.effects, plainly().effects
+    assert one.effect == other.effect
+    assert one.parameters["gap_um"].value == pytest.approx(other.parameters["gap_um"].value, rel=1e-3)
+
+
 def test_without_a_time_the_order_of_rows_is_no_covariate() -> None:
     """With one it is the order of time, however the rows are sorted."""
     points = recording()

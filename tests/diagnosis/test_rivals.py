@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import json
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from cmm_uq.commands.diagnosing import diagnose_job
+from cmm_uq.commands.analysis import analyse_observations, outcome_of
+from cmm_uq.commands.reading import read_job
 from cmm_uq.conformity.accuracy import figures
 from cmm_uq.diagnosis.rivals import REMAINS, SETTLED
 from cmm_uq.documents.diagnosis_costs import costs_data, costs_section
 from cmm_uq.documents.document import Table
-from cmm_uq.documents.result import Diagnosed
+from cmm_uq.documents.outcome import Outcome
+from cmm_uq.documents.result import Diagnosed, Result
+from cmm_uq.documents.results_file import as_json
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import EVERY, effects
 from cmm_uq.points import Machine
+from cmm_uq.units import MICROMETRE
+from tests.kinds.reading import tables
+from tests.kinds.test_certificate_figures import disagreeing, two_uncertainties
 from tests.recordings import TRAVEL, bar_facts, bars
 
 TRUTH = {"scale_x": 40.0, "scale_y": -30.0, "scale_z": 25.0}
@@ -42,6 +51,7 @@ u_coordinate_um = 1.5
 
 [model]
 effects = ["squareness_xy", "squareness_yz", "squareness_zx"]
+tolerances = { squareness_xy = 7 }
 
 [[conformity]]
 standard = "ASME B89.4.1-1997"
@@ -51,7 +61,7 @@ rule = "ISO 14253-1"
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
+def certified(tmp_path_factory: pytest.TempPathFactory) -> Result:
     """Twenty bars of a machine whose three scales are wrong, and that is taken for one with wrong squarenesses."""
     random = np.random.default_rng(1)
     points = bars(random, 20, 400.0, Machine("m", "XYZ", TRAVEL))
@@ -65,7 +75,22 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
     job.mkdir()
     (job / "recording.csv").write_text("measurement,point,repeat,x_mm,y_mm,z_mm\n" + rows, encoding="utf-8")
     (job / "job.toml").write_text(JOB, encoding="utf-8")
-    return diagnose_job(job)
+    return analyse_observations(read_job(job))
+
+
+@pytest.fixture(scope="module")
+def found(certified: Result) -> Diagnosed:
+    return certified.diagnosed
+
+
+@pytest.fixture(scope="module")
+def outcome(certified: Result) -> Outcome:
+    return outcome_of(certified)
+
+
+@pytest.fixture(scope="module")
+def results(outcome: Outcome) -> dict[str, Any]:
+    return dict(json.loads(as_json(outcome.results)))
 
 
 def test_several_explanations_remain_and_the_true_one_is_among_them(found: Diagnosed) -> None:
@@ -87,17 +112,73 @@ def test_under_the_explanation_that_is_asserted_it_is_the_joint_posterior(found:
             assert own.u == pytest.approx(quantity.u, rel=1 / 3)
 
 
-def test_the_average_has_the_moments_of_the_mixture(found: Diagnosed) -> None:
-    """Mean of the means; mean of the variances and variance of the means (law of total variance)."""
-    remaining = found.diagnosis.remaining
+def test_the_average_has_the_moments_of_the_mixture(certified: Result) -> None:
+    """Mean of the means; Σ w (C + (m − m̄)(m − m̄)ᵀ): each within five standard errors of as many draws."""
+    remaining = certified.diagnosed.diagnosis.remaining
     p = np.array(remaining.weights) / sum(remaining.weights)
-    for effect, parameters in remaining.averaged.items():
-        for name, quantity in parameters.items():
-            each = [rival.named[effect][name] for rival in remaining.rivals]
-            values, us = np.array([q.value for q in each]), np.array([q.u for q in each])
-            assert quantity.value == pytest.approx(p @ values)
-            assert quantity.u == pytest.approx(np.sqrt(p @ (us**2 + values**2) - (p @ values) ** 2))
-            assert quantity.u > min(us)
+    each = []
+    for rival in remaining.rivals:
+        keys = [unknown.key for unknown in rival.model.unknowns]
+        each.append(rival.draws[:, [keys.index(unknown.key) for unknown in certified.model.unknowns]])
+    means = np.array([draws.mean(axis=0) for draws in each])
+    mean = p @ means
+    off = means - mean
+    covariance = np.einsum("r,rij->ij", p, [np.cov(draws, rowvar=False) for draws in each]) + (p * off.T) @ off
+    draws = remaining.draws
+    assert draws is not None
+    few = np.sqrt(len(draws))
+    assert np.all(np.abs(draws.mean(axis=0) - mean) < 5 * draws.std(axis=0) / few)
+    products = (draws - mean)[:, :, None] * (draws - mean)[:, None, :]
+    assert np.all(np.abs(np.array(certified.covariance.matrix) - covariance) < 5 * products.std(axis=0) / few)
+
+
+def test_a_certificate_states_the_average_wherever_it_states_an_estimate(
+    results: dict[str, Any], outcome: Outcome
+) -> None:
+    """Estimates, covariance and file of draws are one distribution; no table or record has another U of a parameter."""
+    assert results["estimates"] == results["diagnosis"]["averaged"]["estimates"]
+    stated = {f"{owner}.{name}": one for owner, found in results["estimates"].items() for name, one in found.items()}
+    stated["artefact.length_mm"] = results["artefact"]["length_mm"]
+    assert results["covariance"]["parameters"] == list(stated)
+    with np.load(BytesIO(outcome.files[results["posterior"]["file"]])) as file:
+        draws = (file["centre"] + file["draws"]).reshape(-1, len(file["names"]))
+    for i, (name, one) in enumerate(stated.items()):
+        assert results["covariance"]["matrix"][i][i] == pytest.approx(one["u"] ** 2, rel=1e-8)
+        assert results["posterior"]["parameters"][i] == name
+        assert draws[:, i].mean() == pytest.approx(one["value"], rel=1e-8)
+        assert draws[:, i].std(ddof=1) == pytest.approx(one["u"], rel=1e-6)
+    # under each explanation it is another, which is what the average is made of
+    assert {path.rsplit(".", 2)[0] for path in disagreeing(results)} == {"diagnosis.remaining.estimates"}
+    assert two_uncertainties(outcome.document) == []
+
+
+def test_a_guide_is_turned_back_by_the_averaged_angle(results: dict[str, Any]) -> None:
+    (turn,) = (one["angle_arcsec"] for one in results["adjustments"] if one["effect"] == "squareness_xy")
+    angle = results["estimates"]["squareness_xy"]["angle_arcsec"]
+    assert (turn["value"], turn["u"]) == pytest.approx((-angle["value"], angle["u"]), rel=1e-3)
+
+
+def test_a_tolerance_is_kept_by_the_averaged_interval(certified: Result, results: dict[str, Any]) -> None:
+    """In, though the named model, for which the scales are noise, leaves it open."""
+    assert results["tolerances"]["squareness_xy"]["verdict"] == "in"
+    low, high = np.quantile(certified.posterior.draws[:, 0], [0.025, 0.975])
+    assert low < -7 or high > 7
+
+
+def test_the_draws_of_the_average_agree_between_chains_and_keep_the_noise_of_the_named_model(
+    certified: Result, results: dict[str, Any]
+) -> None:
+    assert results["posterior"]["rhat_max"] < 1.01
+    noise = certified.draws["noise.coordinate_um"].ravel()
+    assert set(noise) <= set(certified.posterior.sizes.coordinate / MICROMETRE)
+    assert abs(noise.mean() - certified.noise.coordinate.value) < certified.noise.coordinate.u / 5
+
+
+def test_the_reader_is_told_what_is_averaged_and_what_is_not(certified: Result, outcome: Outcome) -> None:
+    count = len(certified.diagnosed.diagnosis.remaining.rivals)
+    assert any(f"averaged over {count} explanations that remain" in warning for warning in outcome.warnings)
+    columns = tables(outcome.document)["Error factors of the machine"].columns
+    assert "Least squares, named model" in [column.heading for column in columns]
 
 
 def test_figures_under_an_explanation_are_those_of_the_lengths_corrected_for_it(found: Diagnosed) -> None:

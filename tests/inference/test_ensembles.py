@@ -1,10 +1,11 @@
-"""R-hat against ArviZ, the peer whose definition it follows."""
+"""R-hat against ArviZ, the peer whose definition it follows, and the autocorrelation time against emcee."""
 
 import arviz
 import numpy as np
 import pytest
+from emcee.autocorr import integrated_time
 
-from cmm_uq.inference.ensembles import rhat
+from cmm_uq.inference.ensembles import autocorrelation_time, rhat
 from cmm_uq.points import Floats
 
 
@@ -31,3 +32,13 @@ def test_r_hat_is_that_of_arviz(drift: float, wide: float) -> None:
 def test_chains_that_never_moved_have_not_converged() -> None:
     chains = np.zeros((4, 100, 1)) + np.arange(4.0)[:, None, None]
     assert not rhat(chains) < 1.01
+
+
+@pytest.mark.parametrize("steps", [64, 100, 511])
+def test_the_autocorrelation_time_is_that_of_emcee(steps: int) -> None:
+    for kept in (0.0, 0.5, 0.9, 0.99):
+        chains = np.random.default_rng(steps).standard_normal((12, steps))
+        for step in range(1, steps):
+            chains[:, step] += kept * chains[:, step - 1]
+        peers = integrated_time(chains.T[:, :, None], quiet=True, tol=0)
+        assert autocorrelation_time(chains) == pytest.approx(float(peers[0]), rel=1e-9)

@@ -15,7 +15,7 @@ from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.instruments.reading import Reading
 from cmm_uq.instruments.source import SYSTEM, Event, Gap, Identity, Returned, Source
 
-PATIENCE_S = 8.0
+PATIENCE_S = 30.0
 """Until a test gives up waiting, on a busy machine."""
 
 

@@ -89,7 +89,8 @@ def test_half_lines_noise_and_a_wrong_baud_rate_give_words_and_no_value(
         heard.until(lambda one: len(one.good()) >= 2)
         for key, value in keys.items():
             setattr(line.mischief, key, value)
-        time.sleep(0.2)
+        before = len(heard.events)
+        heard.until(lambda one: any(event.status for event in one.of(Reading, before)))  # type: ignore[union-attr]
         since = len(heard.events)
         heard.until(lambda one: len(one.of(Reading, since)) >= 2)
         bad = [event for event in heard.of(Reading, since) if isinstance(event, Reading)]

@@ -45,6 +45,23 @@ NORMALS = np.column_stack([C["nx"], C["ny"], C["nz"]])
 TRAVELS = np.column_stack([C["approach_x"], C["approach_y"], C["approach_z"]])
 
 
+TIMED = [name for name, effect in EVERY.items() if "time_s" in effect.columns]
+
+
+@pytest.mark.parametrize("name", TIMED)
+def test_by_a_clock_that_began_long_before_time_counts_from_the_first_reading(name: str) -> None:
+    """As by a stopwatch, in the whole recording and in each part of it; a stopwatch's own start is kept."""
+    epoch = with_columns(POINTS, time_s=C["time_s"] + 1.7e9)
+    shape = [0.5 * (one.low + one.high) for one in EVERY[name].shape]
+    later = np.arange(len(POINTS)) >= 12
+    assert np.ptp(EVERY[name].basis(POINTS, shape)) > 0
+    np.testing.assert_array_equal(EVERY[name].basis(epoch, shape), EVERY[name].basis(POINTS, shape))
+    if name != "artefact_lag":  # begins with what it follows
+        expected = EVERY[name].basis(POINTS, shape)[later]
+        np.testing.assert_array_equal(EVERY[name].basis(epoch.select(later), shape), expected)
+        np.testing.assert_array_equal(EVERY[name].basis(POINTS.select(later), shape), expected)
+
+
 def error(name: str, points: Points = POINTS, **parameters: float) -> Floats:
     return EVERY[name].displacement(points, parameters)
 

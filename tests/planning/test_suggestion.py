@@ -107,7 +107,7 @@ KNOWN = BALLBAR.model_copy(update={"u_um": 1e-3})
 PAIR = ("rotation_x_z", "scale_x")
 
 
-@pytest.mark.parametrize(("size", "odds"), [(4.0, 1.0), (2.0, 1.0), (2.0, 1 / 30), (2.0, 8.0)])
+@pytest.mark.parametrize(("size", "odds"), [(4.0, 1.0), (2.0, 1.0), (2.0, 1 / 15), (2.0, 8.0)])
 def test_the_odds_of_a_plan_are_those_of_a_fit_to_it(size: float, odds: float) -> None:
     """Independently of the plan, the true effect is put in without noise, and the false one fitted to the recording and the
     further bars together. What the recording itself says counts by the odds that the diagnosis found, either may be true, and
@@ -130,6 +130,11 @@ def test_the_odds_of_a_plan_are_those_of_a_fit_to_it(size: float, odds: float) -
     assert len(plan.placings) == (1 if odds >= 1 else 2)
     if plan.repeats > 1:
         assert np.exp(expected(plan.repeats - 1)) < ODDS
+
+
+@pytest.mark.parametrize(("odds", "parted"), [(1 / 30, False), (1 / 19, True), (19.0, True), (1000.0, False)])
+def test_a_pair_that_the_recording_parts_already_is_not_planned_for(odds: float, parted: bool) -> None:
+    assert (planned(in_one_plane(2.0, {"scale_x": odds}), KNOWN) is not None) == parted
 
 
 def test_what_the_recording_says_already_is_no_less_than_the_odds_it_could_not_tell() -> None:

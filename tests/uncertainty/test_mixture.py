@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import optimize, stats
 
-from cmm_uq.uncertainty.mixture import averaged
+from cmm_uq.uncertainty.mixture import averaged, mixed
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import unit
 
@@ -43,6 +43,32 @@ def test_where_all_models_agree_it_is_what_they_say(
     found = averaged([one] * len(weights), weights)
     assert (found.value, found.u) == pytest.approx((one.value, one.u), abs=1e-5)
     assert found.interval95 == pytest.approx(one.interval95, abs=1e-6)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(0.01, 1), min_size=1, max_size=5), st.integers(0, 2**31))
+def test_every_draw_of_a_mixture_is_one_of_a_model_and_each_model_has_its_share(
+    weights: list[float], seed: int
+) -> None:
+    """Row i is row i of one model, so that none comes twice; shares to less than one draw."""
+    count = 200
+    draws = [np.column_stack([np.full(count, model), np.arange(count)]) for model in range(len(weights))]
+    found = mixed(draws, weights, np.random.default_rng(seed))
+    assert np.array_equal(found[:, 1], np.arange(count))
+    share = np.bincount(found[:, 0].astype(int), minlength=len(weights))
+    assert np.all(np.abs(share - count * np.array(weights) / sum(weights)) < 1)
+    assert np.array_equal(found, mixed(draws, weights, np.random.default_rng(seed)))
+
+
+def test_where_models_disagree_on_two_quantities_the_mixture_has_them_vary_together() -> None:
+    """Three models without any uncertainty of their own: Σ w (m − m̄)(m − m̄)ᵀ by hand, weights 1 : 2 : 5 of 800 draws."""
+    means = np.array([[1.0, -2.0], [3.0, 4.0], [-5.0, 0.5]])
+    found = mixed([np.tile(mean, (800, 1)) for mean in means], [1, 2, 5], np.random.default_rng(3))
+    p = np.array([0.125, 0.25, 0.625])
+    off = means - p @ means
+    assert np.cov(found, rowvar=False, ddof=0) == pytest.approx((p[:, None] * off).T @ off)
+    first = np.cov(found[:400], rowvar=False, ddof=0)  # in any order: the first half is like the whole
+    assert first == pytest.approx((p[:, None] * off).T @ off, rel=0.25)
 
 
 def test_what_nothing_makes_uncertain_stays_so() -> None:

@@ -85,11 +85,11 @@ class Combinations:
 
     def of(self, index: int) -> float:
         """Probability that an explanation is part of the truth."""
-        return float(sum(p for key, p in self.probability.items() if index in key))
+        return self.of_any(frozenset((index,)))
 
     def of_any(self, those: Key) -> float:
         """Probability that at least one of some explanations is part of the truth."""
-        return float(sum(p for key, p in self.probability.items() if those & key))
+        return min(1.0, float(sum(p for key, p in self.probability.items() if those & key)))
 
     def instead(self, effects: Key, index: int) -> dict[int, float]:
         """Odds of each other known effect in the place of one, the rest kept."""

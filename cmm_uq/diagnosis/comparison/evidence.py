@@ -26,8 +26,11 @@ from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.model.display import Display
 from cmm_uq.points import Floats, Ints
 
-_WIDE, _KEPT = 30, 40
-"""Columns of what is given from which on what follows from it is kept, and how often."""
+_WIDE = 30
+"""Columns of a version from which on its principal axes are kept where it is given."""
+
+_KEPT = 8_000_000
+"""Numbers that are kept of what follows from what was given last."""
 
 _BLOCK, _COLUMNS = 150_000, 500
 """Numbers of a block that a processor's cache holds; columns weighed at a time."""
@@ -367,29 +370,33 @@ class Comparison:
         if blocks.shape[3] == 1:
             strengths = blocks[..., 0]
         else:
-            strengths, turn = np.linalg.eigh(blocks)
+            strengths, turn = _eigen(blocks)
             shown = turn.swapaxes(2, 3) @ shown
         variance = (amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
-        squares = known.squares[:, None, None, :] - (variance / (1 + ratio)) @ shown**2
+        gain, square = variance / (1 + ratio), shown**2
+        explained = np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None] if b == 1 else gain @ square
+        squares = known.squares[:, None, None, :] - explained
         log = self.over_sigma(squares)
         log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
         return np.asarray(np.logaddexp.reduce(log, axis=0), dtype=np.float64)
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
-        key = tuple(given)
-        if data is not None or sum(self._columns(version).shape[1] for version in key) < _WIDE:
+        if data is not None:
             return self._weigh(data, given)
-        if key not in self._besides:
-            while len(self._besides) >= _KEPT:
-                del self._besides[next(iter(self._besides))]
-            self._besides[key] = self._weigh(None, given)
-        return self._besides[key]
+        kept, key = self._besides, frozenset(given)
+        if key not in kept:
+            new = self._weigh(None, given)
+            most = max(1, _KEPT // new.seen_by.size)
+            while len(kept) >= most:
+                del kept[next(iter(kept))]
+            kept[key] = new
+        return kept[key]
 
     @cached_property
-    def _besides(self) -> dict[tuple[Version, ...], _Beside]:
-        """The recording beside what was given last, where that is many columns."""
+    def _besides(self) -> dict[frozenset[Version], _Beside]:
+        """The recording beside what was given last: a search comes back to it within some steps."""
         return {}
 
     def _weigh(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
@@ -398,15 +405,53 @@ class Comparison:
         squares = np.einsum("mb,kmb->kb", plain, weighed)
         log = np.array([noise.log for noise in self._noises])
         if given:
-            taken = np.hstack([version.amplitude * self._columns(version) for version in given])
-            other = np.concatenate([v.amplitude * self._weighed_columns(v) for v in given], axis=2)
-            factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ other)
-            rows = np.linalg.solve(factor, other.swapaxes(1, 2))
+            rows, logs = self._rows(given)
             seen = rows @ plain
-            log = log - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+            log = log - logs
             squares = squares - np.sum(seen**2, axis=1)
             weighed = np.concatenate([weighed - rows.swapaxes(1, 2) @ seen, rows.swapaxes(1, 2)], axis=2)
         return _Beside(weighed.transpose(1, 0, 2).reshape(len(plain), -1), squares, log)
+
+    def _rows(self, given: Sequence[Version]) -> tuple[Floats, Floats]:
+        """Rows (k, g, m) of what is given (see :class:`_Beside`), and half the logarithm (k,) of its determinant.
+
+        The widest comes first and by its principal axes, of which a search, that gives it again and again at several sizes,
+        needs another length only; to what it leaves the others are added by Cholesky's factors.
+        """
+        kinds, m = len(self._noises), len(self.left)
+        rows, logs = np.zeros((kinds, 0, m)), np.zeros(kinds)
+        others = list(given)
+        widest = max(others, key=lambda version: self._columns(version).shape[1])
+        if self._columns(widest).shape[1] >= _WIDE:
+            others.remove(widest)
+            strengths, axes = self._principal_axes(widest)
+            ratio = widest.amplitude**2 * strengths
+            rows = (widest.amplitude / np.sqrt(1 + ratio))[:, :, None] * axes
+            logs = 0.5 * np.log1p(ratio).sum(axis=1)
+        if not others:
+            return rows, logs
+        taken = np.hstack([version.amplitude * self._columns(version) for version in others])
+        weighed = np.concatenate([v.amplitude * self._weighed_columns(v) for v in others], axis=2)
+        if rows.shape[1]:
+            weighed = weighed - rows.swapaxes(1, 2) @ (rows @ taken)
+        factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ weighed)
+        more = np.linalg.solve(factor, weighed.swapaxes(1, 2))
+        logs = logs + np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        return np.concatenate([rows, more], axis=1), logs
+
+    def _principal_axes(self, version: Version) -> tuple[Floats, Floats]:
+        """Eigenvalues (k, r) of a version's inner products by kind of noise, and its weighed columns along them (k, r, m)."""
+        key = version.explanation, version.member
+        if key not in self._axes:
+            weighed = self._weighed_columns(version)
+            strengths, turn = np.linalg.eigh(self._columns(version).T @ weighed)
+            self._axes[key] = np.maximum(strengths, 0.0), turn.swapaxes(1, 2) @ weighed.swapaxes(1, 2)
+        return self._axes[key]
+
+    @cached_property
+    def _axes(self) -> dict[tuple[int, int], tuple[Floats, Floats]]:
+        """Principal axes of wide members that were ever given."""
+        return {}
 
     def _columns(self, version: Version) -> Floats:
         return self._stack[0][:, self._where[version.explanation, version.member]]
@@ -430,6 +475,24 @@ def _log_sum(log: Floats, axis: int) -> Floats:
     return np.asarray((np.log1p(others / count) + np.log(count) + largest).squeeze(axis), dtype=np.float64)
 
 
+def _eigen(blocks: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (…, r) of symmetric matrices and their eigenvectors (…, r, r); of two columns, which abound, by a rotation.
+
+    The rotation is Jacobi's (Golub, Van Loan 2013, Matrix Computations, section 8.5.2), as exact as what is iterated.
+    """
+    if blocks.shape[-1] != 2:
+        strengths, turn = np.linalg.eigh(blocks)
+        return np.asarray(strengths), np.asarray(turn)
+    first, second, twice = blocks[..., 0, 0], blocks[..., 1, 1], blocks[..., 0, 1] + blocks[..., 1, 0]
+    apart = second - first
+    length = np.abs(apart) + np.hypot(apart, twice)
+    tangent = np.where(apart < 0, -twice, twice) / np.maximum(length, 1e-300)
+    cosine = 1 / np.sqrt(1 + tangent**2)
+    sine, shift = tangent * cosine, 0.5 * tangent * twice
+    turn = np.stack([np.stack([cosine, sine], axis=-1), np.stack([-sine, cosine], axis=-1)], axis=-2)
+    return np.stack([first - shift, second + shift], axis=-1), turn
+
+
 def _log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
     return float(np.log(np.abs(np.diag(triangular))).sum())
 
@@ -441,7 +504,7 @@ class _Beside:
     ``seen_by`` (m, k·(b + g)): of each kind Σ⁻¹·data and the rows of what is given, side by side; ``squares`` (k, b)
     dataᵀ·Σ⁻¹·data; ``log`` (k,) probability of the noise less that of its determinant.
 
-    With Σ = N + C·Cᵀ and rows = chol(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
+    With Σ = N + C·Cᵀ and rows = root(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, any square root, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
     """
 
     seen_by: Floats

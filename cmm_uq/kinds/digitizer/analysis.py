@@ -66,7 +66,7 @@ class DigitizerFigures:
     def covariance(self) -> Floats:
         """(3, 3) of U1, V1, W1, mm²."""
         columns = [i for i, u in enumerate(self.result.posterior.unknowns) if u.key[0] == ARTEFACT][:3]
-        return self.result.posterior.covariance[np.ix_(columns, columns)]
+        return np.cov(self.result.values[:, columns], rowvar=False)
 
     @property
     def correlation(self) -> Floats:
@@ -77,7 +77,7 @@ class DigitizerFigures:
     @cached_property
     def sphere(self) -> tuple[float, ...]:
         """Centre of the reference sphere in the recorded frame, mm."""
-        values = self.result.posterior.draws.mean(axis=0)
+        values = self.result.values.mean(axis=0)
         model, digitizer = self.result.model, self.digitizer
         count = len(digitizer.sizes)
         return tuple(digitizer.centre(model.placed(values), values[len(values) - count :]).tolist())

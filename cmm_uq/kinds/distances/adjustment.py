@@ -136,8 +136,8 @@ def settings(result: Result) -> tuple[Setting, ...]:
 
 def _turns(result: Result) -> dict[str, Quantity]:
     """The three turns of the draws' axes, by the squareness that they take away; one that the job does not name is 0."""
-    draws = {name: values for (name, _), (values, _) in result.model.reported(result.posterior.draws).items()}
-    none = np.zeros(len(result.posterior.draws))
+    draws = {name: values for (name, _), (values, _) in result.model.reported(result.values).items()}
+    none = np.zeros(len(result.values))
     squareness = np.column_stack([draws.get(effect.name, none) for effect in SQUARENESS.values()])
     rides = Chain.of(result.artefact.points.machine.chain).rides("z", on="y")
     each = turns(ARCSECOND * squareness, rides).T / ARCSECOND

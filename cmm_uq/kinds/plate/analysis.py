@@ -137,7 +137,7 @@ def _common(result: Result) -> CommonScale | None:
     if not scales:
         return None
     columns = {unknown.key[0]: i for i, unknown in enumerate(result.posterior.unknowns)}
-    draws = result.posterior.draws[:, [columns[name] for name in scales]].mean(axis=1)
+    draws = result.values[:, [columns[name] for name in scales]].mean(axis=1)
     cte = result.job.facts.artefact.cte_per_k or STEEL
     change = Quantity.of_draws(draws, unit("ppm"))
     return CommonScale(change, cte, change.times(-PPM / cte, unit("K")))

@@ -169,7 +169,7 @@ class TriangleFigures:
         """Pairs of effects that these placings hardly tell apart, with the correlation of their estimates."""
         result = self.result
         names = [u.key[0] for u in result.posterior.unknowns if u.key[0] in result.parameters]
-        correlation = np.atleast_2d(np.corrcoef(result.posterior.draws[:, : len(names)], rowvar=False))
+        correlation = np.atleast_2d(np.corrcoef(result.values[:, : len(names)], rowvar=False))
         return tuple(
             (names[j], names[i], float(correlation[i, j]))
             for i in range(len(names))

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.diagnosis.comparison.evidence import Comparison, _log_sum
+from cmm_uq.diagnosis.comparison.evidence import Comparison, _eigen, _log_sum
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation, Member
 from cmm_uq.diagnosis.comparison.lack_of_fit import tail_probability
+from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.diagnosis.noise import TAILS, shape_of, sigma_grid, tails
 from cmm_uq.diagnosis.shapes import drawn_shapes, kinds
 from cmm_uq.inference.least_squares import solve
@@ -110,6 +111,52 @@ def test_the_best_version_of_each_explanation_is_the_one_of_most_evidence() -> N
         j, amplitude = max(tried, key=lambda key: tried[key])
         assert (version.explanation, version.member) == (i, j)
         assert version.amplitude == pytest.approx(amplitude)
+
+
+def wide(columns: int) -> Comparison:
+    """Two narrow explanations and a wide one in fifty observations."""
+    random, m = np.random.default_rng(8), 50
+    several = [
+        Explanation(name, EFFECT, (Member(0.3 * random.standard_normal((m, r))),))
+        for name, r in (("one column", 1), ("two columns", 2), ("wide", columns))
+    ]
+    noise, (sigma, log_sigma) = some_kinds(np.full(m, 1.4)), sigma_grid(None, 0.08)
+    observed, baseline = 0.08 * random.standard_normal(m), random.standard_normal((m, 2))
+    return Comparison(observed, baseline, noise, sigma, log_sigma, several, np.full(m, 1.4), 0.01)
+
+
+@pytest.mark.parametrize("columns", [5, 36])
+def test_what_is_given_is_noise_of_its_covariance(columns: int) -> None:
+    """Against the density written out, whatever is given first, and of a wide one at two sizes one after the other."""
+    c = wide(columns)
+    Q = rest(c)
+    y, n = Q.T @ c.observed, Q.shape[1]
+    for given in ([(0, 3.0)], [(2, 2.0)], [(2, 0.7)], [(0, 3.0), (2, 2.0)], [(2, 2.0), (1, 1.0), (0, 3.0)]):
+        total = []
+        for kind in c.kinds:
+            white = Q.T @ covariance(kind) @ Q
+            for i, amplitude in given:
+                F = Q.T @ (c.explanations[i].members[0].columns / c.noise_scale[:, None])
+                white = white + amplitude**2 * F @ F.T
+            log = -0.5 * (y @ np.linalg.solve(white, y) / c.sigma**2 + np.linalg.slogdet(white)[1])
+            total.append(log - n * np.log(c.sigma) + c.log_sigma + np.log(kind.probability))
+        versions = [Version(i, 0, amplitude) for i, amplitude in given]
+        expected = float(special.logsumexp(total))
+        assert float(c.log_evidence_of(versions)[0]) == pytest.approx(expected, abs=2e-4)
+
+
+def test_two_columns_have_the_principal_axes_of_any_others() -> None:
+    """Against LAPACK, of matrices of all conditions: equal, dependent and absent columns too."""
+    columns = np.random.default_rng(9).standard_normal((200, 6, 2)) * [1.0, 1e-5]
+    blocks = np.concatenate([columns.swapaxes(1, 2) @ columns, np.diag([1.0, 2.0])[None], np.diag([2.0, 1.0])[None],
+                             np.ones((1, 2, 2)), 2 * np.eye(2)[None] - 1, np.eye(2)[None], np.zeros((1, 2, 2))])  # fmt: skip
+    strengths, axes = _eigen(blocks)
+    largest = np.abs(blocks).max(axis=(1, 2))
+    expected = np.linalg.eigvalsh(blocks)
+    assert np.all(np.abs(np.sort(strengths, axis=1) - expected).max(axis=1) <= 1e-15 * 4 * largest)
+    np.testing.assert_allclose(axes.swapaxes(1, 2) @ axes, np.broadcast_to(np.eye(2), blocks.shape), atol=1e-14)
+    back = axes @ (strengths[:, :, None] * axes.swapaxes(1, 2))
+    assert np.all(np.abs(back - blocks).max(axis=(1, 2)) <= 1e-14 * largest)
 
 
 def test_kind_and_size_of_the_noise_are_as_probable_as_the_observations_make_them() -> None:

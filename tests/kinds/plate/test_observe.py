@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds import artefact_facts
+from cmm_uq.kinds.plate.facts import PlateFacts
 from cmm_uq.kinds.plate.observe import Plate
 from cmm_uq.points import Points
 from tests.kinds.constructions import FLAT, MIDDLE, estimated, free, indicated, model, plate
@@ -112,6 +113,26 @@ def test_nominal_positions_leave_one_scale_common_to_axes_and_plate() -> None:
 def test_a_level_plate_of_nominal_positions_still_tells_how_x_differs_from_y() -> None:
     combinations = free(estimated(NOMINAL, plate([FLAT]), ["scale_x", "scale_y", "squareness_xy"]))
     assert [sorted(c) for c in combinations] == [["artefact", "scale_x", "scale_y"]]
+
+
+@pytest.mark.parametrize("facts", [NOMINAL, artefact_facts(kind="plate", u_um=0.5)], ids=["nominal", "certified"])
+@pytest.mark.parametrize("turned", [FLAT, (0.0, 0.0, 37.0), (0.003, 0.0, 90.0)])
+def test_what_only_the_noise_of_its_attitude_tells_of_a_flat_plate_stays_open(
+    turned: tuple[float, float, float], facts: PlateFacts
+) -> None:
+    """Nothing in a plane shows an axis across it; of the plane's own scales, a free length leaves one.
+
+    A shear of squareness S leaves S/2 of each coordinate once the plate has turned: u = σ / √(Σ(x² + y²)/4), rad.
+    """
+    wanted = [{"scale_z"}, {"squareness_yz"}, {"squareness_zx"}]
+    wanted += [{"scale_x", "scale_y", "artefact"}] if facts.nominal else []
+    u = 206264.8 * 7e-4 / np.sqrt(2 * 25 * (20000 + 20000) / 4)
+    for seed in range(3):
+        recorded = indicated(facts, plate([FLAT, turned]), SIX, [9, -6, 14, 12, -7.5, 4], sigma=7e-4, seed=seed)
+        found = estimated(facts, recorded, SIX, sigma=None)
+        assert sorted(map(sorted, free(found))) == sorted(map(sorted, wanted))
+        assert np.sqrt(found.covariance[3, 3]) == pytest.approx(u, rel=0.3)
+        assert found.value[3] == pytest.approx(12, abs=5 * u)
 
 
 def test_the_certificate_of_the_plate_limits_the_scale() -> None:
