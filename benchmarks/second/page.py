@@ -92,6 +92,9 @@ def _state(truths: list[dict], pairs: Pairs, faults: list, mark: str, asked: tup
         f"`{mark[:16]}…`: {hiding} with something hidden (600 are asked for), and of each kind of noise {min(by)} to "
         f"{max(by)} without a cause (300 are asked for)."
     ]
+    again = sum(bool(f.get("again")) for _, f in pairs)
+    if again:
+        lines.append(f"{again} of them was diagnosed again after the refusal that it met had been mended.")
     return lines + ([f"{len(faults)} ended in a refusal or a fault: " + "; ".join(f"{n}: {w}" for n, w in faults[:8]) + "."]
                     if faults else [])  # fmt: skip
 
@@ -134,7 +137,7 @@ def _wanted(pairs: Pairs, both: list) -> list[str]:
         ("Said and found probability, every tenth", "in each other's 95 %, of ≥ 500",
          f"{len(off)} tenths apart, of {len(said)} assertions", _kept(not off, len(said) >= 500)),
         ("Intervals that hold the truth", "93–97 %", _share(sum(held), len(held)),
-         _kept(bool(held) and 0.93 <= np.mean(held) <= 0.97, full)),
+         _kept(_between(sum(held), len(held), full), full)),
         ("Outside the catalogue, recognised", "≥ 95 %", _share(known, len(out)), _kept(known >= 0.95 * len(out), full)),
     ]  # fmt: skip
     return ["| | asked | this run (95 % interval) | |", "| --- | --- | --- | --- |",
@@ -149,6 +152,14 @@ def _agree(row: tuple) -> bool:
     """Whether what was said lies in the interval of what was right, and what was right in that of what was said."""
     count, mean, right, found, expected = row
     return bool(found[0] <= mean <= found[1] and expected[0] <= right / count <= expected[1])
+
+
+def _between(hits: int, count: int, full: bool) -> bool:
+    """Whether 93 to 97 % of intervals hold; of a short run, whether its own interval leaves that open."""
+    if not count:
+        return False
+    low, high = (hits / count, hits / count) if full else proportion(hits, count)
+    return low <= 0.97 and high >= 0.93
 
 
 def _kept(good: object, full: bool) -> str:

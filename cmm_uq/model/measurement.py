@@ -41,6 +41,9 @@ _SMALLEST_NOISE = 1e-6
 SMALL_LEAN = 100 * ARCSECOND
 """rad: squares and products of angles up to this are 0.25 ppm."""
 
+_NO_LEAN = 1.0
+"""rad: an axis that leans so is another one; least squares gets there where a recording does not show the angle."""
+
 _MOVED = 10 * ARCSECOND
 """rad: about an angle this far away a model is as linear."""
 
@@ -203,8 +206,8 @@ class MeasurementModel:
             scale = np.array([u.scale for u in self.unknowns])
             change = np.abs(result.value - values) / scale
             values = result.value
-            if change.max(initial=0.0) < 1e-9:
-                break
+            if change.max(initial=0.0) < 1e-9 or self.leans_beyond(values, np.zeros_like(values), _NO_LEAN):
+                break  # nothing but noise says how an angle stands: another step would go farther still
         about = self._likeliest(linear, values, result)
         return Estimate(result, linear if about is values else self.linearised(about), about)
 
