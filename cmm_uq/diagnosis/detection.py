@@ -90,4 +90,4 @@ def _reached(probability: Callable[[Floats], Floats], power: float) -> float:
         return float(np.inf)
     from scipy import optimize  # takes its time, and most commands need none of it
 
-    return float(optimize.brentq(short, SHORTEST, LONGEST, xtol=1e-4)) if short(SHORTEST) < 0 else SHORTEST
+    return float(optimize.brentq(short, SHORTEST, LONGEST, xtol=1e-10)) if short(SHORTEST) < 0 else SHORTEST
