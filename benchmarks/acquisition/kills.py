@@ -128,8 +128,10 @@ def main(folder: Path, kills: int, seed: int) -> None:
             assert before | set(said) <= there, (number, sorted((before | set(said)) - there))
             assert len(there) - len(before | set(said)) <= 1, "more than the one that was not said yet"
             if (job / "bar.csv").exists():
-                assert len(read_job(job).points) % 2 == 0
-                assert not read_job(job).acquired.changed  # type: ignore[union-attr]
+                read = read_job(job)
+                assert len(read.points) % 2 == 0
+                assert read.acquired is not None
+                assert not read.acquired.changed
             before = there
         said_all += len(said)
         empty += not said

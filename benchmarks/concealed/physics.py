@@ -146,3 +146,16 @@ ROUGHLY: dict[str, Error] = {
     },
 }  # fmt: skip
 """Right mechanisms, shapes somewhat off: a bow with its top off the middle, backlash that grows, a second harmonic."""
+
+
+def holds(truth: dict, name: str, size: float, parameter: str, low: float, high: float) -> bool:
+    """Whether an interval holds the true parameter of an effect of this size; phases are taken above its lower end."""
+    value = size * UNIT.get(kind_of(name), 1.0)
+    if parameter == "amplitude_um":
+        value = abs(size)
+    elif parameter == "period_mm":
+        value = truth["period"]
+    elif parameter == "phase_rad":
+        value = truth["phase"] + (np.pi if size < 0 else 0.0)
+        value = low + (value - low) % (2 * np.pi)
+    return bool(low <= value <= high)

@@ -12,12 +12,11 @@ import json
 import time
 from pathlib import Path
 
-import numpy as np
 from rich.progress import track
 
 from benchmarks.concealed.generator import DESIGNS, NOTHING, SIGNALS, case, seal
 from benchmarks.concealed.greedy import searched
-from benchmarks.concealed.physics import UNIT, kind_of
+from benchmarks.concealed.physics import holds
 from cmm_uq.commands.diagnosing import diagnose_job
 
 
@@ -83,15 +82,7 @@ def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:
         return listed
     for name, size in truth["hidden"].items():
         for parameter, (_, _, low, high) in found["effects"].get(name, {"parameters": {}})["parameters"].items():
-            value = size * UNIT.get(kind_of(name), 1.0)
-            if parameter == "amplitude_um":
-                value = abs(size)
-            elif parameter == "period_mm":
-                value = truth["period"]
-            elif parameter == "phase_rad":
-                value = truth["phase"] + (np.pi if size < 0 else 0.0)
-                value = low + (value - low) % (2 * np.pi)
-            listed.append((parameter, bool(low <= value <= high)))
+            listed.append((parameter, holds(truth, name, size, parameter, low, high)))
     return listed
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from scipy import stats
 
-from benchmarks.concealed.physics import UNIT, kind_of
+from benchmarks.concealed.physics import holds
 from benchmarks.second.cases import FAULTS
 
 OF_THE_ARTEFACT = ("artefact", "thermal_artefact")
@@ -79,15 +79,7 @@ def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:
     for name, size in truth["hidden"].items():
         said = found["effects"].get(name)
         for parameter, (_, _, low, high) in said["parameters"].items() if said else ():
-            value = size * UNIT.get(kind_of(name), 1.0)
-            if parameter == "amplitude_um":
-                value = abs(size)
-            elif parameter == "period_mm":
-                value = truth["period"]
-            elif parameter == "phase_rad":
-                value = truth["phase"] + (np.pi if size < 0 else 0.0)
-                value = low + (value - low) % (2 * np.pi)
-            listed.append((parameter, bool(low <= value <= high)))
+            listed.append((parameter, holds(truth, name, size, parameter, low, high)))
     return listed
 
 
