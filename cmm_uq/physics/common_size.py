@@ -18,8 +18,11 @@ SEED = "seed"
 """Beside the size, in a truth: which of all errors of this size."""
 
 
-_ROUNDS, _HELD = 60, 1e-9
-"""Of the iteration; part of the largest variance below which a combination is held."""
+_GRID, _HELD = 2000, 1e-9
+"""Of sizes; part of the largest variance below which a combination is held."""
+
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+"""Multiples of it spread evenly over the unit interval, and neighbours lie apart: draws of a chain share nothing with them."""
 
 
 class CommonSize(Effect):
@@ -69,20 +72,31 @@ class CommonSize(Effect):
 
 
 def _shrunk(draws: Floats) -> Floats:
-    """Draws (N, j) of errors with their common size for a prior, which is what they themselves tell (empirical Bayes).
+    """Draws (N, j) of errors with their common size for a hyper-parameter, known as well as they themselves tell.
 
-    Along each principal axis of their covariance, with an error ĉ of variance v and a size s, the posterior is normal about
-    k·ĉ with variance k·v, k = s²/(s² + v); s² is the likeliest, found by expectation and maximisation.
+    Along each principal axis of their covariance an error ĉ of variance v is, given a size s, normal about k·ĉ with variance
+    k·v, k = s²/(s² + v). Each draw has its own s, of the posterior p(s) ∝ Π N(ĉ; 0, s² + v) under a constant prior (A. Gelman,
+    Bayesian Analysis 1 (2006) 515, section 4), so that what is not known of the size widens its interval.
     """
     mean = draws.mean(axis=0)
     v, axes = np.linalg.eigh(np.atleast_2d(np.cov(draws, rowvar=False)))
     v = np.maximum(v, 0.0)
     about, c = (draws - mean) @ axes, mean @ axes
     free = v > _HELD * v.max(initial=0.0)  # what no coefficient does is no error
-    squares = float(np.mean(c[free] ** 2)) if free.any() else 0.0
-    for _ in range(_ROUNDS):
-        k = squares / (squares + v[free]) if squares > 0 else np.zeros(int(free.sum()))
-        squares = float(np.mean((k * c[free]) ** 2 + k * v[free])) if free.any() else 0.0
-    k = np.ones(len(v))
-    k[free] = squares / (squares + v[free]) if squares > 0 else 0.0
+    k = np.ones(draws.shape)
+    if free.any():
+        squares = _sizes(c[free], v[free], len(draws))[:, None] ** 2
+        k[:, free] = squares / (squares + v[free])
     return np.asarray((k * c + np.sqrt(k) * about) @ axes.T, dtype=np.float64)
+
+
+def _sizes(c: Floats, v: Floats, count: int) -> Floats:
+    """(count,) sizes of their posterior, given errors c (j,) of variances v (j,): even probabilities in mixed order."""
+    part = (np.arange(_GRID) + 0.5) / _GRID
+    turn = 0.5 * np.pi * part
+    s = np.sqrt(np.mean(c**2) + np.mean(v)) * np.tan(turn)  # the whole half line
+    variance = s[:, None] ** 2 + v
+    logs = -0.5 * np.sum(c**2 / variance + np.log(variance), axis=1) - 2.0 * np.log(np.cos(turn))
+    weights = np.exp(logs - logs.max())
+    probability = (np.cumsum(weights) - 0.5 * weights) / weights.sum()
+    return np.asarray(np.interp((np.arange(1, count + 1) * _GOLDEN) % 1.0, probability, s), dtype=np.float64)
