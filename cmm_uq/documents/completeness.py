@@ -14,10 +14,16 @@ from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.messages import Text, Verbatim, day, say, semicolons
 
+_INTERIM = say("An interim check ([job] interim): no calibration certificate, whatever the title says.")
+
 
 def formal_warnings(job: Job) -> tuple[Text, ...]:
     """What an assessor would hold against a certificate of this job, whatever was measured."""
-    return (*contradictions(job), *_missing(job.facts)) if job.origin == MEASURED else ()
+    if job.origin != MEASURED:
+        return ()
+    if job.facts.job.interim:
+        return (_INTERIM, *contradictions(job))
+    return (*contradictions(job), *_missing(job.facts))
 
 
 def contradictions(job: Job) -> tuple[Text, ...]:

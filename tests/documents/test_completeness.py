@@ -162,3 +162,9 @@ def test_the_page_on_certificates_tells_of_every_clause_once_and_of_every_key_th
     gauge = ShortGaugeFacts(file="s.csv", length_mm=20.0, u_um=0.1)
     bare = measured("step-gauge-simulated", job={"origin": "measured", "procedure": ""})
     assert warned == set(missing(replace(bare, facts=bare.facts.model_copy(update={"short_gauge": gauge}))))
+
+
+def test_an_interim_check_says_that_it_is_no_certificate_and_lacks_none_of_what_one_states() -> None:
+    told = [str(text) for text in formal_warnings(measured("step-gauge-simulated", job={"interim": True}))]
+    assert told[0].startswith("An interim check")
+    assert not [text for text in told if "17025" in text]
