@@ -1,0 +1,1 @@
+"""Tests of when machines are calibrated again."""

@@ -1,0 +1,32 @@
+"""The staircase: its steps by hand, and the reliability at which it stands still."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cmm_uq.recertification.interval_test import Changing
+from cmm_uq.recertification.staircase import staircase, step_down
+
+WIDE = Changing(factor=1e9, shortest_days=1e-9, longest_days=1e12)
+
+
+def test_up_kept_down_by_hand() -> None:
+    """At a reliability of one half a step down undoes a step up: 100 · 1.1 · 1.1 · 1 / 1.1."""
+    found = staircase([0.3, 0.8, 0.81, 1.01], 100.0, 0.5, WIDE)
+    assert (found.interval, found.up, found.kept, found.down) == (pytest.approx(110), 2, 1, 1)
+
+
+@given(st.floats(0.5, 0.99))
+def test_at_the_wanted_reliability_the_interval_stands_still(reliability: float) -> None:
+    drift = reliability * math.log(1.1) + (1 - reliability) * math.log(step_down(reliability))
+    assert drift == pytest.approx(0, abs=1e-12)
+
+
+def test_one_failure_at_most_halves_and_bounds_are_kept() -> None:
+    assert staircase([2.0], 365, 0.95).interval == pytest.approx(182.5)
+    assert staircase([2.0] * 20, 365, 0.95).interval == 14
+    assert staircase([0.1] * 50, 365, 0.95).interval == 1826
