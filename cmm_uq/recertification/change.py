@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy.special import ndtr
+from cmm_uq.recertification.normal import two_sided
 
 FAMILY = 0.05
 """Probability that anything at all is called significant where nothing changed."""
@@ -47,7 +47,7 @@ class Change:
     @property
     def chance(self) -> float:
         """Probability of a difference at least as large where nothing changed (two-sided)."""
-        return float(2 * ndtr(-abs(self.ratio)))
+        return two_sided(self.ratio)
 
     def significant(self, compared: int, family: float = FAMILY) -> bool:
         """Whether it is more than chance among ``compared`` differences (Šidák)."""

@@ -19,9 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from scipy.special import ndtr, ndtri
-
 from cmm_uq.recertification.change import Change, Stated, change, each_of
+from cmm_uq.recertification.normal import two_sided, two_sided_limit
 from cmm_uq.recertification.observed import part_used
 from cmm_uq.records import Certificate, Value
 
@@ -54,8 +53,7 @@ class Checked:
 
 def limit_for(count: int, single: float) -> float:
     """Limit for each of several values with the rate of false alarms that ``single`` has for one."""
-    rate = each_of(count, float(2 * ndtr(-single)))
-    return float(-ndtri(rate / 2))
+    return two_sided_limit(each_of(count, two_sided(single)))
 
 
 def check_standings(calibration: Certificate, checks: Sequence[Certificate]) -> list[Checked]:

@@ -63,31 +63,40 @@ def after_months(start: dt.date, months: int) -> dt.date:
     return dt.date(year, month + 1, min(start.day, calendar.monthrange(year, month + 1)[1]))
 
 
-def machine_due(
-    machine: Machine,
-    rule: Rule,
-    certificates: Sequence[Certificate],
-    artefacts: Mapping[str, ArtefactRow],
-    on: dt.date,
-    pool: Pool,
-) -> Due:
-    """When a machine is to be calibrated again.
+@dataclass(frozen=True)
+class Known:
+    """What is known of a machine on a day.
 
     Parameters
     ----------
     machine, rule : as its newest certificate has them.
-    certificates : of the machine, measured and standing, by day; of a fixed interval those since the last calibration will do.
+    certificates : measured and standing ones up to the day, by day; of a fixed interval those since the last calibration.
+    late : last date of those that are dated after the day; ``None`` where none is.
+    """
+
+    machine: Machine
+    rule: Rule
+    certificates: Sequence[Certificate]
+    late: dt.date | None = None
+
+
+def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, pool: Pool) -> Due:
+    """When a machine is to be calibrated again.
+
+    Parameters
+    ----------
+    of : what is known of the machine.
     artefacts : by serial.
     on : the day asked about.
     pool : intervals of all machines of its model.
     """
+    machine, known = of.machine, of.certificates
     remarks: list[Text] = []
     if machine.by_name:
         remarks.append(say("It has no serial number and is recognised by its name alone."))
-    known = [one for one in certificates if one.day <= on]
-    if len(known) < len(certificates):
-        remarks.append(say("Its certificate of {day} is dated after {on} and does not count: a clock or a date is wrong.",
-                           day=day(certificates[-1].day), on=day(on)))  # fmt: skip
+    if of.late is not None:
+        remarks.append(say("A recording of {day} is dated after {on} and does not count: a clock or a date is wrong.",
+                           day=day(of.late), on=day(on)))  # fmt: skip
     done = calibrations(known)
     if not done:
         why = say("never calibrated up to {on}", on=day(on))
@@ -99,7 +108,7 @@ def machine_due(
         remarks.append(say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day)))
     if not any(one.limit for one in last.values) and last.decision == "none":
         remarks.append(say("Its certificate has no limits, so that only time can say when it is due."))
-    calibrated_again, why = _machine_date(machine, rule, known, done, pool)
+    calibrated_again, why = _machine_date(of, done, pool)
     used = artefacts.get(last.artefact)
     blocked = _blocked(used, on)
     if used is not None and used.due is not None and blocked is None and used.due < calibrated_again:
@@ -109,14 +118,11 @@ def machine_due(
                tuple(remarks), last.artefact, blocked)  # fmt: skip
 
 
-def _machine_date(
-    machine: Machine, rule: Rule, known: Sequence[Certificate], done: Sequence[Certificate], pool: Pool
-) -> tuple[dt.date, Text]:
+def _machine_date(of: Known, done: Sequence[Certificate], pool: Pool) -> tuple[dt.date, Text]:
     """By the first of: an adjustment since, a certificate that does not conform, an interim check, the rule."""
-    last = done[-1]
-    since = [one for one in (*machine.adjusted, *(c.adjusted_since for c in known)) if one and one > last.day]
-    newest = known[-1].day
-    adjusted = [one for one in since if one <= max(newest, last.day)] or since
+    last, known, rule = done[-1], of.certificates, of.rule
+    since = (*of.machine.adjusted, *(one.adjusted_since for one in known))
+    adjusted = [one for one in since if one is not None and one > last.day]
     if adjusted:
         return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted)))
     if last.decision == "fail":
@@ -176,8 +182,9 @@ def _blocked(artefact: ArtefactRow | None, on: dt.date) -> Text | None:
 
 def artefact_due(artefact: ArtefactRow) -> Due:
     """When an artefact is to be calibrated again, as its own certificate says."""
-    why = say("as its certificate {number} says", number=Verbatim(artefact.certificate)) if artefact.certificate else (
-        say("as the jobs that use it say"))  # fmt: skip
+    why: Text = say("as the jobs that use it say")
+    if artefact.certificate:
+        why = say("as its certificate {number} says", number=Verbatim(artefact.certificate))
     if artefact.due is None:
         why = say("no job says when its calibration ends")
     return Due("artefact", artefact.serial, artefact.kind, "", "", artefact.calibrated, artefact.due, why)

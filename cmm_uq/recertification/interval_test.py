@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scipy.special import bdtr, betaincinv
+from scipy import special
 
 from cmm_uq.errors import CmmUqError
 
@@ -109,7 +109,11 @@ def _rejection(passed: int, tested: int, target: float) -> float:
         return float(1 - target**tested)
     if passed == 0:
         return float(1 - (1 - target) ** tested)
-    tail = bdtr(passed, tested, target) if passed / tested <= target else 1 - bdtr(passed - 1, tested, target)
+    tail = (
+        special.bdtr(passed, tested, target)
+        if passed / tested <= target
+        else 1 - special.bdtr(passed - 1, tested, target)
+    )
     return max(float(1 - 2 * tail), 0.0)
 
 
@@ -119,6 +123,6 @@ def reliability_range(passed: int, tested: int, confidence: float) -> tuple[floa
         return 0.0, float(1 - (1 - confidence) ** (1 / tested))
     if passed == tested:
         return float((1 - confidence) ** (1 / tested)), 1.0
-    low = betaincinv(passed, tested - passed + 1, (1 - confidence) / 2)
-    high = betaincinv(passed + 1, tested - passed, (1 + confidence) / 2)
+    low = special.betaincinv(passed, tested - passed + 1, (1 - confidence) / 2)
+    high = special.betaincinv(passed + 1, tested - passed, (1 + confidence) / 2)
     return float(low), float(high)

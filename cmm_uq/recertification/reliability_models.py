@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
+from scipy import special
 
 from cmm_uq.points import Floats
 
@@ -57,7 +57,7 @@ def _mixed_exponential(t: Floats, p: Floats) -> Floats:
 def _within_one(variance: Floats) -> Floats:
     """Probability that a normal deviate of this variance lies within ±1."""
     with np.errstate(divide="ignore"):
-        return np.asarray(2 * ndtr(1 / np.sqrt(variance)) - 1)
+        return np.asarray(2 * special.ndtr(1 / np.sqrt(variance)) - 1)
 
 
 def _random_walk(t: Floats, p: Floats) -> Floats:
@@ -82,12 +82,12 @@ def _warranty(t: Floats, p: Floats) -> Floats:
 
 
 def _drift(t: Floats, p: Floats) -> Floats:
-    return np.asarray(ndtr(p[0] + p[2] * t) + ndtr(p[1] - p[2] * t) - 1)
+    return np.asarray(special.ndtr(p[0] + p[2] * t) + special.ndtr(p[1] - p[2] * t) - 1)
 
 
 def _log_normal(t: Floats, p: Floats) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(ndtr(-np.log(p[0] * t) / p[1]))
+        return np.asarray(special.ndtr(-np.log(p[0] * t) / p[1]))
 
 
 MODELS: Mapping[str, ReliabilityModel] = {

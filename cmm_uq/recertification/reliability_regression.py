@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import approx_fprime, brentq, least_squares
-from scipy.special import fdtr, fdtri, ndtri, xlogy
+from scipy import optimize, special
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import Floats
@@ -28,6 +27,9 @@ _FAR, _STEPS = 50.0, 2000
 
 _SEARCHED = 200
 """Evaluations of a model in one search."""
+
+_STEP = 1e-6
+"""Of a parameter, for a gradient."""
 
 _APART = 1.5
 """Two intervals are not alike where the step between them is so many times the mean step."""
@@ -110,7 +112,9 @@ def grouped(days: Sequence[float], in_tolerance: Sequence[bool], groups: int = 8
     tested = np.bincount(index, minlength=groups)
     kept = tested > 0
     mean = np.bincount(index, length, groups)[kept] / tested[kept]
-    return Grouped(mean, tested[kept].astype(np.float64), np.bincount(index, passed, groups)[kept])
+    return Grouped(
+        mean, tested[kept].astype(np.float64), np.asarray(np.bincount(index, passed, groups)[kept], dtype=np.float64)
+    )
 
 
 def reliability_regression(data: Grouped, target: float) -> ReliabilityRegression:
@@ -164,10 +168,10 @@ def _fitted(model: ReliabilityModel, data: Grouped, scale: float, target: float)
     lack = (data.tested * (observed - model.reliability(data.days / scale, parameters)) ** 2).sum() / (groups - free)
     ratio = lack / error if error > 0 else np.inf
     freedoms = groups - free, count - groups
-    rejection = float(fdtr(*freedoms, ratio)) if np.isfinite(ratio) else 1.0
+    rejection = float(special.fdtr(*freedoms, ratio)) if np.isfinite(ratio) else 1.0
     interval = _time_of(model, parameters, target)
     reach = _time_of(model, parameters, 1 - target) or _FAR
-    accepted = bool(ratio < fdtri(*freedoms, LEVEL))
+    accepted = bool(ratio < special.fdtri(*freedoms, LEVEL))
     days = None if interval is None else interval * scale
     return Fitted(model.name, parameters, scale, days, rejection, accepted, 0.0), reach * scale
 
@@ -175,7 +179,11 @@ def _fitted(model: ReliabilityModel, data: Grouped, scale: float, target: float)
 def _most_likely(model: ReliabilityModel, data: Grouped, scale: float) -> Floats:
     """Parameters of the largest likelihood found from several starts."""
     t, out = data.days / scale, data.tested - data.in_tolerance
-    fullest = xlogy(data.in_tolerance, data.in_tolerance) + xlogy(out, out) - xlogy(data.tested, data.tested)
+    fullest = (
+        special.xlogy(data.in_tolerance, data.in_tolerance)
+        + special.xlogy(out, out)
+        - special.xlogy(data.tested, data.tested)
+    )
 
     def deviances(parameters: Floats) -> Floats:
         """Signed roots, whose squares add up to twice what the logarithm of the likelihood lacks."""
@@ -184,7 +192,7 @@ def _most_likely(model: ReliabilityModel, data: Grouped, scale: float) -> Floats
         return np.asarray(np.sign(data.in_tolerance - data.tested * r) * np.sqrt(2 * np.maximum(lacking, 0)))
 
     low, high = np.transpose(model.bounds)
-    found = [least_squares(deviances, start, bounds=(low, high), max_nfev=_SEARCHED) for start in model.starts]
+    found = [optimize.least_squares(deviances, start, bounds=(low, high), max_nfev=_SEARCHED) for start in model.starts]
     return np.asarray(min(found, key=lambda one: float(one.cost)).x)
 
 
@@ -196,7 +204,9 @@ def _time_of(model: ReliabilityModel, parameters: Floats, level: float) -> float
         return None
     i = int(np.argmin(above))
     return float(
-        brentq(lambda t: float(model.reliability(np.array([t]), parameters)[0]) - level, times[i - 1], times[i])
+        optimize.brentq(
+            lambda t: float(model.reliability(np.array([t]), parameters)[0]) - level, times[i - 1], times[i]
+        )
     )
 
 
@@ -212,22 +222,22 @@ def _alike(intervals: Sequence[float | None]) -> list[int]:
 def _range(best: Fitted, data: Grouped, target: float) -> tuple[float, float]:
     """Days between which the reliability may well be the target (RP-1 eq. D-29, from the likelihood's curvature)."""
     model, t = MODELS[best.name], data.days / best.scale
-    step = 1e-6
-
-    def slope(time: float) -> Floats:
-        return np.asarray(
-            approx_fprime(best.parameters, lambda p: float(model.reliability(np.array([time]), p)[0]), step)
-        )
-
     r = np.clip(model.reliability(t, best.parameters), _SURE, 1 - _SURE)
-    slopes = np.array([slope(one) for one in t])
+    slopes = _gradients(model, t, best.parameters)
     covariance = np.linalg.pinv(slopes.T @ ((data.tested / (r * (1 - r)))[:, None] * slopes))
-    factor = float(ndtri(0.5 + LEVEL / 2))
+    factor = float(special.ndtri(0.5 + LEVEL / 2))
     times = np.linspace(1e-6, 1.0, 400)
-    gradient = np.array([slope(one) for one in times])
+    gradient = _gradients(model, times, best.parameters)
     half = factor * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", gradient, covariance, gradient), 0))
     line = model.reliability(times, best.parameters)
     surely, maybe = times[line - half >= target], times[line + half >= target]
     low = float(surely.max()) * best.scale if len(surely) else 0.0
     high = float(maybe.max()) * best.scale if len(maybe) and maybe.max() < 1.0 else float("inf")
     return low, high
+
+
+def _gradients(model: ReliabilityModel, t: Floats, parameters: Floats) -> Floats:
+    """Of the reliability at times (n,) by the m parameters, (n, m)."""
+    line = model.reliability(t, parameters)
+    steps = _STEP * np.eye(len(parameters))
+    return np.column_stack([(model.reliability(t, parameters + step) - line) / _STEP for step in steps])

@@ -2,8 +2,8 @@
 
 A calibration that finds the machine well within its limits (to 80 %, as the guide suggests) lengthens the next interval by a
 step up; one that finds it beyond a limit shortens it by a step down; between, it stays. The guide leaves the steps open. Here
-the step down follows from the step up and the reliability R that is wanted: where R of the calibrations go up and 1 − R down, the
-logarithm of the interval does not move, R·ln(1 + a) + (1 − R)·ln(1 − b) = 0.
+the step down follows from the step up and the reliability R that is wanted: where R of the calibrations go up and 1 − R down,
+the logarithm of the interval does not move, R·ln(1 + a) + (1 − R)·ln(1 − b) = 0.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A straight line through the values of one machine since it was last adjusted, and the day on which it meets a limit.
 
 Generalised least squares: the values are as uncertain as their certificates say, and what comes from the artefact is common
-to all that were made with it. A common error shifts the line and does not tilt it. Where the values scatter about the line by more
-than their uncertainties allow, the line is as much more uncertain (Birge ratio).
+to all that were made with it. A common error shifts the line and does not tilt it. Where the values scatter about the line by
+more than their uncertainties allow, the line is as much more uncertain (Birge ratio).
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
+from numpy.typing import NDArray
 
 from cmm_uq.points import Floats
+from cmm_uq.recertification.normal import below
 from cmm_uq.records import Series
 
 YEAR = 365.2425
@@ -73,7 +74,7 @@ def epochs(series: Series) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in zip(starts, [*starts[1:], len(series.day)], strict=True)]
 
 
-def covariance_of(u: Floats, u_artefact: Floats, artefact: Floats) -> Floats:
+def covariance_of(u: Floats, u_artefact: Floats, artefact: NDArray[np.str_]) -> Floats:
     """Covariance (n, n) of values (n,): what the artefact contributes is common to all with the same one."""
     same = (np.asarray(artefact)[:, None] == np.asarray(artefact)[None, :]) & (np.asarray(artefact) != "")
     covariance = np.where(same, np.outer(u_artefact, u_artefact), 0.0)
@@ -106,7 +107,7 @@ def meeting(line: Line, limit: float) -> Meeting:
     days = line.day + np.arange(0.0, _HORIZON, 7.0)
     value, u = line.at(days)
     u = np.maximum(u, 1e-300)
-    beyond = ndtr((value - limit) / u) + ndtr((-limit - value) / u)
+    beyond = below((value - limit) / u) + below((-limit - value) / u)
 
     def first(level: float) -> int | None:
         reached = np.flatnonzero(beyond >= level)

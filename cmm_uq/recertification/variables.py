@@ -11,8 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import stdtr
+from scipy import optimize, special
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import Floats
@@ -132,7 +131,7 @@ def _falls(excess: Callable[[Floats], Floats], longest: float) -> float:
     if not short.any():
         return float("inf")
     i = int(np.argmax(short))
-    return float(brentq(lambda t: float(excess(np.array([t]))[0]), times[i - 1], times[i]))
+    return float(optimize.brentq(lambda t: float(excess(np.array([t]))[0]), times[i - 1], times[i]))
 
 
 def _powers(days: Floats, order: int) -> Floats:
@@ -141,4 +140,4 @@ def _powers(days: Floats, order: int) -> Floats:
 
 def _t(freedoms: Floats, distance: Floats, u: Floats) -> Floats:
     """Student's distribution function of ``distance/u``; a step where nothing is uncertain."""
-    return np.asarray(np.where(u > 0, stdtr(freedoms, distance / np.where(u > 0, u, 1.0)), distance >= 0))
+    return np.asarray(np.where(u > 0, special.stdtr(freedoms, distance / np.where(u > 0, u, 1.0)), distance >= 0))

@@ -138,9 +138,22 @@ class Records:
         """
         return self._read(lambda connection: queries.named(connection, certificate, self.home))
 
-    def latest(self) -> list[Certificate]:
-        """Newest measured certificate, not withdrawn nor replaced, of each machine; interim checks are none."""
-        return self._read(lambda connection: queries.latest_of(connection, self.home))
+    def latest(self, until: dt.date | None = None) -> list[Certificate]:
+        """Newest measured certificate, not withdrawn nor replaced, of each machine; interim checks are none.
+
+        Parameters
+        ----------
+        until : a day; what is dated later does not count.
+        """
+        return self._read(lambda connection: queries.latest_of(connection, self.home, until))
+
+    def dated_after(self, day: dt.date) -> dict[str, dt.date]:
+        """Machines with measured certificates or interim checks dated after a day, and the last such date of each."""
+        return self._read(lambda connection: queries.dated_after_of(connection, day))
+
+    def checks(self) -> list[Certificate]:
+        """Measured interim checks of all machines, neither withdrawn nor replaced, by day, then entry."""
+        return self._read(lambda connection: queries.checks_of(connection, self.home))
 
     def series(
         self, machine: str, names: Collection[str] | None = None, origin: str = "measured"
