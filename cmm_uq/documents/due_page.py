@@ -66,7 +66,20 @@ def _overview(items: Sequence[Due], on: dt.date, within: dt.timedelta) -> Overvi
     verdict, standing = counts(items, on, within)
     blocked = sum(one.blocked is not None for one in items)
     count = plural(blocked, one=say("one machine"), many=say("{count} machines", count=blocked))
-    return Overview(verdict, standing, ((say("Artefact out of date"), count),) if blocked else ())
+    rows: list[tuple[Text, Text]] = [(say("Looked at"), _looked_at(items))]
+    if blocked:
+        rows.append((say("Artefact out of date"), count))
+    return Overview(verdict, standing, tuple(rows))
+
+
+def _looked_at(items: Sequence[Due]) -> Text:
+    found = Counter(one.item for one in items)
+    machines, artefacts = found["machine"], found["artefact"]
+    return say(
+        "{machines} and {artefacts}",
+        machines=plural(machines, one=say("one machine"), many=say("{count} machines", count=machines)),
+        artefacts=plural(artefacts, one=say("one artefact"), many=say("{count} artefacts", count=artefacts)),
+    )
 
 
 def _table(rows: Sequence[Due], on: dt.date, within: dt.timedelta, title: Text) -> tuple[Block, ...]:
@@ -87,7 +100,9 @@ def _table(rows: Sequence[Due], on: dt.date, within: dt.timedelta, title: Text) 
         )
         for one in rows
     )  # fmt: skip
-    return (Table(title, tuple(Column(head, numeric=False) for head in heads), cells),)
+    whole = (True, False, False, False, False, True, False)  # dates are not broken at their hyphens
+    columns = tuple(Column(head, numeric=kept) for head, kept in zip(heads, whole, strict=True))
+    return (Table(title, columns, cells),)
 
 
 def reason(one: Due) -> Text:

@@ -43,17 +43,14 @@ def history_document(history: MachineHistory) -> Document:
 def overview_of(history: MachineHistory) -> Overview:
     """Whether anything is beyond its limit, and what changed."""
     beyond = [Verbatim(one.series.quantity) for one in history.values if one.beyond]
+    probable = [Verbatim(one.series.quantity) for one in history.values if one.probably_beyond(history.on)]
     changed = [Verbatim(one.series.quantity) for one in history.values if history.significant(one)]
-    standing: Standing = "bad" if beyond else "open" if changed else "good"
-    verdict = (
-        say("Beyond its limits")
-        if beyond
-        else say("Changed since the last time")
-        if changed
-        else say("No change that stands out")
-    )
-    if not history.values:
-        standing, verdict = "open", say("Nothing is recorded yet")
+    standing: Standing = "bad" if beyond else "open" if probable or changed or not history.values else "good"
+    verdicts = (
+        (not history.values, say("Nothing is recorded yet")), (bool(beyond), say("Beyond its limits")),
+        (bool(probable), say("Probably beyond a limit by now")), (bool(changed), say("Changed since the last time")),
+    )  # fmt: skip
+    verdict = next((text for holds, text in verdicts if holds), say("No change that stands out"))
     rows: list[tuple[Text, Text]] = []
     if beyond:
         rows.append((say("Beyond a limit"), commas(beyond)))

@@ -108,13 +108,13 @@ def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, po
         remarks.append(say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day)))
     if not any(one.limit for one in last.values) and last.decision == "none":
         remarks.append(say("Its certificate has no limits, so that only time can say when it is due."))
-    calibrated_again, why = _machine_date(of, done, pool)
+    calibrated_again, reason = _machine_date(of, done, pool)
     used = artefacts.get(last.artefact)
     blocked = _blocked(used, on)
     if used is not None and used.due is not None and blocked is None and used.due < calibrated_again:
         remarks.append(say("Its artefact {artefact} is itself due on {due}, before that.",
                            artefact=Verbatim(used.serial), due=day(used.due)))  # fmt: skip
-    return Due("machine", machine.serial, machine.name, machine.model, machine.place, last.day, calibrated_again, why,
+    return Due("machine", machine.serial, machine.name, machine.model, machine.place, last.day, calibrated_again, reason,
                tuple(remarks), last.artefact, blocked)  # fmt: skip
 
 

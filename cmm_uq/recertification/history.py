@@ -36,6 +36,11 @@ class ValueHistory:
         """Whether the last value is beyond its limit."""
         return self.series.limit is not None and abs(float(self.series.value[-1])) > self.series.limit
 
+    def probably_beyond(self, on: dt.date) -> bool:
+        """Whether the line is more probably beyond the limit on a day than not, although the last value was not."""
+        middle = None if self.meeting is None else self.meeting.middle
+        return not self.beyond and middle is not None and middle <= on.toordinal()
+
 
 @dataclass(frozen=True)
 class MachineHistory:

@@ -69,9 +69,8 @@ def machine_of(connection: Connection, serial: str) -> Machine:
 
 
 def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> Machine:
-    names = ("name", "manufacturer", "model", "place")
     return Machine(
-        row["called"], *(row[name] for name in names), adjusted=tuple(adjusted),
+        row["called"], row["name"], row["manufacturer"], row["model"], row["place"], tuple(adjusted),
         by_name=row["recognised"].startswith("name:"), calibrate=json.loads(row["calibrate"]) if row["calibrate"] else None,
     )  # fmt: skip
 
