@@ -108,7 +108,7 @@ def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, po
         remarks.append(say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day)))
     if not any(one.limit for one in last.values) and last.decision == "none":
         remarks.append(say("Its certificate has no limits, so that only time can say when it is due."))
-    calibrated_again, reason = _machine_date(of, done, pool)
+    calibrated_again, reason = _machine_date(of, done, on, pool)
     used = artefacts.get(last.artefact)
     blocked = _blocked(used, on)
     if used is not None and used.due is not None and blocked is None and used.due < calibrated_again:
@@ -118,11 +118,11 @@ def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, po
                tuple(remarks), last.artefact, blocked)  # fmt: skip
 
 
-def _machine_date(of: Known, done: Sequence[Certificate], pool: Pool) -> tuple[dt.date, Text]:
+def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Pool) -> tuple[dt.date, Text]:
     """By the first of: an adjustment since, a certificate that does not conform, an interim check, the rule."""
     last, known, rule = done[-1], of.certificates, of.rule
     since = (*of.machine.adjusted, *(one.adjusted_since for one in known))
-    adjusted = [one for one in since if one is not None and one > last.day]
+    adjusted = [one for one in since if one is not None and last.day < one <= on]
     if adjusted:
         return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted)))
     if last.decision == "fail":

@@ -13,6 +13,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, Verbatim, foreign, number, plural, say
+from cmm_uq.recertification.drift_interval import drift_interval
 from cmm_uq.recertification.interval_test import interval_test
 from cmm_uq.recertification.observed import Ended, adjusted_between, calibrations, ended_intervals
 from cmm_uq.recertification.reliability_regression import grouped, reliability_regression
@@ -143,12 +144,20 @@ def _control_chart(rule: Rule, certificates: Sequence[Certificate], pool: Pool) 
     if shortest is None:
         raise CmmUqError("it needs three calibrations without an adjustment between")
     length, name = shortest
-    reached = (
-        say("{days} days", days=number(length, ".0f")) if np.isfinite(length) else say("more than was ever observed")
-    )
     why = say("control chart: {name} stays within its limit with {target} % for {reached}", name=name,
-              target=_percent(rule.reliability), reached=reached)  # fmt: skip
+              target=_percent(rule.reliability), reached=_lasting(length))  # fmt: skip
     return rule.changing.bounded(length), why
 
 
-_METHODS = {"A3": _a3, "S2": _s2, "staircase": _staircase, "control chart": _control_chart}
+def _drift(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[float, Text]:
+    length, name = drift_interval(certificates, rule.reliability)
+    why = say("drift model: {name} has not crossed its limit with {target} % for {reached}", name=Verbatim(name),
+              target=_percent(rule.reliability), reached=_lasting(length))  # fmt: skip
+    return rule.changing.bounded(length), why
+
+
+def _lasting(days: float) -> Text:
+    return say("{days} days", days=number(days, ".0f")) if np.isfinite(days) else say("longer than can be foreseen")
+
+
+_METHODS = {"A3": _a3, "S2": _s2, "staircase": _staircase, "control chart": _control_chart, "drift": _drift}

@@ -106,7 +106,7 @@ class Indexer:
         if together := data.get("covariance"):
             self._rows[covariances].append({
                 "certificate": entry.number, "names": json.dumps(together["names"], ensure_ascii=False),
-                "triangle": json.dumps(together["triangle"]),
+                "lower": json.dumps(together["lower"]),
             })  # fmt: skip
 
     def _machine(self, facts: Mapping[str, Any], day: str, entry: int) -> Row:

@@ -99,6 +99,7 @@ def _file(path: Path, create: bool, read_only: bool) -> Engine:
             made.execute("PRAGMA foreign_keys = ON")
             made.execute("PRAGMA synchronous = FULL")
             made.execute("PRAGMA recursive_triggers = ON")
+            made.execute("PRAGMA cache_size = -65536")  # KiB: pages of the indexes of 10⁵ certificates
         return made
 
     engine = create_engine("sqlite://", creator=connect, poolclass=QueuePool)

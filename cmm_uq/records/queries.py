@@ -15,7 +15,7 @@ from sqlalchemy import ColumnElement, Connection, Select, and_, func, or_, selec
 
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.records.facts import STANDING, ArtefactRow, Certificate, Machine, Series, Signature, Value
-from cmm_uq.records.recognised import spelled
+from cmm_uq.records.recognised import BY_NAME, spelled
 from cmm_uq.records.tables import (
     adjustments,
     artefacts,
@@ -71,7 +71,8 @@ def machine_of(connection: Connection, serial: str) -> Machine:
 def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> Machine:
     return Machine(
         row["called"], row["name"], row["manufacturer"], row["model"], row["place"], tuple(adjusted),
-        by_name=row["recognised"].startswith("name:"), calibrate=json.loads(row["calibrate"]) if row["calibrate"] else None,
+        row["recognised"].startswith(BY_NAME),
+        json.loads(row["calibrate"]) if row["calibrate"] else None,
     )  # fmt: skip
 
 
@@ -251,7 +252,7 @@ def _together(
     c, found = covariances.c, {}
     for block in _blocks(entries):
         for row in connection.execute(select(covariances).where(c.certificate.in_(block))):
-            found[row.certificate] = (tuple(json.loads(row.names)), tuple(json.loads(row.triangle)))
+            found[row.certificate] = (tuple(json.loads(row.names)), tuple(json.loads(row.lower)))
     return found
 
 
