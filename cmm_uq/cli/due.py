@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cmm_uq.cli import NOT_CONFORMING
-from cmm_uq.cli.deferred import defer_scipy
 from cmm_uq.cli.options import Force, Json, Quiet, examples
 from cmm_uq.cli.printing import layout, put_data, show
 from cmm_uq.cli.recording_options import On, Records, day_of, time_of
@@ -41,7 +40,6 @@ def command(
     json: Json = False,
 ) -> None:
     """Say which machines and artefacts are due for calibration, when, and why."""
-    defer_scipy()
     from cmm_uq.commands.due import what_is_due, write_due
 
     found = what_is_due(records, machines or (), on=day_of(on), within=time_of(within))

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.cli.deferred import defer_scipy
 from cmm_uq.cli.options import Force, Json, Quiet, Verbose, examples
 from cmm_uq.cli.printing import layout, put_data, show
 from cmm_uq.cli.recording_options import On, Records, day_of
@@ -34,7 +33,6 @@ def command(
     json: Json = False,
 ) -> None:
     """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be met."""
-    defer_scipy()
     from cmm_uq.commands.history import history_of, write_history
 
     found = history_of(machine, records, on=day_of(on))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq import __version__
 from cmm_uq.errors import CmmUqError
 from cmm_uq.recertification.due import Due, Known, artefact_due, in_order, machine_due
-from cmm_uq.recertification.observed import Ended, ended_intervals
+from cmm_uq.recertification.interval import Pool
+from cmm_uq.recertification.observed import Ended, calibrations, ended_intervals, part_used
 from cmm_uq.recertification.rule import Rule
 from cmm_uq.records import Certificate, Machine, open_records
 from cmm_uq.records.facts import STANDING
@@ -98,53 +99,51 @@ def due_in(records: Records, machines: Collection[str], on: dt.date) -> list[Due
     CmmUqError : a machine is not in them.
     """
     artefacts = {one.serial: one for one in records.artefacts()}
-    reading = _Reading(records, on)
-    known = [records.machine(serial) for serial in machines] if machines else records.machines()
-    if not machines and not known and not artefacts:
+    asked = {one.serial: one for one in map(records.machine, machines)}.values() if machines else records.machines()
+    if not asked and not artefacts:
         raise CmmUqError("no machine is recorded yet", where="records", fix="Record one: cmm-uq report JOB")
-    found = [
-        machine_due(
-            Known(one, Rule.of(one.calibrate), reading.certificates(one), reading.late.get(one.serial)), artefacts, on,
-            reading.pool(one),
-        )
-        for one in known
-    ]  # fmt: skip
+    reading = _Reading(records, on, whole=bool(machines))
+    found = [machine_due(reading.known(one), artefacts, on, reading.pool(one)) for one in asked]
     used = {one.artefact for one in found} if machines else set(artefacts)
     return in_order([*found, *(artefact_due(artefacts[serial]) for serial in used if serial in artefacts)])
 
 
 class _Reading:
-    """Certificates of machines: all newest ones in one query, whole histories only where a rule needs them.
+    """Certificates of machines: all newest ones in one query, whole histories only where something needs them.
 
     Parameters
     ----------
     records, on : where from, and up to which day.
+    whole : whether histories are read whole, of the few machines that are asked for.
     """
 
-    def __init__(self, records: Records, on: dt.date) -> None:
+    def __init__(self, records: Records, on: dt.date, *, whole: bool) -> None:
         self.records = records
+        self._late = records.dated_after(on)
         self._on = on
-        self._newest = {one.machine: one for one in records.latest(on)}
-        self.late = records.dated_after(on)
-        self._checks: dict[str, list[Certificate]] = {}
-        for one in records.checks():
-            if one.day <= on:
-                self._checks.setdefault(one.machine, []).append(one)
-        self._whole: dict[str, list[Certificate]] = {}
+        self._newest: dict[str, Certificate] = {}
+        self._checked: dict[str, Certificate] = {}
+        self._without: set[int] = set()
+        self._pasts: dict[str, list[Certificate]] = {}
         self._pools: dict[tuple[str, str], list[Ended]] = {}
+        if not whole:
+            self._newest = {one.machine: one for one in records.latest(on, values=False)}
+            self._checked = {one.machine: one for one in records.checks() if one.day <= on}
+            undecided = [one.entry for one in self._newest.values() if one.decision == "none"]
+            self._without = set(undecided) - records.limited(undecided)
 
-    def certificates(self, machine: Machine) -> Sequence[Certificate]:
-        """What its rule needs, by day."""
-        newest = self._newest.get(machine.serial)
-        checks = self._checks.get(machine.serial, [])
-        if newest is None:
-            return checks
-        if Rule.of(machine.calibrate).method != "fixed":
-            return self._past(machine.serial)
-        later = [one for one in checks if (one.day, one.entry) > (newest.day, newest.entry)]
-        return [newest, *later]
+    def known(self, machine: Machine) -> Known:
+        """What its rule needs of a machine: its newest certificate where that will do."""
+        rule, late = Rule.of(machine.calibrate), self._late.get(machine.serial)
+        newest, checked = self._newest.get(machine.serial), self._checked.get(machine.serial)
+        later = checked is not None and (newest is None or (checked.day, checked.entry) > (newest.day, newest.entry))
+        if newest is not None and not later and rule.method == "fixed":
+            return Known(machine, rule, [newest], newest.entry not in self._without, late)
+        past = self._past(machine.serial)
+        limited = any(part_used(one) is not None or one.decision != "none" for one in calibrations(past)[-1:])
+        return Known(machine, rule, past, limited, late)
 
-    def pool(self, machine: Machine) -> Callable[[], Sequence[Ended]]:
+    def pool(self, machine: Machine) -> Pool:
         """Intervals of all machines of its model; its own where its model is not known."""
 
         def pooled() -> Sequence[Ended]:
@@ -160,10 +159,10 @@ class _Reading:
 
     def _past(self, serial: str) -> list[Certificate]:
         """Standing certificates and checks of a machine up to the day."""
-        if serial not in self._whole:
+        if serial not in self._pasts:
             known = self.records.certificates(serial, states=STANDING)
-            self._whole[serial] = [one for one in known if one.day <= self._on]
-        return self._whole[serial]
+            self._pasts[serial] = [one for one in known if one.day <= self._on]
+        return self._pasts[serial]
 
 
 def write_due(found: WhatIsDue, folder: Path, *, force: bool = False) -> dict[str, Path]:

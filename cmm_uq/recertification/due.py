@@ -71,12 +71,14 @@ class Known:
     ----------
     machine, rule : as its newest certificate has them.
     certificates : measured and standing ones up to the day, by day; of a fixed interval those since the last calibration.
+    limited : whether the last calibration sets a limit, or decides on one.
     late : last date of those that are dated after the day; ``None`` where none is.
     """
 
     machine: Machine
     rule: Rule
     certificates: Sequence[Certificate]
+    limited: bool = True
     late: dt.date | None = None
 
 
@@ -106,7 +108,7 @@ def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, po
     last = done[-1]
     if last.state == "draft":
         remarks.append(say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day)))
-    if not any(one.limit for one in last.values) and last.decision == "none":
+    if not of.limited:
         remarks.append(say("Its certificate has no limits, so that only time can say when it is due."))
     calibrated_again, reason = _machine_date(of, done, on, pool)
     used = artefacts.get(last.artefact)

@@ -5,17 +5,6 @@ from __future__ import annotations
 import math
 from statistics import NormalDist
 
-import numpy as np
-
-from cmm_uq.points import Floats
-
-_erfc = np.frompyfunc(math.erfc, 1, 1)
-
-
-def below(z: Floats) -> Floats:
-    """Probability (n,) of a deviate below ``z`` (n,)."""
-    return np.asarray(0.5 * _erfc(-np.asarray(z, dtype=np.float64) / math.sqrt(2)), dtype=np.float64)
-
 
 def two_sided(z: float) -> float:
     """Probability of a deviate at least as far from zero as ``z``."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cmm_uq.recertification.interval_test import Changing
+from cmm_uq.recertification.changing import Changing
 
 DAYS_A_MONTH = 365.2425 / 12
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from cmm_uq.recertification.interval_test import USUAL, Changing
+from cmm_uq.recertification.changing import USUAL, Changing
 
 WELL_WITHIN = 0.8
 """Part of the limit up to which the interval is lengthened (ILAC-G24 / OIML D 10:2022, 6.2)."""

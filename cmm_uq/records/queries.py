@@ -163,7 +163,9 @@ def named(connection: Connection, name: str, home: Path | None) -> list[Certific
     return []
 
 
-def latest_of(connection: Connection, home: Path | None, until: dt.date | None = None) -> list[Certificate]:
+def latest_of(
+    connection: Connection, home: Path | None, until: dt.date | None = None, *, values: bool = True
+) -> list[Certificate]:  # fmt: skip
     """Newest of each machine; see :meth:`cmm_uq.records.store.Records.latest`."""
     newest = certificates.alias()
     of_machine = (
@@ -177,7 +179,7 @@ def latest_of(connection: Connection, home: Path | None, until: dt.date | None =
     rows = []
     for block in _blocks([entry for entry in entries if entry is not None]):
         query = select(*_COLUMNS).select_from(_JOINED).where(certificates.c.entry.in_(block))
-        rows += _certificates(connection, query, values=True, home=home)
+        rows += _certificates(connection, query, values=values, home=home)
     return sorted(rows, key=lambda one: (one.machine, one.entry))
 
 
@@ -188,6 +190,15 @@ def checks_of(connection: Connection, home: Path | None) -> list[Certificate]:
         c.command == "report", c.origin == "measured", c.interim.is_(True), c.state.in_(STANDING)
     )  # fmt: skip
     return _certificates(connection, query.order_by(c.day, c.entry), values=True, home=home)
+
+
+def limited_of(connection: Connection, entries: Sequence[int]) -> set[int]:
+    """Those with a limit; see :meth:`cmm_uq.records.store.Records.limited`."""
+    f, found = figures.c, set[int]()
+    for block in _blocks(entries):
+        query = select(f.certificate).distinct().where(f.certificate.in_(block), f.at_most.is_not(None))
+        found.update(connection.execute(query).scalars())
+    return found
 
 
 def dated_after_of(connection: Connection, day: dt.date) -> dict[str, dt.date]:

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.stats import beta, binomtest
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.recertification.interval_test import Changing, interval_test, reliability_range
+from cmm_uq.recertification.changing import Changing
+from cmm_uq.recertification.interval_test import interval_test, reliability_range
 
 PRINTED = [
     ((15, 20, 365, 0.95), 0.5, (231, 0.9949, 0.6516, 0.8286)),

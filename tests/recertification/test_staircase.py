@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.recertification.interval_test import Changing
+from cmm_uq.recertification.changing import Changing
 from cmm_uq.recertification.staircase import staircase, step_down
 
 WIDE = Changing(factor=1e9, shortest_days=1e-9, longest_days=1e12)
