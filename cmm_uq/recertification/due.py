@@ -14,7 +14,7 @@ from typing import Literal
 from cmm_uq.messages import Text, Verbatim, day, foreign, number, say
 from cmm_uq.recertification.checks import Checked, check_standings
 from cmm_uq.recertification.interval import Interval, Pool, interval_by
-from cmm_uq.recertification.observed import calibrations
+from cmm_uq.recertification.observed import BEYOND, calibrations
 from cmm_uq.recertification.rule import Rule
 from cmm_uq.records import ArtefactRow, Certificate, Machine
 
@@ -127,7 +127,7 @@ def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Poo
     adjusted = [one for one in since if one is not None and last.day < one <= on]
     if adjusted:
         return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted)))
-    if last.decision == "fail":
+    if last.decision in BEYOND:
         return last.day, say("its last certificate finds it beyond its limits")
     interval = interval_by(rule, known[: known.index(last) + 1], pool)
     planned = _ends(last.day, interval)
