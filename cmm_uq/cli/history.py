@@ -53,7 +53,8 @@ def _show(found: MachineHistory, files: dict[str, Path], *, verbose: bool) -> No
     machine = found.machine
     serial = "" if machine.by_name else f", serial number {machine.serial}"
     count = len(found.certificates)
-    show([((f"{machine.name}{serial}", HEADING), (f": {count} recordings up to {found.on.isoformat()}", ""))])
+    recordings = "one recording" if count == 1 else f"{count} recordings"
+    show([((f"{machine.name}{serial}", HEADING), (f": {recordings} up to {found.on.isoformat()}", ""))])
     show(layout(verbose=verbose).table([summary_row(found, one) for one in found.values]))
     show([((text, COLOURS["open"]),) for text in found.remarks])
     if files:

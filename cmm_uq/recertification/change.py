@@ -2,6 +2,8 @@
 
 Both values carry the error of the artefact. Where it was the same artefact, that part is in both, and cancels in their
 difference: u²(d) = u₁² + u₂² − 2·u_a1·u_a2 (JCGM 100:2008, 5.2.2, with correlation 1 of what comes from the artefact).
+Where all of an uncertainty comes from the artefact, as a test uncertainty does, nothing is stated of how the machine
+repeats; then nothing cancels either, or every change would be called significant.
 """
 
 from __future__ import annotations
@@ -10,6 +12,9 @@ import math
 from dataclasses import dataclass
 
 from cmm_uq.recertification.normal import two_sided
+
+_NOTHING = 1e-9
+"""Part of a variance that is none."""
 
 FAMILY = 0.05
 """Probability that anything at all is called significant where nothing changed."""
@@ -62,7 +67,13 @@ def each_of(count: int, family: float) -> float:
     return -math.expm1(math.log1p(-family) / max(count, 1))
 
 
+def common_part(u: float, u_artefact: float) -> float:
+    """Part of a standard uncertainty that cancels against another value of the same artefact; 0 where it is the whole."""
+    return u_artefact if u**2 - u_artefact**2 > _NOTHING * u**2 else 0.0
+
+
 def change(before: Stated, now: Stated) -> Change:
     """What a value changed by."""
-    common = before.u_artefact * now.u_artefact if before.artefact and before.artefact == now.artefact else 0.0
+    same = bool(before.artefact) and before.artefact == now.artefact
+    common = common_part(before.u, before.u_artefact) * common_part(now.u, now.u_artefact) if same else 0.0
     return Change(now.value - before.value, math.sqrt(max(before.u**2 + now.u**2 - 2 * common, 0.0)))

@@ -21,7 +21,7 @@ from typing import Literal
 
 from cmm_uq.recertification.change import Change, Stated, change, each_of
 from cmm_uq.recertification.normal import two_sided, two_sided_limit
-from cmm_uq.recertification.observed import part_used
+from cmm_uq.recertification.observed import is_of_machine, part_used
 from cmm_uq.records import Certificate, Value
 
 Standing = Literal["in control", "warning", "action"]
@@ -64,7 +64,7 @@ def check_standings(calibration: Certificate, checks: Sequence[Certificate]) -> 
     calibration : that the checks are compared with.
     checks : of the same machine since, without an adjustment between, by day.
     """
-    stated = {one.name: _stated(one, calibration) for one in calibration.values}
+    stated = {one.name: _stated(one, calibration) for one in calibration.values if is_of_machine(one.unit)}
     found: list[Checked] = []
     before: dict[str, Change] = {}
     for check in checks:

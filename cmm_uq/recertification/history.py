@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from cmm_uq.messages import Text, day, plural, say
 from cmm_uq.recertification.change import Change, Stated, change
+from cmm_uq.recertification.observed import is_of_machine
 from cmm_uq.recertification.trend import Line, Meeting, meeting, trend
 from cmm_uq.records import Certificate, Machine, Series
 
@@ -92,7 +93,7 @@ def machine_history(
         )
         remarks.append(plural(late, one=one, many=many))
     cut = (_until(one, on) for one in series.values())
-    values = tuple(_value(one) for one in cut if len(one.day))
+    values = tuple(_value(one) for one in cut if len(one.day) and is_of_machine(one.unit))
     if values and not any(one.series.limit is not None for one in values):
         remarks.append(say("No certificate has limits, so that none can be met."))
     if known and len({one.day for one in known}) == 1:

@@ -44,6 +44,11 @@ def part_used(certificate: Certificate) -> float | None:
     return max(parts) if parts else _DECIDED.get(certificate.decision)
 
 
+def is_of_machine(unit: str) -> bool:
+    """Whether a value says something of the machine: one in mm is a size, of the artefact, and changes with it."""
+    return unit != "mm"
+
+
 def calibrations(certificates: Iterable[Certificate]) -> list[Certificate]:
     """Those that are no interim checks."""
     return [one for one in certificates if not one.interim]

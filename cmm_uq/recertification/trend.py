@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.points import Floats
+from cmm_uq.recertification.change import common_part
 from cmm_uq.records import Series
 
 YEAR = 365.2425
@@ -91,7 +92,9 @@ def trend(series: Series) -> Line | None:
     day, value = series.day[rows], series.value[rows]
     if len(np.unique(day)) < 2:
         return None
-    covariance = covariance_of(series.u[rows], series.u_artefact[rows], series.artefact[rows])
+    pairs = zip(series.u[rows], series.u_artefact[rows], strict=True)
+    common = np.array([common_part(float(u), float(shared)) for u, shared in pairs])
+    covariance = covariance_of(series.u[rows], common, series.artefact[rows])
     floor = _LEAST * max(float(np.abs(value).max()), 1e-30)
     covariance += np.diag(np.full(len(day), floor**2))
     terms = np.column_stack([np.ones(len(day)), (day - day[-1]) / YEAR])

@@ -32,9 +32,16 @@ def test_another_artefact_does_not_nor_does_an_unknown_one() -> None:
 def test_it_is_the_difference_of_two_sums_with_a_common_term(u1: float, u2: float, p1: float, p2: float) -> None:
     """x = r₁ + p₁u₁·a and y = r₂ + p₂u₂·a: the variance of y − x as a quadratic form of independent r₁, r₂, a."""
     own = u1 * math.sqrt(1 - p1**2), u2 * math.sqrt(1 - p2**2)
-    weights = np.array([-own[0], own[1], p2 * u2 - p1 * u1])
+    weights = np.array([-own[0], own[1], p2 * u2 - p1 * u1])  # of r₁, r₂, a
     found = change(Stated(0, u1, p1 * u1, "A"), Stated(0, u2, p2 * u2, "A"))
     assert found.u == pytest.approx(float(np.linalg.norm(weights)), rel=1e-6, abs=1e-9 * max(u1, u2))
+
+
+def test_an_uncertainty_that_is_all_the_artefacts_does_not_vanish() -> None:
+    """As a test uncertainty: how the machine repeats is not stated, and a change by a thousandth means nothing."""
+    found = change(Stated(60.0, 7.0, 7.0, "BB-7"), Stated(60.001, 7.0, 7.0, "BB-7"))
+    assert found.u == pytest.approx(7 * math.sqrt(2))
+    assert not found.significant(1)
 
 
 def test_a_chance_is_two_sided() -> None:

@@ -29,7 +29,7 @@ def test_the_artefacts_errors_may_be_estimated_instead() -> None:
 
 
 def test_a_common_error_does_not_tilt_the_line() -> None:
-    alone, shared = trend(series(DAYS, VALUES, 0.5)), trend(series(DAYS, VALUES, np.hypot(0.5, 3.0), 3.0))
+    alone, shared = trend(series(DAYS, VALUES, 0.5)), trend(series(DAYS, VALUES, float(np.hypot(0.5, 3.0)), 3.0))
     assert alone is not None
     assert shared is not None
     assert (shared.slope, shared.u_slope) == pytest.approx((alone.slope, alone.u_slope), rel=1e-6)
