@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import say
 from cmm_uq.records import Certificate, Series
 
 MODEL = "cmm_uq.recertification.crossing"
@@ -58,7 +59,7 @@ def drift_interval(certificates: Sequence[Certificate], reliability: float) -> t
     last = certificates[-1]
     limited = [one for one in last.values if one.limit]
     if not limited:
-        raise CmmUqError("its certificate has no limits")
+        raise CmmUqError(say("its certificate has no limits"))
     crossing: Any = import_module(MODEL).crossing
     found: list[tuple[float, str]] = []
     refused: CmmUqError | None = None
@@ -70,5 +71,5 @@ def drift_interval(certificates: Sequence[Certificate], reliability: float) -> t
             continue
         found.append((float("inf") if crossed is None else float((crossed - last.day).days), one.quantity))
     if not found:
-        raise refused or CmmUqError("nothing in its history can be followed")
+        raise refused or CmmUqError(say("nothing in its history can be followed"))
     return min(found)

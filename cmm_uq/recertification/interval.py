@@ -5,7 +5,7 @@ Where the history does not bear the method, the interval that the rule begins wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from cmm_uq.errors import CmmUqError
@@ -13,6 +13,12 @@ from cmm_uq.messages import Text, Verbatim, foreign, plural, say
 from cmm_uq.recertification.observed import Ended
 from cmm_uq.recertification.rule import Rule
 from cmm_uq.records import Certificate
+
+METHOD_WORDS: Mapping[str, Text] = {
+    "fixed": say("fixed"), "A3": Verbatim("A3"), "S2": Verbatim("S2"), "staircase": say("staircase"),
+    "control chart": say("control chart"), "drift": say("drift"),
+}  # fmt: skip
+"""Methods as they are called."""
 
 Pool = Callable[[], Sequence[Ended]]
 """Intervals of all machines of the model, this one's among them; asked for only by methods that pool."""
@@ -55,7 +61,7 @@ def interval_by(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> 
     except CmmUqError as error:
         return Interval(
             None, rule.every_months,
-            say("{months}, as method {method} cannot say: {why}", months=months_of(rule), method=Verbatim(rule.method),
+            say("{months}, as method {method} cannot say: {why}", months=months_of(rule), method=METHOD_WORDS[rule.method],
                 why=foreign(error.problem)),
         )  # fmt: skip
     return Interval(days, None, why)

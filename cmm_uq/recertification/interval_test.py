@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from scipy import special
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import say
 from cmm_uq.recertification.changing import USUAL, Changing
 
 
@@ -60,7 +61,7 @@ def interval_test(
     I·10^((R₀ − R)/(1 − Q)) above it.
     """
     if not 0 <= in_tolerance <= tested or tested == 0:
-        raise CmmUqError("a test of an interval needs at least one calibration at its end")
+        raise CmmUqError(say("a test of an interval needs at least one calibration at its end"))
     observed = in_tolerance / tested
     rejection = _rejection(in_tolerance, tested, target)
     if observed > target:

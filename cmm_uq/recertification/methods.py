@@ -31,7 +31,7 @@ def _a3(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[fl
     near = min(LIKE_DAYS, LIKE_PART * assigned)
     like = [one for one in pool() if abs(one.days - assigned) <= near]
     if not like:
-        raise CmmUqError(f"no interval of about {rule.every_months} months has ended with known limits")
+        raise CmmUqError(say("no interval of about {months} has ended with known limits", months=months_of(rule)))
     passed = sum(one.in_tolerance for one in like)
     found = interval_test(passed, len(like), assigned, rule.reliability, rule.changing)
     return found.recommended, say(
@@ -45,7 +45,7 @@ def _a3(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[fl
 def _s2(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[float, Text]:
     ended = pool()
     if not ended:
-        raise CmmUqError("no interval has ended with known limits")
+        raise CmmUqError(say("no interval has ended with known limits"))
     data = grouped([one.days for one in ended], [one.in_tolerance for one in ended])
     found = reliability_regression(data, rule.reliability)
     why = say(
@@ -61,7 +61,7 @@ def _s2(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[fl
 def _staircase(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[float, Text]:
     ended = ended_intervals(certificates)
     if not ended:
-        raise CmmUqError("no interval of this machine has ended with known limits")
+        raise CmmUqError(say("no interval of this machine has ended with known limits"))
     found = staircase([one.used for one in ended], rule.days, rule.reliability, rule.changing)
     return found.interval, say(
         "staircase from {months}: {up} up, {kept} kept, {down} down", months=months_of(rule),
@@ -75,7 +75,7 @@ def _control_chart(rule: Rule, certificates: Sequence[Certificate], pool: Pool) 
     pairs = [(a, b) for a, b in pairwise(done) if b.day > a.day and not adjusted_between(a, b)]
     limited = [one for one in done[-1].values if one.limit]
     if not limited:
-        raise CmmUqError("its certificate has no limits")
+        raise CmmUqError(say("its certificate has no limits"))
     shortest: tuple[float, Text] | None = None
     for one in limited:
         changes = [
@@ -90,7 +90,7 @@ def _control_chart(rule: Rule, certificates: Sequence[Certificate], pool: Pool) 
         if shortest is None or length < shortest[0]:
             shortest = length, foreign(one.quantity)
     if shortest is None:
-        raise CmmUqError("it needs three calibrations without an adjustment between")
+        raise CmmUqError(say("it needs three calibrations without an adjustment between"))
     length, name = shortest
     why = say("control chart: {name} stays within its limit with {target} % for {reached}", name=name,
               target=_percent(rule.reliability), reached=_lasting(length))  # fmt: skip

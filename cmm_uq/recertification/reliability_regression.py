@@ -13,6 +13,7 @@ import numpy as np
 from scipy import optimize, special
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import say
 from cmm_uq.points import Floats
 from cmm_uq.recertification.reliability_models import MODELS, ReliabilityModel
 
@@ -141,7 +142,7 @@ def reliability_regression(data: Grouped, target: float) -> ReliabilityRegressio
     ]  # fmt: skip
     fit = [found for found in ranked if found.accepted and found.interval]
     if not fit:
-        raise CmmUqError("no model of the reliability both fits the intervals and meets the target",
+        raise CmmUqError(say("no model of the reliability both fits the intervals and meets the target"),
                          fix="Take a lower reliability, or a fixed interval")  # fmt: skip
     best = max(fit, key=lambda found: found.merit)
     others = sorted((found for found in ranked if found is not best), key=lambda found: -found.merit)
@@ -152,10 +153,10 @@ def reliability_regression(data: Grouped, target: float) -> ReliabilityRegressio
 def _sufficient(data: Grouped) -> None:
     if len(data.days) < 4 or data.tested.sum() <= len(data.days):
         raise CmmUqError(
-            "a regression of the reliability needs intervals of four lengths or more, some of them several times"
+            say("a regression of the reliability needs intervals of four lengths or more, some of them several times")
         )
     if (data.in_tolerance == data.tested).all():
-        raise CmmUqError("nothing was ever out of tolerance, so that the reliability over time cannot be fitted",
+        raise CmmUqError(say("nothing was ever out of tolerance, so that the reliability over time cannot be fitted"),
                          fix="Use method A3 or the drift of the values")  # fmt: skip
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import optimize, special
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import say
 from cmm_uq.points import Floats
 
 _FAR, _STEPS = 100.0, 4000
@@ -68,11 +69,13 @@ def fitted_drift(days: Floats, changes: Floats, order: int = 1) -> Drift:
 
     Raises
     ------
-    CmmUqError : fewer than two intervals more than... the order asks for, or all of no length.
+    CmmUqError : no more intervals than the order, or one of no length.
     """
     days, changes = np.asarray(days, dtype=np.float64), np.asarray(changes, dtype=np.float64)
     if len(days) <= order or not (days > 0).all():
-        raise CmmUqError(f"a drift of order {order} needs more than {order} intervals, none of them of no length")
+        raise CmmUqError(
+            say("a drift of order {order} needs more than {order} intervals, none of them of no length", order=order)
+        )
     longest = float(days.max())
     powers = _powers(days / longest, order)  # of the order of one, whatever the unit
     inverse = np.linalg.pinv(powers.T @ powers)

@@ -1,1 +1,0 @@
-"""Tests of when machines are calibrated again."""
