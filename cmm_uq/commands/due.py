@@ -87,7 +87,7 @@ def what_is_due(
     day = on or dt.datetime.now().astimezone().date()
     with open_records(where, read_only=True) as records:
         found = due_in(records, machines, day)
-    kept = found if within is None else [one for one in found if one.due is None or one.due <= day + within]
+    kept = found if within is None else [one for one in found if one.due is None or one.due - day <= within]
     return WhatIsDue(day, WITHIN if within is None else within, tuple(kept))
 
 

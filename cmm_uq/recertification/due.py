@@ -53,13 +53,16 @@ class Due:
         """Overdue before a day, due within a time of it, later, or unknown."""
         if self.due is None:
             return "unknown"
-        return "overdue" if self.due < on else "due" if self.due <= on + within else "later"
+        left = self.due - on  # and not on + within, which may lie beyond the calendar
+        return "overdue" if left.days < 0 else "due" if left <= within else "later"
 
 
 def after_months(start: dt.date, months: int) -> dt.date:
-    """The same day of a later month, or that month's last."""
+    """The same day of a later month, or that month's last; no later than the calendar's last day."""
     years, month = divmod(start.month - 1 + months, 12)
     year = start.year + years
+    if year > dt.MAXYEAR:
+        return dt.date.max
     return dt.date(year, month + 1, min(start.day, calendar.monthrange(year, month + 1)[1]))
 
 
@@ -138,7 +141,7 @@ def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Poo
 def _ends(start: dt.date, interval: Interval) -> dt.date:
     if interval.months is not None:
         return after_months(start, interval.months)
-    return start + dt.timedelta(days=int(interval.days or 0))
+    return dt.date.fromordinal(min(start.toordinal() + int(interval.days or 0), dt.date.max.toordinal()))
 
 
 def _checked(
@@ -160,8 +163,8 @@ def _checked(
                             day=day(newest.certificate.day), what=_furthest(newest))  # fmt: skip
     if rule.longest_months is None:
         return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
-    carried = newest.certificate.day + (planned - last.day)
-    extended = min(carried, after_months(last.day, rule.longest_months))
+    carried = Interval((planned - last.day).days, None, why)
+    extended = min(_ends(newest.certificate.day, carried), after_months(last.day, rule.longest_months))
     if extended <= planned:
         return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
     return extended, say("{why}; lengthened by the interim check of {day}, in control", why=why,

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
 
@@ -28,6 +28,7 @@ def test_another_artefact_does_not_nor_does_an_unknown_one() -> None:
         assert found.u == pytest.approx(math.sqrt(0.5))
 
 
+@settings(deadline=None)
 @given(U, U, PART, PART)
 def test_it_is_the_difference_of_two_sums_with_a_common_term(u1: float, u2: float, p1: float, p2: float) -> None:
     """x = r₁ + p₁u₁·a and y = r₂ + p₂u₂·a: the variance of y − x as a quadratic form of independent r₁, r₂, a."""

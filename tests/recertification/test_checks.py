@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 
 import pytest
-from scipy.stats import norm
+from scipy.stats import multivariate_normal, norm
 
 from cmm_uq.recertification.checks import check_standings, limit_for
 from cmm_uq.records import Certificate
@@ -58,6 +58,14 @@ def test_more_values_raise_no_more_false_alarms(count: int, single: float) -> No
     one = norm.cdf(single) - norm.cdf(-single)
     each = norm.cdf(limit_for(count, single)) - norm.cdf(-limit_for(count, single))
     assert each**count == pytest.approx(one)
+
+
+@pytest.mark.parametrize(("count", "percent"), [(1, 0.81), (7, 0.39)])
+def test_how_often_two_checks_warn_on_one_side_by_chance(count: int, percent: float) -> None:
+    """docs/records/due.md: a correlation of ½ where calibration and checks are alike; the values independent of each other."""
+    limit = limit_for(count, 2.0)
+    both = multivariate_normal([0, 0], [[1, 0.5], [0.5, 1]]).cdf([-limit, -limit])
+    assert 100 * (1 - (1 - 2 * both) ** count) == pytest.approx(percent, abs=0.005)
 
 
 def test_what_the_calibration_does_not_state_is_not_compared() -> None:

@@ -38,6 +38,7 @@ def check(day: dt.date, number: float, **further: Any) -> Certificate:
     ("start", "months", "end"),
     [
         ("2024-03-01", 12, "2025-03-01"), ("2024-02-29", 12, "2025-02-28"), ("2024-01-31", 1, "2024-02-29"),
+        ("9999-06-01", 12, "9999-12-31"),
         ("2024-12-15", 1, "2025-01-15"), ("2023-11-30", 3, "2024-02-29"), ("2024-06-30", 24, "2026-06-30"),
     ],
 )  # fmt: skip
@@ -66,6 +67,12 @@ def test_states_about_the_day() -> None:
     assert [found.state(dt.date(2025, 3, 1) + dt.timedelta(days=i), week) for i in (-8, -7, 0, 1)] == [
         "later", "due", "due", "overdue",
     ]  # fmt: skip
+
+
+def test_the_end_of_the_calendar_is_no_fault() -> None:
+    last = dt.date.max
+    assert due(certificate(last)).due == last
+    assert due(certificate(last)).state(last, dt.timedelta(days=36_500)) == "due"
 
 
 def test_a_machine_that_was_never_calibrated_has_no_date() -> None:

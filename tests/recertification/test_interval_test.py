@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import beta, binomtest
 
@@ -65,6 +65,7 @@ def test_small_changes_are_not_made_and_bounds_are_kept() -> None:
     assert interval_test(0, 5, 20, 0.9).recommended == 14
 
 
+@settings(deadline=None)
 @given(st.integers(1, 60).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))), st.floats(0.5, 0.99))
 def test_the_range_is_clopper_pearsons(counts: tuple[int, int], confidence: float) -> None:
     passed, tested = counts
@@ -77,6 +78,7 @@ def test_the_range_is_clopper_pearsons(counts: tuple[int, int], confidence: floa
         assert beta.cdf(low, tested, 1) == pytest.approx(1 - confidence)
 
 
+@settings(deadline=None)
 @given(st.integers(1, 40), st.floats(0.6, 0.99))
 def test_more_in_tolerance_never_shortens(tested: int, target: float) -> None:
     days = [interval_test(passed, tested, 365, target).calculated for passed in range(tested + 1)]

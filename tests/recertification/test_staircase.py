@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.recertification.changing import Changing
@@ -20,6 +20,7 @@ def test_up_kept_down_by_hand() -> None:
     assert (found.interval, found.up, found.kept, found.down) == (pytest.approx(110), 2, 1, 1)
 
 
+@settings(deadline=None)
 @given(st.floats(0.5, 0.99), st.floats(1.2, 1e6))
 def test_at_the_wanted_reliability_the_interval_stands_still(reliability: float, factor: float) -> None:
     up, down = steps(reliability, factor)
