@@ -25,7 +25,7 @@ class Recalibration(Table):
     shortest_months: Months = 1
     """Shortest interval that a method may come to."""
     longest_months: Months | None = None
-    """Longest interval that a method, or interim checks that found nothing, may come to."""
+    """Longest interval that a method, or with a fixed one interim checks in control, may come to."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:

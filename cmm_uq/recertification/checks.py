@@ -11,8 +11,8 @@ The rule, for each check in turn, on the difference of every value from the cali
 For one value the warning and action limits are 2 and 3 standard uncertainties, as on Shewhart's chart; for several they are so
 much wider that no more false alarms come of more values (Šidák). Two checks in a row beyond the warning limit come by chance
 oftener than by the square of one: both carry the calibration's error (docs/records/due.md says how often). Runs of more than
-two, and moving averages, are left out: all checks are compared with the same calibration, so that their differences from it are
-not independent, as such rules assume.
+two, and moving averages, are left out: all checks are compared with the same calibration, so that their differences from it
+are not independent, as such rules assume.
 """
 
 from __future__ import annotations

@@ -147,7 +147,7 @@ def _ends(start: dt.date, interval: Interval) -> dt.date:
 def _checked(
     rule: Rule, last: Certificate, planned: dt.date, why: Text, checks: Sequence[Checked]
 ) -> tuple[dt.date, Text]:
-    """What interim checks make of the date: an action ends the interval, a check in control may lengthen it."""
+    """What interim checks make of the date: an action ends the interval, a check in control may lengthen a fixed one."""
     for one in checks:
         if one.standing == "action":
             return one.certificate.day, say(
@@ -161,7 +161,7 @@ def _checked(
     if newest.standing == "warning":
         return planned, say("{why}; the interim check of {day} warns ({what}): repeat it", why=why,
                             day=day(newest.certificate.day), what=_furthest(newest))  # fmt: skip
-    if rule.longest_months is None:
+    if rule.method != "fixed" or rule.longest_months is None:
         return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
     carried = Interval((planned - last.day).days, None, why)
     extended = min(_ends(newest.certificate.day, carried), after_months(last.day, rule.longest_months))

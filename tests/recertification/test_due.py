@@ -146,6 +146,12 @@ def test_checks_in_control_lengthen_only_where_the_rule_lets_them() -> None:
     assert due(*late, rule={"every_months": 12, "longest_months": 18}).due == dt.date(2025, 9, 1)
 
 
+def test_what_a_method_came_to_is_not_lengthened() -> None:
+    checked = certificate(FIRST), check(dt.date(2024, 6, 1), 1.2)
+    rule = {"method": "staircase", "every_months": 12, "longest_months": 24}
+    assert due(*checked, rule=rule).due == dt.date(2025, 3, 1)
+
+
 def test_a_check_before_the_calibration_does_not_count() -> None:
     assert due(check(dt.date(2024, 2, 1), 7.0), certificate(FIRST)).due == dt.date(2025, 3, 1)
 
