@@ -6,7 +6,8 @@ The rule, for each check in turn, on the difference of every value from the cali
 - *action*: a value beyond its action limit, or beyond its warning limit on the same side in two checks one after the other, or
   beyond its limit of tolerance. The machine is to be calibrated at once.
 - *warning*: a value beyond its warning limit. The check is to be repeated.
-- *in control*: neither.
+- *nothing compared*: it has no value in common with the calibration, as one of another kind may not.
+- *in control*: none of these.
 
 For one value the warning and action limits are 2 and 3 standard uncertainties, as on Shewhart's chart; for several they are so
 much wider that no more false alarms come of more values (Šidák). Two checks in a row beyond the warning limit come by chance
@@ -26,7 +27,7 @@ from cmm_uq.recertification.normal import two_sided, two_sided_limit
 from cmm_uq.recertification.observed import is_of_machine, part_used
 from cmm_uq.records import Certificate, Value
 
-Standing = Literal["in control", "warning", "action"]
+Standing = Literal["in control", "warning", "action", "nothing compared"]
 
 WARNING, ACTION = 2.0, 3.0
 """Limits of a chart of one value, in standard uncertainties."""
@@ -90,7 +91,7 @@ def _checked(check: Certificate, changes: dict[str, Change], before: dict[str, C
     )  # fmt: skip
     used = part_used(check)
     beyond = used is not None and used > 1
-    standing: Standing = "in control"
+    standing: Standing = "in control" if changes else "nothing compared"
     if abs(furthest) > action or twice or beyond:
         standing = "action"
     elif abs(furthest) > warning:

@@ -161,6 +161,9 @@ def _checked(
     if newest.standing == "warning":
         return planned, say("{why}; the interim check of {day} warns ({what}): repeat it", why=why,
                             day=day(newest.certificate.day), what=_furthest(newest))  # fmt: skip
+    if newest.standing == "nothing compared":
+        return planned, say("{why}; the interim check of {day} has no value in common with the calibration", why=why,
+                            day=day(newest.certificate.day))  # fmt: skip
     if rule.method != "fixed" or rule.longest_months is None:
         return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
     carried = Interval((planned - last.day).days, None, why)

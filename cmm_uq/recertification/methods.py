@@ -52,7 +52,7 @@ def _s2(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[fl
         "method S2: after {days} days {target} % of {tested} intervals end within the limits ({model} model; 95 %: {low} to "
         "{high} days)",
         days=number(found.interval, ".0f"), target=_percent(rule.reliability), tested=len(ended),
-        model=Verbatim(found.best.name), low=number(found.low, ".0f"),
+        model=found.best.name, low=number(found.low, ".0f"),
         high=number(found.high, ".0f") if np.isfinite(found.high) else say("more than all observed"),
     )  # fmt: skip
     return rule.changing.bounded(found.interval), why

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.points import Floats
 
 _LARGEST = 1e4
@@ -31,7 +32,7 @@ class ReliabilityModel:
     starts : parameters that a search begins with.
     """
 
-    name: str
+    name: Text
     reliability: Callable[[Floats, Floats], Floats]
     starts: tuple[tuple[float, ...], ...]
 
@@ -93,15 +94,17 @@ def _log_normal(t: Floats, p: Floats) -> Floats:
 MODELS: Mapping[str, ReliabilityModel] = {
     model.name: model
     for model in (
-        ReliabilityModel("exponential", _exponential, ((1.0,), (0.1,))),
-        ReliabilityModel("Weibull", _weibull, ((1.0, 1.0), (0.3, 0.5), (0.3, 2.0))),
-        ReliabilityModel("mixed exponential", _mixed_exponential, ((1.0, 1.0), (10.0, 0.3))),
-        ReliabilityModel("random walk", _random_walk, ((0.3, 1.0), (0.1, 5.0))),
-        ReliabilityModel("restricted walk", _restricted_walk, ((0.3, 1.0, 1.0), (0.1, 3.0, 5.0), (0.1, 20.0, 0.2))),
-        ReliabilityModel("modified gamma", _modified_gamma, ((3.0,), (1.0,))),
-        ReliabilityModel("mortality drift", _mortality_drift, ((0.5, 0.5), (0.1, 1.0))),
-        ReliabilityModel("warranty", _warranty, ((4.0, 1.0), (1.0, 0.5))),
-        ReliabilityModel("drift", _drift, ((2.0, 2.0, 2.0), (4.0, 1.0, 1.0))),
-        ReliabilityModel("log-normal", _log_normal, ((1.0, 1.0), (1.0, 3.0))),
+        ReliabilityModel(say("exponential"), _exponential, ((1.0,), (0.1,))),
+        ReliabilityModel(Verbatim("Weibull"), _weibull, ((1.0, 1.0), (0.3, 0.5), (0.3, 2.0))),
+        ReliabilityModel(say("mixed exponential"), _mixed_exponential, ((1.0, 1.0), (10.0, 0.3))),
+        ReliabilityModel(say("random walk"), _random_walk, ((0.3, 1.0), (0.1, 5.0))),
+        ReliabilityModel(
+            say("restricted walk"), _restricted_walk, ((0.3, 1.0, 1.0), (0.1, 3.0, 5.0), (0.1, 20.0, 0.2))
+        ),
+        ReliabilityModel(say("modified gamma"), _modified_gamma, ((3.0,), (1.0,))),
+        ReliabilityModel(say("mortality drift"), _mortality_drift, ((0.5, 0.5), (0.1, 1.0))),
+        ReliabilityModel(say("warranty"), _warranty, ((4.0, 1.0), (1.0, 0.5))),
+        ReliabilityModel(say("drift"), _drift, ((2.0, 2.0, 2.0), (4.0, 1.0, 1.0))),
+        ReliabilityModel(say("log-normal"), _log_normal, ((1.0, 1.0), (1.0, 3.0))),
     )
 }

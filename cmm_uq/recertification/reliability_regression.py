@@ -13,7 +13,7 @@ import numpy as np
 from scipy import optimize, special
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import say
+from cmm_uq.messages import Text, say
 from cmm_uq.points import Floats
 from cmm_uq.recertification.reliability_models import MODELS, ReliabilityModel
 
@@ -66,7 +66,7 @@ class Fitted:
     merit : RP-1's figure of merit, N_G/C · t^¼.
     """
 
-    name: str
+    name: Text
     parameters: Floats
     scale: float
     interval: float | None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from cmm_uq.recertification.changing import Changing
@@ -44,7 +44,8 @@ class Rule:
         """From the table of a job, which was checked when it was read; ``None`` where it has none."""
         if said is None:
             return cls()
-        given = {name: value for name, value in said.items() if value is not None}
+        known = {field.name for field in fields(cls)}
+        given = {name: value for name, value in said.items() if value is not None and name in known}
         given.setdefault("method", "A3" if "reliability" in given else "fixed")
         return cls(**given, stated=True)
 

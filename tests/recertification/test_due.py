@@ -146,6 +146,13 @@ def test_checks_in_control_lengthen_only_where_the_rule_lets_them() -> None:
     assert due(*late, rule={"every_months": 12, "longest_months": 18}).due == dt.date(2025, 9, 1)
 
 
+def test_a_check_of_other_values_lengthens_nothing() -> None:
+    other = certificate(dt.date(2024, 6, 1), value(1.0, name="scale_y.ppm"), interim=True)
+    found = due(certificate(FIRST), other, rule={"every_months": 12, "longest_months": 24})
+    assert found.due == dt.date(2025, 3, 1)
+    assert found.why.endswith("has no value in common with the calibration")
+
+
 def test_what_a_method_came_to_is_not_lengthened() -> None:
     checked = certificate(FIRST), check(dt.date(2024, 6, 1), 1.2)
     rule = {"method": "staircase", "every_months": 12, "longest_months": 24}
