@@ -146,7 +146,7 @@ class Records:
         return self._read(lambda connection: queries.named(connection, certificate, self.home))
 
     def latest(self, until: dt.date | None = None, *, values: bool = True) -> list[Certificate]:
-        """Newest measured certificate, not withdrawn nor replaced, of each machine; interim checks are none.
+        """Newest measured certificate, not withdrawn nor replaced, of each machine, by serial; interim checks are none.
 
         Parameters
         ----------
