@@ -14,13 +14,14 @@ TYPE_CHECKING = False  # typing alone would cost ten times as much as all of thi
 if TYPE_CHECKING:
     from cmm_uq.api.beginning import check, new
     from cmm_uq.api.calls import budget, compensate, diagnose, job, plan, prove, read, report, simulate
+    from cmm_uq.api.recertification import due, history
     from cmm_uq.errors import CmmUqError
 
 __version__ = "0.5.0"
 
 __all__ = [
-    "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "job", "new", "plan", "prove", "read",
-    "report", "simulate",
+    "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "due", "history", "job", "new", "plan",
+    "prove", "read", "report", "simulate",
 ]  # fmt: skip
 
 
@@ -29,7 +30,8 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    places = {"CmmUqError": "cmm_uq.errors", "check": "cmm_uq.api.beginning", "new": "cmm_uq.api.beginning"}
+    places = {"CmmUqError": "cmm_uq.errors", "check": "cmm_uq.api.beginning", "new": "cmm_uq.api.beginning",
+              "due": "cmm_uq.api.recertification", "history": "cmm_uq.api.recertification"}  # fmt: skip
     found = getattr(import_module(places.get(name, "cmm_uq.api.calls")), name)
     globals()[name] = found
     return found

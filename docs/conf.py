@@ -35,7 +35,7 @@ CONTENTS: dict[str, list[str]] = {
         "certificate", "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
-        "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
+        "uncertainty/index", "uncertainty/methods", "uncertainty/budgets", "records/due", "records/history",
     ],
     "What it rests on": [
         "validation", "coverage-study", "noise-ranks", "diagnosis-study", "diagnosis-second-study", "mutation-study",

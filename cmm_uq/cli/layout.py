@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
 from cmm_uq.cli.folding import folded
-from cmm_uq.documents.document import Standing
-from cmm_uq.documents.in_short import Summary, Verdict
 from cmm_uq.errors import printable
+
+if TYPE_CHECKING:
+    from cmm_uq.documents.document import Standing
+    from cmm_uq.documents.in_short import Summary, Verdict
 
 Line = tuple[tuple[str, str], ...]
 """Parts of a line, each with its style in the words of rich; none for the usual one."""

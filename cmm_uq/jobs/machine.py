@@ -8,6 +8,7 @@ from typing import Annotated, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.files.limits import COLUMNS, LISTED, MAPS
+from cmm_uq.jobs.recalibration import Recalibration
 from cmm_uq.jobs.table import Column, Number, Range, Table, Temperature, Triple, at_least
 
 HOTTEST_C = 100.0
@@ -197,6 +198,8 @@ class MachineFacts(Table):
     """What the scales' thermocouples showed while the recording was made."""
     digitizer: DigitizerFacts | None = None
     """A laser digitizer on the ram."""
+    calibrate: Recalibration | None = None
+    """When the machine is to be calibrated again, for `cmm-uq due`."""
 
     @model_validator(mode="after")
     def _squareness_once(self) -> Self:

@@ -118,6 +118,7 @@ def _of_job(facts: JobFile) -> dict[str, Any]:
         "machine": {
             "serial": machine.serial, "name": machine.name, "manufacturer": machine.manufacturer, "model": machine.model,
             "place": job.place,
+            "calibrate": machine.calibrate.model_dump(exclude_none=True) if machine.calibrate else None,
         },
         "artefact": {
             "serial": artefact.serial, "name": artefact.name, "certificate": chain.number if chain else "",

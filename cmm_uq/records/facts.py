@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,6 +29,7 @@ class Machine:
     name, manufacturer, model, place : as its newest certificate has them.
     adjusted : days on which it was adjusted, sorted.
     by_name : whether it has no serial number and is recognised by its name.
+    calibrate : ``[machine] calibrate`` of its newest certificate; ``None`` where the job has none.
     """
 
     serial: str
@@ -37,6 +39,7 @@ class Machine:
     place: str
     adjusted: tuple[dt.date, ...] = ()
     by_name: bool = False
+    calibrate: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,15 +116,19 @@ class Indexer:
         row = self._known(machines, self._machines, key)
         said = {name: called(facts, name) for name in ("name", "manufacturer", "model", "place")}
         said["named"] = spelled(said["name"])
+        rule = json.dumps(facts["calibrate"], sort_keys=True) if facts.get("calibrate") else None
         if row is None:
             row = {
                 "id": self._next(machines), "recognised": key, "called": self._name_of(facts),
-                "spelled": spelled(called(facts, "serial", "name")), **said, "day": day, "entry": entry,
+                "spelled": spelled(called(facts, "serial", "name")), **said, "calibrate": rule, "day": day,
+                "entry": entry,
             }  # fmt: skip
             self._machines[key] = row
             self._rows[machines].append(row)
         elif day >= row["day"]:
-            changed = {name: value for name, value in said.items() if value and value != row[name]}
+            changed: Row = {name: value for name, value in said.items() if value and value != row[name]}
+            if "calibrate" in facts and rule != row["calibrate"]:
+                changed["calibrate"] = rule
             self._change(machines, row, {**changed, "day": day, "entry": entry} if changed else {})
         return row
 

@@ -73,6 +73,7 @@ def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> Machine:
     return Machine(
         row["called"], row["name"], row["manufacturer"], row["model"], row["place"], tuple(adjusted),
         row["recognised"].startswith(BY_NAME),
+        json.loads(row["calibrate"]) if row["calibrate"] else None,
     )  # fmt: skip
 
 
@@ -163,13 +164,16 @@ def named(connection: Connection, name: str, home: Path | None) -> list[Certific
     return []
 
 
-def latest_of(connection: Connection, home: Path | None, *, values: bool = True) -> list[Certificate]:
+def latest_of(
+    connection: Connection, home: Path | None, until: dt.date | None = None, *, values: bool = True
+) -> list[Certificate]:  # fmt: skip
     """Newest of each machine; see :meth:`cmm_uq.records.store.Records.latest`."""
     newest = certificates.alias()
     of_machine = (
         select(newest.c.entry)
         .where(newest.c.machine == machines.c.id, newest.c.command == "report", newest.c.origin == "measured",
-               newest.c.state.in_(STANDING), newest.c.interim.is_(False))
+               newest.c.state.in_(STANDING), newest.c.interim.is_(False),
+               *((newest.c.day <= until.isoformat(),) if until else ()))
         .order_by(newest.c.day.desc(), newest.c.entry.desc()).limit(1).correlate(machines).scalar_subquery()
     )  # fmt: skip
     found = connection.execute(select(of_machine).select_from(machines)).scalars()
@@ -179,6 +183,33 @@ def latest_of(connection: Connection, home: Path | None, *, values: bool = True)
         query = select(*_COLUMNS).select_from(_JOINED).where(certificates.c.entry.in_(block))
         rows += _certificates(connection, query, values=values, home=home)
     return sorted(rows, key=lambda one: (one.machine, one.entry))
+
+
+def checks_of(connection: Connection, home: Path | None) -> list[Certificate]:
+    """Interim checks of all machines; see :meth:`cmm_uq.records.store.Records.checks`."""
+    c = certificates.c
+    query = select(*_COLUMNS).select_from(_JOINED).where(
+        c.command == "report", c.origin == "measured", c.interim.is_(True), c.state.in_(STANDING)
+    )  # fmt: skip
+    return _certificates(connection, query.order_by(c.day, c.entry), values=True, home=home)
+
+
+def limited_of(connection: Connection, entries: Sequence[int]) -> set[int]:
+    """Those with a limit; see :meth:`cmm_uq.records.store.Records.limited`."""
+    f, found = figures.c, set[int]()
+    for block in _blocks(entries):
+        query = select(f.certificate).distinct().where(f.certificate.in_(block), f.at_most.is_not(None))
+        found.update(connection.execute(query).scalars())
+    return found
+
+
+def dated_after_of(connection: Connection, day: dt.date) -> dict[str, dt.date]:
+    """By machine; see :meth:`cmm_uq.records.store.Records.dated_after`."""
+    c = certificates.c
+    query = select(machines.c.called, func.max(c.day)).select_from(certificates.join(machines)).where(
+        c.command == "report", c.origin == "measured", c.state.in_(STANDING), c.day > day.isoformat()
+    )  # fmt: skip
+    return {row[0]: dt.date.fromisoformat(row[1]) for row in connection.execute(query.group_by(machines.c.called))}
 
 
 def signatures_of(connection: Connection, certificate: int) -> list[Signature]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
@@ -145,14 +145,27 @@ class Records:
         """
         return self._read(lambda connection: queries.named(connection, certificate, self.home))
 
-    def latest(self, *, values: bool = True) -> list[Certificate]:
+    def latest(self, until: dt.date | None = None, *, values: bool = True) -> list[Certificate]:
         """Newest measured certificate, not withdrawn nor replaced, of each machine, by serial; interim checks are none.
 
         Parameters
         ----------
-        values : whether what they state is read too.
+        until : a day; what is dated later does not count.
+        values : whether their values are read too.
         """
-        return self._read(lambda connection: queries.latest_of(connection, self.home, values=values))
+        return self._read(lambda connection: queries.latest_of(connection, self.home, until, values=values))
+
+    def limited(self, entries: Sequence[int]) -> set[int]:
+        """Those of the certificates, by the numbers of their entries, that set a limit to any value."""
+        return self._read(lambda connection: queries.limited_of(connection, entries))
+
+    def dated_after(self, day: dt.date) -> dict[str, dt.date]:
+        """Machines with measured certificates or interim checks dated after a day, and the last such date of each."""
+        return self._read(lambda connection: queries.dated_after_of(connection, day))
+
+    def checks(self) -> list[Certificate]:
+        """Measured interim checks of all machines, neither withdrawn nor replaced, by day, then entry."""
+        return self._read(lambda connection: queries.checks_of(connection, self.home))
 
     def series(
         self, machine: str, names: Collection[str] | None = None, origin: str = "measured"

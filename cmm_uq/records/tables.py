@@ -65,6 +65,7 @@ machines = Table(
     Column("manufacturer", Text, nullable=False),
     Column("model", Text, nullable=False),
     Column("place", Text, nullable=False),
+    Column("calibrate", Text),
     Column("day", DAY, nullable=False),
     Column("entry", NUMBER, _of("entries.number"), nullable=False),
 )  # fmt: skip

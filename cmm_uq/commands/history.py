@@ -1,0 +1,50 @@
+"""The history of a machine: from the records to trends, and to written files where a folder is asked for."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+
+from cmm_uq.recertification.history import MachineHistory, machine_history
+from cmm_uq.records import open_records
+
+FILES = ("history.html", "history.json")
+
+
+def history_of(machine: str, where: str | Path | None = None, *, on: dt.date | None = None) -> MachineHistory:
+    """The history of a machine.
+
+    Parameters
+    ----------
+    machine : its serial, or its name.
+    where : the records; see :func:`cmm_uq.records.open_records`.
+    on : up to which day; today where nothing is said.
+
+    Raises
+    ------
+    CmmUqError : there are no records, or the machine is not in them.
+    """
+    day = on or dt.datetime.now().astimezone().date()
+    with open_records(where, read_only=True) as records:
+        found = records.machine(machine)
+        certificates = records.certificates(found.serial, values=False)
+        return machine_history(found, certificates, records.series(found.serial), day)
+
+
+def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -> dict[str, Path]:
+    """Write ``history.html`` and ``history.json``, all or none.
+
+    Raises
+    ------
+    CmmUqError : something in the folder is not this command's for this machine.
+    OutputError : the folder cannot be written to.
+    """
+    from cmm_uq.documents.history_page import history_document
+    from cmm_uq.documents.history_words import history_data
+    from cmm_uq.documents.html import render_html
+    from cmm_uq.documents.results_file import as_json
+    from cmm_uq.writing import Owner, staged
+
+    with staged(folder, Owner("history", found.machine.serial), force=force, expected=FILES) as place:
+        page = render_html(history_document(found)).encode()
+        return place.write({"history.html": page, "history.json": as_json(history_data(found))})

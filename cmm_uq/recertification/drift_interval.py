@@ -1,0 +1,75 @@
+"""The interval by the drift model: until the probability that an error has crossed its limit is no longer small enough.
+
+The model, :mod:`cmm_uq.recertification.crossing`, is loaded when a rule first asks for it.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import say
+from cmm_uq.records import Certificate, Series
+
+MODEL = "cmm_uq.recertification.crossing"
+
+
+def series_from(certificates: Sequence[Certificate], name: str) -> Series:
+    """One value over certificates of one machine, by day, as the records give it.
+
+    Parameters
+    ----------
+    certificates : with their values; those without this one are left out.
+    name : of the value.
+    """
+    rows = [(one, value) for one in certificates for value in one.values if value.name == name]
+    last = rows[-1][1]
+    limits = [value.limit for _, value in rows if value.limit is not None]
+    since = (one.adjusted_since for one, _ in rows)
+    return Series(
+        name, last.quantity, last.unit, limits[-1] if limits else None,
+        np.array([one.day.toordinal() for one, _ in rows]), np.array([value.value for _, value in rows]),
+        np.array([value.u for _, value in rows]), np.array([value.u_artefact for _, value in rows]),
+        np.array([one.artefact for one, _ in rows]), np.array([one.entry for one, _ in rows]),
+        np.array([0 if day is None else day.toordinal() for day in since]), np.array([one.interim for one, _ in rows]),
+    )  # fmt: skip
+
+
+def drift_interval(certificates: Sequence[Certificate], reliability: float) -> tuple[float, str]:
+    """Days after the last certificate until the first of the errors may have crossed its limit, and which one it is.
+
+    Parameters
+    ----------
+    certificates : of the machine, by day, the last one its newest calibration.
+    reliability : probability with which no single error has crossed yet.
+
+    Returns
+    -------
+    days, infinite beyond the model's horizon, and the quantity's name.
+
+    Raises
+    ------
+    CmmUqError : no value has a limit, or none of them a history that the model takes.
+    """
+    last = certificates[-1]
+    limited = [one for one in last.values if one.limit]
+    if not limited:
+        raise CmmUqError(say("its certificate has no limits"))
+    crossing: Any = import_module(MODEL).crossing
+    found: list[tuple[float, str]] = []
+    refused: CmmUqError | None = None
+    for one in limited:
+        try:
+            crossed: dt.date | None = crossing(series_from(certificates, one.name), one.limit).quantile(1 - reliability)
+        except CmmUqError as error:
+            refused = error
+            continue
+        found.append((float("inf") if crossed is None else float((crossed - last.day).days), one.quantity))
+    if not found:
+        raise refused or CmmUqError(say("nothing in its history can be followed"))
+    return min(found)

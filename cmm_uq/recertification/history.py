@@ -1,0 +1,126 @@
+"""The history of one machine: every value over its certificates, what it changed by, and when it will meet its limit."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from cmm_uq.messages import Text, day, plural, say
+from cmm_uq.recertification.change import Change, Stated, change
+from cmm_uq.recertification.observed import is_of_machine
+from cmm_uq.recertification.trend import Line, Meeting, meeting, trend
+from cmm_uq.records import Certificate, Machine, Series
+
+
+@dataclass(frozen=True)
+class ValueHistory:
+    """One value of a machine over time.
+
+    Parameters
+    ----------
+    series : its values, none of them after the day asked about.
+    change : since the recording before the last; ``None`` where there is one only.
+    adjusted : whether the machine was adjusted between the two.
+    line : through the values since the last adjustment; ``None`` where they do not give one.
+    meeting : when the line leaves the limits; ``None`` without a line or a limit.
+    """
+
+    series: Series
+    change: Change | None
+    adjusted: bool
+    line: Line | None
+    meeting: Meeting | None
+
+    @property
+    def beyond(self) -> bool:
+        """Whether the last value is beyond its limit."""
+        return self.series.limit is not None and abs(float(self.series.value[-1])) > self.series.limit
+
+    def probably_beyond(self, on: dt.date) -> bool:
+        """Whether the line is more probably beyond the limit on a day than not, although the last value was not."""
+        middle = None if self.meeting is None else self.meeting.middle
+        return not self.beyond and middle is not None and middle <= on.toordinal()
+
+
+@dataclass(frozen=True)
+class MachineHistory:
+    """All of a machine.
+
+    Parameters
+    ----------
+    machine, on : which, and up to which day.
+    certificates : its certificates and interim checks, by day, those withdrawn or replaced too.
+    values : in the order of the newest certificate.
+    remarks : what is to be known, a sentence each.
+    """
+
+    machine: Machine
+    on: dt.date
+    certificates: tuple[Certificate, ...]
+    values: tuple[ValueHistory, ...]
+    remarks: tuple[Text, ...]
+
+    def significant(self, value: ValueHistory) -> bool:
+        """Whether a value changed by more than chance among all that are compared."""
+        compared = sum(one.change is not None and not one.adjusted for one in self.values)
+        return value.change is not None and not value.adjusted and value.change.significant(compared)
+
+
+def machine_history(
+    machine: Machine, certificates: Sequence[Certificate], series: Mapping[str, Series], on: dt.date
+) -> MachineHistory:
+    """The history up to a day.
+
+    Parameters
+    ----------
+    machine : which.
+    certificates : of it, by day.
+    series : its values, by name.
+    on : the day; what is dated later does not count.
+    """
+    known = tuple(one for one in certificates if one.day <= on)
+    remarks: list[Text] = []
+    if machine.by_name:
+        remarks.append(say("The machine has no serial number and is recognised by its name alone."))
+    late = len(certificates) - len(known)
+    if late:
+        one = say("One certificate is dated after {on} and does not count: a clock or a date is wrong.", on=day(on))
+        many = say(
+            "{count} certificates are dated after {on} and do not count: a clock or a date is wrong.",
+            count=late,
+            on=day(on),
+        )
+        remarks.append(plural(late, one=one, many=many))
+    cut = (_until(one, on) for one in series.values())
+    values = tuple(_value(one) for one in cut if len(one.day) and is_of_machine(one.unit))
+    if values and not any(one.series.limit is not None for one in values):
+        remarks.append(say("No certificate has limits, so that none can be met."))
+    if known and len({one.day for one in known}) == 1:
+        remarks.append(say("There is one day of recordings only: a trend needs two."))
+    return MachineHistory(machine, on, known, values, tuple(remarks))
+
+
+def _until(series: Series, on: dt.date) -> Series:
+    """The series without what is dated later."""
+    rows = series.day <= on.toordinal()
+    if rows.all():
+        return series
+    names = ("day", "value", "u", "u_artefact", "artefact", "entry", "adjusted_since", "interim")
+    return replace(series, **{name: getattr(series, name)[rows] for name in names})
+
+
+def _value(series: Series) -> ValueHistory:
+    found = changed = None
+    adjusted = False
+    if len(series.day) > 1:
+        before, now = (
+            Stated(float(series.value[i]), float(series.u[i]), float(series.u_artefact[i]), str(series.artefact[i]))
+            for i in (-2, -1)
+        )
+        changed = change(before, now)
+        adjusted = bool(series.adjusted_since[-2] != series.adjusted_since[-1])
+    line = trend(series)
+    if line is not None and series.limit:
+        found = meeting(line, series.limit)
+    return ValueHistory(series, changed, adjusted, line, found)

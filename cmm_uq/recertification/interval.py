@@ -1,0 +1,73 @@
+"""The interval of a machine by its rule, from what its certificates, and those of its model, have found.
+
+Where the history does not bear the method, the interval that the rule begins with is taken, and it is said why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, Verbatim, foreign, plural, say
+from cmm_uq.recertification.observed import Ended
+from cmm_uq.recertification.rule import Rule
+from cmm_uq.records import Certificate
+
+METHOD_WORDS: Mapping[str, Text] = {
+    "fixed": say("fixed"), "A3": Verbatim("A3"), "S2": Verbatim("S2"), "staircase": say("staircase"),
+    "control chart": say("control chart"), "drift": say("drift"),
+}  # fmt: skip
+"""Methods as they are called."""
+
+Pool = Callable[[], Sequence[Ended]]
+"""Intervals of all machines of the model, this one's among them; asked for only by methods that pool."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An interval, and why it is that long.
+
+    Parameters
+    ----------
+    days : ``None`` where it is a number of calendar months.
+    months : that many; ``None`` where it is a number of days.
+    why : one sentence without a full stop.
+    """
+
+    days: float | None
+    months: int | None
+    why: Text
+
+
+def interval_by(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> Interval:
+    """The interval after the last of a machine's calibrations.
+
+    Parameters
+    ----------
+    rule : of the machine.
+    certificates : of the machine, by day, the last one its newest calibration.
+    pool : intervals of all machines of its model.
+    """
+    if rule.method == "fixed":
+        months = months_of(rule)
+        stated = say("fixed interval of {months}", months=months)
+        usual = say("{months}, as its job does not say otherwise", months=months)
+        return Interval(None, rule.every_months, stated if rule.stated else usual)
+    from cmm_uq.recertification.methods import METHODS  # numpy and scipy: a fixed interval need not wait for them
+
+    try:
+        days, why = METHODS[rule.method](rule, certificates, pool)
+    except CmmUqError as error:
+        return Interval(
+            None, rule.every_months,
+            say("{months}, as method {method} cannot say: {why}", months=months_of(rule), method=METHOD_WORDS[rule.method],
+                why=foreign(error.problem)),
+        )  # fmt: skip
+    return Interval(days, None, why)
+
+
+def months_of(rule: Rule) -> Text:
+    """The interval that a rule begins with, in words."""
+    count = rule.every_months
+    return plural(count, one=say("one month"), many=say("{count} months", count=count))

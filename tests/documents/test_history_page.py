@@ -1,0 +1,91 @@
+"""Pages of histories and of what is due: every text a message or the user's, and readable on a telephone."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from cmm_uq.documents.document import Document
+from cmm_uq.documents.due_page import due_document
+from cmm_uq.documents.history_page import history_document, overview_of
+from cmm_uq.documents.history_words import meets
+from cmm_uq.documents.html import render_html
+from cmm_uq.recertification.due import Due, Known, artefact_due, machine_due
+from cmm_uq.recertification.history import MachineHistory, machine_history
+from cmm_uq.recertification.rule import Rule
+from cmm_uq.records import ArtefactRow
+from tests.documents.saying import strangers
+from tests.recertification.made import FIRST, MACHINE, certificate, series, value
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+ON = dt.date(2026, 6, 1)
+OWN = "Iota DEA 1102 Hall scale_x.ppm Scale error of x quantity BB-7 PTB ballbar K-2024 history.json due.json"
+
+
+def history(*numbers: float, limit: float | None = 8.0) -> MachineHistory:
+    """A recording a year; an interim check among them."""
+    days = [300 * i for i in range(len(numbers))]
+    made = [certificate(FIRST + dt.timedelta(days=day), value(number), interim=i == 1, entry=i + 1)
+            for i, (day, number) in enumerate(zip(days, numbers, strict=True))]  # fmt: skip
+    return machine_history(MACHINE, made, {"scale_x.ppm": series(days, numbers, 0.5, limit=limit)}, ON)
+
+
+def items() -> list[Due]:
+    artefact = ArtefactRow("BB-7", "ballbar", "PTB 1", "PTB", None, dt.date(2026, 1, 1))
+    rules = (None, {"every_months": 6}, {"method": "A3"}, {"method": "staircase"}, {"method": "control chart"})
+    known = [Known(MACHINE, Rule.of(rule), [certificate(FIRST)], False, ON) for rule in rules]
+    checked = [certificate(FIRST), certificate(FIRST + dt.timedelta(days=30), value(9.0), interim=True)]
+    made = [machine_due(one, {"BB-7": artefact}, ON, list) for one in [*known, Known(MACHINE, Rule(), checked)]]
+    return [*made, artefact_due(artefact)]
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        history_document(history(1.0, 2.0, 4.5)), history_document(history(1.0, limit=None)), history_document(history()),
+        history_document(history(1.0, 2.0, 9.5)), due_document(items(), ON, dt.timedelta(days=90)),
+        due_document([], ON, dt.timedelta(days=90)),
+    ],
+)  # fmt: skip
+def test_every_text_is_a_message_or_the_users(document: Document) -> None:
+    assert strangers(document, OWN) == []
+
+
+@pytest.mark.parametrize(
+    ("numbers", "standing", "verdict"),
+    [
+        ((1.0, 1.1, 1.0), "good", "No change that stands out"),
+        ((1.0, 1.0, 4.0), "open", "Changed since the last time"),
+        ((1.0, 2.0, 8.1), "bad", "Beyond its limits"),
+        ((-1.0, -2.0, -8.1), "bad", "Beyond its limits"),
+        ((), "open", "Nothing is recorded yet"),
+    ],
+)
+def test_what_stands_out(numbers: tuple[float, ...], standing: str, verdict: str) -> None:
+    found = overview_of(history(*numbers))
+    assert (found.standing, found.verdict) == (standing, verdict)
+
+
+def test_when_a_limit_is_met_in_words() -> None:
+    """From 2024-03-01 on: 300 days apart, to 2025-10-22; asked on 2026-06-01."""
+    assert meets(history(1.0, 2.0, 9.5).values[0], ON) == "is beyond it"
+    assert meets(history(1.0).values[0], ON) == "no trend yet"
+    assert meets(history(1.0, 2.0, 3.0, limit=None).values[0], ON) == "–"
+    assert meets(history(2.0, 4.5, 7.0).values[0], ON) == "probably already"
+    assert meets(history(0.0, 0.0, 0.0, limit=800.0).values[0], ON) == "not within 20 years"
+
+
+def test_a_history_fits_a_telephone(browser: Browser, tmp_path: Path) -> None:
+    for name, document in (("history", history_document(history(1.0, 2.0, 4.5))),
+                           ("due", due_document(items(), ON, dt.timedelta(days=90)))):  # fmt: skip
+        file = tmp_path / f"{name}.html"
+        file.write_text(render_html(document), encoding="utf-8")
+        page = browser.new_page(viewport={"width": 360, "height": 800})
+        page.goto(file.as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") == 360
+        page.close()
