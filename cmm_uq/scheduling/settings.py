@@ -82,7 +82,7 @@ class LogTable(Table):
     """``[log]``: what was done, a line each, for a person."""
 
     file: str = "schedule.log"
-    """The file; an empty text for none."""
+    """The file, in the folder of the reports; an empty text for none."""
     largest_bytes: Annotated[int, Field(ge=1000, le=1_000_000_000)] = 1_000_000
     """Size at which a new one is begun."""
     kept: Annotated[int, Field(ge=1, le=100)] = 5
