@@ -15,17 +15,15 @@ Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "
 
 EVENTS: tuple[Event, ...] = get_args(Event)
 
-_OF_DECISION: Mapping[str, Event] = {
-    "fail": "fail", "conditional fail": "fail", "incomplete": "incomplete", "undecided": "undecided",
-    "remeasure": "undecided", "conditional pass": "undecided",
-}  # fmt: skip
-"""Event of a decision of results.json; a pass is none."""
+_OF_DECISION: Mapping[str, Event] = {"fail": "fail", "conditional fail": "fail", "incomplete": "incomplete"}
+"""Event of a decision of results.json; a pass is none, and every other word leaves it undecided."""
 
 _OF_VERDICT: Mapping[str, Text] = {
     "explained": say("the recording contradicts its model, and the diagnosis names what was left out"),
     "partial": say("the recording contradicts its model, and the diagnosis names only part of what was left out"),
     "unexplained": say("the recording contradicts its model, and no known effect accounts for it"),
 }
+_CONTRADICTS = say("the recording contradicts its model")
 
 
 @dataclass(frozen=True)
@@ -71,12 +69,11 @@ def of_results(results: Mapping[str, Any], inputs: str, where: str) -> list[Noti
     told: dict[Event, list[Text]] = {}
     for statement in results.get("conformity") or ():
         decision = str(statement.get("decision"))
-        event = _OF_DECISION.get(decision)
-        if event is not None:
-            told.setdefault(event, []).append(_statement(statement, decision))
-    verdict = str((results.get("diagnosis") or {}).get("verdict", ""))
-    if verdict in _OF_VERDICT:
-        told.setdefault("mismatch", []).append(_OF_VERDICT[verdict])
+        if decision != "pass":
+            told.setdefault(_OF_DECISION.get(decision, "undecided"), []).append(_statement(statement, decision))
+    verdict = str((results.get("diagnosis") or {}).get("verdict") or "consistent")
+    if verdict != "consistent":
+        told.setdefault("mismatch", []).append(_OF_VERDICT.get(verdict, _CONTRADICTS))
     return [
         Notice(
             event, str(name), say("{event}: {of}", event=Verbatim(event), of=of),

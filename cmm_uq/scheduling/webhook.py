@@ -62,7 +62,8 @@ class Webhook:
         try:
             return within(self.timeout_s, lambda: self._post(request), who)
         except urllib.error.HTTPError as error:
-            raise UndeliveredError(f"{who} answered {error.code} {printable(str(error.reason))[:200]}") from None
+            with error:
+                raise UndeliveredError(f"{who} answered {error.code} {printable(str(error.reason))[:200]}") from None
         except (OSError, http.client.HTTPException, ValueError) as error:
             why = getattr(error, "reason", error)
             raise UndeliveredError(f"{who}: {printable(str(why))[:200] or type(error).__name__}") from None
