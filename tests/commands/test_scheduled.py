@@ -1,0 +1,173 @@
+"""``cmm-uq report --scheduled`` and ``cmm-uq schedule``, as they are typed, with real reports and real processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cmm_uq.writing import read_manifest, sha256_of
+from tests.cli.process import COMMAND, run
+from tests.scheduling.servers import Taken, web_server
+
+QUICK = "[run]\nquiet_s = 0\nback_off_s = 0\n"
+
+
+@pytest.fixture
+def jobs(iota: Path, tmp_path: Path) -> Path:
+    """A folder with a job in it, and one that is wrong."""
+    shutil.copytree(iota, tmp_path / "jobs" / "iota")
+    (tmp_path / "jobs" / "schedule.toml").write_text(QUICK)
+    return tmp_path / "jobs"
+
+
+def lines(text: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def of_job(text: str) -> dict[str, Any]:
+    (line,) = [line for line in lines(text) if line.get("job") == "iota-1102-20C"]
+    return line
+
+
+def started(jobs: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen([*COMMAND, "report", "--scheduled", str(jobs)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                            text=True)  # fmt: skip
+
+
+def test_two_schedulers_on_one_folder_make_one_certificate_and_one_message(jobs: Path) -> None:
+    taken = Taken()
+    with web_server(taken) as port:
+        (jobs / "schedule.toml").write_text(f'{QUICK}[[webhook]]\nurl = "http://localhost:{port}/"\n')
+        runs = [started(jobs) for _ in range(2)]
+        told = [one.communicate() for one in runs]
+        assert run("report", "--scheduled", jobs).returncode == 0
+    assert [error for _, error in told] == ["", ""]
+    states = sorted(of_job(text)["state"] for text, _ in told)
+    assert states in (["busy", "reported"], ["reported", "unchanged"])
+    assert sorted(one.returncode for one in runs) == [0, 1]
+    (body,) = [json.loads(body) for _, body in taken.requests]
+    assert (body["event"], body["about"]) == ("fail", "iota-1102-20C")
+    folder = jobs / "reports" / "iota-1102-20C"
+    assert body["where"] == str(folder)
+    manifest = read_manifest(folder)
+    assert manifest is not None
+    assert all(sha256_of(folder / name) == digest for name, digest in manifest.files.items())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGTERM that a process can see")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_run_that_is_ended_in_the_middle_leaves_nothing_half_and_the_next_one_goes_on(
+    jobs: Path, number: signal.Signals
+) -> None:
+    lock = jobs / "reports" / ".scheduled" / "locks" / "iota-1102-20c.lock"
+    one = started(jobs)
+    deadline = time.monotonic() + 60
+    while not (lock.exists() and lock.stat().st_size) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    one.send_signal(number)
+    _, error = one.communicate()
+    if number == signal.SIGTERM:
+        assert one.returncode == 143
+        assert error == "cmm-uq: interrupted; nothing was written\n"
+    assert not (jobs / "reports" / "iota-1102-20C" / "results.json").exists()
+    if number == signal.SIGKILL:
+        done = run("report", "--scheduled", jobs)
+        assert done.returncode == 1
+        assert of_job(done.stdout)["state"] == "reported"
+        assert not lock.exists()
+        assert not list((jobs / "reports" / "iota-1102-20C").glob(".unfinished-*"))
+
+
+def test_a_dry_run_writes_nothing_and_lines_are_added_to_a_file(jobs: Path, tmp_path: Path) -> None:
+    (jobs / "wrong").mkdir()
+    (jobs / "wrong" / "job.toml").write_text("x =")
+    for _ in range(2):
+        done = run("report", "--scheduled", jobs, "--dry-run", "--lines", tmp_path / "lines.jsonl")
+        assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    told = lines((tmp_path / "lines.jsonl").read_text())
+    assert [line.get("state") for line in told] == ["would report", "would report", None] * 2
+    assert not (jobs / "reports").exists()
+
+
+def test_bad_jobs_are_lines_and_exit_code_2(jobs: Path, tmp_path: Path) -> None:
+    shutil.rmtree(jobs / "iota")
+    (jobs / "wrong").mkdir()
+    (jobs / "wrong" / "job.toml").write_text("x =")
+    done = run("report", "--scheduled", jobs, "--out", tmp_path / "out")
+    assert (done.returncode, done.stderr) == (2, "")
+    first, last = lines(done.stdout)
+    assert first["error"]["problem"].startswith("is not valid TOML")
+    assert last["exit_code"] == 2
+    assert "refused" in (tmp_path / "out" / "schedule.log").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ["a", "b"],
+            "b: 2 jobs are named, and a report is of one. Report them one after the other, or with --scheduled",
+        ),
+        (["a", "--dry-run"], "--dry-run: goes with --scheduled. Add --scheduled"),
+        (["a", "--lines", "x"], "--lines: goes with --scheduled. Add --scheduled"),
+        (["a", "--scheduled", "--force"], "--force: goes without --scheduled. Leave it out"),
+        (
+            ["a", "--scheduled", "--schedule", "x.toml"],
+            "x.toml: no such file. cmm-uq schedule new FILE writes one with every",
+        ),
+    ],
+)
+def test_options_of_the_other_way_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
+    done = run("report", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"cmm-uq: {told}")
+    assert done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_for_lines_that_is_none_is_told_before_anything_is_done(jobs: Path, tmp_path: Path) -> None:
+    done = run("report", "--scheduled", jobs, "--lines", tmp_path)
+    assert done.returncode == 3
+    assert "Name another file" in done.stderr
+    assert not (jobs / "reports").exists()
+
+
+def test_a_new_schedule_is_read_and_is_written_over_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "schedule.toml"
+    assert run("schedule", "new", path).returncode == 0
+    text = path.read_text()
+    assert "# [[email]]" in text
+    assert 'out = "reports"' in text
+    done = run("schedule", "test", "--schedule", path)
+    assert done.returncode == 2
+    assert "names nobody who is told of anything" in done.stderr
+    assert run("schedule", "new", path).returncode == 3
+    assert path.read_text() == text
+
+
+def test_a_trial_message_says_who_got_it_and_who_did_not(tmp_path: Path) -> None:
+    taken = Taken()
+    with web_server(taken) as port:
+        hooks = [f'[[webhook]]\nurl = "http://localhost:{at}/"\n' for at in (port, 1)]
+        (tmp_path / "schedule.toml").write_text("".join(hooks))
+        done = run("schedule", "test", tmp_path, "--json")
+    assert done.returncode == 1
+    assert [one["sent"] for one in json.loads(done.stdout)["channels"]] == [True, False]
+    assert len(taken.requests) == 1
+
+
+def test_ready_files_are_printed_or_written(jobs: Path, tmp_path: Path) -> None:
+    printed = run("schedule", "print", "systemd", jobs, "--at", "05:00").stdout
+    assert printed.startswith("# cmm-uq-schedule.service\n[Unit]")
+    assert "OnCalendar=*-*-* 05:00:00" in printed
+    done = run("schedule", "print", "windows", jobs, "--out", tmp_path)
+    assert done.stdout == f"{tmp_path / 'cmm-uq-schedule.xml'}\n"
+    assert "--scheduled" in (tmp_path / "cmm-uq-schedule.xml").read_text(encoding="utf-16")
