@@ -9,7 +9,7 @@ import typer
 
 from cmm_uq.cli.completion import job_folders
 from cmm_uq.cli.importing import show_imported
-from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict, Verbose, examples, out
+from cmm_uq.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
 from cmm_uq.errors import CmmUqError
@@ -36,6 +36,7 @@ def command(
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
+    records: Records = None,
     scheduled: Annotated[
         bool,
         typer.Option(
@@ -64,14 +65,16 @@ def command(
     _check(job, {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run} if not scheduled else
            {"--force": force, "--strict": strict, "--verbose": verbose}, scheduled=scheduled)  # fmt: skip
     if scheduled:
-        from cmm_uq.cli.scheduled import run
+        from cmm_uq.cli.scheduled import STANDARD_OUTPUT, run
+        from cmm_uq.commands.scheduled import Asked
 
-        raise typer.Exit(run(job, out, seed=seed or None, schedule=schedule, lines=lines, quiet=quiet, dry=dry_run))
+        asked = Asked(tuple(job), out, schedule, records, seed or None, dry_run)
+        raise typer.Exit(run(asked, None if quiet and lines is None else lines or STANDARD_OUTPUT))
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.report import write_report
 
         told = None if quiet or json else show_imported
-        report = write_report(job[0], out, seed=seed, force=force, stage=stage, told=told)
+        report = write_report(job[0], out, seed=seed, force=force, stage=stage, told=told, records=records)
     conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)
 
 

@@ -5,29 +5,38 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq.cli.printing import put_json
 from cmm_uq.errors import OutputError
 
+if TYPE_CHECKING:
+    from cmm_uq.commands.scheduled import Asked
 
-def run(
-    folders: Sequence[Path], out: Path | None, *, seed: int | None, schedule: Path | None, lines: Path | None, quiet: bool,
-    dry: bool,
-) -> int:  # fmt: skip
+
+STANDARD_OUTPUT = Path("-")
+"""In place of a file for the lines."""
+
+
+def run(asked: Asked, lines: Path | None) -> int:
     """A scheduled run from the command line; its exit code.
+
+    Parameters
+    ----------
+    asked : what is to be run.
+    lines : file that the lines are added to, :data:`STANDARD_OUTPUT`, or ``None`` for nowhere.
 
     Raises
     ------
     CmmUqError : the schedule is wrong.
-    OutputError : the lines could not be written, after all else was done.
+    OutputError : the records cannot be written; or the lines could not be, after all else was done.
     """
     from cmm_uq.commands.scheduled import run_scheduled
 
     failed: list[OutputError] = []
-    write = _nowhere if quiet and lines is None else _printed if lines is None else _added_to(lines)
+    write = _nowhere if lines is None else _printed if lines == STANDARD_OUTPUT else _added_to(lines)
 
     def tell(told: dict[str, Any]) -> None:
         try:
@@ -35,7 +44,7 @@ def run(
         except OutputError as error:
             failed.append(error)
 
-    code = run_scheduled(folders, schedule=schedule, out=out, seed=seed, dry=dry, tell=tell)
+    code = run_scheduled(asked, tell)
     if failed:
         raise failed[0]
     return code

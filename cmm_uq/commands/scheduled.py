@@ -7,28 +7,31 @@ import getpass
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.scheduled_records import due_notices, opened
 from cmm_uq.commands.schemas import shipped
 from cmm_uq.commands.written import REPORTS
-from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.errors import CmmUqError, OutputError, suggestion
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.toml_text import commented
 from cmm_uq.messages import say
+from cmm_uq.records.place import NONE, beside, is_url, place_of
 from cmm_uq.scheduling.channels import channels
 from cmm_uq.scheduling.found import Found
 from cmm_uq.scheduling.log import Log
 from cmm_uq.scheduling.message import Channel, Message, UndeliveredError
-from cmm_uq.scheduling.notices import Notice
+from cmm_uq.scheduling.notices import Notice, of_error
 from cmm_uq.scheduling.outbox import Outbox
+from cmm_uq.scheduling.problems import Problems
 from cmm_uq.scheduling.ready import DAYS, READY, Call, encoded
 from cmm_uq.scheduling.run import Clock, Run
 from cmm_uq.scheduling.settings import FILE, ScheduleFile, read_schedule
-from cmm_uq.scheduling.state import InFolder
+from cmm_uq.scheduling.state import InFolder, InRecords
 from cmm_uq.scheduling.work import Work
 from cmm_uq.writing.new_file import write_new
 
@@ -57,6 +60,12 @@ class Schedule:
         """Folder of the reports."""
         return REPORTS if self.path is None else self.home / self.facts.run.out
 
+    @property
+    def records(self) -> str | None:
+        """Records that it names: a file relative to it, a URL, or ``none``."""
+        given = self.facts.run.records
+        return given if not given or given == NONE or is_url(given) else str(self.home / given)
+
     def channels(self) -> list[Channel]:
         """Ways of sending."""
         return channels(self.facts, self.home)
@@ -81,19 +90,34 @@ def schedule_of(folders: Sequence[Path], given: Path | None = None) -> Schedule:
     return Schedule(read_schedule(path), path.parent, path)
 
 
-def run_scheduled(
-    folders: Sequence[Path], *, schedule: Path | None = None, out: Path | None = None, seed: int | None = None,
-    dry: bool = False, tell: Tell = lambda told: None, clock: Clock = CLOCK,
-) -> int:  # fmt: skip
-    """Report every job in folders that is new or changed, send what a person must hear of; the exit code.
+@dataclass(frozen=True)
+class Asked:
+    """A scheduled run, as it is asked for.
 
     Parameters
     ----------
     folders : job folders, or folders with job folders in them.
-    schedule : the file; by default ``schedule.toml`` in the first folder.
     out : folder of the reports; by default what the schedule says.
+    schedule : the file; by default ``schedule.toml`` in the first folder.
+    records : file, URL, or ``none``; by default what the schedule says, else ``records.db`` beside the reports.
     seed : of everything random; by default what the schedule says.
     dry : say what would happen, and do nothing.
+    """
+
+    folders: tuple[Path, ...]
+    out: Path | None = None
+    schedule: Path | None = None
+    records: str | None = None
+    seed: int | None = None
+    dry: bool = False
+
+
+def run_scheduled(asked: Asked, tell: Tell = lambda told: None, clock: Clock = CLOCK) -> int:
+    """Report every job in folders that is new or changed, send what a person must hear of; the exit code.
+
+    Parameters
+    ----------
+    asked : which folders, and how.
     tell : takes a line for each job, each message, and at the end.
     clock : time.
 
@@ -103,20 +127,43 @@ def run_scheduled(
 
     Raises
     ------
-    CmmUqError : the schedule is wrong.
+    CmmUqError : the schedule is wrong, or the records are another program's.
+    OutputError : the records cannot be written to.
     """
-    found = schedule_of(folders, schedule)
-    facts, reports = found.facts, (out or found.out).absolute()  # a message is read elsewhere
-    state = InFolder(reports)
-    outbox = Outbox(reports, found.channels(), state, clock.moment)
-    chosen = facts.run.seed if seed is None else seed
-    work = Work(reports, state, lambda job: _reported(job, reports, chosen), outbox.add)
+    found = schedule_of(asked.folders, asked.schedule)
+    facts, reports = found.facts, (asked.out or found.out).absolute()  # a message is read elsewhere
+    place = place_of(asked.records or found.records, beside(reports / "x"))
     log = Log(reports / facts.log.file if facts.log.file else None, facts.log.largest_bytes, facts.log.kept)
-    roots = [folder.absolute() for folder in folders]
-    return Run(roots, facts.run, work, outbox, _due, tell, log.write, clock, dry).through()
+    ways = found.channels()
+    try:
+        with opened(place, dry=asked.dry) as records:
+            state = InFolder(reports) if records is None else InRecords(records, reports)
+            outbox = Outbox(reports, ways, state, clock.moment)
+            seed = facts.run.seed if asked.seed is None else asked.seed
+            work = Work(reports, state, lambda job: _reported(job, reports, seed, place or NONE), outbox.add)
+            within = dt.timedelta(days=facts.run.due_within_days)
+            roots = [folder.absolute() for folder in asked.folders]
+            return Run(roots, facts.run, work, outbox, lambda on: due_notices(records, on, within), tell, log.write, clock,
+                       asked.dry).through()  # fmt: skip
+    except CmmUqError as error:  # of the records: without them nothing is made, and somebody has to hear of that too
+        if not asked.dry:
+            _send_alone(error, Outbox(reports, ways, InFolder(reports), clock.moment), log, clock)
+        raise
 
 
-def _reported(job: Found, out: Path, seed: int) -> bytes:
+def _send_alone(error: CmmUqError, outbox: Outbox, log: Log, clock: Clock) -> None:
+    """Tell of an error that ended the whole run."""
+    log.write(f"{clock.moment()} nothing was done: {error}")
+    since = Problems(outbox.out).since("the run", str(error), clock.moment())
+    notice = of_error(error, "the run", since)
+    try:
+        outbox.add([notice])
+        outbox.deliver(patience_s=0.0)
+    except OutputError:
+        outbox.sent_at_once([notice])
+
+
+def _reported(job: Found, out: Path, seed: int, records: str | Path) -> bytes:
     """Contents of results.json of a job, once its certificate is written."""
     from cmm_uq.commands.report import write_report
 
@@ -129,12 +176,7 @@ def _reported(job: Found, out: Path, seed: int) -> bytes:
             raise CmmUqError(f"its id {job.id!r} was changed while it was read", where=str(job.folder),
                              fix="The next run takes it")  # fmt: skip
 
-    return write_report(job.folder, out / job.id, seed=seed, told=same).results
-
-
-def _due(on: dt.date) -> Iterable[Notice]:
-    """What is due, or drifts."""
-    return ()
+    return write_report(job.folder, out / job.id, seed=seed, told=same, records=records).results
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import Text, Verbatim, commas, say
+from cmm_uq.messages import Text, Verbatim, commas, day, say
 
 Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "error"]
 """What a message may be about."""
@@ -94,6 +95,25 @@ def of_error(error: CmmUqError, about: str, since: str) -> Notice:
     """
     title = say("error: {about}", about=Verbatim(about))
     return Notice("error", about, title, Verbatim(str(error)), f"{error} since {since}", error.where or "")
+
+
+def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text) -> Notice:
+    """What has to be said of a machine or an artefact that is to be calibrated: once before its day, and once after it.
+
+    Parameters
+    ----------
+    item : machine or artefact.
+    called : its serial number or name.
+    due : day by which it is to be calibrated.
+    on : today.
+    why : it is due then.
+    """
+    overdue = due < on
+    state = say("overdue since {due}", due=day(due)) if overdue else say("due on {due}", due=day(due))
+    title = say("{state}: {item} {called}", state=state, item=Verbatim(item), called=Verbatim(called))
+    text = say("{item} {called} is {state}: {why}.", item=Verbatim(item.capitalize()), called=Verbatim(called), state=state,
+               why=why)  # fmt: skip
+    return Notice("due", f"{item} {called}", title, text, f"{due.isoformat()} {'overdue' if overdue else 'due'}")
 
 
 def decisions(results: Mapping[str, Any]) -> list[str]:

@@ -121,7 +121,7 @@ class Work:
         if known is None:
             return "new"  # one without an id is refused when it is read
         changed = differing(job, known.inputs)
-        if changed and known.released:
+        if changed and self.state.released(job.id):
             raise CmmUqError(f"{', '.join(changed)} changed after the certificate was released", where=str(job.folder),
                              fix="Give the new recording a job id of its own, or withdraw the certificate")  # fmt: skip
         return f"changed: {', '.join(changed)}" if changed else ""

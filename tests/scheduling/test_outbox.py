@@ -95,6 +95,9 @@ class Locked:
     def reported(self, job: str) -> Reported | None:
         return None
 
+    def released(self, job: str) -> bool:
+        return False
+
     def sent(self, key: str) -> bool:
         return key in self.keys
 
