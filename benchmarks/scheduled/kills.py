@@ -28,7 +28,15 @@ PAUSE_S = 0.004
 
 
 def start(root: Path, port: int) -> subprocess.Popen[bytes]:
-    return subprocess.Popen([sys.executable, "-m", "benchmarks.scheduled.scheduler", root, str(port), str(PAUSE_S)])
+    return subprocess.Popen(
+        [sys.executable, "-m", "benchmarks.scheduled.scheduler", root, str(port), str(PAUSE_S)], stdout=subprocess.PIPE
+    )
+
+
+def begun(run: subprocess.Popen[bytes]) -> None:
+    """Wait until it is at its work: imports are no place to be killed in."""
+    assert run.stdout is not None
+    run.stdout.readline()
 
 
 def judged(root: Path, taken: Taken) -> dict[str, int]:
@@ -37,13 +45,13 @@ def judged(root: Path, taken: Taken) -> dict[str, int]:
     whole = [job.name for job in jobs if state.reported(job.name) is not None]
     failing = {job.name for job in jobs if (job / "points.csv").read_text() == "fail"}
     keys = Counter(headers["Idempotency-Key"] for headers, _ in taken.requests)
-    begun = Counter((root / "begun").read_text().split())
+    reported = Counter((root / "begun").read_text().split())
     left = [path for path in (root / "reports").rglob("*") if ".unfinished-" in path.name or path.name == ".placing"]
     told = Counter(name for _, body in taken.requests for name in told_in(json.loads(body)))
     return {
         "jobs": len(jobs),
         "with one whole certificate": len(whole),
-        "reported more than once": sum(n > 1 for n in begun.values()),
+        "reported more than once": sum(n > 1 for n in reported.values()),
         "no pass": len(failing),
         "no pass and told": len(failing & set(told)),
         "told more than once": sum(n > 1 for n in told.values()),
@@ -68,13 +76,14 @@ def kills(count: int, seed: int) -> dict[str, int]:
         killed = more = 0
         while killed < count:
             run = start(root, port)
-            time.sleep(0.25 + dice.expovariate(2.0))
+            begun(run)
+            time.sleep(dice.expovariate(2.0))
             if run.poll() is None:
                 run.kill()
                 killed += 1
             elif run.wait() not in (0, 1):
                 raise SystemExit(f"ended with {run.returncode}")
-            else:
+            elif len(list((root / "jobs").iterdir())) == len(list((root / "reports").glob("*-*"))):
                 more += 1
                 for i in range(100):
                     new = root / "jobs" / f"more-{more:03}-{i:03}"

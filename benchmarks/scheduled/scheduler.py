@@ -56,6 +56,7 @@ def main(root: Path, port: int, pause_s: float) -> int:
         os.close(descriptor)
         return content
 
+    print("begun", flush=True)
     work = Work(out, state, report, outbox.add)
     settings = RunTable(quiet_s=0.0, back_off_s=0.1)
     return Run(

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
+import datetime as dt
 import json
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import time
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
+from cmm_uq.commands.scheduled_records import due_notices
+from cmm_uq.errors import CmmUqError
+from cmm_uq.records import open_records
 from cmm_uq.writing import read_manifest, sha256_of
 from tests.cli.process import COMMAND, run
+from tests.records.histories import certificate
 from tests.scheduling.servers import Taken, web_server
 
 QUICK = "[run]\nquiet_s = 0\nback_off_s = 0\n"
@@ -171,3 +179,74 @@ def test_ready_files_are_printed_or_written(jobs: Path, tmp_path: Path) -> None:
     done = run("schedule", "print", "windows", jobs, "--out", tmp_path)
     assert done.stdout == f"{tmp_path / 'cmm-uq-schedule.xml'}\n"
     assert "--scheduled" in (tmp_path / "cmm-uq-schedule.xml").read_text(encoding="utf-16")
+
+
+def test_what_was_reported_and_sent_is_in_the_records_and_a_dry_run_only_reads_them(jobs: Path) -> None:
+    taken, where = Taken(), jobs / "lab.db"
+    with web_server(taken) as port:
+        (jobs / "schedule.toml").write_text(
+            f'{QUICK}records = "lab.db"\n[[webhook]]\nurl = "http://localhost:{port}/"\n'
+        )
+        with mock.patch.dict(os.environ):
+            del os.environ["CMM_UQ_RECORDS"]
+            run("report", "--scheduled", jobs, "--dry-run")
+            assert not where.exists()
+            assert run("report", "--scheduled", jobs).returncode == 1
+            before = where.read_bytes()
+            shutil.rmtree(jobs / "reports")
+            done = run("report", "--scheduled", jobs, "--dry-run")
+            assert of_job(done.stdout)["state"] == "unchanged"
+            assert where.read_bytes() == before
+    with open_records(where, read_only=True) as records:
+        assert [entry.kind for entry in records.entries()] == ["report", "sent"]
+        sent = list(records.entries())[1].data
+    assert (sent["event"], sent["about"]) == ("fail", "iota-1102-20C")
+    assert len(taken.requests) == 1
+
+
+def test_records_that_cannot_be_written_end_the_run_before_any_job_and_somebody_is_told_once(
+    jobs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Held by another program for longer than anybody waits."""
+    where, taken = jobs / "lab.db", Taken()
+    open_records(where, create=True).close()
+    monkeypatch.setattr("cmm_uq.records.opening.PATIENCE_S", 0.1)
+    holder = sqlite3.connect(where, isolation_level=None)
+    with web_server(taken) as port, contextlib.closing(holder):
+        (jobs / "schedule.toml").write_text(f'{QUICK}[[webhook]]\nurl = "http://localhost:{port}/"\n')
+        holder.execute("BEGIN IMMEDIATE")
+        for _ in range(2):
+            done = run("report", "--scheduled", jobs, "--records", where)
+            assert done.returncode == 3
+            assert done.stderr.count("\n") == 1
+    assert str(where) in done.stderr
+    assert not (jobs / "reports" / "iota-1102-20C").exists()
+    (body,) = [json.loads(body) for _, body in taken.requests]
+    assert (body["event"], body["about"]) == ("error", "the run")
+
+
+def test_another_programs_database_is_bad_input(jobs: Path) -> None:
+    (jobs / "lab.db").write_text("no database, but long enough")
+    done = run("report", "--scheduled", jobs, "--records", jobs / "lab.db")
+    assert done.returncode == 2
+    assert "is no database" in done.stderr
+
+
+def test_an_artefact_that_is_due_is_told_and_with_a_clock_behind_the_records_nothing_is_due(tmp_path: Path) -> None:
+    """The made-up certificate's artefact is due on 2027-06-01."""
+    with open_records(tmp_path / "lab.db", create=True) as records:
+        records.append("report", certificate(), at=dt.datetime(2027, 5, 1, tzinfo=dt.UTC))
+        told = {on: list(due_notices(records, dt.date.fromisoformat(on), dt.timedelta(days=29))) for on in (
+            "2027-05-02", "2027-05-03", "2027-06-01", "2027-06-02",
+        )}  # fmt: skip
+        titles = {on: [str(notice.title) for notice in notices] for on, notices in told.items()}
+        assert titles == {
+            "2027-05-02": [],
+            "2027-05-03": ["due on 2027-06-01: artefact BB-7"],
+            "2027-06-01": ["due on 2027-06-01: artefact BB-7"],
+            "2027-06-02": ["overdue since 2027-06-01: artefact BB-7"],
+        }
+        assert len({notice.key for notices in told.values() for notice in notices}) == 2
+        with pytest.raises(CmmUqError, match="the clock says 2027-04-20"):
+            list(due_notices(records, dt.date(2027, 4, 20), dt.timedelta(days=60)))
+    assert list(due_notices(None, dt.date(2027, 6, 1), dt.timedelta(days=30))) == []
