@@ -19,7 +19,7 @@ from cmm_uq.commands.written import REPORTS
 from cmm_uq.errors import CmmUqError, OutputError, suggestion
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.toml_text import commented
-from cmm_uq.messages import say
+from cmm_uq.messages import plural, say
 from cmm_uq.records.place import NONE, beside, is_url, place_of
 from cmm_uq.scheduling.channels import channels
 from cmm_uq.scheduling.found import Found
@@ -32,7 +32,8 @@ from cmm_uq.scheduling.ready import DAYS, READY, Call, encoded
 from cmm_uq.scheduling.run import Clock, Run
 from cmm_uq.scheduling.settings import FILE, ScheduleFile, read_schedule
 from cmm_uq.scheduling.state import InFolder, InRecords
-from cmm_uq.scheduling.work import Work
+from cmm_uq.scheduling.work import REPORTED, Work
+from cmm_uq.writing.interruption import keeping
 from cmm_uq.writing.new_file import write_new
 
 CLOCK = Clock(lambda: dt.datetime.now(dt.UTC), time.monotonic, time.sleep)
@@ -143,12 +144,20 @@ def run_scheduled(asked: Asked, tell: Tell = lambda told: None, clock: Clock = C
             work = Work(reports, state, lambda job: _reported(job, reports, seed, place or NONE), outbox.add)
             within = dt.timedelta(days=facts.run.due_within_days)
             roots = [folder.absolute() for folder in asked.folders]
-            return Run(roots, facts.run, work, outbox, lambda on: due_notices(records, on, within), tell, log.write, clock,
-                       asked.dry).through()  # fmt: skip
+            run = Run(roots, facts.run, work, outbox, lambda on: due_notices(records, on, within), tell, log.write, clock,
+                      asked.dry)  # fmt: skip
+            with keeping(lambda: _kept(run)):
+                return run.through()
     except CmmUqError as error:  # of the records: without them nothing is made, and somebody has to hear of that too
         if not asked.dry:
             _send_alone(error, Outbox(reports, ways, InFolder(reports), clock.moment), log, clock)
         raise
+
+
+def _kept(run: Run) -> str:
+    """What a signal finds."""
+    count = run.counted.get(REPORTED, 0)
+    return str(plural(count, one=say("1 report was written"), many=say("{count} reports were written", count=count)))
 
 
 def _send_alone(error: CmmUqError, outbox: Outbox, log: Log, clock: Clock) -> None:

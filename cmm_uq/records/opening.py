@@ -23,10 +23,10 @@ APPLICATION = 0x434D4D55
 PATIENCE_S = 15.0
 """How long to wait for another process that writes."""
 
-REVISION = "0001"
+REVISION = "0002"
 """Newest revision of the tables; see :mod:`cmm_uq.records.migrations`."""
 
-KNOWN = ("0001",)
+KNOWN = ("0001", "0002")
 """All revisions, oldest first."""
 
 

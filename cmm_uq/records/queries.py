@@ -208,7 +208,7 @@ def _certificates(
             row.entry, row.job, row.machine_called, row.artefact_called, row.kind, row.origin, dt.date.fromisoformat(row.day),
             dt.datetime.fromisoformat(row.at), _since(row.adjusted_since, row.day, adjusted[row.machine]), row.state,
             row.decision, row.diagnosis, bool(row.interim), _folder(row.folder, home), row.version, row.results_sha256,
-            row.number, row.command, tuple(stated.get(row.entry, ())), together.get(row.entry),
+            row.number, row.command, _day(row.artefact_due), tuple(stated.get(row.entry, ())), together.get(row.entry),
         )
         for row in rows
     ]  # fmt: skip

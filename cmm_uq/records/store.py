@@ -325,12 +325,24 @@ class Writing:
         ------
         CmmUqError : one says something that no entry before it allows.
         """
+        return self._all(self._following(new))
+
+    def copy(self, whole: Iterable[Entry]) -> None:
+        """Add entries of other records as they are, into records that hold none."""
+        self._all(whole)
+
+    def _following(self, new: Iterable[New]) -> Iterator[Entry]:
         number, previous = last(self.connection)
-        indexer, block, added = Indexer(self.connection), [], []
         for kind, content, at in new:
             number += 1
             entry = following(previous, number, at or self.records.clock(), kind, content)
             previous = entry.hash
+            yield entry
+
+    def _all(self, whole: Iterable[Entry]) -> list[Entry]:
+        indexer, added = Indexer(self.connection), []
+        block: list[Entry] = []
+        for entry in whole:
             indexer.add(entry)
             block.append(entry)
             if len(block) == _BLOCK:

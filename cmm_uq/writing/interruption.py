@@ -12,7 +12,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 PATIENCE_S = 1.2
 """How long to wait for files that are just being put in place: the process ends within two seconds of a signal."""
-
-_SHOWN = 5
-"""Folders that are named in one line."""
 
 _placing = threading.Lock()
 _stages: list[Staged] = []
@@ -52,7 +49,8 @@ def placing(folder: Path) -> Iterator[None]:
     try:
         with _placing:
             yield
-            _written.append(folder)
+            if not _keeping:  # or there may be a hundred thousand of them, and what is kept is said
+                _written.append(folder)
     finally:
         _going_in.remove(folder)
 
@@ -126,19 +124,13 @@ def _wait(reading: int) -> None:
             _end(number)
 
 
-def _listed(folders: Sequence[Path]) -> str:
-    """Folders; of many the first few, and how many more."""
-    more = f" and {len(folders) - _SHOWN} more" if len(folders) > _SHOWN else ""
-    return ", ".join(map(str, folders[:_SHOWN])) + more
-
-
 def _end(number: int) -> None:
     alone = _placing.acquire(timeout=PATIENCE_S)
     if alone:
         for place in _stages.copy():
             place.discard()
     if _written:
-        said = f"interrupted; what was asked for is written in {_listed(_written)}"
+        said = f"interrupted; what was asked for is written in {', '.join(map(str, _written))}"
     elif alone:
         said = f"interrupted; {_keeping[-1]() if _keeping else 'nothing was written'}"
     else:

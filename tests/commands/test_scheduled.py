@@ -84,7 +84,7 @@ def test_a_run_that_is_ended_in_the_middle_leaves_nothing_half_and_the_next_one_
     _, error = one.communicate()
     if number == signal.SIGTERM:
         assert one.returncode == 143
-        assert error == "cmm-uq: interrupted; nothing was written\n"
+        assert error == "cmm-uq: interrupted; 0 reports were written\n"
     assert not (jobs / "reports" / "iota-1102-20C" / "results.json").exists()
     if number == signal.SIGKILL:
         done = run("report", "--scheduled", jobs)
