@@ -41,10 +41,11 @@ class Turn:
     def end(self) -> None:
         """Release the lock."""
         if self.through:
-            with contextlib.suppress(OSError):
-                os.ftruncate(self.descriptor, 0)
-            with contextlib.suppress(OSError):
-                self.path.unlink()  # fails on Windows while it is open; empty it says the same
+            try:
+                self.path.unlink()
+            except OSError:  # on Windows while it is open; empty it says the same
+                with contextlib.suppress(OSError):
+                    os.ftruncate(self.descriptor, 0)
         os.close(self.descriptor)
 
 

@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,10 @@ MOST = 20
 LISTED = 200
 """Titles in a message of several."""
 
-_WAITING, _SENT = ".json", ".sent"
+_WAITING, _SENT, _UNFINISHED = ".json", ".sent", ".unfinished-"
+
+_ABANDONED_S = 3600.0
+"""Age at which nobody writes a file any more that takes milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,7 @@ class Outbox:
         with turn(self.out / PRIVATE / "messages.lock", patience_s=patience_s) as mine:
             if mine is None:
                 return []
+            self._clear()
             self._remember()
             done = self._send_all()
             self._remember()
@@ -169,6 +174,13 @@ class Outbox:
                 return
             _drop(path)
 
+    def _clear(self) -> None:
+        """Remove what a run that was killed left while it wrote a message."""
+        for path in self.folder.glob(f"{_UNFINISHED}*"):
+            with contextlib.suppress(OSError):
+                if time.time() - path.stat().st_mtime > _ABANDONED_S:
+                    path.unlink()
+
     def _wait(self, message: Message, channel: str) -> bool:
         """Whether the message was new."""
         place = self.folder / f"{message.key}{_WAITING}"
@@ -177,7 +189,7 @@ class Outbox:
         with _told(place):
             self.folder.mkdir(parents=True, exist_ok=True)
             content = json.dumps({"channel": channel, "message": message.as_data()}, ensure_ascii=False)
-            with tempfile.NamedTemporaryFile("wb", dir=self.folder, prefix=".unfinished-", delete=False) as file:
+            with tempfile.NamedTemporaryFile("wb", dir=self.folder, prefix=_UNFINISHED, delete=False) as file:
                 try:
                     file.write(content.encode())
                     file.flush()

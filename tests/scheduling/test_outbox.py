@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -187,3 +188,14 @@ def test_a_key_tells_channel_event_what_it_is_about_and_its_state_apart() -> Non
     }  # fmt: skip
     assert len(keys) == 16
     assert Message.of(notice("a"), "x", NOW).key == Message.of(notice("a"), "x", "2027-01-01T00:00:00Z").key
+
+
+def test_what_a_kill_left_of_a_message_is_removed_once_nobody_can_be_writing_it(tmp_path: Path) -> None:
+    box = outbox(tmp_path, Kept())
+    box.add([notice("a")])
+    for name, age in {".unfinished-old": 7200, ".unfinished-new": 0}.items():
+        path = box.folder / name
+        path.write_text("")
+        os.utime(path, (time.time() - age,) * 2)
+    box.deliver(0.0)
+    assert [path.name for path in box.folder.iterdir()] == [".unfinished-new"]
