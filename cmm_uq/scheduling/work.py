@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -95,12 +95,14 @@ class Work:
     state : what earlier runs have done.
     report : reports one job.
     queue : lets notices go out, before a job counts as done.
+    further : what the history of its machine says of a new certificate.
     """
 
     out: Path
     state: State
     report: Report
     queue: Callable[[Sequence[Notice]], object]
+    further: Callable[[Found], Iterable[Notice]] = lambda job: ()
 
     def lock_of(self, job: Found) -> Path:
         """Its lock file; one for two ids that some systems take for one."""
@@ -152,7 +154,7 @@ class Work:
                 return Ended(job, UNCHANGED)
             results = json.loads(self.report(job) if why else self._written(job))
             turn.through = False  # until its messages wait to be sent, the next run has to look at it again
-            notices = of_results(results, _digest(results), str(self.out / job.id))
+            notices = [*of_results(results, _digest(results), str(self.out / job.id)), *self.further(job)]
             self.queue(notices)
             turn.through = True
             return Ended(job, REPORTED, why, results=results, notices=notices) if why else Ended(job, UNCHANGED)
