@@ -7,8 +7,8 @@ not answer) is tried again when everything else is done.
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +92,7 @@ class Run:
         self._send(1, last=False)
         ready, changing = self._parted(jobs, problems)
         self._report_all(ready, problems)
-        self._report_all(self._settled(changing, problems), problems)
+        self._report_all(self._settled(changing, {job.id.casefold() for job in jobs}, problems), problems)
         self._look_what_is_due()
         self._send(self.settings.tries, last=True)
         return self._conclude()
@@ -158,13 +158,24 @@ class Run:
                 self._end(would, problems)
         return ready, changing
 
-    def _settled(self, changing: Mapping[Found, tuple[float, Snapshot]], problems: Problems) -> list[Found]:
-        """Of the jobs that were changed a moment ago, or have times of the future, those that nobody changes now."""
+    def _settled(
+        self, changing: Mapping[Found, tuple[float, Snapshot]], ids: Collection[str], problems: Problems
+    ) -> list[Found]:
+        """Of the jobs that were changed a moment ago, or have times of the future, those that nobody changes now.
+
+        Parameters
+        ----------
+        changing : when each was looked at, and what lay in its folder.
+        ids : of all jobs, without regard to case.
+        problems : that stand.
+        """
         settled = []
         for job, (looked, seen) in changing.items():
             self.clock.sleep(max(0.0, looked + self.settings.quiet_s - self.clock.passed()))
-            if snapshot(job.folder) == seen:
-                settled.append(job)
+            again = _looked_at_again(job)
+            same_id = again.id == job.id or again.id.casefold() not in ids
+            if snapshot(job.folder) == seen and same_id and not again.planned:
+                settled.append(again)
             else:
                 self._end(Ended(job, WAITING, "is still being changed: left for the next run"), problems)
         return settled
@@ -274,3 +285,12 @@ class Run:
         counts = ", ".join(f"{count} {state}" for state, count in self.counted.items()) or "nothing found"
         self._log(f"run ended with {code}: {counts}")
         return code
+
+
+def _looked_at_again(job: Found) -> Found:
+    """A job that may have been read while it was being copied."""
+    try:
+        again = next(job_folders(job.folder), job)
+    except CmmUqError:  # it went away, which taking it says
+        return job
+    return replace(again, root=job.root)

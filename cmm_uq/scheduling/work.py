@@ -144,7 +144,7 @@ class Work:
     def _alone(self, job: Found) -> Ended:
         if not job.id:
             self.report(job)
-            raise CmmUqError("was changed while it was read", where=str(job.folder), fix="The next run takes it")
+            return Ended(job, WAITING, "was changed while it was read: left for the next run")
         with locks.turn(self.lock_of(job)) as turn:
             if turn is None:
                 return Ended(job, BUSY, "another run is at it")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.errors import CmmUqError, OutputError
-from cmm_uq.scheduling.found import Found
+from cmm_uq.scheduling.found import Found, Snapshot, snapshot
 from cmm_uq.scheduling.locks import turn, turn_at
 from tests.scheduling.runs import Jobs, made
 from tests.scheduling.told import notice
@@ -157,6 +157,28 @@ def test_a_folder_that_is_still_being_copied_is_left_for_the_next_run(jobs: Jobs
     jobs.now += dt.timedelta(minutes=5)
     assert jobs.run() == 0
     assert jobs.states()["b"] == "reported"
+
+
+@pytest.mark.parametrize(("id", "state"), [("b", "reported"), ("C", "waiting")])
+def test_a_job_that_was_read_before_it_was_whole_is_read_again(
+    jobs: Jobs,
+    id: str,
+    state: str,
+    monkeypatch: pytest.MonkeyPatch,  # noqa: A002
+) -> None:
+    """Its last byte comes between the first look into job.toml and the one at the folder; then it may have another's id."""
+    path = jobs.root / "b" / "job.toml"
+    path.write_text("[jo")
+    jobs.now = dt.datetime.now(dt.UTC)
+
+    def completed(folder: Path) -> Snapshot:
+        made(jobs.root, "b", id=id) if path.read_text() == "[jo" else None
+        return snapshot(folder)
+
+    monkeypatch.setattr("cmm_uq.scheduling.run.snapshot", completed)
+    assert jobs.run() == 0
+    assert [line["state"] for line in jobs.lines if line.get("folder") == str(jobs.root / "b")] == [state]
+    assert jobs.channel.messages == []
 
 
 def test_a_clock_that_jumped_back_keeps_no_job_waiting(jobs: Jobs) -> None:
