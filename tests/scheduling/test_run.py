@@ -159,12 +159,12 @@ def test_a_folder_that_is_still_being_copied_is_left_for_the_next_run(jobs: Jobs
     assert jobs.states()["b"] == "reported"
 
 
-@pytest.mark.parametrize(("id", "state"), [("b", "reported"), ("C", "waiting")])
+@pytest.mark.parametrize(("named", "state"), [("b", "reported"), ("C", "waiting")])
 def test_a_job_that_was_read_before_it_was_whole_is_read_again(
     jobs: Jobs,
-    id: str,
+    named: str,
     state: str,
-    monkeypatch: pytest.MonkeyPatch,  # noqa: A002
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its last byte comes between the first look into job.toml and the one at the folder; then it may have another's id."""
     path = jobs.root / "b" / "job.toml"
@@ -172,7 +172,7 @@ def test_a_job_that_was_read_before_it_was_whole_is_read_again(
     jobs.now = dt.datetime.now(dt.UTC)
 
     def completed(folder: Path) -> Snapshot:
-        made(jobs.root, "b", id=id) if path.read_text() == "[jo" else None
+        made(jobs.root, "b", id=named) if path.read_text() == "[jo" else None
         return snapshot(folder)
 
     monkeypatch.setattr("cmm_uq.scheduling.run.snapshot", completed)
