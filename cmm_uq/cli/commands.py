@@ -10,6 +10,7 @@ import typer
 from cmm_uq.cli import (
     BAD_INPUT,
     acquire,
+    affected,
     budget,
     check,
     compensate,
@@ -19,6 +20,8 @@ from cmm_uq.cli import (
     new,
     plan,
     prove,
+    records,
+    release,
     report,
     schedule,
     schema,
@@ -51,6 +54,8 @@ for module, short in {
     simulate: "A recording drawn from known errors, as a job of its own.",
     compensate: "A recording corrected by its machine's error maps.",
     budget: "The uncertainty of any measurement model in a file.",
+    release: "A certificate released, withdrawn or replaced.",
+    affected: "Which certificates a correction of the package touches.",
     schema: "JSON Schema of a file, for editors that complete and explain.",
     selftest: "Published reference figures, computed here and compared.",
 }.items():
@@ -61,6 +66,7 @@ app.add_typer(instruments.app, name="instruments", short_help="Instruments: read
 app.add_typer(
     schedule.app, name="schedule", short_help="Scheduled runs: what they go by, whom they tell, what starts them."
 )
+app.add_typer(records.app, name="records", short_help="The history: verified, imported, backed up, brought up to date.")
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
 and the calibration certificates that state it.

@@ -88,8 +88,9 @@ def restore(file: Path, place: str | Path) -> tuple[int, str]:
             shutil.copyfile(file, path)
         _set_aside(target)
         _in_place(path, target)
-    with open_records(target):  # in the mode in which it is written to
-        return head
+    with _raw(target) as raw:
+        raw.execute("PRAGMA journal_mode = WAL")
+    return head
 
 
 def _set_aside(target: Path) -> None:
@@ -126,10 +127,12 @@ def _checked(path: Path) -> tuple[int, str]:
 
 def _copied(records: Records, path: Path) -> None:
     path.unlink()
-    with open_records(path, create=True) as made, told(records.place), records.engine.connect() as source:
-        with made.writing() as writing:
-            rows = source.execution_options(yield_per=2000).execute(select(entries).order_by(entries.c.number))
-            writing.copy(Entry(*row) for row in rows)
+    with (
+        open_records(path, create=True) as made, made.writing() as writing, told(records.place),
+        records.engine.connect() as source,
+    ):  # fmt: skip
+        rows = source.execution_options(yield_per=2000).execute(select(entries).order_by(entries.c.number))
+        writing.copy(Entry(*row) for row in rows)
     with _raw(path) as raw:
         raw.execute("PRAGMA journal_mode = DELETE")
 
