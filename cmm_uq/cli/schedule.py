@@ -32,7 +32,7 @@ def new(
 ) -> None:
     """Write a schedule.toml with every key explained; never over anything."""
     defer_scipy()
-    from cmm_uq.commands.scheduled import write_schedule
+    from cmm_uq.commands.schedule import write_schedule
 
     write_schedule(file)
     say(str(file))
@@ -49,7 +49,7 @@ def try_out(
 ) -> None:
     """Send a trial message to everybody whom the schedule names. Exit code 1 when one did not go out."""
     defer_scipy()
-    from cmm_uq.commands.scheduled import schedule_of, send_trial
+    from cmm_uq.commands.schedule import schedule_of, send_trial
 
     told = send_trial(schedule_of(folders or (), schedule))
     if json:
@@ -78,7 +78,7 @@ def ready(
 ) -> None:
     """Print what starts a scheduled run: a line of cron, a service and a timer of systemd, a task of Windows."""
     defer_scipy()
-    from cmm_uq.commands.scheduled import ready_files, write_ready
+    from cmm_uq.commands.schedule import ready_files, write_ready
 
     files = ready_files(scheduler, folders, schedule, at=at, days=days)
     if out is not None:

@@ -170,7 +170,7 @@ class Outbox:
             try:
                 if not self.state.sent(message.key):
                     self.state.add_sent(message.key, {**message.as_data(), "channel": name})
-            except OutputError:
+            except CmmUqError:
                 return
             _drop(path)
 

@@ -222,7 +222,7 @@ class Run:
         for attempt in range(1, tries + 1):
             try:
                 deliveries = self.outbox.deliver(_PATIENCE_S)
-            except OutputError as error:
+            except CmmUqError as error:
                 self._line({"message": None, "why": str(error)}, 3)
                 return
             failed = [one for one in deliveries if one.problem]
@@ -262,7 +262,7 @@ class Run:
         """Let notices go out; where they cannot be kept they are sent at once, and again by the next run."""
         try:
             return self.outbox.add(notices)
-        except OutputError as error:
+        except CmmUqError as error:  # a full disk, or records that were lost meanwhile
             self.codes.add(3)
             self._log(f"a message cannot be kept: {error}")
             for one in self.outbox.sent_at_once(notices):

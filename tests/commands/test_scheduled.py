@@ -11,6 +11,7 @@ import signal
 import sqlite3
 import subprocess
 import time
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -221,6 +222,10 @@ def test_records_that_cannot_be_written_end_the_run_before_any_job_and_somebody_
             assert done.stderr.count("\n") == 1
     assert str(where) in done.stderr
     assert not (jobs / "reports" / "iota-1102-20C").exists()
+    assert list((jobs / "reports" / ".scheduled" / "problems").iterdir())
+    shutil.rmtree(jobs / "iota")
+    run("report", "--scheduled", jobs, "--records", where)
+    assert not list((jobs / "reports" / ".scheduled" / "problems").glob(f"{sha256(b'the run').hexdigest()[:16]}-*"))
     (body,) = [json.loads(body) for _, body in taken.requests]
     assert (body["event"], body["about"]) == ("error", "the run")
 

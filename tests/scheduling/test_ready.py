@@ -12,7 +12,7 @@ from pathlib import Path, PureWindowsPath
 
 import pytest
 
-from cmm_uq.commands.scheduled import ready_files, write_ready
+from cmm_uq.commands.schedule import ready_files, write_ready
 from cmm_uq.errors import CmmUqError
 from cmm_uq.scheduling.ready import Call, cron, encoded, systemd, windows
 

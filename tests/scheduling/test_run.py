@@ -12,6 +12,7 @@ import pytest
 from cmm_uq.errors import CmmUqError, OutputError
 from cmm_uq.scheduling.found import Found, Snapshot, snapshot
 from cmm_uq.scheduling.locks import turn, turn_at
+from cmm_uq.scheduling.state import InFolder
 from tests.scheduling.runs import Jobs, made
 from tests.scheduling.told import notice
 
@@ -243,6 +244,23 @@ def test_where_even_a_message_cannot_be_kept_it_is_sent_at_once(jobs: Jobs, monk
     monkeypatch.setattr(os, "fsync", full)
     assert jobs.run() == 3
     assert sorted(jobs.channel.titles) == ["error: a", "error: b", "error: c"]
+
+
+def test_records_that_are_lost_in_the_middle_stop_neither_the_jobs_nor_the_messages(jobs: Jobs) -> None:
+    class Lost(InFolder):
+        def sent(self, key: str) -> bool:
+            raise CmmUqError("the server closed the connection")
+
+    for name in "ab":
+        made(jobs.root, name, "fail")
+    jobs.state = Lost(jobs.out)
+    assert jobs.run() == 3
+    assert jobs.states() == {"a": "refused", "b": "refused", "c": "reported"}
+    assert sorted(jobs.channel.titles) == ["error: a", "error: b"]
+    jobs.state = None
+    jobs.run()
+    assert jobs.reported == []
+    assert sorted(jobs.channel.titles)[2:] == ["fail: CMM 3 (job a)", "fail: CMM 3 (job b)"]
 
 
 def test_a_job_that_another_run_is_at_is_left_to_it(jobs: Jobs) -> None:
