@@ -24,6 +24,7 @@ CONTENTS: dict[str, list[str]] = {
         "notebooks/*",
         "import/index", "import/*", "instruments/index", "instruments/*",
     ],
+    "Records": ["records/index", "records/*"],
     "Reference": [
         "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
         "reference/instrument", "reference/schedule",
