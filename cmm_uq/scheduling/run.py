@@ -203,7 +203,10 @@ class Run:
             in_a_row += 1
             self._log(f"will be tried again {ended.name}: {ended.why}")
             if in_a_row == _IN_A_ROW:
-                return [*again, *jobs[i + 1 :]]
+                return [
+                    *jobs[i + 1 :],
+                    *again,
+                ]  # whatever is wrong with these, it keeps none of the others from its turn
         return again
 
     def _back_off(self, attempt: int) -> None:

@@ -235,6 +235,20 @@ def test_where_output_is_impossible_for_several_in_a_row_no_more_are_computed_be
     assert len(jobs.reported) == 10
 
 
+def test_folders_that_cannot_be_written_keep_no_other_job_from_its_turn(tmp_path: Path) -> None:
+    for name in ("a", "b", "c", "d", "e"):
+        made(tmp_path, name)
+
+    def refused(job: Found) -> None:
+        if job.id in "abc":
+            raise OutputError("Permission denied")
+
+    jobs = Jobs(tmp_path, before=refused)
+    assert jobs.run() == 3
+    assert jobs.reported == ["d", "e"]
+    assert jobs.slept[0] == 1.0
+
+
 def test_where_even_a_message_cannot_be_kept_it_is_sent_at_once(jobs: Jobs, monkeypatch: pytest.MonkeyPatch) -> None:
     """A full disk is what a person has to hear of most."""
 
