@@ -75,7 +75,7 @@ def systemd(call: Call) -> dict[str, str]:
         "After=network-online.target", "", "[Service]", "Type=oneshot", *user, f"WorkingDirectory={home}",
         "# Variables of secrets, NAME=value a line; chmod 600", f"EnvironmentFile=-{secrets}",
         f"ExecStart={' '.join(map(_quoted, call.line()))}",
-        "# 1: something needs a person, who was told; 2 and 3 show in systemctl --failed", "SuccessExitStatus=1",
+        "# Whatever is not 0 shows in systemctl --failed: 1 is also how a Python ends that cannot start",
         "# Longer than the longest night: what a run that was ended left, the next one does", "TimeoutStartSec=12h",
         "TimeoutStopSec=30s", "Nice=10", "NoNewPrivileges=true", "UMask=0027",
     ]  # fmt: skip

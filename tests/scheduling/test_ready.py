@@ -71,6 +71,7 @@ def test_a_service_of_systemd_runs_the_command(tmp_path: Path, name: str) -> Non
     assert exec_words(settings["ExecStart"]) == made.line()
     assert settings["WorkingDirectory"].replace("%%", "%") == str(tmp_path / name)
     assert settings["User"] == "cmm"
+    assert "SuccessExitStatus" not in settings  # a Python that cannot start ends with 1
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd here")
