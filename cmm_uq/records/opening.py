@@ -113,6 +113,7 @@ def _file(path: Path, create: bool, read_only: bool) -> Engine:
 
 
 def _check_file(path: Path, create: bool) -> None:
+    """The file itself is not looked into: closing it would drop SQLite's locks of this process on it."""
     if path.is_dir():
         raise CmmUqError("is a folder, and records are a file", where=str(path), fix="Name a file in it: records.db")
     try:
@@ -123,13 +124,8 @@ def _check_file(path: Path, create: bool) -> None:
                     fix=f"Name them with --records or {ENVIRONMENT}, or begin them: cmm-uq records import FOLDER",
                 )  # fmt: skip
             path.parent.mkdir(parents=True, exist_ok=True)
-            return
-        with path.open("rb") as file:
-            head = file.read(16)
     except OSError as error:
         raise OutputError(f"cannot be opened: {error.strerror}", where=str(path), fix="Mend the permissions") from error
-    if head and head != b"SQLite format 3\0":
-        raise CmmUqError("is no database", where=str(path), fix="Name the file of the records, or restore a backup")
 
 
 def _server(url: str, read_only: bool) -> Engine:
