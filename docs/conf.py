@@ -20,13 +20,14 @@ from cmm_uq import __version__  # noqa: E402
 CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "overview", "gallery"],
     "How to": [
-        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*",
+        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "records/scheduled", "howto/python",
+        "notebooks/*",
         "import/index", "import/*", "instruments/index", "instruments/*",
     ],
     "Records": ["records/index", "records/*"],
     "Reference": [
         "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
-        "reference/instrument",
+        "reference/instrument", "reference/schedule",
         "reference/commands", "reference/results", "reference/prove", "running",
         "api", "reference/python", "uncertainty/model-file",
         "machine/effects", "limits", "words",

@@ -50,6 +50,7 @@ def files() -> dict[Path, str]:
         "truth": truth(),
         "budget": budget(),
         "instrument": instrument(),
+        "schedule": schedule(),
         "columns": columns(),
         "commands": commands(),
         "results": results(),
@@ -156,6 +157,21 @@ def instrument() -> str:
             title = f"[{name}.NAME]" if shown is inside else header(name, one)
             parts += [f"## `{title}`", one["description"], keys_table(shown)]
     return page("Profile of an instrument, key by key", *parts)
+
+
+def schedule() -> str:
+    """Every key of schedule.toml."""
+    schema = schema_named("schedule")
+    parts = [
+        "What `cmm-uq report --scheduled` goes by, and whom it tells: [scheduled runs](../records/scheduled.md). `cmm-uq "
+        "schedule new FILE` writes one; every table may be left out, and every key that is not said to be needed.",
+        EDITORS.format(name="schedule"),
+        "Paths are relative to the file. No secret stands in it: keys that end in `_variable` name a variable of the "
+        "environment.",
+    ]
+    for name, one in schema["properties"].items():
+        parts += [f"## `{header(name, one)}`", one["description"], keys_table(one)]
+    return page("schedule.toml, key by key", *parts)
 
 
 def ready_profiles() -> str:

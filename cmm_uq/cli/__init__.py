@@ -1,7 +1,7 @@
 """The command ``cmm-uq``: one subcommand a file, heavy imports only where they are used.
 
 Exit codes: 0 done; 2 bad input; 3 output impossible; 4 done, and not conforming or inconsistent (with ``--strict``);
-130 after SIGINT, 143 after SIGTERM.
+130 after SIGINT, 143 after SIGTERM; 1 done, and something needs a person (``report --scheduled``, ``schedule test``).
 """
 
 from __future__ import annotations
@@ -15,6 +15,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from cmm_uq.errors import CmmUqError
+
+NEEDS_A_PERSON = 1
+"""Exit code of a scheduled run after which a person has to look at something, and was told of it."""
 
 BAD_INPUT = 2
 """Exit code of everything that the user can mend."""

@@ -25,6 +25,7 @@ from cmm_uq.cli import (
     records,
     release,
     report,
+    schedule,
     schema,
     selftest,
     simulate,
@@ -37,7 +38,8 @@ app = typer.Typer(
     name="cmm-uq",
     help="Uncertainty of coordinate measuring machines, and the certificates that state it.",
     epilog="Exit codes: 0 done; 2 bad input; 3 output impossible; 4 with --strict: done, not conforming or inconsistent; "
-    "130, 143 interrupted.\n\n" + examples("report examples/iota-1102-20C", "report --help", "--install-completion"),
+    "130, 143 interrupted; 1 with report --scheduled: done, and something needs a person.\n\n"
+    + examples("report examples/iota-1102-20C", "report --help", "--install-completion"),
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # brackets of TOML stay as they are, and help is there at once
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -65,6 +67,9 @@ for module, short in {
     app.command(name, short_help=short, epilog=module.EXAMPLES)(module.command)
 
 app.add_typer(instruments.app, name="instruments", short_help="Instruments: ready profiles, tried at a port, new ones.")
+app.add_typer(
+    schedule.app, name="schedule", short_help="Scheduled runs: what they go by, whom they tell, what starts them."
+)
 app.add_typer(records.app, name="records", short_help="The history: verified, imported, backed up, brought up to date.")
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),

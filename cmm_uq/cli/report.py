@@ -1,22 +1,34 @@
-"""``cmm-uq report JOB``: the certificate of a recording."""
+"""``cmm-uq report JOB``: the certificate of a recording; with ``--scheduled`` of every one that is new or changed."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
 
+import typer
+
+from cmm_uq.cli.completion import job_folders
 from cmm_uq.cli.importing import show_imported
-from cmm_uq.cli.options import Force, Job, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
+from cmm_uq.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
+from cmm_uq.errors import CmmUqError
 
 EXAMPLES = examples(
-    "report examples/iota-1102-20C", "report JOB --out DIR --seed 3", "report JOB --json --strict > results.json"
-)
+    "report examples/iota-1102-20C", "report JOB --out DIR --seed 3", "report JOB --json --strict > results.json",
+    "report --scheduled jobs --dry-run",
+)  # fmt: skip
 
 
 def command(
-    job: Job,
+    job: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Job folder: job.toml and the recording that it names; with --scheduled folders that hold job folders.",
+            metavar="JOB",
+            autocompletion=job_folders,
+        ),
+    ],
     out: Annotated[Path | None, out("reports/<job id>")] = None,
     seed: Seed = 0,
     force: Force = False,
@@ -25,11 +37,53 @@ def command(
     verbose: Verbose = False,
     json: Json = False,
     records: Records = None,
+    scheduled: Annotated[
+        bool,
+        typer.Option(
+            "--scheduled", help="Every job that is new or changed; a line of JSON for each; DIR holds them all."
+        ),
+    ] = False,
+    schedule: Annotated[
+        Path | None,
+        typer.Option(
+            help="With --scheduled: what the run goes by.",
+            metavar="FILE",
+            show_default="schedule.toml in the first JOB",
+        ),
+    ] = None,
+    lines: Annotated[
+        Path | None,
+        typer.Option(
+            help="With --scheduled: file that the lines are added to.", metavar="FILE", show_default="printed"
+        ),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="With --scheduled: say what would happen, and do nothing.")
+    ] = False,
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
+    _check(job, {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run} if not scheduled else
+           {"--force": force, "--strict": strict, "--verbose": verbose}, scheduled=scheduled)  # fmt: skip
+    if scheduled:
+        from cmm_uq.cli.scheduled import STANDARD_OUTPUT, run
+        from cmm_uq.commands.scheduled import Asked
+
+        asked = Asked(tuple(job), out, schedule, records, seed or None, dry_run)
+        raise typer.Exit(run(asked, None if quiet and lines is None else lines or STANDARD_OUTPUT))
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.report import write_report
 
         told = None if quiet or json else show_imported
-        report = write_report(job, out, seed=seed, force=force, stage=stage, told=told, records=records)
+        report = write_report(job[0], out, seed=seed, force=force, stage=stage, told=told, records=records)
     conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)
+
+
+def _check(jobs: list[Path], others: dict[str, object], *, scheduled: bool) -> None:
+    """Refuse what belongs to the other way of the command."""
+    for option, given in others.items():
+        if given:
+            fix = "Leave it out" if scheduled else "Add --scheduled"
+            raise CmmUqError(f"goes {'without' if scheduled else 'with'} --scheduled", where=option, fix=fix)
+    if len(jobs) > 1 and not scheduled:
+        raise CmmUqError(f"{len(jobs)} jobs are named, and a report is of one", where=str(jobs[1]),
+                         fix="Report them one after the other, or with --scheduled")  # fmt: skip

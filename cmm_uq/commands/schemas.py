@@ -16,6 +16,7 @@ from cmm_uq.jobs.truth import Truth
 from cmm_uq.kinds import names, table_of
 from cmm_uq.physics.effect import Effect
 from cmm_uq.plugins import EFFECTS, KINDS, STANDARDS, Plugin, naming_package, offered
+from cmm_uq.scheduling.settings import ScheduleFile
 
 
 def tables() -> dict[str, type[ArtefactFacts]]:
@@ -58,6 +59,11 @@ def instrument() -> Schema:
     return schema_of(ProfileFile, "instrument profile of cmm-uq")
 
 
+def schedule() -> Schema:
+    """Of what a scheduled run goes by."""
+    return schema_of(ScheduleFile, "schedule.toml of cmm-uq")
+
+
 def _told(effect: Effect) -> str:
     """What it is, its formula, and the columns that it needs."""
     needs = f"; needs the columns {', '.join(effect.columns)}" if effect.columns else ""
@@ -65,7 +71,7 @@ def _told(effect: Effect) -> str:
 
 
 SCHEMAS: Mapping[str, Callable[[], Schema]] = MappingProxyType({
-    "job": job, "budget": budget, "truth": truth, "instrument": instrument,
+    "job": job, "budget": budget, "truth": truth, "instrument": instrument, "schedule": schedule,
 })  # fmt: skip
 """By name."""
 

@@ -49,7 +49,8 @@ def placing(folder: Path) -> Iterator[None]:
     try:
         with _placing:
             yield
-            _written.append(folder)
+            if not _keeping:  # or there may be a hundred thousand of them, and what is kept is said
+                _written.append(folder)
     finally:
         _going_in.remove(folder)
 

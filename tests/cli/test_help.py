@@ -53,8 +53,8 @@ def test_alone_the_command_shows_the_three_most_used_calls() -> None:
     [
         (("reprot", "x"), "No such command 'reprot'. Did you mean 'report'? cmm-uq --help lists commands and options"),
         (
-            ("report", "x", "--sed", "3"),
-            "No such option: --sed. Did you mean --seed? cmm-uq report --help lists its options",
+            ("report", "x", "--seeed", "3"),
+            "No such option: --seeed. Did you mean --seed? cmm-uq report --help lists its options",
         ),
         (("report",), "Missing argument 'JOB'. cmm-uq report --help lists its options"),
     ],
