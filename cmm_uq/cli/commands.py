@@ -10,6 +10,7 @@ import typer
 from cmm_uq.cli import (
     BAD_INPUT,
     acquire,
+    batch,
     budget,
     check,
     compensate,
@@ -42,6 +43,7 @@ for module, short in {
     importing: "What is recognised of a laboratory's export.",
     check: "All that is wrong with jobs, without computing.",
     report: "The certificate of a recording: estimates, figures, decisions.",
+    batch: "The reports of many jobs, by processes or a cluster.",
     diagnose: "What a recording shows that its model leaves out.",
     plan: "What to measure, and what it will tell.",
     prove: "The diagnosis tried on sealed cases with a job's set-ups.",

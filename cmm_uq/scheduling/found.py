@@ -7,6 +7,7 @@ somebody is at them: they may lie, and where they cannot be right two looks at t
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from cmm_uq.files.content import content_of, text_of
 from cmm_uq.files.limits import JOB_BYTES
 from cmm_uq.files.toml import toml_of
 from cmm_uq.jobs.acquired import provenance_name
+from cmm_uq.jobs.file_names import device_name
 from cmm_uq.jobs.origin import is_planned
 from cmm_uq.writing import sha256_of
 
@@ -25,6 +27,7 @@ JOB_FILE = "job.toml"
 Snapshot = frozenset[tuple[str, int, int, int]]
 """Name, size, and times of change in nanoseconds of every file in a folder."""
 
+_ID = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _HEAD = 200
 """Bytes of a recording that say whether it is a plan still to be measured."""
 
@@ -127,9 +130,14 @@ def _read(folder: Path, root: Path) -> Found:
         identity, recording = data["job"]["id"], data.get("recording", {}).get("file", "")
     except (CmmUqError, tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError):
         return Found(folder, root)
-    if not isinstance(identity, str) or not isinstance(recording, str):
+    if not (isinstance(identity, str) and isinstance(recording, str) and _names_a_folder(identity)):
         return Found(folder, root)
     return Found(folder, root, identity, recording, _is_to_be_measured(folder / recording, with_plan="plan" in data))
+
+
+def _names_a_folder(identity: str) -> bool:
+    """Whether an id is one that a job may have; what is wrong with another, reading the job says."""
+    return bool(_ID.fullmatch(identity)) and set(identity) != {"."} and not device_name(identity)
 
 
 def _is_to_be_measured(recording: Path, *, with_plan: bool) -> bool:

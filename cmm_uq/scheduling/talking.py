@@ -68,6 +68,23 @@ class Answer:
     ended: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Packed:
+    """A value that is opened by the process that it is for, and by nobody on its way.
+
+    Parameters
+    ----------
+    content : its pickle.
+    """
+
+    content: bytes
+
+    @classmethod
+    def of(cls, value: Any) -> Packed:
+        """A value, packed."""
+        return cls(pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL))
+
+
 class _EndedError(Exception):
     """A process ended instead of answering."""
 
@@ -212,7 +229,7 @@ def serve(begin: Callable[[Any], Callable[[int, Any], Any]]) -> None:
         values = _given(asked)
         setting = next(values)
         try:
-            answer = begin(setting)
+            answer = begin(_opened(setting))
         except CmmUqError as error:
             put(told, error)
             return
@@ -223,7 +240,7 @@ def serve(begin: Callable[[Any], Callable[[int, Any], Any]]) -> None:
 
 def _answer(answer: Callable[[int, Any], Any], number: int, task: Any) -> Any:
     try:
-        return answer(number, task)
+        return answer(number, _opened(task))
     except CmmUqError as error:
         return error
     except MemoryError:
@@ -232,6 +249,10 @@ def _answer(answer: Callable[[int, Any], Any], number: int, task: Any) -> Any:
         return told_with_package(error) or CmmUqError(
             f"a fault of the program: {type(error).__name__}: {error}", fix="Please report it with the input"
         )
+
+
+def _opened(value: Any) -> Any:
+    return pickle.loads(value.content) if isinstance(value, Packed) else value  # noqa: S301 - the same
 
 
 def _given(stream: BinaryIO) -> Iterator[Any]:

@@ -15,16 +15,22 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from cmm_uq.writing.staging import Staged
+from typing import Protocol
 
 PATIENCE_S = 1.2
 """How long to wait for files that are just being put in place: the process ends within two seconds of a signal."""
 
+
+class Unplaced(Protocol):
+    """Something on its way to its place."""
+
+    def discard(self) -> None:
+        """Remove it."""
+        ...
+
+
 _placing = threading.Lock()
-_stages: list[Staged] = []
+_stages: list[Unplaced] = []
 _written: list[Path] = []
 _going_in: list[Path] = []
 _signalled: list[int] = []
@@ -33,7 +39,7 @@ _keeping: list[Callable[[], str]] = []
 
 
 @contextlib.contextmanager
-def staged(place: Staged) -> Iterator[None]:
+def staged(place: Unplaced) -> Iterator[None]:
     """While something is staged, a signal removes it."""
     _stages.append(place)
     try:
@@ -49,7 +55,8 @@ def placing(folder: Path) -> Iterator[None]:
     try:
         with _placing:
             yield
-            _written.append(folder)
+            if not _keeping:  # or there may be a hundred thousand of them, and what is kept is said
+                _written.append(folder)
     finally:
         _going_in.remove(folder)
 
