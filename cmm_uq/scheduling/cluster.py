@@ -160,7 +160,7 @@ def _client(address: str) -> Any:
                          fix="Install it: pip install 'cmm-uq[fleet]'") from None  # fmt: skip
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
     try:
-        return distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+        return distributed.Client(address, timeout=CONNECT_S)
     except (OSError, ValueError, TypeError) as error:
         raise CmmUqError("no Dask scheduler answers", where=f"--scheduler {address}",
                          fix="Start one (dask scheduler), or mend the address: tcp://HOST:8786") from error  # fmt: skip
