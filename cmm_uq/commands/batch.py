@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cmm_uq.commands.batch_job import PROGRAM, JobSetting, Task
+from cmm_uq.commands.batch_job import PROGRAM, Task
 from cmm_uq.commands.batch_jobs import Listed, Wanted, conforming, jobs_in, results_of
 from cmm_uq.commands.batch_table import write_table
 from cmm_uq.commands.reading import read_job
@@ -75,7 +75,7 @@ class Asked:
     @property
     def work(self) -> Work:
         """What processes are begun for."""
-        return Work(PROGRAM, JobSetting(self.seed, self.results_only), self.seconds, self.tries)
+        return Work(PROGRAM, (self.seed, self.results_only), self.seconds, self.tries)
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,7 @@ class _Run:
                 self._is_there(number, results, computed=False)
                 continue
             self._under_way[number] = _Place(self.wanted.folder(job), REPORT.owner(job), tuple(job.paths))
-            yield number, Task(one.folder, dict(job.inputs))
+            yield number, (one.folder, dict(job.inputs))
 
     def _take(self, answer: Answer) -> None:
         where = self._under_way.pop(answer.number)

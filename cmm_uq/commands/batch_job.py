@@ -7,7 +7,7 @@ answers with the bytes of the report's, and writes nothing: these follow from th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from cmm_uq.commands.reading import job_of
@@ -17,49 +17,29 @@ from cmm_uq.scheduling.talking import serve
 PROGRAM = "cmm_uq.commands.batch_job"
 
 
-@dataclass(frozen=True)
-class JobSetting:
-    """What every process is told first.
+Setting = tuple[int, bool]
+"""Seed of everything random, and whether figures alone are wanted: no document is composed, no picture drawn."""
 
-    Parameters
-    ----------
-    seed : of everything random.
-    results_only : whether figures alone are wanted: no document is composed, no picture drawn.
-    """
-
-    seed: int = 0
-    results_only: bool = False
+Task = tuple[str, dict[str, bytes]]
+"""Folder that a job lies in, for messages, and contents of job.toml and of all that it names, by name."""
 
 
-@dataclass(frozen=True)
-class Task:
-    """A job to be reported.
-
-    Parameters
-    ----------
-    folder : where it lies, for messages.
-    files : contents of job.toml and of all that it names, by name.
-    """
-
-    folder: str
-    files: dict[str, bytes]
-
-
-def begin(setting: JobSetting) -> Callable[[int, Task], dict[str, bytes]]:
+def begin(setting: Setting) -> Callable[[int, Task], dict[str, bytes]]:
     """What answers a job with the contents of its report's files, by name."""
     return lambda number, task: reported(task, setting)
 
 
-def reported(task: Task, setting: JobSetting) -> dict[str, bytes]:
+def reported(task: Task, setting: Setting) -> dict[str, bytes]:
     """Contents of the files of a report, by name.
 
     Raises
     ------
     CmmUqError : the job cannot be analysed.
     """
-    job = replace(job_of(task.files), folder=Path(task.folder))
-    outcome = report_outcome(job, seed=setting.seed, composed=not setting.results_only)
-    return REPORT.contents(outcome, results_only=setting.results_only)
+    (folder, files), (seed, results_only) = task, setting
+    job = replace(job_of(files), folder=Path(folder))
+    outcome = report_outcome(job, seed=seed, composed=not results_only)
+    return REPORT.contents(outcome, results_only=results_only)
 
 
 def main() -> None:
