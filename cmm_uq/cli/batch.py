@@ -9,7 +9,7 @@ import typer
 
 from cmm_uq.cli import BAD_INPUT, NOT_CONFORMING
 from cmm_uq.cli.completion import job_folders
-from cmm_uq.cli.options import Force, Json, Quiet, Seed, Strict, Verbose, examples, out
+from cmm_uq.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import layout, put_data, show
 from cmm_uq.cli.progress import shown
 
@@ -73,13 +73,14 @@ def command(
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
+    records: Records = None,
 ) -> None:
     """Write the report of every job as `report` does; one that fails never stops the others. Exit code 2 when one failed."""
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.batch import Asked, write_batch
 
         asked = Asked(workers, scheduler, results_only, seed, resume, force, time_limit, tries)
-        batch = write_batch(folders, out, asked, parquet=parquet, stage=stage)
+        batch = write_batch(folders, out, asked, parquet=parquet, stage=stage, records=records)
     if json:
         put_data(batch.as_data())
     elif not quiet:
@@ -107,6 +108,8 @@ def _summary(batch: Batch, *, verbose: bool) -> Summary:
     jobs = plural(batch.count, one=say("1 job"), many=say("{count} jobs", count=batch.count))
     verdict = Verdict("FAILED" if batch.failed else "DONE", "bad" if batch.failed else "good", jobs, tuple(counted))
     remarks: list[Text] = [say("Reports: {folder}", folder=Verbatim(batch.out))]
+    if batch.records:
+        remarks.append(say("Recorded in {records}", records=Verbatim(batch.records)))
     if batch.parquet is not None:
         remarks.append(say("Values: {file}", file=Verbatim(batch.parquet)))
     if batch.written and batch.seconds > 0:

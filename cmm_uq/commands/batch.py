@@ -13,20 +13,26 @@ from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq.commands.batch_job import PROGRAM, Task
 from cmm_uq.commands.batch_jobs import Listed, Wanted, conforming, jobs_in, results_of
 from cmm_uq.commands.batch_table import write_table
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.recording import ledger_of, opened
 from cmm_uq.commands.report import REPORT
 from cmm_uq.commands.written import REPORTS, RESULTS, Stage, silent
 from cmm_uq.errors import CmmUqError, OutputError
+from cmm_uq.jobs.job import Job
+from cmm_uq.records.place import NONE
 from cmm_uq.scheduling.parquet import check_parquet
 from cmm_uq.scheduling.pool import answers, check_workers, processes
 from cmm_uq.scheduling.progress import Pace
 from cmm_uq.scheduling.talking import Answer, Work
-from cmm_uq.writing import Owner, interruption, staged
+from cmm_uq.writing import Ledger, Owner, interruption, staged
+
+if TYPE_CHECKING:
+    from cmm_uq.records.store import Records
 
 TIME_LIMIT_S, TRIES, MOST_TRIES = 1800.0, 3, 100
 
@@ -118,6 +124,7 @@ class Batch:
     failed : the others, in the order of the jobs.
     seconds : that it took.
     parquet : file with a row for each value, if one was asked for.
+    records : what they were recorded in, as it is shown; empty where they were not.
     """
 
     out: Path
@@ -130,6 +137,7 @@ class Batch:
     failed: list[Failed] = field(default_factory=list)
     seconds: float = 0.0
     parquet: Path | None = None
+    records: str = ""
 
     def as_data(self) -> dict[str, Any]:
         """For results in JSON."""
@@ -137,14 +145,14 @@ class Batch:
             "schema": "cmm-uq/batch/1", "out": str(self.out), "jobs": self.count, "planned": self.planned,
             "written": self.written, "already": self.already, "not_conforming": self.not_conforming,
             "processes_ended": self.ended, "seconds": round(self.seconds, 3),
-            "parquet": None if self.parquet is None else str(self.parquet),
+            "records": self.records or None, "parquet": None if self.parquet is None else str(self.parquet),
             "failed": [one.as_data() for one in self.failed],
         }  # fmt: skip
 
 
 def write_batch(
     folders: Sequence[Path], out: Path | None = None, asked: Asked | None = None, *, parquet: Path | None = None,
-    stage: Stage | None = None,
+    stage: Stage | None = None, records: str | Path | None = NONE,
 ) -> Batch:  # fmt: skip
     """Report every job in folders and below them, as :func:`~cmm_uq.commands.report.write_report` reports one.
 
@@ -155,6 +163,7 @@ def write_batch(
     asked : how.
     parquet : file to be written with a row for each value.
     stage : told of progress.
+    records : that reports are recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside them.
 
     Returns
     -------
@@ -170,23 +179,26 @@ def write_batch(
         check_parquet(parquet, force=how.force)
     tell("Looking for jobs", 0.0)
     listed, planned = jobs_in(folders, place)
-    run = _Run(listed, how, Wanted(place, how.seed, how.results_only, how.force), Batch(place, len(listed), planned))
-    with interruption.keeping(run.kept):
-        run.through(tell)
-        if parquet is not None:
-            tell("Writing the table", 1.0)
-            write_table(parquet, filter(None, map(results_of, run.folders())), force=how.force)
-            run.batch.parquet = parquet
-    return run.batch
+    batch = Batch(place, len(listed), planned)
+    with opened(records, None if out is None else out / "job") as history:
+        run = _Run(listed, how, Wanted(place, how.seed, how.results_only, how.force), batch, history)
+        batch.records = "" if history is None else history.shown
+        with interruption.keeping(run.kept):
+            run.through(tell)
+            if parquet is not None:
+                tell("Writing the table", 1.0)
+                write_table(parquet, filter(None, map(results_of, run.folders())), force=how.force)
+                batch.parquet = parquet
+    return batch
 
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where a report is written, by whom, and from which files."""
+    """Where a report is written, by whom, and of which job."""
 
     folder: Path
     owner: Owner
-    inputs: tuple[Path, ...]
+    job: Job
 
 
 class _Run:
@@ -197,10 +209,13 @@ class _Run:
     listed : its jobs.
     asked, wanted : how, and what is written of each.
     batch : what came of it so far.
+    records : that each report is recorded in with its files.
     """
 
-    def __init__(self, listed: list[Listed], asked: Asked, wanted: Wanted, batch: Batch) -> None:
-        self.listed, self.asked, self.wanted, self.batch = listed, asked, wanted, batch
+    def __init__(
+        self, listed: list[Listed], asked: Asked, wanted: Wanted, batch: Batch, records: Records | None
+    ) -> None:  # fmt: skip
+        self.listed, self.asked, self.wanted, self.batch, self.records = listed, asked, wanted, batch, records
         self.there = bytearray(len(listed))
         self._under_way: dict[int, _Place] = {}
         self._failed: dict[int, Failed] = {}
@@ -252,7 +267,7 @@ class _Run:
                 self.batch.already += 1
                 self._is_there(number, results, computed=False)
                 continue
-            self._under_way[number] = _Place(self.wanted.folder(job), REPORT.owner(job), tuple(job.paths))
+            self._under_way[number] = _Place(self.wanted.folder(job), REPORT.owner(job), job)
             yield number, (one.folder, dict(job.inputs))
 
     def _take(self, answer: Answer) -> None:
@@ -262,10 +277,10 @@ class _Run:
             self._fail(answer.number, answer.failure)
             return
         try:
-            with staged(where.folder, where.owner, inputs=where.inputs, force=self.wanted.force) as place:
-                place.write(answer.value)
+            with staged(where.folder, where.owner, inputs=where.job.paths, force=self.wanted.force) as place:
+                place.write(answer.value, ledger=self._ledger(where, answer.value))
         except OutputError as error:
-            if getattr(error.__cause__, "errno", None) in _NO_ROOM:
+            if self._for_all(error):
                 raise OutputError(error.problem, where=error.where, fix=f"Free the disk; {self.kept()}") from error
             self._fail(answer.number, error)
             return
@@ -274,6 +289,16 @@ class _Run:
             return
         self.batch.written += 1
         self._is_there(answer.number, json.loads(answer.value[RESULTS]))
+
+    def _for_all(self, error: OutputError) -> bool:
+        """Whether no other job could be written either: the disk is full, or the records are gone."""
+        lost = self.records is not None and error.where == self.records.shown
+        return lost or getattr(error.__cause__, "errno", None) in _NO_ROOM
+
+    def _ledger(self, where: _Place, files: dict[str, bytes]) -> Ledger | None:
+        if self.records is None:
+            return None
+        return ledger_of(self.records, where.job, REPORT.command, where.folder, files, RESULTS)
 
     def _is_there(self, number: int, results: dict[str, Any], *, computed: bool = True) -> None:
         self.there[number] = 1

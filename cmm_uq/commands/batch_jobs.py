@@ -14,6 +14,7 @@ from cmm_uq.commands.written import RESULTS
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.records.content import decision
 from cmm_uq.scheduling.found import job_folders
 from cmm_uq.writing import Manifest, read_manifest, sha256_of
 from cmm_uq.writing.replacing import journal_for
@@ -149,15 +150,6 @@ def results_of(folder: Path) -> dict[str, Any] | None:
 def conforming(results: Mapping[str, Any]) -> bool:
     """Whether every statement of conformity is a pass, and the recording agrees with the model that the job names."""
     return decision(results) in ("pass", "none") and verdict(results) in ("consistent", "")
-
-
-_GRAVEST = ("fail", "remeasure", "conditional fail", "undecided", "incomplete", "conditional pass", "pass")
-
-
-def decision(results: Mapping[str, Any]) -> str:
-    """The gravest of its statements of conformity, in the words of results.json; ``none`` where it states none."""
-    stated = {str(one.get("decision")) for one in results.get("conformity") or ()}
-    return next((word for word in _GRAVEST if word in stated), "none")
 
 
 def verdict(results: Mapping[str, Any]) -> str:

@@ -30,10 +30,12 @@ def test_every_quantity_and_statement_of_a_certificate_is_a_row() -> None:
         "iota-1102-20C", "measured", dt.date(2004, 9, 1), "ppm", __version__, "consistent",
     ]  # fmt: skip
     assert (found["squareness_xy.angle_arcsec"]["unit"], found["accuracy.b89_range_um"]["unit"]) == ("″", "µm")
+    assert found["scale_x.ppm"]["quantity"] == "Scale error of X"
     (statement,) = results["conformity"]
     performance = found[f"performance:{statement['characteristic']}"]
-    assert [performance[name] for name in ("value", "u", "lower", "limit", "outcome", "decision")] == [
-        statement["value_um"], statement["u_um"], None, statement["limit_um"], "fail", "fail",
+    assert [performance[name] for name in ("value", "u", "lower", "limit", "decision")] == [
+        statement["value_um"], statement["u_um"], statement["value_um"] - 2 * statement["u_um"], statement["limit_um"],
+        "fail",
     ]  # fmt: skip
 
 
