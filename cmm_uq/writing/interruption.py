@@ -51,6 +51,7 @@ def staged(place: Unplaced) -> Iterator[None]:
 @contextlib.contextmanager
 def placing(folder: Path) -> Iterator[None]:
     """While files are put in place, a signal waits; afterwards it says that they were written."""
+    give_way()  # of a thread that is not the one that a signal stops
     _going_in.append(folder)  # before the lock: a signal in between must not stop whoever holds it
     try:
         with _placing:
