@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import datetime as dt
+import re
 from pathlib import Path
 
 import pytest
 
 from cmm_uq import __version__
 from cmm_uq.commands.batch_table import COLUMNS, rows, write_table
+from tests.conftest import ROOT
 from tests.kinds.simulated import outcome
 from tests.scheduling import canned
 
@@ -49,3 +51,9 @@ def test_each_row_is_of_its_columns_types_and_lists_of_positions_are_no_values(t
     assert table.column_names == NAMES
     assert table.column("name").to_pylist()[:2] == ["scale_x.ppm", "scale_x.ppm"]
     assert table.column("job").to_pylist().count("s") == 1
+
+
+def test_the_page_says_what_each_column_is() -> None:
+    page = (ROOT / "docs" / "records" / "batch.md").read_text(encoding="utf-8")
+    told = re.findall(r"(?m)^\| `(\w+)` \| (?:text|date|number) \| (.+) \|$", page)
+    assert told == [(name, meaning) for name, _, meaning in COLUMNS]
