@@ -21,8 +21,9 @@ CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "overview", "gallery"],
     "How to": [
         "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*",
-        "import/index", "import/*", "instruments/index", "instruments/*", "records/batch",
+        "import/index", "import/*", "instruments/index", "instruments/*",
     ],
+    "Records": ["records/index", "records/*"],
     "Reference": [
         "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
         "reference/instrument",

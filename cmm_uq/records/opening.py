@@ -113,6 +113,7 @@ def _file(path: Path, create: bool, read_only: bool) -> Engine:
 
 
 def _check_file(path: Path, create: bool) -> None:
+    """The file itself is not looked into: closing it would drop SQLite's locks of this process on it."""
     if path.is_dir():
         raise CmmUqError("is a folder, and records are a file", where=str(path), fix="Name a file in it: records.db")
     try:
@@ -123,13 +124,8 @@ def _check_file(path: Path, create: bool) -> None:
                     fix=f"Name them with --records or {ENVIRONMENT}, or begin them: cmm-uq records import FOLDER",
                 )  # fmt: skip
             path.parent.mkdir(parents=True, exist_ok=True)
-            return
-        with path.open("rb") as file:
-            head = file.read(16)
     except OSError as error:
         raise OutputError(f"cannot be opened: {error.strerror}", where=str(path), fix="Mend the permissions") from error
-    if head and head != b"SQLite format 3\0":
-        raise CmmUqError("is no database", where=str(path), fix="Name the file of the records, or restore a backup")
 
 
 def _server(url: str, read_only: bool) -> Engine:
@@ -262,6 +258,14 @@ _WORDS: tuple[tuple[str, str, str, type[CmmUqError]], ...] = (
     ("disk is full", "the disk of the records is full", "Free it; nothing was recorded", OutputError),
     ("disk I/O error", "the disk of the records fails", "Free or mend it; nothing was recorded", OutputError),
     ("unable to open", "cannot be opened", "Mend the permissions of the file and its folder", OutputError),
+    (
+        "connection failed",
+        "the server of the records cannot be reached",
+        "Start it, or mend host and port",
+        OutputError,
+    ),
+    ("connection to server", "the server of the records cannot be reached", "Start it, or mend the URL", OutputError),
+    ("password", "the server of the records refuses the login", "Mend user and password", OutputError),
     ("not a database", "is no database", "Name the file of the records, or restore a backup", CmmUqError),
     ("malformed", "the file of the records is damaged", "Restore a backup: cmm-uq records restore FILE", CmmUqError),
     ("never changed", "entries are never changed", "Record what is right as a new entry", CmmUqError),

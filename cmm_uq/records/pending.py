@@ -8,6 +8,7 @@ crash looks at every row whose process is no more: it has the folder completed o
 
 from __future__ import annotations
 
+import contextlib
 import json
 import socket
 from collections.abc import Mapping
@@ -23,7 +24,7 @@ from cmm_uq.records.place import shown
 from cmm_uq.records.queries import entry_of_results
 from cmm_uq.records.store import Records, Writing
 from cmm_uq.records.tables import pending
-from cmm_uq.writing import MANIFEST, InDoubtError, finish_interrupted, is_writing, sha256_of
+from cmm_uq.writing import MANIFEST, InDoubtError, finish_interrupted, is_pending, sha256_of
 
 
 class Intended:
@@ -51,27 +52,25 @@ class Intended:
         """See :meth:`cmm_uq.writing.staging.Ledger.commit`."""
         try:
             with self.records.writing() as writing:
-                _record(writing, token)
-        except CmmUqError as error:
-            if self._is_pending(token, error):
+                _record(writing, self.kind, json.loads(self.content))
+                writing.connection.execute(delete(pending).where(pending.c.token == token))
+        except (CmmUqError, OSError):
+            if self._is_pending(token):
                 raise
 
     def forget(self, token: str) -> None:
         """See :meth:`cmm_uq.writing.staging.Ledger.forget`; what cannot be forgotten now is found by the next opening."""
-        try:
-            with self.records.writing() as writing:
-                writing.connection.execute(delete(pending).where(pending.c.token == token))
-        except CmmUqError:
-            return
+        with contextlib.suppress(CmmUqError, OSError), self.records.writing() as writing:
+            writing.connection.execute(delete(pending).where(pending.c.token == token))
 
-    def _is_pending(self, token: str, error: CmmUqError) -> bool:
+    def _is_pending(self, token: str) -> bool:
         """Whether a commit that failed was none; its answer may have been lost on the way."""
         try:
             with told(self.records.place), self.records.engine.connect() as connection:
                 return _row(connection, token) is not None
-        except CmmUqError as lost:
+        except (CmmUqError, OSError) as lost:
             raise InDoubtError("the records were lost while a report was recorded", where=shown(self.records.place),
-                               fix="Its files are in place; the next command records them") from (lost or error)  # fmt: skip
+                               fix="Its files are in place; the next command records them") from lost  # fmt: skip
 
 
 def settle(records: Records) -> None:
@@ -80,25 +79,25 @@ def settle(records: Records) -> None:
         rows = connection.execute(select(pending).where(pending.c.host == socket.gethostname())).all()
     for row in rows:
         folder = Path(row.folder)
-        if is_writing(folder, row.token) or not folder.parent.is_dir():
-            continue  # a disk that is away for now may hold it
-        finish_interrupted(folder)
+        if is_pending(folder, row.token):
+            with contextlib.suppress(
+                CmmUqError
+            ):  # a folder that cannot be written to now keeps nobody from the records
+                finish_interrupted(folder)  # of a process that is no more; otherwise nothing happens
+        if is_pending(folder, row.token) or not folder.parent.is_dir():
+            continue  # somebody is at it; a disk that is away for now may hold it
         with records.writing() as writing:
+            if _row(writing.connection, row.token) is None:
+                continue  # somebody was faster
             if sha256_of(folder / MANIFEST) == row.manifest:
-                _record(writing, row.token)
-            else:
-                writing.connection.execute(delete(pending).where(pending.c.token == row.token))
+                _record(writing, row.kind, json.loads(row.content))
+            writing.connection.execute(delete(pending).where(pending.c.token == row.token))
 
 
-def _record(writing: Writing, token: str) -> None:
-    """Add the entry that is pending, once; the same results are recorded once."""
-    row = _row(writing.connection, token)
-    if row is None:
-        return
-    content = json.loads(row.content)
-    if entry_of_results(writing.connection, content.get("results_sha256") or "") is None:
-        writing.add([(row.kind, content, None)])
-    writing.connection.execute(delete(pending).where(pending.c.token == token))
+def _record(writing: Writing, kind: str, content: dict[str, Any]) -> None:
+    """Add an entry; the same results are recorded once, and anew after they were withdrawn."""
+    if entry_of_results(writing.connection, content.get("results_sha256") or "", standing=True) is None:
+        writing.add([(kind, content, None)])
 
 
 def _row(connection: Connection, token: str) -> Any:

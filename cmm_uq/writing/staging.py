@@ -41,7 +41,7 @@ class Ledger(Protocol):
     """What is to know of every set that is in place, and of no other.
 
     What a kill left between a set and its ledger is told by the set: it is in place where :data:`MANIFEST` has the hash that
-    was intended, once :func:`finish_interrupted` was there and nobody :func:`is_writing` any more.
+    was intended, once :func:`finish_interrupted` was there and it :func:`is_pending` no more.
     """
 
     def intend(self, token: str, folder: Path, manifest: str) -> None:
@@ -240,24 +240,23 @@ def finish_interrupted(folder: Path) -> None:
         return  # no folder, or none that can be read: whoever needs it will say so
     placing = folder / PLACING
     token = _token(placing) if PLACING in names else ""
-    if token and not _alive(folder, token):
-        journal = Journal.read(placing)
-        if journal is None:
-            _drop(folder, token)
-        else:
-            with _told(folder):
-                _finish(folder, placing, journal)
+    if token:
+        with _of_the_dead(folder, token) as dead:
+            journal = Journal.read(placing) if dead else None
+            if journal is not None:
+                with _told(folder):
+                    _finish(folder, placing, journal)
+            elif dead and _token(placing) == token:  # nobody was faster
+                _drop(folder, token)
     for name in names:
         staged_by = _STAGED.fullmatch(name)
-        if staged_by and not _alive(folder, staged_by[1]):
-            shutil.rmtree(folder / f"{STAGE}{staged_by[1]}", ignore_errors=True)
-            with contextlib.suppress(OSError):
-                (folder / f"{STAGE}{staged_by[1]}{LOCK}").unlink()
+        if staged_by:
+            _clear(folder, staged_by[1])
 
 
-def is_writing(folder: Path, token: str) -> bool:
-    """Whether the process that staged a set in a folder is still at it."""
-    return _alive(folder, token)
+def is_pending(folder: Path, token: str) -> bool:
+    """Whether a set is on its way in a folder still: its process lives, or somebody is just completing it."""
+    return _alive(folder, token) or _token(folder / PLACING) == token
 
 
 def synced(folder: Path) -> None:
@@ -298,6 +297,31 @@ def _alive(folder: Path, token: str) -> bool:
         return lock.exists()
     os.close(descriptor)
     return False
+
+
+@contextlib.contextmanager
+def _of_the_dead(folder: Path, token: str) -> Iterator[bool]:
+    """Whether the process that staged something is no more; while that is acted upon nobody else does, nor takes its lock."""
+    lock = folder / f"{STAGE}{token}{LOCK}"
+    descriptor = locked(lock, create=False)
+    try:
+        yield descriptor is not None or not lock.exists()
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+def _clear(folder: Path, token: str) -> None:
+    """Remove the stage of a process that is no more, and its lock: under the lock, which may just be made."""
+    lock = folder / f"{STAGE}{token}{LOCK}"
+    with _of_the_dead(folder, token) as dead:
+        if dead:
+            shutil.rmtree(folder / f"{STAGE}{token}", ignore_errors=True)
+            with contextlib.suppress(OSError):
+                lock.unlink()
+    if dead:
+        with contextlib.suppress(OSError):
+            lock.unlink()  # Windows removes no open file
 
 
 def _finish(folder: Path, placing: Path, journal: Journal, ledger: Ledger | None = None) -> None:
