@@ -190,8 +190,9 @@ def prove(
     ------
     CmmUqError : the job has an analysis of its own, or neither recording nor stated noise.
     """
-    from cmm_uq.commands.prove import processes, prove_outcome
+    from cmm_uq.commands.prove import prove_outcome
     from cmm_uq.commands.proving import Asked
+    from cmm_uq.scheduling.pool import processes
 
     asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
     return Proof(prove_outcome(_job(job), asked))

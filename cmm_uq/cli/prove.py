@@ -53,8 +53,9 @@ def command(
 ) -> None:
     """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
     with shown(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.commands.prove import processes, write_proof
+        from cmm_uq.commands.prove import write_proof
         from cmm_uq.commands.proving import Asked
+        from cmm_uq.scheduling.pool import processes
 
         asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
         written = write_proof(job, asked, out, force=force, stage=stage, sealed=None if quiet or json else _tell)

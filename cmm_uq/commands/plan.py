@@ -43,7 +43,7 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
     stage("Drawing the placings", 0.95)
     document = plan_document(plan)
     return Outcome(
-        plan, document, plan_results(plan), plan_summary(plan), document.warnings,
+        plan, lambda: document, plan_results(plan), plan_summary(plan), document.warnings,
         {TO_FILL_IN: recording_to_be(plan)} if plan.to_measure else {},
         conforming=all(condition.met for condition in plan.conditions),
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -96,11 +95,3 @@ def write_proof(
     for kept in open_:
         kept.remove()
     return written
-
-
-def processes() -> int:
-    """How many processes this one may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not every system says
-        return os.cpu_count() or 1

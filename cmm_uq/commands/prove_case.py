@@ -26,7 +26,8 @@ from cmm_uq.points import Floats, Points
 from cmm_uq.proving.cases import Case
 from cmm_uq.proving.design import Design
 from cmm_uq.proving.judged import REFUSED
-from cmm_uq.proving.running import Record, serve
+from cmm_uq.proving.running import Record
+from cmm_uq.scheduling.talking import serve
 from cmm_uq.uncertainty.quantity import Quantity
 
 _DIGITS = 9

@@ -34,9 +34,10 @@ from cmm_uq.proving.design import Design
 from cmm_uq.proving.judged import ANSWER, REFUSED, Judgement, judge
 from cmm_uq.proving.running import RECORDS, Kept, Record, answered
 from cmm_uq.proving.sealed import sha256_of, truth_file
+from cmm_uq.scheduling.pool import check_workers
 from cmm_uq.writing import interruption
 
-CASES, FEWEST, MOST, MOST_WORKERS = 200, 1, 20_000, 256
+CASES, FEWEST, MOST = 200, 1, 20_000
 
 _PROGRAM = "cmm_uq.commands.prove_case"
 _OF_ARTEFACT = "artefact"
@@ -65,10 +66,7 @@ class Asked:
             raise CmmUqError(
                 f"{self.cases} cases", where="--cases", fix=f"Give from {FEWEST} to {MOST}; {CASES} are usual"
             )
-        if not 1 <= self.workers <= MOST_WORKERS:
-            raise CmmUqError(
-                f"{self.workers} workers", where="--workers", fix=f"Give from 1 to {MOST_WORKERS} processes"
-            )
+        check_workers(self.workers)
         if not 1e-6 <= self.alpha <= 0.5:
             raise CmmUqError(f"a false-alarm rate of {self.alpha:g}", where="--alpha",
                              fix="Give one between 0.000001 and 0.5; 0.01 is usual")  # fmt: skip

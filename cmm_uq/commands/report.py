@@ -20,7 +20,7 @@ DIAGNOSE = Form("diagnose", DIAGNOSIS, "diagnosis", (TO_FILL_IN,), recorded=True
 
 
 @naming_package()
-def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent) -> Outcome:
+def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: bool = True) -> Outcome:
     """Analyse a job that was read and compose its certificate; nothing is written.
 
     Parameters
@@ -28,6 +28,7 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent) -> Outcome
     job : that was read.
     seed : of everything random.
     stage : told of progress.
+    composed : whether the certificate is composed, too, so that whatever stops it is said here; figures are the same.
 
     Raises
     ------
@@ -37,7 +38,10 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent) -> Outcome
         job, seed=seed, progress=lambda part: stage(_sampled("Sampling the posterior", part), 0.1 + 0.4 * part)
     )
     stage("Composing the certificate", 0.5)
-    return analysis.outcome_of(found, seed)
+    outcome = analysis.outcome_of(found, seed)
+    if composed:
+        outcome.document  # noqa: B018 - composed when it is first asked for
+    return outcome
 
 
 def write_report(

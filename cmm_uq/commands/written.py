@@ -105,9 +105,9 @@ class Form:
         CmmUqError : as computing does, or something in the folder that this command did not write for this job.
         OutputError : the folder, or the records, cannot be written to.
         """
-        owner = Owner(self.command, job.facts.job.id, job.origin)
+        owner = self.owner(job)
         folder = out or REPORTS / owner.job / self.below
-        expected = (*self._names(job), RESULTS, *self.further)
+        expected = (*self.names(job), RESULTS, *self.further)
         with (
             opened(records if self.recorded else NONE, out) as history,
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
@@ -121,12 +121,21 @@ class Form:
         stage("Done", 1.0)
         return Written(found, contents[RESULTS], files, where)
 
-    def contents(self, outcome: Outcome, stage: Stage = silent) -> dict[str, bytes]:
-        """Bytes of every file, by name."""
+    def owner(self, job: Job) -> Owner:
+        """Of what is written for a job."""
+        return Owner(self.command, job.facts.job.id, job.origin)
+
+    def contents(
+        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False
+    ) -> dict[str, bytes]:  # fmt: skip
+        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
+        from cmm_uq.documents.results_file import as_json
+
+        if results_only:
+            return {RESULTS: as_json(outcome.results)}
         from cmm_uq.documents.html import render_html
         from cmm_uq.documents.origin import marked
         from cmm_uq.documents.pdf import render_pdf
-        from cmm_uq.documents.results_file import as_json
 
         job, data = outcome.found.job, as_json(outcome.results)
         document = marked(outcome.document, job)
@@ -134,7 +143,7 @@ class Form:
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
         rendered = {}
-        for name in self._names(job):
+        for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
             pdf = name.endswith(".pdf")
             rendered[name] = (
@@ -144,7 +153,8 @@ class Form:
             )
         return {**rendered, RESULTS: data, **outcome.files}
 
-    def _names(self, job: Job) -> list[str]:
+    def names(self, job: Job) -> list[str]:
+        """Of the documents of a job."""
         from cmm_uq.documents.origin import file_name
 
         return [file_name(document, job.origin) for document in self.documents]

@@ -8,6 +8,7 @@ from cmm_uq.documents import tolerance_section
 from cmm_uq.documents.as_found_section import as_found_data, as_found_section, quantities_left
 from cmm_uq.documents.capability import with_capability
 from cmm_uq.documents.certificate import certificate_of
+from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conformity_section import conformity_section
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
 from cmm_uq.documents.document import Document, Section
@@ -18,11 +19,10 @@ from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.results_file import results
 from cmm_uq.documents.results_section import error_factors, performance
-from cmm_uq.documents.stating import Stating
 from cmm_uq.documents.summary import in_short, summary
 from cmm_uq.documents.traceability_section import traceability
 from cmm_uq.documents.warning import warnings
-from cmm_uq.messages import Verbatim, say
+from cmm_uq.messages import Text, Verbatim, say
 
 
 def certified(result: Result, page: Page) -> Outcome:
@@ -34,7 +34,8 @@ def certified(result: Result, page: Page) -> Outcome:
     page : what its kind adds.
     """
     result, stating = with_capability(result)
-    document = _certificate(result, page, stating)
+    told = (*warnings(result), *stating.warnings())
+    warned = (*told, *formal_warnings(result.job))
     draws = posterior_file(result.draws, result.job.origin) if len(result.draws) else None
     data = (
         results(result)
@@ -44,13 +45,13 @@ def certified(result: Result, page: Page) -> Outcome:
     )
     passed = all(statement.outcome == "pass" for statement in result.statements)
     return Outcome(
-        result, document, page.with_further(result, data), summary(result, document.warnings), document.warnings,
+        result, lambda: _certificate(result, page, told), page.with_further(result, data), summary(result, warned), warned,
         {draws.name: draws.content} if draws else {}, draws=result.draws,
         conforming=passed and result.diagnosed.diagnosis.verdict == "consistent",
     )  # fmt: skip
 
 
-def _certificate(result: Result, page: Page, stating: Stating) -> Document:
+def _certificate(result: Result, page: Page, told: tuple[Text, ...]) -> Document:
     diagnosis = diagnosis_sections(result.diagnosed) if result.job.facts.job.diagnosis_on_certificate else ()
     sections = [
         *_ordered(result, page.sections(result)), *tolerance_section.sections(result), method(result),
@@ -63,7 +64,6 @@ def _certificate(result: Result, page: Page, stating: Stating) -> Document:
         seed=result.posterior.seed,
     )
     files = (Verbatim(posterior_name(result.job.origin)),) if len(result.draws) else ()
-    told = (*warnings(result), *stating.warnings())
     return certificate_of(result.job, sections, told, produced_by, files, in_short(result))
 
 

@@ -322,4 +322,4 @@ def diagnosed_outcome(found: Diagnosed) -> Outcome:
     short = summary_of(found.job.facts, found.diagnosis.verdict, lines(found), found.findings)
     document = diagnosis_document(found)
     consistent = found.diagnosis.verdict == "consistent"
-    return Outcome(found, document, diagnosis_results(found), short, document.warnings, conforming=consistent)
+    return Outcome(found, lambda: document, diagnosis_results(found), short, document.warnings, conforming=consistent)

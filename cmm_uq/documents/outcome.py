@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 from cmm_uq.documents.document import Document, Section
@@ -32,7 +33,7 @@ class Outcome:
     Parameters
     ----------
     found : in the kind's own terms.
-    document : certificate, or page of a diagnosis.
+    composed : makes the certificate, or the page of a diagnosis; its pictures take longer than all other figures of it.
     results : contents of results.json.
     summary : for the end of a command.
     warnings : what the reader must know before using a figure.
@@ -42,13 +43,18 @@ class Outcome:
     """
 
     found: Found
-    document: Document
+    composed: Callable[[], Document]
     results: Mapping[str, Any]
     summary: Summary
     warnings: tuple[Text, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
     conforming: bool = True
     draws: Draws | None = None
+
+    @cached_property
+    def document(self) -> Document:
+        """Certificate, or page of a diagnosis; composed when it is first asked for."""
+        return self.composed()
 
     @property
     def origin(self) -> Origin:

@@ -97,7 +97,7 @@ KEYS: Mapping[str, str] = MappingProxyType(
 def proof_outcome(proof: Proof) -> Outcome:
     """What there is to write."""
     return Outcome(
-        proof, proof_document(proof), proof_results(proof), proof_summary(proof), warnings_of(proof),
+        proof, lambda: proof_document(proof), proof_results(proof), proof_summary(proof), warnings_of(proof),
         {TRUTH: proof.truth, RECORDS: proof.answers}, conforming=proof.conforming,
     )  # fmt: skip
 

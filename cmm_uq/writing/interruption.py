@@ -15,16 +15,22 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from cmm_uq.writing.staging import Staged
+from typing import Protocol
 
 PATIENCE_S = 1.2
 """How long to wait for files that are just being put in place: the process ends within two seconds of a signal."""
 
+
+class Unplaced(Protocol):
+    """Something on its way to its place."""
+
+    def discard(self) -> None:
+        """Remove it."""
+        ...
+
+
 _placing = threading.Lock()
-_stages: list[Staged] = []
+_stages: list[Unplaced] = []
 _written: list[Path] = []
 _going_in: list[Path] = []
 _signalled: list[int] = []
@@ -33,7 +39,7 @@ _keeping: list[Callable[[], str]] = []
 
 
 @contextlib.contextmanager
-def staged(place: Staged) -> Iterator[None]:
+def staged(place: Unplaced) -> Iterator[None]:
     """While something is staged, a signal removes it."""
     _stages.append(place)
     try:
@@ -45,6 +51,7 @@ def staged(place: Staged) -> Iterator[None]:
 @contextlib.contextmanager
 def placing(folder: Path) -> Iterator[None]:
     """While files are put in place, a signal waits; afterwards it says that they were written."""
+    give_way()  # of a thread that is not the one that a signal stops
     _going_in.append(folder)  # before the lock: a signal in between must not stop whoever holds it
     try:
         with _placing:

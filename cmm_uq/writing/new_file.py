@@ -5,9 +5,14 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from cmm_uq.errors import OutputError
+from cmm_uq.writing import interruption
+from cmm_uq.writing.placing import free_name
+
+_TAKEN, _FOLDER = "Name another file; nothing is overwritten", "Name a folder that exists"
 
 
 def write_new(out: Path, content: bytes) -> None:
@@ -22,18 +27,58 @@ def write_new(out: Path, content: bytes) -> None:
     ------
     OutputError : something is there, or it cannot be written.
     """
-    temporary = ""
-    try:
-        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=".unfinished-", delete=False) as file:
-            temporary = file.name
-            file.write(content)
-        os.link(temporary, out)
-    except FileExistsError:
-        raise OutputError("is there already", where=str(out), fix="Name another file; nothing is overwritten") from None
-    except OSError as error:
-        raise OutputError(
-            f"cannot be written: {error.strerror}", where=str(out), fix="Name a folder that exists"
-        ) from error
-    finally:
+    with new_file(out) as path:
+        path.write_bytes(content)
+
+
+def refuse_taken(out: Path) -> None:
+    """Make sure, before there is anything to write, that a new file could be there.
+
+    Raises
+    ------
+    OutputError : something is there, or its folder is not.
+    """
+    if os.path.lexists(out):
+        raise OutputError("is there already", where=str(out), fix=_TAKEN)
+    if not out.parent.is_dir():
+        raise OutputError("cannot be written: no such folder", where=str(out), fix=_FOLDER)
+
+
+@contextlib.contextmanager
+def new_file(out: Path, *, force: bool = False) -> Iterator[Path]:
+    """Where a file is to be written that then takes its place; where that fails, nothing is left, after a signal neither.
+
+    Parameters
+    ----------
+    out : its path.
+    force : keep what is there as ``NAME.previous`` instead of refusing.
+
+    Raises
+    ------
+    OutputError : something is there, or it cannot be written.
+    """
+    unfinished = _Unfinished()
+    with interruption.staged(unfinished):
+        try:
+            with tempfile.NamedTemporaryFile(dir=out.parent, prefix=".unfinished-", delete=False) as file:
+                unfinished.name = file.name
+            yield Path(unfinished.name)
+            if force and os.path.lexists(out):
+                out.rename(out.parent / free_name(out.parent, out.name))
+            os.link(unfinished.name, out)
+        except FileExistsError:
+            raise OutputError("is there already", where=str(out), fix=_TAKEN) from None
+        except OSError as error:
+            raise OutputError(f"cannot be written: {error.strerror}", where=str(out), fix=_FOLDER) from error
+        finally:
+            unfinished.discard()
+
+
+class _Unfinished:
+    """The file before it takes its place."""
+
+    name = ""
+
+    def discard(self) -> None:
         with contextlib.suppress(OSError):
-            os.unlink(temporary)  # noqa: PTH108 - may be empty
+            os.unlink(self.name)  # noqa: PTH108 - may be empty

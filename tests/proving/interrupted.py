@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cmm_uq.proving.running import Kept, answered
 
-TASKS, TRUTH, PROGRAM = dict.fromkeys(range(12)), b'{"run":1}\n', "tests.proving.echo"
+TASKS, TRUTH, PROGRAM = dict.fromkeys(range(12)), b'{"run":1}\n', "tests.scheduling.echo"
 
 
 def main(folder: Path, seconds: float) -> None:

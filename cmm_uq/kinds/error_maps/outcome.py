@@ -15,7 +15,7 @@ def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
     short = summary_of(found.job.facts, verdict, told(found), found.findings)
     document = maps_document(found, seed)
     consistent = verdict == "consistent"
-    return Outcome(found, document, maps_results(found, seed), short, document.warnings, conforming=consistent)
+    return Outcome(found, lambda: document, maps_results(found, seed), short, document.warnings, conforming=consistent)
 
 
 OWN = OwnAnalysis(diagnose=Recipe(diagnose_error_maps, outcome))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from cmm_uq import __version__
 from cmm_uq.documents.as_found_section import as_found_data, as_found_section
 from cmm_uq.documents.certificate import certificate_of
+from cmm_uq.documents.completeness import formal_warnings
+from cmm_uq.documents.document import Document
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.documents.posterior_file import posterior_file
 from cmm_uq.inference.posterior import Progress
@@ -18,7 +20,7 @@ from cmm_uq.kinds.shift_plate.results import plane_shift_results
 from cmm_uq.kinds.shifting.correction_table import table_text
 from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.kinds.shifting.page import table_file
-from cmm_uq.messages import Verbatim, say
+from cmm_uq.messages import Text, Verbatim, names, say
 
 
 def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult | PlaneShiftResult:
@@ -36,28 +38,34 @@ def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Shi
 def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
     """The certificate of a shift job, with the correction table beside it."""
     if isinstance(found, ShiftResult):
-        sections, told, results = axis_page.sections(found), axis_page.warnings(found), shift_results(found)
-        left = axis_page.quantities(found)
+        told, results = axis_page.warnings(found), shift_results(found)
     else:
-        sections, told, results = plane_page.sections(found), plane_page.warnings(found), plane_shift_results(found)
-        left = plane_page.quantities(found)
-    sections.insert(1, as_found_section(found.job, left))
+        told, results = plane_page.warnings(found), plane_shift_results(found)
     told += tuple(found.stating.warnings())
-    results |= as_found_data(found.job) | found.stating.data()
-    chains, table = found.estimate.chains, table_file(found.job)
-    draws = posterior_file(found.draws, found.job.origin)
+    warned = (*told, *formal_warnings(found.job))
+    short = axis_page.summary(found, warned) if isinstance(found, ShiftResult) else plane_page.summary(found, warned)
+    draws, table = posterior_file(found.draws, found.job.origin), table_file(found.job)
+    results |= as_found_data(found.job) | found.stating.data() | {"posterior": draws.entry}
+    files = {table: table_text(found.table), draws.name: draws.content}
+    return Outcome(
+        found, lambda: _certificate(found, told, tuple(files)), results, short, warned, files,
+        draws=found.draws,
+    )  # fmt: skip
+
+
+def _certificate(found: ShiftResult | PlaneShiftResult, told: tuple[Text, ...], files: tuple[str, ...]) -> Document:
+    if isinstance(found, ShiftResult):
+        sections, left = axis_page.sections(found), axis_page.quantities(found)
+    else:
+        sections, left = plane_page.sections(found), plane_page.quantities(found)
+    sections.insert(1, as_found_section(found.job, left))
     produced_by = say(
         "cmm-uq {version}, {sampler}, seed {seed}",
         version=Verbatim(__version__),
-        sampler=Verbatim(chains.sampler),
+        sampler=Verbatim(found.estimate.chains.sampler),
         seed=found.estimate.seed,
     )
-    document = certificate_of(found.job, sections, told, produced_by, (Verbatim(table), Verbatim(draws.name)))
-    told = document.warnings
-    short = axis_page.summary(found, told) if isinstance(found, ShiftResult) else plane_page.summary(found, told)
-    files = {table: table_text(found.table), draws.name: draws.content}
-    results["posterior"] = draws.entry
-    return Outcome(found, document, results, short, told, files, draws=found.draws)
+    return certificate_of(found.job, sections, told, produced_by, tuple(names(files)))
 
 
 OWN = OwnAnalysis(report=Recipe(analyse, outcome))
