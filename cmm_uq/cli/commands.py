@@ -22,6 +22,7 @@ from cmm_uq.cli import (
     report,
     schema,
     selftest,
+    serve,
     simulate,
 )
 from cmm_uq.cli.options import examples
@@ -49,6 +50,7 @@ for module, short in {
     simulate: "A recording drawn from known errors, as a job of its own.",
     compensate: "A recording corrected by its machine's error maps.",
     budget: "The uncertainty of any measurement model in a file.",
+    serve: "The records to look at, in a browser.",
     schema: "JSON Schema of a file, for editors that complete and explain.",
     selftest: "Published reference figures, computed here and compared.",
 }.items():

@@ -1,0 +1,241 @@
+"""What a list of the records shows: where each machine stands, and certificates by what a reader chooses, a page at a time.
+
+Few columns, no values: a list of 10⁵ certificates is counted and paged by the database.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import ColumnElement, Select, func, or_, select
+
+from cmm_uq.records.entries import Entry
+from cmm_uq.records.facts import STANDING
+from cmm_uq.records.opening import told
+from cmm_uq.records.store import Records
+from cmm_uq.records.tables import artefacts, certificates, entries, figures, machines, quantities
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """A certificate, interim check or diagnosis in a list; fields as in :class:`~cmm_uq.records.facts.Certificate`."""
+
+    entry: int
+    job: str
+    number: str
+    machine: str
+    machine_name: str
+    artefact: str
+    kind: str
+    origin: str
+    day: dt.date
+    state: str
+    decision: str
+    diagnosis: str
+    interim: bool
+    command: str
+
+
+@dataclass(frozen=True, slots=True)
+class Called:
+    """What a machine is called: fields as in :class:`~cmm_uq.records.facts.Machine`."""
+
+    serial: str
+    name: str
+    manufacturer: str
+    model: str
+    place: str
+    by_name: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Newest:
+    """A machine and its newest measured certificate that stands; ``None`` where it has none."""
+
+    machine: Called
+    certificate: Listed | None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which certificates are listed; what is empty or ``None`` leaves all.
+
+    Parameters
+    ----------
+    text : in the job's id, the certificate's number, or the machine's serial or name; capitals do not matter.
+    machine, artefact : as they are called in the records.
+    origin : of the recording.
+    command : report or diagnose.
+    states, decisions, verdicts : of the certificate, its statements, its diagnosis.
+    interim : whether interim checks, or certificates.
+    since, until : first and last day.
+    """
+
+    text: str = ""
+    machine: str = ""
+    artefact: str = ""
+    origin: str = "measured"
+    command: str = "report"
+    states: Collection[str] = ()
+    decisions: Collection[str] = ()
+    verdicts: Collection[str] = ()
+    interim: bool | None = None
+    since: dt.date | None = None
+    until: dt.date | None = None
+
+
+_C = certificates.c
+_COLUMNS = (
+    _C.entry, _C.job, _C.number, machines.c.called.label("machine"), machines.c.name.label("machine_name"),
+    func.coalesce(artefacts.c.called, "").label("artefact"), _C.kind, _C.origin, _C.day, _C.state, _C.decision,
+    _C.diagnosis, _C.interim, _C.command,
+)  # fmt: skip
+_JOINED = certificates.join(machines).outerjoin(artefacts, artefacts.c.id == _C.artefact)
+
+
+def standing_of_all(records: Records) -> list[Newest]:
+    """Every machine with its newest certificate, by serial.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    newest = certificates.alias()
+    of_machine = (
+        select(newest.c.entry)
+        .where(newest.c.machine == machines.c.id, newest.c.command == "report", newest.c.origin == "measured",
+               newest.c.state.in_(STANDING), newest.c.interim.is_(False))
+        .order_by(newest.c.day.desc(), newest.c.entry.desc()).limit(1).correlate(machines).scalar_subquery()
+    )  # fmt: skip
+    m = machines.c
+    query = (
+        select(m.called, m.name.label("of_name"), m.manufacturer, m.model, m.place, m.recognised, *_COLUMNS)
+        .select_from(machines.outerjoin(certificates, _C.entry == of_machine)
+                     .outerjoin(artefacts, artefacts.c.id == _C.artefact))
+        .order_by(m.called)
+    )  # fmt: skip
+    with told(records.place), records.engine.connect() as connection:
+        rows = connection.execute(query).all()
+    return [
+        Newest(Called(*row[:5], row[5].startswith("name:")), None if row.entry is None else _listed(row[6:]))
+        for row in rows
+    ]
+
+
+def chosen(records: Records, choice: Choice, most: int, left_out: int = 0) -> tuple[list[Listed], int]:
+    """Certificates, newest first, and how many there are.
+
+    Parameters
+    ----------
+    most : of a page.
+    left_out : newer ones on the pages before.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    where = _conditions(choice)
+    joined: Select[Any] = select(*_COLUMNS).select_from(_JOINED).where(*where)
+    page = joined.order_by(_C.day.desc(), _C.entry.desc()).limit(most).offset(left_out)
+    counted = certificates.join(machines) if choice.text or choice.machine else certificates
+    counted = counted.outerjoin(artefacts, artefacts.c.id == _C.artefact) if choice.artefact else counted
+    with told(records.place), records.engine.connect() as connection:
+        count = connection.execute(select(func.count()).select_from(counted).where(*where)).scalar_one()
+        rows = connection.execute(page).all()
+    return [_listed(row) for row in rows], int(count)
+
+
+def _listed(row: Any) -> Listed:
+    entry, job, number, machine, name, artefact, kind, origin, day, state, decision, verdict, interim, command = row
+    return Listed(entry, job, number, machine, name, artefact, kind, origin, dt.date.fromisoformat(day), state, decision,
+                  verdict, bool(interim), command)  # fmt: skip
+
+
+def _conditions(choice: Choice) -> list[ColumnElement[bool]]:
+    exact = ((_C.command, choice.command), (_C.origin, choice.origin), (machines.c.called, choice.machine),
+             (artefacts.c.called, choice.artefact))  # fmt: skip
+    found: list[ColumnElement[bool]] = [column == value for column, value in exact if value]
+    several = ((_C.state, choice.states), (_C.decision, choice.decisions), (_C.diagnosis, choice.verdicts))
+    found += [column.in_(tuple(values)) for column, values in several if values]
+    if choice.interim is not None:
+        found.append(_C.interim.is_(choice.interim))
+    if choice.since is not None:
+        found.append(_C.day >= choice.since.isoformat())
+    if choice.until is not None:
+        found.append(_C.day <= choice.until.isoformat())
+    if choice.text:
+        columns = (_C.job, _C.number, machines.c.called, machines.c.name)
+        found.append(or_(*(column.icontains(choice.text, autoescape=True) for column in columns)))
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """One value of one machine over its newest certificates and interim checks, oldest first.
+
+    Parameters
+    ----------
+    name, quantity, unit : of the value.
+    rows : certificate's entry, day, value, ends of the stated interval, limit, whether it is an interim check.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    rows: list[tuple[int, dt.date, float, float, float, float | None, bool]]
+
+
+def courses(records: Records, machine: str, most: int) -> list[Course]:
+    """What a machine's measured certificates and interim checks state, as far as they stand.
+
+    Parameters
+    ----------
+    machine : as it is called in the records.
+    most : certificates, the newest.
+
+    Returns
+    -------
+    in the order of the newest certificate, then what only older ones state.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    newest = (
+        select(_C.entry, _C.day, _C.interim)
+        .where(_C.machine == select(machines.c.id).where(machines.c.called == machine).scalar_subquery(),
+               _C.command == "report", _C.origin == "measured", _C.state.in_(STANDING))
+        .order_by(_C.day.desc(), _C.entry.desc()).limit(most).subquery()
+    )  # fmt: skip
+    f, q = figures.c, quantities.c
+    query = (
+        select(newest.c.entry, newest.c.day, newest.c.interim, q.name, q.quantity, q.unit, f.value, f.lower, f.upper,
+               f.at_most)
+        .select_from(newest.join(figures, f.certificate == newest.c.entry).join(quantities, q.id == f.quantity))
+        .order_by(newest.c.day.desc(), newest.c.entry.desc(), f.place)
+    )  # fmt: skip
+    found: dict[tuple[str, str], Course] = {}
+    with told(records.place), records.engine.connect() as connection:
+        rows = connection.execute(query).all()
+    for row in rows:
+        course = found.setdefault((row.name, row.unit), Course(row.name, row.quantity, row.unit, []))
+        day = dt.date.fromisoformat(row.day)
+        course.rows.append((row.entry, day, row.value, row.lower, row.upper, row.at_most, bool(row.interim)))
+    for course in found.values():
+        course.rows.reverse()
+    return list(found.values())
+
+
+def entry_of(records: Records, number: int) -> Entry | None:
+    """One entry; ``None`` where there is none of that number.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    with told(records.place), records.engine.connect() as connection:
+        row = connection.execute(select(entries).where(entries.c.number == number)).first()
+    return None if row is None else Entry(*row)

@@ -1,0 +1,221 @@
+"""One certificate: how it stands, what it states, what its diagnosis says, who signed it, and its files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.documents.document import Standing
+from cmm_uq.documents.effect_words import title_of
+from cmm_uq.documents.wording import probability
+from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, say
+from cmm_uq.records.entries import Entry
+from cmm_uq.records.facts import Certificate, Value
+from cmm_uq.records.listing import entry_of
+from cmm_uq.serving.exchange import Answer, Asked, Refused
+from cmm_uq.serving.page import Block, Cell, Column, Facts, Notice, Page, Paragraph, Section, Table, address
+from cmm_uq.serving.recorded_files import RecordedFile, content_of, files_of, results_of, sent
+from cmm_uq.serving.view import View, machine_cell
+from cmm_uq.serving.words import DECISIONS, NOT_MEASURED, STATES, VERDICTS, cell_of, moment, shown
+from cmm_uq.uncertainty.rounding import rounded
+
+
+def certificate_page(view: View, asked: Asked) -> Page:
+    """The certificate whose entry the address names.
+
+    Raises
+    ------
+    Refused : there is none.
+    """
+    asked.only(("entry",))
+    one, entry = _named(view, asked)
+    folder = Path(one.folder)
+    files = files_of(entry, folder)
+    title = say("Diagnosis {number}", number=Verbatim(one.number)) if one.command != "report" else say(
+        "Interim check {number}" if one.interim else "Certificate {number}", number=Verbatim(one.number)
+    )  # fmt: skip
+    return Page(
+        title, "/certificates",
+        lead=say("Machine {machine}, measured on {day}", machine=Verbatim(one.machine), day=day(one.day)),
+        above=(Cell(say("Certificates"), "/certificates"), machine_cell(one.machine)),
+        blocks=(*_notices(one), _facts(view, one, entry)),
+        sections=(
+            Section(say("Values"), (_values(one.values),)),
+            *_diagnosis(results_of(files, folder)),
+            *_signed(view, one),
+            Section(say("Files"), tuple(_files(one, files))),
+        ),
+    )  # fmt: skip
+
+
+def recorded_file(view: View, asked: Asked) -> Answer:
+    """A file of a certificate, as it was recorded.
+
+    Raises
+    ------
+    Refused : it is not one of the certificate's, or not as it was recorded.
+    """
+    asked.only(("entry", "name", "keep"))
+    keep, name = asked.one_of("keep", ("yes",)) == "yes", asked.text("name")
+    one, entry = _named(view, asked)
+    for file in files_of(entry, Path(one.folder)):
+        if file.name == name:
+            return sent(file, content_of(file, Path(one.folder)), keep=keep)
+    raise Refused(
+        HTTPStatus.NOT_FOUND, say("the certificate {number} has no file of that name", number=Verbatim(one.number))
+    )
+
+
+def _named(view: View, asked: Asked) -> tuple[Certificate, Entry]:
+    number_of = asked.count("entry", 0)
+    if not number_of:
+        raise Refused(HTTPStatus.NOT_FOUND, say("the address names no entry of the records"))
+    entry = entry_of(view.records, number_of)
+    try:
+        one = view.records.certificate(number_of)
+    except CmmUqError:
+        entry = None
+    if entry is None:
+        raise Refused(HTTPStatus.NOT_FOUND, say("entry {number} is no certificate", number=number(number_of)))
+    return one, entry
+
+
+def _notices(one: Certificate) -> list[Notice]:
+    """What it decides and whether it holds, taken together as the worse of both; before that, that nothing was measured."""
+    warning = NOT_MEASURED.get(one.origin)
+    found = [Notice(warning, "open")] if warning is not None else []
+    if one.command != "report":
+        return found
+    state, stands = STATES.get(one.state, (Verbatim(one.state), "open"))
+    decision, conforms = DECISIONS.get(one.decision, (Verbatim(one.decision), "open"))
+    worse: Standing = max(stands or "good", conforms or "good", key=("good", "open", "bad").index)
+    if one.decision == "none":
+        return [*found, Notice(say("{state}; it states no conformity", state=state), worse)]
+    return [*found, Notice(say("{state}; decision: {decision:small}", state=state, decision=decision), worse)]
+
+
+def _facts(view: View, one: Certificate, entry: Entry) -> Facts:
+    artefact = next((row for row in view.records.artefacts() if row.serial == one.artefact), None)
+    rows: list[tuple[Text, Cell]] = [
+        (say("Decision"), cell_of(DECISIONS, one.decision)),
+        (say("Diagnosis"), cell_of(VERDICTS, one.diagnosis)),
+        (say("Machine"), machine_cell(one.machine)),
+        (say("Artefact"), Cell(shown(one.artefact), "/artefacts" if artefact else "")),
+        (say("Measurement"), Cell(shown(one.kind))),
+        (say("Job"), Cell(shown(one.job))),
+    ]
+    if one.adjusted_since is not None:
+        rows.append((say("Adjusted before, on"), Cell(day(one.adjusted_since))))
+    rows += [
+        (say("Recorded"), Cell(moment(one.recorded))),
+        (say("Made by"), Cell(say("cmm-uq {version}", version=Verbatim(one.version)) if one.version else DASH)),
+        (say("Entry of the records"), Cell(number(one.entry), note=Verbatim(entry.hash))),
+    ]
+    return Facts(tuple(rows))
+
+
+def _values(values: tuple[Value, ...]) -> Table:
+    columns = (
+        Column(say("Quantity")), Column(say("Value"), sort="number"), Column(say("95 % interval"), sort="number"),
+        Column(say("Limit"), sort="number"), Column(say("Unit")),
+    )  # fmt: skip
+    rows = []
+    for one in values:
+        half = 0.5 * (one.upper - one.lower)
+        value, lower, upper = (rounded(figure, half)[0] for figure in (one.value, one.lower, one.upper))
+        limit = DASH if one.limit is None else number(one.limit, "g")
+        beyond = one.limit is not None and abs(one.value) > one.limit
+        rows.append((
+            Cell(Verbatim(one.quantity)), Cell(value, standing="bad" if beyond else None),
+            Cell(say("{lower} to {upper}", lower=lower, upper=upper)), Cell(limit), Cell(shown(one.unit)),
+        ))  # fmt: skip
+    return Table(say("Values as stated"), columns, tuple(rows), say("It states no value."), heard=True)
+
+
+def _diagnosis(results: Mapping[str, Any]) -> tuple[Section, ...]:
+    """What results.json says of what the model leaves out."""
+    found = results.get("diagnosis")
+    if not isinstance(found, Mapping) or not found.get("verdict"):
+        return ()
+    blocks: list[Block] = [Facts(tuple(_verdict(found)))]
+    rows = tuple(row for one in _list(found.get("effects")) if (row := _effect(one)) is not None)
+    if rows:
+        columns = (Column(say("Effect")), Column(say("Probability"), sort="number"), Column(say("Size")))
+        blocks.append(Table(say("What the model leaves out"), columns, rows))
+    pairs = [one for one in _list(found.get("indistinguishable")) if isinstance(one, list)]
+    for pair in pairs:
+        names = commas(title_of(str(name)) for name in pair)
+        blocks.append(Paragraph(say("This recording cannot tell apart: {names}.", names=names)))
+    asked = [one.get("what") for one in _list(found.get("suggested_measurements")) if isinstance(one, Mapping)]
+    blocks += [Paragraph(say("Measure next: {what}", what=Verbatim(str(what)))) for what in asked if what]
+    return (Section(say("Diagnosis"), tuple(blocks)),)
+
+
+def _verdict(found: Mapping[str, Any]) -> list[tuple[Text, Cell]]:
+    rows: list[tuple[Text, Cell]] = [(say("Verdict"), cell_of(VERDICTS, str(found["verdict"])))]
+    p = found.get("p_value")
+    if isinstance(p, (int, float)):
+        rows.append((say("Lack-of-fit test, p"), Cell(probability(float(p)))))
+    return rows
+
+
+def _effect(one: Any) -> tuple[Cell, ...] | None:
+    if not isinstance(one, Mapping) or not one.get("effect"):
+        return None
+    p, sizes = one.get("probability"), []
+    parameters = one.get("parameters")
+    for name, quantity in parameters.items() if isinstance(parameters, Mapping) else ():
+        value, u = (quantity.get(key) if isinstance(quantity, Mapping) else None for key in ("value", "u"))
+        if isinstance(value, (int, float)) and isinstance(u, (int, float)) and u >= 0:
+            text = say(
+                "{name} {value} (u = {u})", name=Verbatim(str(name)), value=(pair := rounded(value, u))[0], u=pair[1]
+            )
+            sizes.append(text)
+    told = probability(float(p)) if isinstance(p, (int, float)) else DASH
+    return Cell(title_of(str(one["effect"]))), Cell(told), Cell(commas(sizes))
+
+
+def _list(found: Any) -> list[Any]:
+    return found if isinstance(found, list) else []
+
+
+def _signed(view: View, one: Certificate) -> tuple[Section, ...]:
+    found = view.records.signatures(one.entry)
+    if not found:
+        return ()
+    words = {"release": say("Released"), "withdrawal": say("Withdrawn"), "replacement": say("Replaced")}
+    columns = (
+        Column(say("What")),
+        Column(say("By")),
+        Column(say("When")),
+        Column(say("Reason")),
+        Column(say("In its place")),
+    )
+    rows = tuple(
+        (Cell(words.get(each.what, Verbatim(each.what))), Cell(shown(each.by)), Cell(moment(each.at)),
+         Cell(Verbatim(each.reason)),
+         Cell(NOTHING) if each.replaced_by is None else
+         Cell(say("entry {number}", number=number(each.replaced_by)), address("/certificate", entry=each.replaced_by)))
+        for each in found
+    )  # fmt: skip
+    return (Section(say("Release"), (Table(say("Who released, withdrew or replaced it"), columns, rows, heard=True),)),)
+
+
+def _files(one: Certificate, files: tuple[RecordedFile, ...]) -> list[Block]:
+    columns = (Column(say("File")), Column(say("Keep")), Column(say("SHA-256 as recorded")))
+    rows = tuple(
+        (
+            Cell(Verbatim(file.name), address("/recorded", entry=one.entry, name=file.name) if file.shown else ""),
+            Cell(say("Download {name}", name=Verbatim(file.name)),
+                 address("/recorded", entry=one.entry, name=file.name, keep="yes"), download=True),
+            Cell(Verbatim(file.sha256)),
+        )
+        for file in files
+    )  # fmt: skip
+    empty = say("The records name no file that is still there.")
+    note = say("In {folder}. A file is handed out only while it is, byte for byte, the one that was recorded.",
+               folder=shown(one.folder))  # fmt: skip
+    return [Table(say("Files as recorded"), columns, rows, empty, (note,), heard=True)]
