@@ -8,8 +8,7 @@ from __future__ import annotations
 import calendar
 import datetime as dt
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from cmm_uq.messages import Text, number, say
 from cmm_uq.records.listing import Newest
@@ -22,8 +21,7 @@ SOON = dt.timedelta(days=60)
 """What is due within it is shown before it is late."""
 
 
-@dataclass(frozen=True)
-class Due:
+class Due(NamedTuple):
     """When a machine is due.
 
     Parameters
@@ -78,4 +76,5 @@ def months_after(day: dt.date, months: int) -> dt.date:
     """
     years, month = divmod(day.month - 1 + months, 12)
     year = day.year + years
-    return dt.date(year, month + 1, min(day.day, calendar.monthrange(year, month + 1)[1]))
+    last = 28 if day.day <= 28 else calendar.monthrange(year, month + 1)[1]
+    return dt.date(year, month + 1, min(day.day, last))

@@ -105,4 +105,4 @@ def _facts(known: Known, dropped: Dropped) -> Facts:
             (say("Measured on"), Cell(day(one.day))),
         ]
     size = say("{bytes} bytes", bytes=number(dropped.size, ",d"))
-    return Facts((*rows, (say("Size"), Cell(size)), (say("SHA-256"), Cell(Verbatim(dropped.sha256)))))
+    return Facts((*rows, (say("Size"), Cell(size)), (say("SHA-256"), Cell(Verbatim(dropped.sha256)))), wide=True)

@@ -6,7 +6,7 @@ from cmm_uq.messages import NOTHING, Verbatim, number, plural, say
 from cmm_uq.records.place import shown as shown_place
 from cmm_uq.serving.checking import MOST, Checked
 from cmm_uq.serving.exchange import Asked
-from cmm_uq.serving.page import Block, Cell, Column, Facts, Notice, Page, Paragraph, Press, Section, Table
+from cmm_uq.serving.page import Block, Cell, Column, Facts, Links, Notice, Page, Paragraph, Press, Section, Table
 from cmm_uq.serving.view import View
 from cmm_uq.serving.words import moment
 
@@ -26,14 +26,14 @@ def integrity_page(view: View, asked: Asked) -> Page:
     """
     asked.only(())
     count, head = view.records.head()
-    facts = Facts((
+    rows = (
         (say("Entries"), Cell(number(count, ",d"))),
         (say("Head"), Cell(Verbatim(head) if count else say("none yet"))),
         (say("Records"), Cell(Verbatim(shown_place(view.records.place)))),
-    ))  # fmt: skip
+    )
     return Page(
         say("Integrity"), "/integrity", lead=NOTHING,
-        blocks=(*_found(view, (count, head)), facts),
+        blocks=(*_found(view, (count, head)), Facts(rows, wide=True)),
         sections=(Section(say("Compare the records with their chain"), _forms(view)),),
     )  # fmt: skip
 
@@ -41,7 +41,7 @@ def integrity_page(view: View, asked: Asked) -> Page:
 def _forms(view: View) -> tuple[Block, ...]:
     if (since := view.checking.since) is not None:
         told = say("A comparison is under way since {moment}.", moment=moment(since))
-        return (Paragraph(told), Facts(((say("Then"), Cell(say("Look again"), "/integrity")),)))
+        return (Paragraph(told), Links((Cell(say("Look again"), "/integrity"),)))
     return (
         Paragraph(_WHAT),
         Press("/integrity/chain", say("Compare entries and tables")),
@@ -52,7 +52,7 @@ def _forms(view: View) -> tuple[Block, ...]:
 def _found(view: View, head: tuple[int, str]) -> tuple[Block, ...]:
     last = view.checking.last
     if last is None:
-        return (Notice(say("Not compared since this page was opened"), "open"),)
+        return (Notice(say("Not compared since cmm-uq serve was started"), "open"),)
     at = say("Compared on {moment}, {what}, up to entry {number}.", moment=moment(last.at), number=number(last.head[0]),
              what=say("with all files") if last.files else say("without files"))  # fmt: skip
     later = (Cell(say("Entries were added since.")),) if last.head != head else ()

@@ -8,6 +8,8 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 from cmm_uq.documents.document import Standing
 from cmm_uq.messages import Text, say
@@ -48,8 +50,7 @@ GROUPS: Mapping[str, Group] = {
 _URGENCY = {name: place for place, name in enumerate(GROUPS)}
 
 
-@dataclass(frozen=True, slots=True)
-class Stands:
+class Stands(NamedTuple):
     """How one machine stands.
 
     Parameters
@@ -95,16 +96,22 @@ def in_order(machines: Sequence[Stands]) -> tuple[Stands, ...]:
 
 def groups(newest: Newest, due: Due | None, today: dt.date) -> tuple[str, ...]:
     """To which groups a machine belongs, the most urgent first."""
-    found = []
+    found: tuple[str, ...] = ()
     if due is not None and due.day is not None:
-        found += ["overdue"] if due.day < today else ["due"] if due.day <= today + SOON else []
+        found = ("overdue",) if due.day < today else ("due",) if due.day <= today + SOON else ()
     certificate = newest.certificate
     if certificate is None:
-        found.append("never")
+        found += ("never",)
     else:
-        decision = DECISIONS.get(certificate.decision, (None, "open"))[1]
-        found += {"bad": ["failing"], "open": ["open"]}.get(decision or "", [])
-        consistent = not certificate.diagnosis or VERDICTS.get(certificate.diagnosis, (None, "open"))[1] == "good"
-        found += [] if consistent else ["diagnosis"]
-        found += ["draft"] if certificate.state == "draft" else []
+        found += _of_certificate(certificate.decision, certificate.diagnosis, certificate.state)
     return tuple(sorted(found, key=_URGENCY.__getitem__)) or ("order",)
+
+
+@lru_cache(1000)
+def _of_certificate(decision: str, diagnosis: str, state: str) -> tuple[str, ...]:
+    """To which groups a machine belongs by what its newest certificate says."""
+    conforms = DECISIONS.get(decision, (None, "open"))[1]
+    found = ["failing"] if conforms == "bad" else ["open"] if conforms == "open" else []
+    if diagnosis and VERDICTS.get(diagnosis, (None, "open"))[1] != "good":
+        found.append("diagnosis")
+    return tuple(found + ["draft"] * (state == "draft"))

@@ -75,9 +75,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Facts:
-    """Labels and values."""
+    """Labels and values; in one column where values are long (``wide``)."""
 
     rows: tuple[tuple[Text, Cell], ...]
+    wide: bool = False
     kind: ClassVar[str] = "facts"
 
 
