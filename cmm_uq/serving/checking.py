@@ -71,9 +71,14 @@ class Checking:
                 self._since = dt.datetime.now(dt.UTC)
                 self._running = threading.Thread(target=self._compare, args=(files,), name="verify", daemon=True)
                 self._running.start()
+        self.wait(AT_ONCE_S)
+
+    def wait(self, seconds: float) -> None:
+        """Until the comparison that is under way has ended, or so many seconds."""
+        with self._lock:
             running = self._running
         if running is not None:
-            running.join(AT_ONCE_S)
+            running.join(seconds)
 
     def _compare(self, files: bool) -> None:
         head = (0, "")

@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Mapping
 
 from cmm_uq.documents.document import Standing
-from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, day, say
+from cmm_uq.messages import DASH, NOTHING, Day, Text, Verbatim, day, say
 from cmm_uq.serving.page import Cell
 
 Word = tuple[Text, Standing | None]
@@ -56,7 +56,7 @@ def day_cell(date: dt.date | None, *, before: dt.date | None = None, note: Text 
 
 def moment(at: dt.datetime) -> Text:
     """A moment to the minute."""
-    return Verbatim(f"{at:%Y-%m-%d %H:%M} UTC")
+    return say("{moment} UTC", moment=Day(f"{at:%Y-%m-%d %H:%M}"))
 
 
 def shown(text: str) -> Text:
