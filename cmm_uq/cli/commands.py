@@ -19,6 +19,8 @@ from cmm_uq.cli import (
     new,
     plan,
     prove,
+    records,
+    release,
     report,
     schema,
     selftest,
@@ -50,6 +52,7 @@ for module, short in {
     simulate: "A recording drawn from known errors, as a job of its own.",
     compensate: "A recording corrected by its machine's error maps.",
     budget: "The uncertainty of any measurement model in a file.",
+    release: "A certificate released, withdrawn or replaced.",
     serve: "The records to look at, in a browser.",
     schema: "JSON Schema of a file, for editors that complete and explain.",
     selftest: "Published reference figures, computed here and compared.",
@@ -58,6 +61,7 @@ for module, short in {
     app.command(name, short_help=short, epilog=module.EXAMPLES)(module.command)
 
 app.add_typer(instruments.app, name="instruments", short_help="Instruments: ready profiles, tried at a port, new ones.")
+app.add_typer(records.app, name="records", short_help="The history: verified, imported, backed up, brought up to date.")
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
 and the calibration certificates that state it.

@@ -93,6 +93,7 @@ class Indexer:
             "decision": data.get("decision") or "none", "diagnosis": data.get("diagnosis") or "",
             "interim": bool(data.get("interim")) or entry.kind == "check", "folder": data.get("folder") or "",
             "version": data.get("version") or "", "results_sha256": data.get("results_sha256") or "",
+            "artefact_due": used.get("due") or None,
         }  # fmt: skip
         self._rows[certificates].append(row)
         self._certificates[entry.number] = row
@@ -106,7 +107,7 @@ class Indexer:
         if together := data.get("covariance"):
             self._rows[covariances].append({
                 "certificate": entry.number, "names": json.dumps(together["names"], ensure_ascii=False),
-                "triangle": json.dumps(together["triangle"]),
+                "lower": json.dumps(together["lower"]),
             })  # fmt: skip
 
     def _machine(self, facts: Mapping[str, Any], day: str, entry: int) -> Row:

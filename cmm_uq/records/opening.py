@@ -23,10 +23,10 @@ APPLICATION = 0x434D4D55
 PATIENCE_S = 15.0
 """How long to wait for another process that writes."""
 
-REVISION = "0001"
+REVISION = "0002"
 """Newest revision of the tables; see :mod:`cmm_uq.records.migrations`."""
 
-KNOWN = ("0001",)
+KNOWN = ("0001", "0002")
 """All revisions, oldest first."""
 
 
@@ -99,6 +99,7 @@ def _file(path: Path, create: bool, read_only: bool) -> Engine:
             made.execute("PRAGMA foreign_keys = ON")
             made.execute("PRAGMA synchronous = FULL")
             made.execute("PRAGMA recursive_triggers = ON")
+            made.execute("PRAGMA cache_size = -65536")  # KiB: pages of the indexes of 10⁵ certificates
         return made
 
     engine = create_engine("sqlite://", creator=connect, poolclass=QueuePool)

@@ -15,7 +15,7 @@ from sqlalchemy import ColumnElement, Connection, Select, and_, func, or_, selec
 
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.records.facts import STANDING, ArtefactRow, Certificate, Machine, Series, Signature, Value
-from cmm_uq.records.recognised import spelled
+from cmm_uq.records.recognised import BY_NAME, spelled
 from cmm_uq.records.tables import (
     adjustments,
     artefacts,
@@ -69,10 +69,10 @@ def machine_of(connection: Connection, serial: str) -> Machine:
 
 
 def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> Machine:
-    names = ("name", "manufacturer", "model", "place")
     return Machine(
-        row["called"], *(row[name] for name in names), tuple(adjusted), row["recognised"].startswith("name:")
-    )
+        row["called"], row["name"], row["manufacturer"], row["model"], row["place"], tuple(adjusted),
+        row["recognised"].startswith(BY_NAME),
+    )  # fmt: skip
 
 
 def machine_id(connection: Connection, serial: str) -> int:
@@ -208,7 +208,7 @@ def _certificates(
             row.entry, row.job, row.machine_called, row.artefact_called, row.kind, row.origin, dt.date.fromisoformat(row.day),
             dt.datetime.fromisoformat(row.at), _since(row.adjusted_since, row.day, adjusted[row.machine]), row.state,
             row.decision, row.diagnosis, bool(row.interim), _folder(row.folder, home), row.version, row.results_sha256,
-            row.number, row.command, tuple(stated.get(row.entry, ())), together.get(row.entry),
+            row.number, row.command, _day(row.artefact_due), tuple(stated.get(row.entry, ())), together.get(row.entry),
         )
         for row in rows
     ]  # fmt: skip
@@ -232,7 +232,7 @@ def _together(
     c, found = covariances.c, {}
     for block in _blocks(entries):
         for row in connection.execute(select(covariances).where(c.certificate.in_(block))):
-            found[row.certificate] = (tuple(json.loads(row.names)), tuple(json.loads(row.triangle)))
+            found[row.certificate] = (tuple(json.loads(row.names)), tuple(json.loads(row.lower)))
     return found
 
 

@@ -48,8 +48,8 @@ entries = Table(
     Column("at", String(27), nullable=False),
     Column("kind", String(20), nullable=False),
     Column("content", Text, nullable=False),
-    Column("previous", String(64), nullable=False, unique=True),
-    Column("hash", String(64), nullable=False, unique=True),
+    Column("previous", String(64), nullable=False),
+    Column("hash", String(64), nullable=False),
     CheckConstraint("number >= 1", name="counts"),
     Index(None, "kind", "number"),
 )  # fmt: skip
@@ -110,6 +110,7 @@ certificates = Table(
     Column("folder", Text, nullable=False),
     Column("version", Text, nullable=False),
     Column("results_sha256", String(64), nullable=False),
+    Column("artefact_due", DAY),
     Index(None, "machine", "command", "origin", "day", "entry"),
     Index(None, "command", "origin", "day", "entry"),
     Index(None, "artefact", "day"),
@@ -146,7 +147,7 @@ covariances = Table(
     "covariances", META,
     Column("certificate", NUMBER, _of("certificates.entry"), primary_key=True, autoincrement=False),
     Column("names", Text, nullable=False),
-    Column("triangle", Text, nullable=False),
+    Column("lower", Text, nullable=False),
 )  # fmt: skip
 
 signatures = Table(
@@ -181,7 +182,7 @@ TRIGGERS = {
         "CREATE TRIGGER entries_no_delete BEFORE DELETE ON entries "
         "BEGIN SELECT RAISE(ABORT, 'entries are never changed'); END",
         "CREATE TRIGGER entries_no_replace BEFORE INSERT ON entries "  # INSERT OR REPLACE deletes without a trigger
-        "WHEN EXISTS (SELECT 1 FROM entries WHERE number = NEW.number OR hash = NEW.hash OR previous = NEW.previous) "
+        "WHEN EXISTS (SELECT 1 FROM entries WHERE number = NEW.number) "
         "BEGIN SELECT RAISE(ABORT, 'entries are never changed'); END",
     ),
     "postgresql": (
