@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 from sqlalchemy import ColumnElement, Connection, func, or_, select
 
 from cmm_uq.records.entries import Entry
-from cmm_uq.records.facts import STANDING
+from cmm_uq.records.facts import STANDING, Machine
 from cmm_uq.records.opening import told
+from cmm_uq.records.queries import last_adjusted
 from cmm_uq.records.recognised import spelled
 from cmm_uq.records.store import Records
 from cmm_uq.records.tables import artefacts, certificates, entries, figures, machines, quantities
@@ -188,6 +189,28 @@ def _with_text(connection: Connection, text: str) -> list[ColumnElement[bool]]:
     return [or_(*named, _C.machine.in_(select(machines.c.id).where(of_machine)))]
 
 
+class Stated(NamedTuple):
+    """One value as one certificate or interim check states it.
+
+    Parameters
+    ----------
+    entry, day : of the certificate.
+    value, lower, upper : with the ends of the stated interval.
+    limit : of its amount; ``None`` where none is set.
+    interim : whether it is of an interim check.
+    adjusted_since : the last adjustment of the machine before it.
+    """
+
+    entry: int
+    day: dt.date
+    value: float
+    lower: float
+    upper: float
+    limit: float | None
+    interim: bool
+    adjusted_since: dt.date | None
+
+
 @dataclass(frozen=True, slots=True)
 class Course:
     """One value of one machine over its newest certificates and interim checks, oldest first.
@@ -195,21 +218,21 @@ class Course:
     Parameters
     ----------
     name, quantity, unit : of the value.
-    rows : certificate's entry, day, value, ends of the stated interval, limit, whether it is an interim check.
+    stated : at each.
     """
 
     name: str
     quantity: str
     unit: str
-    rows: list[tuple[int, dt.date, float, float, float, float | None, bool]]
+    stated: list[Stated]
 
 
-def courses(records: Records, machine: str, most: int) -> list[Course]:
+def courses(records: Records, machine: Machine, most: int) -> list[Course]:
     """What a machine's measured certificates and interim checks state, as far as they stand.
 
     Parameters
     ----------
-    machine : as it is called in the records.
+    machine : of the records.
     most : certificates, the newest.
 
     Returns
@@ -221,27 +244,30 @@ def courses(records: Records, machine: str, most: int) -> list[Course]:
     CmmUqError : the records are damaged or locked.
     """
     newest = (
-        select(_C.entry, _C.day, _C.interim)
-        .where(_C.machine == select(machines.c.id).where(machines.c.called == machine).scalar_subquery(),
+        select(_C.entry, _C.day, _C.interim, _C.adjusted_since)
+        .where(_C.machine == select(machines.c.id).where(machines.c.called == machine.serial).scalar_subquery(),
                _C.command == "report", _C.origin == "measured", _C.state.in_(STANDING))
         .order_by(_C.day.desc(), _C.entry.desc()).limit(most).subquery()
     )  # fmt: skip
     f, q = figures.c, quantities.c
     query = (
-        select(newest.c.entry, newest.c.day, newest.c.interim, q.name, q.quantity, q.unit, f.value, f.lower, f.upper,
+        select(newest, q.name, q.quantity, q.unit, f.value, f.lower, f.upper,
                f.at_most)
         .select_from(newest.join(figures, f.certificate == newest.c.entry).join(quantities, q.id == f.quantity))
         .order_by(newest.c.day.desc(), newest.c.entry.desc(), f.place)
     )  # fmt: skip
     found: dict[tuple[str, str], Course] = {}
+    adjusted = [day.isoformat() for day in machine.adjusted]
     with told(records.place), records.engine.connect() as connection:
         rows = connection.execute(query).all()
     for row in rows:
         course = found.setdefault((row.name, row.unit), Course(row.name, row.quantity, row.unit, []))
-        day = dt.date.fromisoformat(row.day)
-        course.rows.append((row.entry, day, row.value, row.lower, row.upper, row.at_most, bool(row.interim)))
+        course.stated.append(
+            Stated(row.entry, dt.date.fromisoformat(row.day), row.value, row.lower, row.upper, row.at_most, bool(row.interim),
+                   last_adjusted(row.adjusted_since, row.day, adjusted))
+        )  # fmt: skip
     for course in found.values():
-        course.rows.reverse()
+        course.stated.reverse()
     return list(found.values())
 
 

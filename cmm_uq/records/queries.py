@@ -206,7 +206,7 @@ def _certificates(
     return [
         Certificate(
             row.entry, row.job, row.machine_called, row.artefact_called, row.kind, row.origin, dt.date.fromisoformat(row.day),
-            dt.datetime.fromisoformat(row.at), _since(row.adjusted_since, row.day, adjusted[row.machine]), row.state,
+            dt.datetime.fromisoformat(row.at), last_adjusted(row.adjusted_since, row.day, adjusted[row.machine]), row.state,
             row.decision, row.diagnosis, bool(row.interim), _folder(row.folder, home), row.version, row.results_sha256,
             row.number, row.command, _day(row.artefact_due), tuple(stated.get(row.entry, ())), together.get(row.entry),
         )
@@ -246,7 +246,7 @@ def _adjusted(connection: Connection, of: Collection[int]) -> dict[int, list[str
     return found
 
 
-def _since(stated: str | None, day: str, adjusted: Sequence[str]) -> dt.date | None:
+def last_adjusted(stated: str | None, day: str, adjusted: Sequence[str]) -> dt.date | None:
     """The adjustment before a recording: stated with it, or the last known before its day.
 
     On the day itself only what is stated counts: a machine is recorded as found and as left on one day.
@@ -272,7 +272,7 @@ def series_of(
     found = {}
     for name, of_name in by_name.items():
         limits = [row.limit for row in of_name if row.limit is not None]
-        since = (_since(row.adjusted_since, row.day, adjusted) for row in of_name)
+        since = (last_adjusted(row.adjusted_since, row.day, adjusted) for row in of_name)
         found[name] = Series(
             name, of_name[-1].quantity, of_name[-1].unit, limits[-1] if limits else None,
             np.array([dt.date.fromisoformat(row.day).toordinal() for row in of_name]),
@@ -310,7 +310,7 @@ def all_series_of(connection: Connection, names: Collection[str] | None, origin:
     known = {row.id: row for row in connection.execute(select(machines))}
     adjusted = _adjusted(connection, set(known))
     ordinal = {day: dt.date.fromisoformat(day).toordinal() for day in {row.day for row in rows}}
-    since = [_since(row.adjusted_since, row.day, adjusted[row.machine]) for row in rows]
+    since = [last_adjusted(row.adjusted_since, row.day, adjusted[row.machine]) for row in rows]
     frame = pd.DataFrame(
         {
             "machine": [known[row.machine].called for row in rows],

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.documents.document import Standing
-from cmm_uq.documents.effect_words import title_of
+from cmm_uq.documents.effect_words import effect_of, size_of, title_of
 from cmm_uq.documents.wording import probability
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, say
+from cmm_uq.records.content import unit_of
 from cmm_uq.records.entries import Entry
 from cmm_uq.records.facts import Certificate, Value
 from cmm_uq.records.listing import entry_of
@@ -19,8 +20,10 @@ from cmm_uq.serving.exchange import Answer, Asked, Refused
 from cmm_uq.serving.page import Block, Cell, Column, Facts, Notice, Page, Paragraph, Section, Table, address
 from cmm_uq.serving.recorded_files import RecordedFile, content_of, files_of, results_of, sent
 from cmm_uq.serving.view import View, machine_cell
-from cmm_uq.serving.words import DECISIONS, NOT_MEASURED, STATES, VERDICTS, cell_of, moment, shown
+from cmm_uq.serving.words import DECISIONS, NOT_MEASURED, ORIGINS, STATES, VERDICTS, cell_of, moment, shown
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.units import unit
 
 
 def certificate_page(view: View, asked: Asked) -> Page:
@@ -39,7 +42,7 @@ def certificate_page(view: View, asked: Asked) -> Page:
     )  # fmt: skip
     return Page(
         title, "/certificates",
-        lead=say("Machine {machine}, measured on {day}", machine=Verbatim(one.machine), day=day(one.day)),
+        lead=_lead(one),
         above=(Cell(say("Certificates"), "/certificates"), machine_cell(one.machine)),
         blocks=(*_notices(one), _facts(view, one, entry)),
         sections=(
@@ -49,6 +52,14 @@ def certificate_page(view: View, asked: Asked) -> Page:
             Section(say("Files"), tuple(_files(one, files))),
         ),
     )  # fmt: skip
+
+
+def _lead(one: Certificate) -> Text:
+    machine, date = Verbatim(one.machine), day(one.day)
+    if one.origin == "measured":
+        return say("Machine {machine}, measured on {day}", machine=machine, day=date)
+    return say("Machine {machine}, {origin:small} recording of {day}", machine=machine, day=date,
+               origin=ORIGINS.get(one.origin, Verbatim(one.origin)))  # fmt: skip
 
 
 def recorded_file(view: View, asked: Asked) -> Answer:
@@ -165,17 +176,21 @@ def _verdict(found: Mapping[str, Any]) -> list[tuple[Text, Cell]]:
 def _effect(one: Any) -> tuple[Cell, ...] | None:
     if not isinstance(one, Mapping) or not one.get("effect"):
         return None
-    p, sizes = one.get("probability"), []
-    parameters = one.get("parameters")
-    for name, quantity in parameters.items() if isinstance(parameters, Mapping) else ():
-        value, u = (quantity.get(key) if isinstance(quantity, Mapping) else None for key in ("value", "u"))
-        if isinstance(value, (int, float)) and isinstance(u, (int, float)) and u >= 0:
-            text = say(
-                "{name} {value} (u = {u})", name=Verbatim(str(name)), value=(pair := rounded(value, u))[0], u=pair[1]
-            )
-            sizes.append(text)
-    told = probability(float(p)) if isinstance(p, (int, float)) else DASH
-    return Cell(title_of(str(one["effect"]))), Cell(told), Cell(commas(sizes))
+    name, p = str(one["effect"]), one.get("probability")
+    given = one.get("parameters")
+    sizes = {str(key): quantity for key, value in (given if isinstance(given, Mapping) else {}).items()
+             if (quantity := _quantity(str(key), value)) is not None}  # fmt: skip
+    size = size_of(effect_of(name), sizes, factors=False) if sizes else NOTHING
+    return Cell(title_of(name)), Cell(probability(float(p)) if isinstance(p, (int, float)) else DASH), Cell(size)
+
+
+def _quantity(name: str, value: Any) -> Quantity | None:
+    """A quantity of results.json; ``None`` where it is not whole."""
+    try:
+        low, high = value["interval95"]
+        return Quantity(float(value["value"]), float(value["u"]), (float(low), float(high)), unit(unit_of(name)))
+    except (TypeError, KeyError, ValueError):
+        return None
 
 
 def _list(found: Any) -> list[Any]:

@@ -36,6 +36,7 @@ class Trend:
     days : of the measurements, ascending, proleptic Gregorian ordinals.
     values, lower, upper : in the unit, with the stated interval.
     interim : whether each is of an interim check.
+    parted : whether the machine was adjusted between each and the next, one fewer.
     adjusted : days of adjustments.
     limit : of its amount; ``None`` where none is set.
     """
@@ -45,6 +46,7 @@ class Trend:
     lower: Sequence[float]
     upper: Sequence[float]
     interim: Sequence[bool]
+    parted: Sequence[bool] = ()
     adjusted: Sequence[int] = ()
     limit: float | None = None
 
@@ -91,7 +93,7 @@ def drawn(trend: Trend, limit_word: Text, adjusted_word: Text) -> str:
         parts.append(f'<text x="{at + shift:.1f}" y="{height}" text-anchor="{anchor}">{escape(adjusted_word)}</text>')
     rows = list(zip(trend.days, trend.values, trend.lower, trend.upper, trend.interim, strict=True))
     joined = "".join(
-        f"{'M' if i == 0 or _parted(rows[i - 1][0], day, inside) else 'L'}{x(day):.1f} {y(value):.1f}"
+        f"{'M' if i == 0 or any(trend.parted[i - 1 : i]) else 'L'}{x(day):.1f} {y(value):.1f}"
         for i, (day, value, *_) in enumerate(rows)
     )
     parts.append(f'<path class="line" d="{joined}"/>')
@@ -103,11 +105,6 @@ def drawn(trend: Trend, limit_word: Text, adjusted_word: Text) -> str:
         for day, value, _, _, interim in rows
     ]
     return "".join(parts)
-
-
-def _parted(before: int, day: int, adjusted: Sequence[int]) -> bool:
-    """Whether the machine was adjusted between two measurements; one of the day of the adjustment is after it."""
-    return any(before < one <= day for one in adjusted)
 
 
 def _range(values: Sequence[float]) -> tuple[float, float]:

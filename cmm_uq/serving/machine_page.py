@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from http import HTTPStatus
+from itertools import pairwise
 
 from cmm_uq.documents.document import Standing
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, Verbatim, commas, day, number, say
 from cmm_uq.records.facts import Machine
-from cmm_uq.records.listing import Choice, Course, chosen, courses
+from cmm_uq.records.listing import Choice, Course, Stated, chosen, courses
 from cmm_uq.serving.drawing import Trend, drawn
 from cmm_uq.serving.exchange import Asked, Refused
 from cmm_uq.serving.machines_page import due_cell
@@ -108,11 +109,11 @@ def _facts(machine: Machine, stands: Stands | None) -> Facts:
 
 
 def _trends(view: View, machine: Machine) -> tuple[Block, ...]:
-    found = courses(view.records, machine.serial, DRAWN)
+    found = courses(view.records, machine, DRAWN)
     if not found:
         return (Paragraph(say("No value is recorded of this machine."), "note"),)
     adjusted = tuple(one.toordinal() for one in machine.adjusted)
-    ordered = sorted(found, key=lambda one: (not one.name.startswith(FIGURES), one.rows[-1][5] is None))
+    ordered = sorted(found, key=lambda one: (not one.name.startswith(FIGURES), one.stated[-1].limit is None))
     notes = (
         say("Newest value with its stated 95 % interval, and all measured values that stand: neither withdrawn nor replaced. "
             "A line is broken where the machine was adjusted; an open mark is an interim check."),
@@ -121,14 +122,16 @@ def _trends(view: View, machine: Machine) -> tuple[Block, ...]:
 
 
 def _chart(course: Course, adjusted: tuple[int, ...]) -> Chart:
-    limit = next((row[5] for row in reversed(course.rows) if row[5] is not None), None)
+    stated = course.stated
+    limit = next((one.limit for one in reversed(stated) if one.limit is not None), None)
     trend = Trend(
-        [row[1].toordinal() for row in course.rows], [row[2] for row in course.rows], [row[3] for row in course.rows],
-        [row[4] for row in course.rows], [row[6] for row in course.rows], adjusted, limit,
+        [one.day.toordinal() for one in stated], [one.value for one in stated], [one.lower for one in stated],
+        [one.upper for one in stated], [one.interim for one in stated],
+        [before.adjusted_since != one.adjusted_since for before, one in pairwise(stated)], adjusted, limit,
     )  # fmt: skip
-    newest = course.rows[-1]
-    told = stated(newest[2], newest[3], newest[4], course.unit)
-    beyond = limit is not None and abs(newest[2]) > limit
+    newest = stated[-1]
+    told = with_interval(newest, course.unit)
+    beyond = limit is not None and abs(newest.value) > limit
     standing: Standing | None = "bad" if beyond else None
     if limit is not None:
         allowed = say("limit {limit} {unit}", limit=number(limit, "g"), unit=Verbatim(course.unit))
@@ -139,9 +142,9 @@ def _chart(course: Course, adjusted: tuple[int, ...]) -> Chart:
 
 def _in_words(course: Course, newest: Text, *, beyond: bool) -> Text:
     """The sentence in place of the picture."""
-    values = [row[2] for row in course.rows]
+    values = [one.value for one in course.stated]
     low, high = (number(value, ".4g") for value in (min(values), max(values)))
-    first, last = course.rows[0][1], course.rows[-1][1]
+    first, last = course.stated[0].day, course.stated[-1].day
     told = say(
         "{quantity}, {count} values from {first} to {last}, between {low} and {high} {unit}; the newest is {newest}",
         quantity=Verbatim(course.quantity), count=number(len(values)), first=day(first), last=day(last), low=low, high=high,
@@ -150,13 +153,13 @@ def _in_words(course: Course, newest: Text, *, beyond: bool) -> Text:
     return say("{told}: beyond it", told=told) if beyond else told
 
 
-def stated(value: float, lower: float, upper: float, unit: str) -> Text:
+def with_interval(one: Stated, unit: str) -> Text:
     """A value with its interval: ``5.2 ± 0.6 µm``, or both ends where it does not lie in the middle of them."""
-    half = 0.5 * (upper - lower)
-    shown_value, shown_half = rounded(value, half)
-    if abs(0.5 * (upper + lower) - value) > 0.05 * half:
-        ends = (rounded(end, half)[0] for end in (lower, upper))
-        told = say("{value} [{lower}, {upper}]", value=shown_value, lower=next(ends), upper=next(ends))
+    half = 0.5 * (one.upper - one.lower)
+    value, shown_half = rounded(one.value, half)
+    if abs(0.5 * (one.upper + one.lower) - one.value) > 0.05 * half:
+        lower, upper = (rounded(end, half)[0] for end in (one.lower, one.upper))
+        told = say("{value} [{lower}, {upper}]", value=value, lower=lower, upper=upper)
     else:
-        told = say("{value} ± {half}", value=shown_value, half=shown_half)
+        told = say("{value} ± {half}", value=value, half=shown_half)
     return say("{told} {unit}", told=told, unit=Verbatim(unit)) if unit not in ("", "1") else told

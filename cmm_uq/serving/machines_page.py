@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say
+from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, day, listed, number, plural, say
 from cmm_uq.serving.exchange import Asked
 from cmm_uq.serving.overview import GROUPS, Stands
 from cmm_uq.serving.page import Cell, Chooser, Column, Count, Field, Notice, Page, Table, Tally, address
@@ -13,6 +13,9 @@ from cmm_uq.serving.words import DECISIONS, cell_of, day_cell, shown
 
 MOST_PLACES = 40
 """Places that are offered to choose from; more are searched for by name."""
+
+MOST_NAMED = 4
+"""Artefacts that are named; a page of its own has all."""
 
 COLUMNS = (
     Column(say("Machine")), Column(say("State")), Column(say("Due"), sort="day"), Column(say("Newest certificate")),
@@ -80,9 +83,10 @@ def _artefacts(view: View) -> tuple[Notice, ...]:
         count, one=say("1 artefact is out of date: no certificate can rest on it"),
         many=say("{count} artefacts are out of date: no certificate can rest on them", count=number(count)),
     )  # fmt: skip
-    lines = [Cell(say("{serial}, since {day}", serial=shown(one.serial), day=day(one.due)))
-             for one in overdue[:5] if one.due is not None]  # fmt: skip
-    return (Notice(head, "bad", (*lines, Cell(say("All artefacts"), "/artefacts"))),)
+    named = [say("{serial} since {day}", serial=shown(one.serial), day=day(one.due))
+             for one in overdue[:MOST_NAMED] if one.due is not None]  # fmt: skip
+    more = [say("{count} more", count=number(count - MOST_NAMED))] if count > MOST_NAMED else []
+    return (Notice(head, "bad", (Cell(listed([*named, *more])), Cell(say("All artefacts"), "/artefacts"))),)
 
 
 def _chooser(view: View, text: str, state: str, place: str) -> Chooser:

@@ -79,7 +79,10 @@ def opened_in(folder: Path) -> Path:
                                at=moment(day))  # fmt: skip
             return entry
 
-        good = values(("scale_x.ppm", "Scale error of X", "ppm", 1.234, 0.5, 8.0), ("squareness_xy.angle_arcsec", "Squareness X–Y", "″", -2.0, 0.2, None))  # noqa: E501
+        good = values(
+            ("scale_x.ppm", "Scale error of X", "ppm", 1.234, 0.5, 8.0),
+            ("squareness_xy.angle_arcsec", "Squareness X–Y", "″", -2.0, 0.2, None),
+        )
         beyond = values(("performance:E0", "Length measurement error E0", "µm", 9.5, 0.5, 9.0))
         add("K1", dt.date(2026, 6, 1), "k-1", "released", values=good)
         add("K2", dt.date(2025, 12, 1), "k-2", "released", values=good)
@@ -91,7 +94,9 @@ def opened_in(folder: Path) -> Path:
         add(HOSTILE, dt.date(2026, 9, 2), "h-1", "released", machine={"serial": HOSTILE, "name": TURNED, "place": HOSTILE},
             artefact={"serial": HOSTILE, "due": "2026-01-01"},
             values=[["x", HOSTILE, HOSTILE, 1.0, 0.1, 0.8, 1.2, 0.0, None]])  # fmt: skip
-        records.append("machine", {"serial": "NEW", "name": "Just bought", "manufacturer": "M", "model": "P", "place": "Hall 2"})
+        records.append(
+            "machine", {"serial": "NEW", "name": "Just bought", "manufacturer": "M", "model": "P", "place": "Hall 2"}
+        )
     return place
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -16,9 +17,17 @@ DAY = dt.date(2020, 1, 1).toordinal()
 FINITE = st.floats(-1e6, 1e6, allow_nan=False)
 
 
-def trend(values: list[float], *, adjusted: tuple[int, ...] = (), limit: float | None = None, u: float = 0.1) -> Trend:
+def trend(
+    values: list[float],
+    *,
+    parted: tuple[bool, ...] = (),
+    adjusted: tuple[int, ...] = (),
+    limit: float | None = None,
+    u: float = 0.1,
+) -> Trend:
     days = [DAY + 365 * i for i in range(len(values))]
-    return Trend(days, values, [v - u for v in values], [v + u for v in values], [False] * len(values), adjusted, limit)
+    return Trend(days, values, [v - u for v in values], [v + u for v in values], [False] * len(values), parted,
+                 adjusted, limit)  # fmt: skip
 
 
 def picture(of: Trend) -> str:
@@ -29,11 +38,11 @@ def marks(svg: str) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in re.findall(r'<circle class="\w+" cx="([\d.]+)" cy="([\d.]+)"', svg)]
 
 
-def pieces(svg: str) -> int:
-    """Into how many the line is broken."""
-    found = re.search(r'class="line" d="([^"]*)"', svg)
+def joined(svg: str) -> list[int]:
+    """How many points each piece of the line has."""
+    found = re.search(r'class="line" d="M([^"]*)"', svg)
     assert found is not None
-    return found[1].count("M")
+    return [piece.count("L") + 1 for piece in found[1].split("M")]
 
 
 @given(low=FINITE, span=st.floats(1e-6, 1e6))
@@ -41,8 +50,10 @@ def test_ticks_are_round_inside_and_few(low: float, span: float) -> None:
     values, texts = ticks(low, low + span)
     assert 1 <= len(values) <= 4
     assert all(low - 1e-9 * span <= value <= low + span * (1 + 1e-9) for value in values)
-    assert [float(text.replace("−", "-")) for text in texts] == pytest.approx(values, abs=1e-9 * max(1.0, abs(low) + span))
-    steps = {f"{b - a:.6g}".strip("0.").rstrip("0") for a, b in zip(values, values[1:], strict=False)}
+    assert [float(text.replace("−", "-")) for text in texts] == pytest.approx(
+        values, abs=1e-9 * max(1.0, abs(low) + span)
+    )
+    steps = {f"{b - a:.6g}".strip("0.").rstrip("0") for a, b in pairwise(values)}
     assert len({step[0] for step in steps if step}) <= 1
 
 
@@ -57,10 +68,10 @@ def test_higher_values_stand_higher_and_later_ones_further_right(values: list[fl
 
 
 def test_the_line_is_broken_at_an_adjustment_and_nowhere_else() -> None:
-    days = [DAY + 365 * i for i in range(5)]
-    assert pieces(picture(trend([1.0, 2.0, 3.0, 1.0, 1.1]))) == 1
-    assert pieces(picture(trend([1.0, 2.0, 3.0, 1.0, 1.1], adjusted=(days[3] - 5,)))) == 2
-    assert pieces(picture(trend([1.0, 2.0, 3.0, 1.0, 1.1], adjusted=(days[0] - 5, days[4] + 5)))) == 1
+    values = [1.0, 2.0, 3.0, 1.0, 1.1]
+    assert joined(picture(trend(values))) == [5]
+    assert joined(picture(trend(values, parted=(False, False, True, False)))) == [3, 2]
+    assert joined(picture(trend(values, parted=(True, True, True, True)))) == [1, 1, 1, 1, 1]
 
 
 def test_a_limit_is_drawn_where_the_values_come_near_it() -> None:

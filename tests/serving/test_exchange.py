@@ -20,7 +20,7 @@ def test_whatever_a_serial_holds_its_address_leads_back_to_it(serial: str, text:
 
 
 @pytest.mark.parametrize("target", [
-    "http://elsewhere/", "*", "", "/?a=1&a=2", "/?a=%ff", "/?a=%00", "/?a=%0d%0a", "/?" + "&".join(f"a{i}=1" for i in range(30)),
+    "http://elsewhere/", "*", "", "/?a=1&a=2", "/?a=%ff", "/?a=%00", "/?a=%0d%0a", "/?" + "a=&" * 30,
     "/?a=" + "x" * 400, "/\u202e", "/?noequals",
 ])  # fmt: skip
 def test_an_address_that_cannot_be_read_is_refused(target: str) -> None:
@@ -48,11 +48,13 @@ def test_what_was_not_asked_is_left_out() -> None:
     ({"since": "31.3.2026"}, "since is a date such as 2026-03-31, not '31.3.2026'"),
 ])  # fmt: skip
 def test_a_slip_in_an_address_is_answered_with_what_was_meant(query: dict[str, str], told: str) -> None:
-    asked = Asked("GET", "/", query)
-    with pytest.raises(Refused) as refused:
+    def read(asked: Asked) -> None:
         asked.only(("state", "since"))
         asked.one_of("state", ("draft", "released"))
         asked.day("since")
+
+    with pytest.raises(Refused) as refused:
+        read(Asked("GET", "/", query))
     assert refused.value.problem == told
     if "since" not in query:
         assert refused.value.fix in ("Did you mean 'state'?", "Did you mean 'draft'?")

@@ -29,7 +29,9 @@ def known(place: Path, content: bytes) -> Known:
     ("k-5", "Known, but a draft: nobody has released it", "open"),
     ("sim-1", "Known, but a draft: nobody has released it", "open"),
 ])  # fmt: skip
-def test_the_very_file_is_known_with_its_state(laboratory: Path, name: str, number: str, head: str, standing: str) -> None:
+def test_the_very_file_is_known_with_its_state(
+    laboratory: Path, name: str, number: str, head: str, standing: str
+) -> None:
     found = known(laboratory, files(number)[name])
     assert found.certificate is not None
     assert (found.how, found.name, found.certificate.number) == ("recorded", name, number)

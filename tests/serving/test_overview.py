@@ -14,7 +14,9 @@ from cmm_uq.serving.overview import Stands, groups, in_order
 TODAY = dt.date(2026, 11, 22)
 
 
-def newest(serial: str = "1", *, decision: str = "pass", diagnosis: str = "consistent", state: str = "released") -> Newest:
+def newest(
+    serial: str = "1", *, decision: str = "pass", diagnosis: str = "consistent", state: str = "released"
+) -> Newest:
     listed = Listed(1, "j", "n", serial, "", "a", "ballbar", "measured", dt.date(2026, 1, 31), state, decision, diagnosis,
                     False, "report")  # fmt: skip
     return Newest(Called(serial, "", "", "", "", False), listed)
@@ -46,7 +48,13 @@ def test_a_machine_without_a_certificate_is_not_in_order() -> None:
 
 
 def test_what_is_longest_overdue_comes_first_then_what_fails() -> None:
-    known = {"in order": ({}, 300), "late": ({}, -5), "later": ({}, -50), "fails": ({"decision": "fail"}, 100), "soon": ({}, 9)}
+    known = {
+        "in order": ({}, 300),
+        "late": ({}, -5),
+        "later": ({}, -50),
+        "fails": ({"decision": "fail"}, 100),
+        "soon": ({}, 9),
+    }
     machines = [newest(name, **said) for name, (said, _) in known.items()]
     stands = [
         Stands(one, due(days), groups(one, due(days), TODAY))

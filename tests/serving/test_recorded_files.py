@@ -90,7 +90,9 @@ def test_a_browser_shows_only_what_it_can_show_safely(name: str, media: str, how
 
 def test_a_recorded_page_can_run_nothing_here() -> None:
     """Not of this origin (sandbox), and without scripts."""
-    assert sent(RecordedFile("certificate.html", HASH), b"", keep=False).policy.startswith("sandbox; default-src 'none'")
+    assert sent(RecordedFile("certificate.html", HASH), b"", keep=False).policy.startswith(
+        "sandbox; default-src 'none'"
+    )
 
 
 def test_a_name_in_a_header_stays_a_name() -> None:

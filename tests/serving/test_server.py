@@ -107,13 +107,14 @@ def test_nothing_but_a_file_and_a_comparison_can_be_sent(host: Host) -> None:
 
 def test_a_head_has_no_body(host: Host) -> None:
     whole, short = (spoken(host, head(host, method=method)) for method in ("GET", "HEAD"))
-    lines, _, body = whole.partition(b"\r\n\r\n")
+    body = whole.partition(b"\r\n\r\n")[2]
     assert short.endswith(b"\r\n\r\n")
     assert f"content-length: {len(body)}".encode() in short.lower()
 
 
 @pytest.mark.parametrize("request_", [
-    b"nonsense\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"\x16\x03\x01\x02\x00\r\n\r\n", b"GET /" + b"a" * 70_000 + b" HTTP/1.1\r\n\r\n",
+    b"nonsense\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"\x16\x03\x01\x02\x00\r\n\r\n",
+    b"GET /" + b"a" * 70_000 + b" HTTP/1.1\r\n\r\n",
     b"GET / HTTP/1.1\r\n" + b"".join(b"A%d: b\r\n" % i for i in range(200)) + b"\r\n",
 ])  # fmt: skip
 def test_what_is_no_request_is_refused_in_words(host: Host, request_: bytes) -> None:
@@ -182,7 +183,11 @@ def closed_after(line: socket.socket, drip: bytes = b"") -> float:
 
 def test_a_browser_that_says_nothing_or_a_byte_at_a_time_is_cut_off(hasty: Host) -> None:
     """Each byte comes long before any time-out for a byte: what is limited is the whole request."""
-    for begin, drip in ((b"", b""), (b"GET / HTTP/1.1\r\n", b"A"), (head(hasty, "Content-Length: 99", method="POST"), b"x")):
+    for begin, drip in (
+        (b"", b""),
+        (b"GET / HTTP/1.1\r\n", b"A"),
+        (head(hasty, "Content-Length: 99", method="POST"), b"x"),
+    ):
         with closing(socket.create_connection(hasty)) as line:
             line.sendall(begin)
             assert closed_after(line, drip) < 3

@@ -1,4 +1,4 @@
-"""Every page by its address: what it lists, that nothing in the records can become part of it, and what it says when it cannot."""
+"""Every page by its address: what it lists, that nothing in the records becomes part of it, and what it says if it cannot."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from tests.serving.conftest import Looked
 from tests.serving.laboratory import HOSTILE, RESULTS, TODAY, TURNED, entry_of, opened_in
 
 ADDRESSES = ["/", "/?state=overdue", "/?text=K1", "/machine?serial=K1", "/machine?serial=K3", "/certificates",
-             "/certificates?origin=simulated", "/certificates?machine=K1", "/diagnoses", "/diagnoses?verdict=all", "/artefacts",
-             "/file", "/integrity", "/nowhere", "/certificates?page=x"]  # fmt: skip
+             "/certificates?origin=simulated", "/certificates?machine=K1", "/diagnoses", "/diagnoses?verdict=all",
+             "/artefacts", "/file", "/integrity", "/nowhere", "/certificates?page=x"]  # fmt: skip
 
 
 class Shown(HTMLParser):
@@ -119,8 +119,10 @@ def test_a_bad_address_is_answered_in_words(looked: Looked, address: str) -> Non
     assert "This cannot be shown" in answer.body.decode()
 
 
-@pytest.mark.parametrize("address", ["/nowhere", "/../etc/passwd", "/machine?serial=K77", "/machine", "/certificate?entry=999999",
-                                     "/certificate", "/recorded?entry=1&name=../records.db", "//", "/style.css/"])  # fmt: skip
+@pytest.mark.parametrize("address", [
+    "/nowhere", "/../etc/passwd", "/machine?serial=K77", "/machine", "/certificate?entry=999999", "/certificate",
+    "/recorded?entry=1&name=../records.db", "//", "/style.css/",
+])  # fmt: skip
 def test_what_is_not_there_is_not_found(looked: Looked, address: str) -> None:
     assert looked.get(address).status == 404
 
@@ -133,7 +135,7 @@ def test_one_certificate_shows_its_values_its_diagnosis_its_signatures_and_its_f
     assert "Scale error of X 1.2 0.2 to 2.2 8 ppm" in text
     assert "Squareness X–Y −2.00 −2.40 to −1.60 – ″" in text
     assert "98 %" in texts
-    assert "gap_um 5.20 (u = 0.30)" in text
+    assert "5.20 ± 0.60 µm" in text
     assert "Measure next: the bar upright in two places" in texts
     assert text.index("A. Prüfer") < text.index("B. Leiter")
     assert "artefact was damaged" in texts
@@ -282,7 +284,9 @@ def test_the_comparison_finds_what_the_records_find(tmp_path: Path) -> None:
         assert records.head()[1] in looked.text("/integrity")
     with sqlite3.connect(place) as connection:
         connection.execute("DROP TRIGGER entries_no_update")
-        connection.execute("UPDATE entries SET content = replace(content, '1.234', '1.235') WHERE content LIKE '%1.234%'")
+        connection.execute(
+            "UPDATE entries SET content = replace(content, '1.234', '1.235') WHERE content LIKE '%1.234%'"
+        )
     connection.close()
     with open_records(place, read_only=True) as records:
         findings = records.verify(files=False)
@@ -340,7 +344,9 @@ def test_every_text_of_every_page_is_a_message_or_of_the_records(
     for address in every_address(looked):
         looked.get(address)
     with open_records(looked.place, read_only=True) as records:
-        known = "\n".join(part for entry in records.entries() for part in (entry.content, entry.hash)) + str(looked.place)
+        known = "\n".join(part for entry in records.entries() for part in (entry.content, entry.hash)) + str(
+            looked.place
+        )
     known += f"{HOSTILE} {RESULTS} page x"
     texts = [text for page in seen for text in texts_of(page)]
     assert len(texts) > 500

@@ -18,8 +18,10 @@ BOUNDARY = "----WebKitFormBoundary7MA4YWxk"
 
 def form(content: bytes, name: str = "certificate.pdf", boundary: str = BOUNDARY) -> bytes:
     """As RFC 7578 has it, and as Chromium sends it."""
-    head = f'--{boundary}\r\nContent-Disposition: form-data; name="file"; filename="{name}"\r\nContent-Type: application/pdf\r\n\r\n'
-    return head.encode() + content + f"\r\n--{boundary}--\r\n".encode()
+    told = f'form-data; name="file"; filename="{name}"\r\nContent-Type: application/pdf'
+    return (
+        f"--{boundary}\r\nContent-Disposition: {told}\r\n\r\n".encode() + content + f"\r\n--{boundary}--\r\n".encode()
+    )
 
 
 def asked(body: bytes, length: int | None = None, boundary: str = BOUNDARY) -> Asked:
@@ -66,7 +68,9 @@ def test_a_file_s_name_has_no_folder() -> None:
     assert read_dropped(asked(form(b"x", name="C:\\lab\\../../etc/k-1.pdf"))).name == "k-1.pdf"
 
 
-@pytest.mark.parametrize("media", ["", "application/json", "multipart/form-data", "multipart/form-data; boundary=" + "x" * 80])
+@pytest.mark.parametrize(
+    "media", ["", "application/json", "multipart/form-data", "multipart/form-data; boundary=" + "x" * 80]
+)
 def test_only_the_form_s_own_media_type_is_read(media: str) -> None:
     with pytest.raises(Refused) as refused:
         read_dropped(Asked("POST", "/file", {}, {"content-type": media}, io.BytesIO(b"x"), 1))
