@@ -55,6 +55,7 @@ def command(
             say_now(f"{site.place} at {server.url} until Ctrl-C")
             if not server.alone:
                 say_now("Whoever reaches this address can read the records: there are no passwords")
+        threading.Thread(target=site.warm, daemon=True).start()
         if open_:
             import webbrowser
 

@@ -8,22 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.documents.document import Standing
-from cmm_uq.documents.effect_words import effect_of, size_of, title_of
-from cmm_uq.documents.wording import probability
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, say
-from cmm_uq.records.content import unit_of
+from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, day, number, say
 from cmm_uq.records.entries import Entry
 from cmm_uq.records.facts import Certificate, Value
 from cmm_uq.records.listing import entry_of
 from cmm_uq.serving.exchange import Answer, Asked, Refused
-from cmm_uq.serving.page import Block, Cell, Column, Facts, Notice, Page, Paragraph, Section, Table, address
+from cmm_uq.serving.page import Block, Cell, Column, Facts, Notice, Page, Section, Table, address
 from cmm_uq.serving.recorded_files import RecordedFile, content_of, files_of, results_of, sent
 from cmm_uq.serving.view import View, machine_cell
 from cmm_uq.serving.words import DECISIONS, NOT_MEASURED, ORIGINS, STATES, VERDICTS, cell_of, moment, shown
-from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
-from cmm_uq.units import unit
 
 
 def certificate_page(view: View, asked: Asked) -> Page:
@@ -47,7 +42,7 @@ def certificate_page(view: View, asked: Asked) -> Page:
         blocks=(*_notices(one), _facts(view, one, entry)),
         sections=(
             Section(say("Values"), (_values(one.values),)),
-            *_diagnosis(results_of(files, folder)),
+            *_diagnosed(results_of(files, folder)),
             *_signed(view, one),
             Section(say("Files"), tuple(_files(one, files))),
         ),
@@ -146,55 +141,13 @@ def _values(values: tuple[Value, ...]) -> Table:
     return Table(say("Values as stated"), columns, tuple(rows), say("It states no value."), heard=True)
 
 
-def _diagnosis(results: Mapping[str, Any]) -> tuple[Section, ...]:
-    """What results.json says of what the model leaves out."""
-    found = results.get("diagnosis")
-    if not isinstance(found, Mapping) or not found.get("verdict"):
+def _diagnosed(results: Mapping[str, Any]) -> tuple[Section, ...]:
+    """Words for effects load half of the package: only where a diagnosis is shown."""
+    if not isinstance(results.get("diagnosis"), Mapping):
         return ()
-    blocks: list[Block] = [Facts(tuple(_verdict(found)))]
-    rows = tuple(row for one in _list(found.get("effects")) if (row := _effect(one)) is not None)
-    if rows:
-        columns = (Column(say("Effect")), Column(say("Probability"), sort="number"), Column(say("Size")))
-        blocks.append(Table(say("What the model leaves out"), columns, rows))
-    pairs = [one for one in _list(found.get("indistinguishable")) if isinstance(one, list)]
-    for pair in pairs:
-        names = commas(title_of(str(name)) for name in pair)
-        blocks.append(Paragraph(say("This recording cannot tell apart: {names}.", names=names)))
-    asked = [one.get("what") for one in _list(found.get("suggested_measurements")) if isinstance(one, Mapping)]
-    blocks += [Paragraph(say("Measure next: {what}", what=Verbatim(str(what)))) for what in asked if what]
-    return (Section(say("Diagnosis"), tuple(blocks)),)
+    from cmm_uq.serving.diagnosis_section import diagnosis_section
 
-
-def _verdict(found: Mapping[str, Any]) -> list[tuple[Text, Cell]]:
-    rows: list[tuple[Text, Cell]] = [(say("Verdict"), cell_of(VERDICTS, str(found["verdict"])))]
-    p = found.get("p_value")
-    if isinstance(p, (int, float)):
-        rows.append((say("Lack-of-fit test, p"), Cell(probability(float(p)))))
-    return rows
-
-
-def _effect(one: Any) -> tuple[Cell, ...] | None:
-    if not isinstance(one, Mapping) or not one.get("effect"):
-        return None
-    name, p = str(one["effect"]), one.get("probability")
-    given = one.get("parameters")
-    sizes = {str(key): quantity for key, value in (given if isinstance(given, Mapping) else {}).items()
-             if (quantity := _quantity(str(key), value)) is not None}  # fmt: skip
-    size = size_of(effect_of(name), sizes, factors=False) if sizes else NOTHING
-    return Cell(title_of(name)), Cell(probability(float(p)) if isinstance(p, (int, float)) else DASH), Cell(size)
-
-
-def _quantity(name: str, value: Any) -> Quantity | None:
-    """A quantity of results.json; ``None`` where it is not whole."""
-    try:
-        low, high = value["interval95"]
-        return Quantity(float(value["value"]), float(value["u"]), (float(low), float(high)), unit(unit_of(name)))
-    except (TypeError, KeyError, ValueError):
-        return None
-
-
-def _list(found: Any) -> list[Any]:
-    return found if isinstance(found, list) else []
+    return diagnosis_section(results["diagnosis"])
 
 
 def _signed(view: View, one: Certificate) -> tuple[Section, ...]:

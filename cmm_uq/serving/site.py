@@ -84,6 +84,12 @@ class Site:
         """
         return open_records(self._where, read_only=True)
 
+    def warm(self) -> None:
+        """Load what is slow to load and work out how the machines stand, so that no reader waits for it."""
+        import cmm_uq.serving.diagnosis_section  # noqa: F401
+
+        self.answer(Asked("GET", "/"))
+
     def answer(self, asked: Asked | Refused) -> Answer:
         """The answer to a request, whatever happens."""
         try:
