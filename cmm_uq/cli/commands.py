@@ -10,6 +10,7 @@ import typer
 from cmm_uq.cli import (
     BAD_INPUT,
     acquire,
+    affected,
     budget,
     check,
     compensate,
@@ -53,6 +54,7 @@ for module, short in {
     compensate: "A recording corrected by its machine's error maps.",
     budget: "The uncertainty of any measurement model in a file.",
     release: "A certificate released, withdrawn or replaced.",
+    affected: "Which certificates a correction of the package touches.",
     serve: "The records to look at, in a browser.",
     schema: "JSON Schema of a file, for editors that complete and explain.",
     selftest: "Published reference figures, computed here and compared.",

@@ -52,8 +52,8 @@ class Intended:
         try:
             with self.records.writing() as writing:
                 _record(writing, token)
-        except CmmUqError as error:
-            if self._is_pending(token, error):
+        except (CmmUqError, OSError):
+            if self._is_pending(token):
                 raise
 
     def forget(self, token: str) -> None:
@@ -61,17 +61,17 @@ class Intended:
         try:
             with self.records.writing() as writing:
                 writing.connection.execute(delete(pending).where(pending.c.token == token))
-        except CmmUqError:
+        except (CmmUqError, OSError):
             return
 
-    def _is_pending(self, token: str, error: CmmUqError) -> bool:
+    def _is_pending(self, token: str) -> bool:
         """Whether a commit that failed was none; its answer may have been lost on the way."""
         try:
             with told(self.records.place), self.records.engine.connect() as connection:
                 return _row(connection, token) is not None
-        except CmmUqError as lost:
+        except (CmmUqError, OSError) as lost:
             raise InDoubtError("the records were lost while a report was recorded", where=shown(self.records.place),
-                               fix="Its files are in place; the next command records them") from (lost or error)  # fmt: skip
+                               fix="Its files are in place; the next command records them") from lost  # fmt: skip
 
 
 def settle(records: Records) -> None:

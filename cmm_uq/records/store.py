@@ -311,6 +311,9 @@ class Writing:
                     self.connection.commit()
                 else:
                     self.connection.rollback()
+            except BaseException:
+                self.connection.invalidate()  # a transaction whose end failed must not come back from the pool
+                raise
             finally:
                 self.connection.close()
         except BaseException as failed:

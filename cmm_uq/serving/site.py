@@ -6,6 +6,7 @@ moved, restored or migrated meanwhile.
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -88,7 +89,8 @@ class Site:
         """Load what is slow to load and work out how the machines stand, so that no reader waits for it."""
         import cmm_uq.serving.diagnosis_section  # noqa: F401
 
-        self.answer(Asked("GET", "/"))
+        with contextlib.suppress(CmmUqError):  # whoever looks is told
+            self.machines()
 
     def answer(self, asked: Asked | Refused) -> Answer:
         """The answer to a request, whatever happens."""
@@ -134,12 +136,29 @@ class Site:
 
     def _view(self, records: Records) -> View:
         today = self._today()
+        return View(records, today, lambda: self._standing(records, today), self.checking)
+
+    def _standing(self, records: Records, today: dt.date) -> Sequence[Stands]:
         head = (*records.head(), today)
         with self._lock:  # worked out once: who asks meanwhile would only do the same
             if self._kept is None or self._kept[0] != head:
                 self._kept = head, overview(records, self._due, today)
-            machines = self._kept[1]
-        return View(records, today, machines, self.checking)
+            return self._kept[1]
+
+    def machines(self) -> Sequence[Stands]:
+        """How every machine stands, the most urgent first.
+
+        Raises
+        ------
+        CmmUqError : the records cannot be read.
+        """
+        with self.opened() as records:
+            return self._standing(records, self._today())
+
+    def forget(self) -> None:
+        """Work out anew how the machines stand when it is next asked for, as after a new entry."""
+        with self._lock:
+            self._kept = None
 
     def _shown(self, page: Page) -> Answer:
         foot = (

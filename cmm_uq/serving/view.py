@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from cmm_uq.errors import CmmUqError
@@ -28,14 +28,19 @@ class View:
     ----------
     records : open, to be read.
     today : the day of the request.
-    machines : how every machine stands, the most urgent first.
+    standing : says how every machine stands.
     checking : the last comparison of the records with their chain.
     """
 
     records: Records
     today: dt.date
-    machines: Sequence[Stands]
+    standing: Callable[[], Sequence[Stands]]
     checking: Checking
+
+    @property
+    def machines(self) -> Sequence[Stands]:
+        """How every machine stands, the most urgent first."""
+        return self.standing()
 
     def overdue_artefacts(self) -> list[ArtefactRow]:
         """Artefacts whose own calibration is out of date."""
