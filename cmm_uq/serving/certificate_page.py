@@ -16,9 +16,9 @@ from cmm_uq.records.listing import entry_of
 from cmm_uq.serving.exchange import Answer, Asked, Refused
 from cmm_uq.serving.page import Block, Cell, Column, Facts, Notice, Page, Section, Table, address
 from cmm_uq.serving.recorded_files import RecordedFile, content_of, files_of, results_of, sent
+from cmm_uq.serving.values import values_table
 from cmm_uq.serving.view import View, machine_cell
 from cmm_uq.serving.words import DECISIONS, NOT_MEASURED, ORIGINS, STATES, VERDICTS, cell_of, moment, shown
-from cmm_uq.uncertainty.rounding import rounded
 
 
 def certificate_page(view: View, asked: Asked) -> Page:
@@ -124,21 +124,8 @@ def _facts(view: View, one: Certificate, entry: Entry) -> Facts:
 
 
 def _values(values: tuple[Value, ...]) -> Table:
-    columns = (
-        Column(say("Quantity")), Column(say("Value"), sort="number"), Column(say("95 % interval"), sort="number"),
-        Column(say("Limit"), sort="number"), Column(say("Unit")),
-    )  # fmt: skip
-    rows = []
-    for one in values:
-        half = 0.5 * (one.upper - one.lower)
-        value, lower, upper = (rounded(figure, half)[0] for figure in (one.value, one.lower, one.upper))
-        limit = DASH if one.limit is None else number(one.limit, "g")
-        beyond = one.limit is not None and abs(one.value) > one.limit
-        rows.append((
-            Cell(Verbatim(one.quantity)), Cell(value, standing="bad" if beyond else None),
-            Cell(say("{lower} to {upper}", lower=lower, upper=upper)), Cell(limit), Cell(shown(one.unit)),
-        ))  # fmt: skip
-    return Table(say("Values as stated"), columns, tuple(rows), say("It states no value."), heard=True)
+    rows = [(one.quantity, one.unit, one) for one in values]
+    return values_table(say("Values as stated"), rows, say("It states no value."), heard=True)
 
 
 def _diagnosed(results: Mapping[str, Any]) -> tuple[Section, ...]:

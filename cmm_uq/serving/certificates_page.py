@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cmm_uq.messages import NOTHING, Text, Verbatim, number, plural, say
+from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, number, plural, say
 from cmm_uq.records.facts import STATES as KNOWN_STATES
 from cmm_uq.records.listing import Choice
 from cmm_uq.serving.exchange import Asked, bad
@@ -78,7 +78,8 @@ def diagnoses_page(view: View, asked: Asked) -> Page:
     count = plural(total, one=say("1 recording"), many=say("{count} recordings", count=number(total, ",d")))
     cells = tuple(
         (certificate_cell(one), cell_of(VERDICTS, one.diagnosis), machine_cell(one.machine, one.machine_name),
-         day_cell(one.day), cell_of(STATES, one.state))
+         day_cell(one.day),
+         cell_of(STATES, one.state) if one.command == "report" else Cell(DASH))
         for one in rows
     )  # fmt: skip
     columns = (

@@ -7,7 +7,7 @@ screen and black on paper. Points are joined by a line between two adjustments, 
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from math import ceil, floor, isfinite, log10
@@ -15,16 +15,46 @@ from math import ceil, floor, isfinite, log10
 from cmm_uq.messages import Text
 
 WIDTH, HEIGHT = 340, 150
-LEFT, RIGHT, TOP, BOTTOM = 44, 8, 8, 20
-"""Of the picture and its margins, CSS pixels at its natural size."""
+RIGHT, TOP, BOTTOM = 8, 8, 20
+"""Of the picture and its margins, CSS pixels at its natural size; the left one is as wide as the figures in it."""
+
+DIGIT = 6.8
+"""Width of a figure of the lettering in the widest of the style sheet's faces, CSS pixels."""
 
 IN_SIGHT = 0.2
 """Part of a limit that the values must come to for it to be drawn: a far one would flatten them."""
 
 _STEPS = (1.0, 2.0, 5.0, 10.0, 20.0)
 
-Scale = Callable[[float], float]
-"""From a day or a value to its place in the picture."""
+
+@dataclass(frozen=True)
+class Frame:
+    """Where days and values lie in the picture.
+
+    Parameters
+    ----------
+    first, last : days at its ends.
+    low, high : values at its ends.
+    """
+
+    first: float
+    last: float
+    low: float
+    high: float
+
+    @property
+    def left(self) -> float:
+        """Margin of the longest figure at the axis."""
+        longest = max((len(text) for text in ticks(self.low, self.high)[1]), default=0)
+        return 10 + DIGIT * min(longest, 15)
+
+    def x(self, day: float) -> float:
+        """Of a day."""
+        return self.left + (WIDTH - self.left - RIGHT) * (day - self.first) / (self.last - self.first)
+
+    def y(self, value: float) -> float:
+        """Of a value."""
+        return TOP + (HEIGHT - TOP - BOTTOM) * (self.high - value) / (self.high - self.low)
 
 
 @dataclass(frozen=True)
@@ -66,24 +96,15 @@ def drawn(trend: Trend, limit_word: Text, adjusted_word: Text) -> str:
     ----------
     limit_word, adjusted_word : what the lines are called.
     """
-    low, high = _range([*trend.lower, *trend.upper, *trend.limits])
     first, last = trend.days[0], max(trend.days[-1], trend.days[0] + 1)
     room = 0.03 * (last - first)
-    first_x, last_x = first - room, last + room
-
-    def x(day: float) -> float:
-        return LEFT + (WIDTH - LEFT - RIGHT) * (day - first_x) / (last_x - first_x)
-
-    def y(value: float) -> float:
-        return TOP + (HEIGHT - TOP - BOTTOM) * (high - value) / (high - low)
-
-    parts = list(_axes(low, high, first, last, x, y))
-    parts += [f'<path class="limit" d="M{LEFT} {y(value):.1f}H{WIDTH - RIGHT}"/>' for value in trend.limits]
+    frame = Frame(first - room, last + room, *_range([*trend.lower, *trend.upper, *trend.limits]))
+    x, y, left, right = frame.x, frame.y, frame.left, WIDTH - RIGHT
+    parts = _axes(frame, first, last)
+    parts += [f'<path class="limit" d="M{left:.1f} {y(value):.1f}H{right}"/>' for value in trend.limits]
     if trend.limits:
         place = y(trend.limits[0]) + (-4 if trend.limits[0] < 0 else 11)
-        parts.append(
-            f'<text class="limit" x="{WIDTH - RIGHT}" y="{place:.1f}" text-anchor="end">{escape(limit_word)}</text>'
-        )
+        parts.append(f'<text class="limit" x="{right}" y="{place:.1f}" text-anchor="end">{escape(limit_word)}</text>')
     inside = [day for day in trend.adjusted if first <= day <= last]
     parts += [f'<path class="adjusted" d="M{x(day - 0.5):.1f} {TOP}V{HEIGHT - BOTTOM}"/>' for day in inside]
     if inside:
@@ -114,28 +135,28 @@ def _range(values: Sequence[float]) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _axes(low: float, high: float, first: int, last: int, x: Scale, y: Scale) -> list[str]:
+def _axes(frame: Frame, first: int, last: int) -> list[str]:
     """Round figures at the left; below, the first and the last day, or where there is room the years."""
-    values, texts = ticks(low, high)
+    x, left, right = frame.x, frame.left, WIDTH - RIGHT
     parts = [
-        f'<path class="axis" d="M{LEFT} {y(value):.1f}H{WIDTH - RIGHT}"/>'
-        f'<text x="{LEFT - 6}" y="{y(value) + 4:.1f}" text-anchor="end">{text}</text>'
-        for value, text in zip(values, texts, strict=True)
+        f'<path class="axis" d="M{left:.1f} {frame.y(value):.1f}H{right}"/>'
+        f'<text x="{left - 6:.1f}" y="{frame.y(value) + 4:.1f}" text-anchor="end">{text}</text>'
+        for value, text in zip(*ticks(frame.low, frame.high), strict=True)
     ]
     below = HEIGHT - 5
     years = [(x(day), year) for day, year in new_years(first, last)]
     if len(years) >= 2:
         parts += [
             f'<path class="axis" d="M{at:.1f} {HEIGHT - BOTTOM}v4"/>'
-            f'<text x="{min(at, WIDTH - RIGHT - 12):.1f}" y="{below}" text-anchor="middle">{year}</text>'
+            f'<text x="{min(at, right - 12):.1f}" y="{below}" text-anchor="middle">{year}</text>'
             for at, year in years
         ]
     else:
         one, other = dt.date.fromordinal(first), dt.date.fromordinal(last)
         parts.append(f'<text x="{x(first):.1f}" y="{below}">{one.isoformat()}</text>')
         if other - one > dt.timedelta(days=1):
-            parts.append(f'<text x="{WIDTH - RIGHT}" y="{below}" text-anchor="end">{other.isoformat()}</text>')
-    parts.append(f'<path class="axis" d="M{LEFT} {HEIGHT - BOTTOM}H{WIDTH - RIGHT}"/>')
+            parts.append(f'<text x="{right}" y="{below}" text-anchor="end">{other.isoformat()}</text>')
+    parts.append(f'<path class="axis" d="M{left:.1f} {HEIGHT - BOTTOM}H{right}"/>')
     return parts
 
 

@@ -90,6 +90,8 @@ def opened_in(folder: Path) -> Path:
         add("K4", dt.date(2026, 7, 1), "k-4", "withdrawal", values=good)
         add("K1", dt.date(2026, 6, 2), "sim-1", origin="simulated", values=good)
         add("K1", dt.date(2026, 9, 1), "check-1", interim=True, values=good)
+        still = values(("performance:E0", "Length measurement error E0", "µm", 9.4, 0.5, 9.0))
+        add("K3", dt.date(2026, 9, 3), "check-3", interim=True, values=still)
         add("K5", dt.date(2026, 9, 1), "k-5", decision="undecided", diagnosis="explained")
         add(HOSTILE, dt.date(2026, 9, 2), "h-1", "released", machine={"serial": HOSTILE, "name": TURNED, "place": HOSTILE},
             artefact={"serial": HOSTILE, "due": "2026-01-01"},

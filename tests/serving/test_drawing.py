@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.messages import say
-from cmm_uq.serving.drawing import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Trend, drawn, new_years, ticks
+from cmm_uq.serving.drawing import BOTTOM, HEIGHT, RIGHT, TOP, WIDTH, Trend, drawn, new_years, ticks
 
 DAY = dt.date(2020, 1, 1).toordinal()
 FINITE = st.floats(-1e6, 1e6, allow_nan=False)
@@ -62,7 +62,7 @@ def test_higher_values_stand_higher_and_later_ones_further_right(values: list[fl
     found = marks(picture(trend(values)))
     assert len(found) == len(values)
     assert [x for x, _ in found] == sorted(x for x, _ in found)
-    assert all(LEFT <= x <= WIDTH - RIGHT and TOP <= y <= HEIGHT - BOTTOM for x, y in found)
+    assert all(0 < x <= WIDTH - RIGHT and TOP <= y <= HEIGHT - BOTTOM for x, y in found)
     by_value = [y for _, (_, y) in sorted(zip(values, found, strict=True), key=lambda one: (one[0], -one[1][1]))]
     assert by_value == sorted(by_value, reverse=True)
 

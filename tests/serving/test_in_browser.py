@@ -13,7 +13,7 @@ from axe_playwright_python.sync_playwright import Axe
 from pypdf import PdfReader
 
 from cmm_uq.serving import Server
-from tests.documents.test_html_layout import CONTRASTS
+from tests.documents.test_html_layout import CONTRASTS, LABELS_COLLIDING
 from tests.serving.laboratory import entry_of, files
 
 if TYPE_CHECKING:
@@ -96,6 +96,25 @@ def test_text_has_enough_contrast_in_pictures_too(tab: Tab, scheme: str) -> None
               for ratio in tab.open(address).evaluate(CONTRASTS)]  # fmt: skip
     assert len(ratios) > 100
     assert min(ratios) >= 4.5
+
+
+CUT_OFF = """() => [...document.querySelectorAll('figure svg')].flatMap(svg => {
+  const frame = svg.getBoundingClientRect();
+  return [...svg.querySelectorAll('text')].filter(text => {
+    const box = text.getBoundingClientRect();
+    return box.left < frame.left - .5 || box.right > frame.right + .5 || box.top < frame.top - .5 || box.bottom > frame.bottom + .5;
+  }).map(text => text.textContent);
+})"""
+
+
+@pytest.mark.parametrize("serial", ["100000", "K3", "K1"])
+def test_words_in_a_picture_are_whole_and_do_not_collide(tab: Tab, serial: str) -> None:
+    for width in (360, 1280):
+        tab.page.set_viewport_size({"width": width, "height": 900})
+        page = tab.open(f"machine?serial={serial}")
+        assert page.locator("figure svg").count() > 0
+        assert page.evaluate(CUT_OFF) == []
+        assert page.evaluate(LABELS_COLLIDING) == []
 
 
 def pressed(tab: Tab, *keys: str) -> None:

@@ -148,7 +148,10 @@ def test_one_certificate_shows_its_values_its_diagnosis_its_signatures_and_its_f
 def test_a_machine_shows_its_newest_values_against_their_limits(looked: Looked) -> None:
     text = " ".join(Shown(looked.text("/machine?serial=K3")).texts)
     assert "Does not conform: its newest certificate says fail" in text
-    assert "Length measurement error E0 ✗ 9.5 ± 1.0 µm, limit 9 µm" in text
+    assert "Length measurement error E0 ✗ 9.4 ± 1.0 µm, limit 9 µm" in text
+    assert "Stated once so far" not in text
+    once = " ".join(Shown(looked.text("/machine?serial=K2")).texts)
+    assert "Stated once so far Quantity Value 95 % interval Limit Unit Scale error of X 1.2 0.2 to 2.2 8 ppm" in once
     course = looked.text("/machine?serial=k%201")
     assert "Scale error of X, 2 values from 2026-06-01 to 2026-09-01" in course
     assert course.count('class="interim"') == 2
