@@ -102,7 +102,8 @@ CUT_OFF = """() => [...document.querySelectorAll('figure svg')].flatMap(svg => {
   const frame = svg.getBoundingClientRect();
   return [...svg.querySelectorAll('text')].filter(text => {
     const box = text.getBoundingClientRect();
-    return box.left < frame.left - .5 || box.right > frame.right + .5 || box.top < frame.top - .5 || box.bottom > frame.bottom + .5;
+    return box.left < frame.left - .5 || box.right > frame.right + .5 ||
+      box.top < frame.top - .5 || box.bottom > frame.bottom + .5;
   }).map(text => text.textContent);
 })"""
 
