@@ -51,13 +51,20 @@ def command(
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq import __version__
         from cmm_uq.commands.affected import affected
+        from cmm_uq.commands.written import silent
         from cmm_uq.records import open_records
 
         with open_records(records, read_only=write is None) as opened:
             where = str(opened.place)
             found = list(
                 affected(
-                    opened, version, to or __version__, recompute=not only_list, out=write, where=where, stage=stage
+                    opened,
+                    version,
+                    to or __version__,
+                    recompute=not only_list,
+                    out=write,
+                    where=where,
+                    stage=stage or silent,
                 )
             )
     if json:

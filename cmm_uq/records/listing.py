@@ -15,7 +15,7 @@ from sqlalchemy import ColumnElement, Connection, func, or_, select
 from cmm_uq.records.entries import Entry
 from cmm_uq.records.facts import STANDING, Machine
 from cmm_uq.records.opening import told
-from cmm_uq.records.queries import last_adjusted
+from cmm_uq.records.queries import _since as last_adjusted
 from cmm_uq.records.recognised import spelled
 from cmm_uq.records.store import Records
 from cmm_uq.records.tables import artefacts, certificates, entries, figures, machines, quantities

@@ -145,9 +145,14 @@ class Records:
         """
         return self._read(lambda connection: queries.named(connection, certificate, self.home))
 
-    def latest(self) -> list[Certificate]:
-        """Newest measured certificate, not withdrawn nor replaced, of each machine; interim checks are none."""
-        return self._read(lambda connection: queries.latest_of(connection, self.home))
+    def latest(self, *, values: bool = True) -> list[Certificate]:
+        """Newest measured certificate, not withdrawn nor replaced, of each machine, by serial; interim checks are none.
+
+        Parameters
+        ----------
+        values : whether what they state is read too.
+        """
+        return self._read(lambda connection: queries.latest_of(connection, self.home, values=values))
 
     def series(
         self, machine: str, names: Collection[str] | None = None, origin: str = "measured"
