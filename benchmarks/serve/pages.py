@@ -8,12 +8,14 @@ after an entry was added, when every machine's standing is worked out anew.
 
 from __future__ import annotations
 
+import gc
 import statistics
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+from cmm_uq.cli import _NEW_OBJECTS as NEW_OBJECTS
 from cmm_uq.serving import Site
 from cmm_uq.serving.exchange import Asked, read_address
 from tests.records.histories import made
@@ -50,6 +52,7 @@ def timed(site: Site, target: str, *, anew: bool = False) -> tuple[float, float,
 
 def measure(place: Path) -> None:
     """Print a row for each page."""
+    gc.set_threshold(NEW_OBJECTS)
     site = Site(place)
     site.warm()
     last = max(1, -(-len(site.machines()) // 50))

@@ -16,7 +16,7 @@ from cmm_uq.records.entries import Entry
 from cmm_uq.records.facts import STANDING, Machine
 from cmm_uq.records.opening import told
 from cmm_uq.records.queries import _since as last_adjusted
-from cmm_uq.records.recognised import spelled
+from cmm_uq.records.recognised import BY_NAME, spelled
 from cmm_uq.records.store import Records
 from cmm_uq.records.tables import artefacts, certificates, entries, figures, machines, quantities
 
@@ -102,7 +102,7 @@ _JOINED = certificates.join(machines).outerjoin(artefacts, artefacts.c.id == _C.
 
 
 def standing_of_all(records: Records) -> list[Newest]:
-    """Every machine with its newest certificate, by serial.
+    """Every machine with its newest certificate, in the order in which they were first recorded.
 
     Raises
     ------
@@ -120,13 +120,15 @@ def standing_of_all(records: Records) -> list[Newest]:
         select(m.called, m.name.label("of_name"), m.manufacturer, m.model, m.place, m.recognised, *_COLUMNS)
         .select_from(machines.outerjoin(certificates, _C.entry == of_machine)
                      .outerjoin(artefacts, artefacts.c.id == _C.artefact))
-        .order_by(m.called)
+        .order_by(m.id)
     )  # fmt: skip
     with told(records.place), records.engine.connect() as connection:
-        rows = connection.execute(query).all()
+        rows = connection.execute(query).tuples().all()
     return [
-        Newest(Called(*row[:5], row[5].startswith("name:")), None if row.entry is None else _listed(row[6:]))
-        for row in rows
+        Newest(
+            Called(serial, name, maker, model, place, key.startswith(BY_NAME)), None if own[0] is None else _listed(own)
+        )
+        for serial, name, maker, model, place, key, *own in rows
     ]
 
 

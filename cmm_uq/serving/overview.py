@@ -104,7 +104,7 @@ def groups(newest: Newest, due: Due | None, today: dt.date) -> tuple[str, ...]:
         found += ("never",)
     else:
         found += _of_certificate(certificate.decision, certificate.diagnosis, certificate.state)
-    return tuple(sorted(found, key=_URGENCY.__getitem__)) or ("order",)
+    return tuple(sorted(found, key=_URGENCY.__getitem__)) if len(found) > 1 else found or ("order",)
 
 
 @lru_cache(1000)
