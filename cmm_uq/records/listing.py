@@ -123,7 +123,7 @@ def standing_of_all(records: Records) -> list[Newest]:
         .order_by(m.id)
     )  # fmt: skip
     with told(records.place), records.engine.connect() as connection:
-        rows = connection.execute(query).tuples().all()
+        rows = connection.execute(query).all()
     return [
         Newest(
             Called(serial, name, maker, model, place, key.startswith(BY_NAME)), None if own[0] is None else _listed(own)

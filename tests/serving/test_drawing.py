@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
+from decimal import Decimal
 from itertools import pairwise
 
 import pytest
@@ -53,8 +54,9 @@ def test_ticks_are_round_inside_and_few(low: float, span: float) -> None:
     assert [float(text.replace("−", "-")) for text in texts] == pytest.approx(
         values, abs=1e-9 * max(1.0, abs(low) + span)
     )
-    steps = {f"{b - a:.6g}".strip("0.").rstrip("0") for a, b in pairwise(values)}
-    assert len({step[0] for step in steps if step}) <= 1
+    exact = [Decimal(text.replace("−", "-")) for text in texts]
+    assert {(b - a).normalize().as_tuple().digits for a, b in pairwise(exact)} <= {(1,), (2,), (5,)}
+    assert len({b - a for a, b in pairwise(exact)}) <= 1
 
 
 @given(values=st.lists(st.floats(-1e3, 1e3).map(lambda value: round(value, 3)), min_size=1, max_size=30))
