@@ -21,7 +21,7 @@ CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "overview", "gallery"],
     "How to": [
         "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*",
-        "import/index", "import/*", "instruments/index", "instruments/*", "records/serve",
+        "import/index", "import/*", "instruments/index", "instruments/*",
     ],
     "Records": ["records/index", "records/*"],
     "Reference": [
