@@ -29,6 +29,7 @@ from cmm_uq.cli import (
     schedule,
     schema,
     selftest,
+    serve,
     simulate,
 )
 from cmm_uq.cli.options import examples
@@ -62,6 +63,7 @@ for module, short in {
     budget: "The uncertainty of any measurement model in a file.",
     release: "A certificate released, withdrawn or replaced.",
     affected: "Which certificates a correction of the package touches.",
+    serve: "The records to look at, in a browser.",
     schema: "JSON Schema of a file, for editors that complete and explain.",
     selftest: "Published reference figures, computed here and compared.",
 }.items():

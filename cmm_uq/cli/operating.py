@@ -9,8 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.cli.printing import on_terminal, put, say
-from cmm_uq.errors import OutputError
+from cmm_uq.cli.printing import on_terminal, say, say_now
 from cmm_uq.writing.interruption import speaking
 
 if TYPE_CHECKING:
@@ -65,14 +64,14 @@ class Plain:
     def tell(self, text: Text) -> None:
         """See :class:`~cmm_uq.acquisition.running.Screen`."""
         if not self._quiet:
-            _flushed(str(text))
+            say_now(str(text))
 
     def show(self, view: View) -> None:
         """See :class:`~cmm_uq.acquisition.running.Screen`."""
         now = f"{view.head}; next: {view.next}"
         if now != self._last and not self._quiet:
             self._last = now
-            _flushed(now)
+            say_now(now)
 
 
 class Whole:
@@ -173,14 +172,6 @@ def _lines(typed: Callable[[str | None], None]) -> None:
         while sys.stdin is not None and (line := sys.stdin.readline()):
             typed(line.rstrip("\r\n"))
     typed(None)
-
-
-def _flushed(text: str) -> None:
-    put(f"{text}\n")
-    try:
-        sys.stdout.flush()
-    except (OSError, ValueError) as error:
-        raise OutputError("standard output cannot be written") from error
 
 
 def _keys_can_be_read() -> bool:

@@ -54,6 +54,20 @@ def put(text: str) -> None:
         raise closed() from None
 
 
+def say_now(text: str) -> None:
+    """One line on standard output, of a command that goes on.
+
+    Raises
+    ------
+    OutputError : nobody takes it.
+    """
+    say(text)
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        raise closed() from None
+
+
 def put_json(text: str) -> None:
     """JSON on standard output, whatever its encoding.
 

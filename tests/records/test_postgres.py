@@ -13,6 +13,7 @@ import pytest
 from cmm_uq.errors import CmmUqError, OutputError
 from cmm_uq.records import open_records
 from cmm_uq.records.backup import back_up, restore
+from cmm_uq.records.listing import Choice, chosen, courses, entry_of, standing_of_all
 from cmm_uq.records.migrations import migrate, upgrade
 from cmm_uq.records.opening import KNOWN, REVISION, engine_of
 from cmm_uq.writing import Owner, staged
@@ -153,3 +154,20 @@ def test_another_programs_database_is_left_alone(url: str) -> None:
         raw.execute("CREATE TABLE orders (number integer)")
     with pytest.raises(CmmUqError, match="another program"):
         open_records(url, create=True)
+
+
+def test_lists_are_the_same_on_a_server_as_in_a_file(url: str, tmp_path: Path) -> None:
+    """Texts in any case, pages, each machine's newest certificate, courses: what :mod:`cmm_uq.records.listing` asks."""
+    choices = [
+        Choice(), Choice(text="M10000%"), Choice(text="M100001-"), Choice(text="k-100002"), Choice(text="cmm 100002"),
+        Choice(machine="100001", states=["released"]), Choice(artefact="BB-1", command="", origin="", interim=False),
+    ]  # fmt: skip
+    with open_records(url, create=True) as server, open_records(tmp_path / "records.db", create=True) as file:
+        for records in (server, file):
+            records.append_all(history(5, 3, released=True))
+        assert [chosen(server, choice, 4)[1] for choice in choices] == [15, 0, 3, 3, 3, 2, 3]
+        for choice in choices:
+            assert chosen(server, choice, 4, 1) == chosen(file, choice, 4, 1)
+        assert standing_of_all(server) == standing_of_all(file)
+        assert courses(server, server.machine("100000"), 2) == courses(file, file.machine("100000"), 2)
+        assert entry_of(server, 3) == entry_of(file, 3)
