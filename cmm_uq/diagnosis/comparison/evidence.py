@@ -196,12 +196,17 @@ class Comparison:
 
     def over_sigma(self, squares: Floats) -> Floats:
         """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape: in closed form if ln σ is uniform, else from a table."""
-        found = np.log(np.maximum(squares, 1e-300))
-        if np.ptp(self.log_sigma) > 0:
-            return np.interp(found, *self._table)
-        half = 0.5 * self.degrees_of_freedom
-        found *= -half
-        return found + self._uniform
+        return self._over_sigma(squares.copy())
+
+    def _over_sigma(self, squares: Floats) -> Floats:
+        """The same, in the place of the squares where that is possible."""
+        np.maximum(squares, 1e-300, out=squares)
+        np.log(squares, out=squares)
+        if self._table is not None:
+            return np.interp(squares, *self._table)
+        squares *= -0.5 * self.degrees_of_freedom
+        squares += self._uniform
+        return squares
 
     @cached_property
     def _uniform(self) -> float:
@@ -210,7 +215,10 @@ class Comparison:
         return float(special.gammaln(half) + (half - 1) * np.log(2) + self.log_sigma[0] - np.log(step))
 
     @cached_property
-    def _table(self) -> tuple[Floats, Floats]:
+    def _table(self) -> tuple[Floats, Floats] | None:
+        """Logarithms of squares and of the integrals over them; none where these have a closed form."""
+        if np.ptp(self.log_sigma) == 0:
+            return None
         nodes = np.linspace(-16.0, 8.0, 1500) + np.log(max(float(self.left @ self.left), 1e-300))
         exponent = (
             self.log_sigma - self.degrees_of_freedom * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
@@ -262,8 +270,8 @@ class Comparison:
     def _total(self, known: _Beside, among: Container[int] | None = None) -> Floats:
         """Log evidence (c, b) of each explanation, its versions and sizes summed."""
         total = np.full((len(self.explanations), known.squares.shape[1]), -np.inf)
-        for group, each in self._each(known, among):
-            gains = _log_sum(each, 1) - np.log(AMPLITUDES) + group.weight[:, None]
+        for group, each in self._each(known, among, sizes=False):
+            gains = each[:, 0] - np.log(AMPLITUDES) + group.weight[:, None]
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
         return total
@@ -337,7 +345,10 @@ class Comparison:
         """Log evidence (M, a, b) of members at every size beside what is given, by groups; ``among`` are wanted at least."""
         yield from self._each(self._beside(data, given), among)
 
-    def _each(self, known: _Beside, among: Container[int] | None) -> Iterator[tuple[Group, Floats]]:
+    def _each(
+        self, known: _Beside, among: Container[int] | None, *, sizes: bool = True
+    ) -> Iterator[tuple[Group, Floats]]:
+        """Log evidence (M, a, b) of members at every size, or (M, 1, b) of all sizes together, by groups."""
         stack, groups = self._stack
         kinds, b = known.squares.shape
         for group, blocks in zip(groups, self._blocks, strict=True):
@@ -346,15 +357,15 @@ class Comparison:
             if not len(chosen.start):
                 continue
             seen = (chosen.columns(stack).T @ known.seen_by).reshape(len(chosen.start), group.r, kinds, -1)
-            total = np.empty((len(chosen.start), AMPLITUDES, b))
+            total = np.empty((len(chosen.start), AMPLITUDES if sizes else 1, b))
             size = max(1, _BLOCK // (kinds * AMPLITUDES * b))
             for begin in range(0, len(total), size):
                 some = slice(begin, begin + size)
-                total[some] = self._under(known, chosen.amplitudes[some], blocks[:, part][:, some], seen[some])
+                total[some] = self._under(known, chosen.amplitudes[some], blocks[:, part][:, some], seen[some], sizes)
             yield chosen, total
 
-    def _under(self, known: _Beside, amplitudes: Floats, blocks: Floats, seen: Floats) -> Floats:
-        """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise.
+    def _under(self, known: _Beside, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
+        """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise, or (M, 1, b) over the sizes too.
 
         Parameters
         ----------
@@ -374,12 +385,9 @@ class Comparison:
             shown = turn.swapaxes(2, 3) @ shown
         variance = (amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
-        gain, square = variance / (1 + ratio), shown**2
-        explained = np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None] if b == 1 else gain @ square
-        squares = known.squares[:, None, None, :] - explained
-        log = self.over_sigma(squares)
+        log = self._over_sigma(_less(known.squares[:, None, None, :], variance / (1 + ratio), shown**2))
         log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
-        return np.asarray(np.logaddexp.reduce(log, axis=0), dtype=np.float64)
+        return _log_sum_in(log, 0 if sizes else (0, 2)).reshape(len(amplitudes), -1, b)
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
@@ -473,6 +481,23 @@ def _log_sum(log: Floats, axis: int) -> Floats:
     count = most.sum(axis=axis, keepdims=True, dtype=np.float64)
     others = np.exp(np.where(most, -np.inf, log) - largest).sum(axis=axis, keepdims=True)
     return np.asarray((np.log1p(others / count) + np.log(count) + largest).squeeze(axis), dtype=np.float64)
+
+
+def _less(squares: Floats, gain: Floats, square: Floats) -> Floats:
+    """Squares (k, 1, 1, b) less what members with gains (k, M, a, r) explain of the squares (k, M, r, b) along them."""
+    if squares.shape[3] == 1:
+        return np.asarray(squares - np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None])
+    found = np.matmul(-gain, square)
+    found += squares
+    return np.asarray(found, dtype=np.float64)
+
+
+def _log_sum_in(log: Floats, axis: int | tuple[int, ...]) -> Floats:
+    """Logarithm of sums of what has these logarithms, which are overwritten; of each sum one is finite."""
+    largest = log.max(axis=axis, keepdims=True)
+    log -= largest
+    np.exp(log, out=log)
+    return np.asarray(np.log(log.sum(axis=axis)) + largest.squeeze(axis), dtype=np.float64)
 
 
 def _eigen(blocks: Floats) -> tuple[Floats, Floats]:
