@@ -97,7 +97,7 @@ class SideBySide:
         differences = []
         for steps, random in zip(self._ahead, self._randoms, strict=True):
             for _ in range(0 if steps else _AHEAD):
-                if random.choice(len(SHARES), p=SHARES):  # its random numbers are the next
+                if random.random_sample() >= SHARES[0]:  # its random numbers are the next
                     differences.append(steps)
                     break
                 drawn.append((steps, self._proposal.draws(walkers, random), random.rand(walkers)))

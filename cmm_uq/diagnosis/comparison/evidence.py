@@ -50,8 +50,12 @@ class _Noise:
 
     def __call__(self, columns: Floats) -> Floats:
         """Precision times columns (m, b)."""
-        whole = self.whitening.T @ (self.whitening @ columns)
+        whole = self._transposed @ (self.whitening @ columns)
         return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
+
+    @cached_property
+    def _transposed(self) -> sparse.csc_array:
+        return self.whitening.T
 
 
 @dataclass(frozen=True, eq=False)
