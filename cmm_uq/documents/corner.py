@@ -276,7 +276,7 @@ def _width_mm(text: str, size: float, weight: str = "normal") -> float:
 
 def _farthest_right(path: Path) -> float:
     """Largest x of a path of lines and quadratic curves, in the steps of its ``get_extents`` but for all curves at once."""
-    x, codes = path.vertices[:, 0], path.codes
+    x, codes = np.asarray(path.vertices)[:, 0], np.asarray(path.codes)
     controls = np.flatnonzero(codes == path.CURVE3)[::2]
     begin, control, end = x[controls - 1], x[controls], x[controls + 1]
     with np.errstate(divide="ignore", invalid="ignore"):
