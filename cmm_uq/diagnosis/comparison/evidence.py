@@ -305,7 +305,7 @@ class Comparison:
         most, best = total.copy(), {}
         for group, cube in self.each(None, given, among):
             each = cube[:, :, 0]
-            gains = _log_sum(each, 1) - np.log(AMPLITUDES) + group.weight
+            gains = _log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
             largest = each.max(axis=1) + group.weight
@@ -390,7 +390,7 @@ class Comparison:
         variance = (amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
         log = self._over_sigma(_less(known.squares[:, None, None, :], variance / (1 + ratio), shown**2))
-        log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
+        log += (known.log[:, None, None] - 0.5 * np.einsum("kmar->kma", np.log1p(ratio)))[..., None]
         return _log_sum_in(log, 0 if sizes else (0, 2)).reshape(len(amplitudes), -1, b)
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
@@ -447,7 +447,7 @@ class Comparison:
         if rows.shape[1]:
             weighed = weighed - rows.swapaxes(1, 2) @ (rows @ taken)
         factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ weighed)
-        more = np.linalg.solve(factor, weighed.swapaxes(1, 2))
+        more = np.linalg.inv(factor) @ weighed.swapaxes(1, 2)
         logs = logs + np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
         return np.concatenate([rows, more], axis=1), logs
 
