@@ -25,7 +25,7 @@ SIGMA_BOUNDS = (1e-6, 10.0)
 _JITTER = 1e-11
 """Relative; a recording that a model explains to the last digit leaves nothing to factorise."""
 
-_NUMBERS = 4_000_000
+_NUMBERS = 500_000
 """In one batch of matrices."""
 
 _MOST_FREE = 150
