@@ -32,6 +32,9 @@ _WIDE = 30
 _KEPT = 8_000_000
 """Numbers that are kept of what follows from what was given last."""
 
+_LARGEST_EXPONENT = 600.0
+"""Of a factor that says how little something counts."""
+
 _BLOCK, _COLUMNS = 150_000, 500
 """Numbers of a block that a processor's cache holds; columns weighed at a time."""
 
@@ -389,9 +392,40 @@ class Comparison:
             shown = turn.swapaxes(2, 3) @ shown
         variance = (amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
-        log = self._over_sigma(_less(known.squares[:, None, None, :], variance / (1 + ratio), shown**2))
-        log += (known.log[:, None, None] - 0.5 * np.einsum("kmar->kma", np.log1p(ratio)))[..., None]
-        return _log_sum_in(log, 0 if sizes else (0, 2)).reshape(len(amplitudes), -1, b)
+        gain, square = variance / (1 + ratio), shown**2
+        constant = known.log[:, None, None] - 0.5 * np.einsum("kmar->kma", np.log1p(ratio))
+        log, offset = self._integrated(known.squares, gain, square, constant)
+        return (_log_sum_in(log, 0 if sizes else (0, 2)) + offset).reshape(len(amplitudes), -1, b)
+
+    def _integrated(
+        self, squares: Floats, gain: Floats, square: Floats, constant: Floats
+    ) -> tuple[Floats, float]:  # fmt: skip
+        """Log evidence (k, M, a, b), but for a number that is to be added, over the noise.
+
+        Parameters
+        ----------
+        squares : (k, b) of the data; members with gains (k, M, a, r) explain of them the squares (k, M, r, b) along them.
+        constant : (k, M, a) to be added.
+        """
+        half = 0.5 * self.degrees_of_freedom
+        every = squares[:, None, None, :]
+        if squares.shape[1] == 1:
+            found = self._over_sigma(every - np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None])
+            found += constant[..., None]
+            return found, 0.0
+        whole = np.concatenate([square, np.broadcast_to(every, (*square.shape[:2], 1, every.shape[3]))], axis=2)
+        if self._table is not None or not half:
+            found = self._over_sigma(np.concatenate([-gain, np.ones_like(gain[..., :1])], axis=3) @ whole)
+            found += constant[..., None]
+            return found, 0.0
+        # of many data: constants are factors of the squares ahead of the logarithm, where they are few
+        most = float(constant.max())
+        factor = np.exp(np.minimum((most - constant) / half, _LARGEST_EXPONENT))[..., None]
+        found = np.concatenate([-factor * gain, factor], axis=3) @ whole
+        np.maximum(found, 1e-300, out=found)
+        np.log(found, out=found)
+        found *= -half
+        return found, most + self._uniform
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
@@ -485,15 +519,6 @@ def _log_sum(log: Floats, axis: int) -> Floats:
     count = most.sum(axis=axis, keepdims=True, dtype=np.float64)
     others = np.exp(np.where(most, -np.inf, log) - largest).sum(axis=axis, keepdims=True)
     return np.asarray((np.log1p(others / count) + np.log(count) + largest).squeeze(axis), dtype=np.float64)
-
-
-def _less(squares: Floats, gain: Floats, square: Floats) -> Floats:
-    """Squares (k, 1, 1, b) less what members with gains (k, M, a, r) explain of the squares (k, M, r, b) along them."""
-    if squares.shape[3] == 1:
-        return np.asarray(squares - np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None])
-    found = np.matmul(-gain, square)
-    found += squares
-    return np.asarray(found, dtype=np.float64)
 
 
 def _interpolated(at: Floats, nodes: Floats, values: Floats) -> Floats:
