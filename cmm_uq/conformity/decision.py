@@ -9,6 +9,7 @@ where the limit is near; with a prior it is that of the posterior distribution.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from scipy import special
@@ -243,6 +244,7 @@ def _posterior_band(u: float, limit: float, risk: float, signed: bool, prior: Kn
     return None if excess(0.0) > 0 else limit - root(excess, 0.0, limit, 1e-12 * limit)
 
 
+@lru_cache(maxsize=1024)  # the lengths of a test have one rule, and mostly one guard band
 def rule_words(rule: Rule, band: float | None = None) -> Text:
     """A rule in words; ``band`` is its guard band in standard uncertainties."""
     if rule == "simple":

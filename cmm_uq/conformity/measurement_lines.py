@@ -51,7 +51,7 @@ def position_on(machine: Machine, middle: Floats, direction: Floats) -> Text:
 @lru_cache(maxsize=16_384)  # conditions, figures and remarks of several standards ask for the same lines
 def _position_on(ends: tuple[float, ...], place: tuple[float, ...], direction: tuple[float, ...]) -> Text:
     travel, along = np.reshape(ends, (-1, 2)), np.array(direction)
-    crossed = _crossed(travel, np.array(place), along)
+    crossed = _crossed(ends, place, direction)
     u = along / np.linalg.norm(along)
     named = position_of(u)
     if crossed is None:
@@ -65,19 +65,22 @@ def _position_on(ends: tuple[float, ...], place: tuple[float, ...], direction: t
 
 def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float | None:
     """Travel, mm, along a line through ``middle`` (3,) in the recorded frame; 0 outside it, ``None`` where none is stated."""
-    return _crossed(machine.travel_mm, middle + machine.origin_mm, direction)
+    travel, place = machine.travel_mm, middle + machine.origin_mm
+    return _crossed(tuple(travel.ravel().tolist()), tuple(place.tolist()), tuple(direction.tolist()))
 
 
-def _crossed(travel: Floats, place: Floats, direction: Floats) -> float | None:
-    """The same of scale readings ``place`` (3,), mm."""
+@lru_cache(maxsize=16_384)
+def _crossed(ends: tuple[float, ...], place_mm: tuple[float, ...], direction: tuple[float, ...]) -> float | None:
+    """The same of scale readings ``place_mm``."""
+    travel, place, along = np.reshape(ends, (-1, 2)), np.array(place_mm), np.array(direction)
     if not np.all(np.isfinite(travel)):
         return None
-    u = direction / np.linalg.norm(direction)
+    u = along / np.linalg.norm(along)
     moving = np.abs(u) > 1e-9
     if np.any((np.abs(place - travel.mean(axis=1)) > 0.5 * np.ptp(travel, axis=1) + _ROUNDING)[~moving]):
         return 0.0
-    ends = (travel - place[:, None])[moving] / u[moving, None]
-    return max(0.0, float(ends.max(axis=1).min() - ends.min(axis=1).max()))
+    crossed = (travel - place[:, None])[moving] / u[moving, None]
+    return max(0.0, float(crossed.max(axis=1).min() - crossed.min(axis=1).max()))
 
 
 def share_of_travel(machine: Machine, middle: Floats, direction: Floats, length: float) -> float | None:

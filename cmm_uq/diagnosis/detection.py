@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
+from cmm_uq.inference.root import root
 from cmm_uq.points import Floats
 
 SHORTEST, LONGEST = 1.0, 60.0
@@ -88,6 +89,4 @@ def _reached(probability: Callable[[Floats], Floats], power: float) -> float:
 
     if short(LONGEST) < 0:
         return float(np.inf)
-    from scipy import optimize  # takes its time, and most commands need none of it
-
-    return float(optimize.brentq(short, SHORTEST, LONGEST, xtol=1e-10)) if short(SHORTEST) < 0 else SHORTEST
+    return root(short, SHORTEST, LONGEST, 1e-10) if short(SHORTEST) < 0 else SHORTEST

@@ -8,7 +8,7 @@ estimates, how they vary together, and what is computed from them are of one dis
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -113,7 +113,9 @@ def remaining(found: Found, joint: Joint, before: MeasurementModel, seed: int) -
     order = sorted((key for key in total if total[key] > REMAINS), key=lambda key: -total[key])[:_MOST]
     if not order or total[order[0]] >= SETTLED or len(order) < 2:
         return Remaining()
-    rivals = tuple(_rival(found, combinations, joint, before, key, total[key], seed) for key in order)
+    typical = joint.posterior.sizes.typical
+    noise = joint.components.white(typical), float(typical.coordinate[0])
+    rivals = tuple(_rival(found, combinations, noise, before, key, total[key], seed) for key in order)
     draws = _over_all(rivals, before, seed)
     return Remaining(rivals, _reported(before, draws), draws)
 
@@ -146,10 +148,11 @@ def needed(combinations: Combinations) -> dict[Key, float]:
 
 
 def _rival(
-    found: Found, combinations: Combinations, joint: Joint, before: MeasurementModel, key: Key, probability: float,
-    seed: int,
+    found: Found, combinations: Combinations, noise: tuple[Callable[[Floats], Floats], float], before: MeasurementModel,
+    key: Key, probability: float, seed: int,
 ) -> Rival:  # fmt: skip
-    explanations = found.first.explanations
+    """One that remains; ``noise`` is what whitens observations, and its standard deviation of a reading, mm."""
+    explanations, (white, sigma) = found.first.explanations, noise
     functions = sorted(i for i in key if explanations[i].kind == UNKNOWN)
     combination = max(
         (k for k in combinations.found if key <= k and combinations.effects_of(k) == combinations.effects_of(key)),
@@ -162,12 +165,11 @@ def _rival(
         model = with_effects(found.first, versions, effects)
         model = replace(model, artefact=before.artefact, used=before.used)
     linear = replace(model.linearised(_about(model, before, found.model)), sigma=None)
-    sigma = float(joint.posterior.sizes.typical.coordinate[0])
     for version in versions:
         if version.explanation in functions:
             member = explanations[version.explanation].members[version.member]
             linear = _with_columns(linear, member.columns, version.amplitude * sigma)
-    own = linear.uncorrelated(joint.components.white(joint.posterior.sizes.typical))
+    own = linear.uncorrelated(white)
     draws = _drawn(own, sigma, found.stated, seed)[:, : len(model.unknowns)]
     reported = _reported(model, draws)
     added = tuple(effect.name for effect in model.effects if effect.name not in {e.name for e in before.effects})

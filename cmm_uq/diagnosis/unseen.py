@@ -14,7 +14,7 @@ from math import comb, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, special
+from scipy import special
 
 from cmm_uq.diagnosis.comparison.combinations import EFFECTS
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
@@ -24,6 +24,7 @@ from cmm_uq.diagnosis.detection import LONGEST, SHORTEST, Thresholds
 from cmm_uq.diagnosis.power import ALLOWED, CERTAIN, Naming
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.freedoms import reached
+from cmm_uq.inference.root import root
 from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import every
@@ -433,7 +434,7 @@ def _pair(explanations: Sequence[Explanation], visible: frozenset[int]) -> float
 def _gate(null: Floats, alpha: float) -> float:
     """Statistic that the test rejects from."""
     low, high = float(null.min()) - 1.0, float(null.max()) + 50.0
-    return float(optimize.brentq(lambda value: np.log(tail_probability(null, value) / alpha), low, high, xtol=1e-6))
+    return root(lambda value: float(np.log(tail_probability(null, value) / alpha)), low, high, 1e-6)
 
 
 def _passes(margin: Floats) -> float:

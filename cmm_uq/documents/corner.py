@@ -31,6 +31,7 @@ from cmm_uq.points import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.path import Path
 
 READABLE = 12
 """Most parameters that one corner shows."""
@@ -159,6 +160,7 @@ class _Panels:
         ax.set(xlim=np.array([-self.left, WIDTH_MM - self.left]) / self.panel_mm)
         ax.set(ylim=np.array([-below, height - below]) / self.panel_mm)
         ax.set_axis_off()
+        ax.set(xticks=[], yticks=[])  # not shown, but made and measured
         self.ax: Axes = ax
         relative = (draws - ranges[:, 0]) / np.ptp(ranges, axis=1)
         self.bins = np.where((relative >= 0) & (relative < 1), np.floor(relative * _BINS).astype(np.intp), -1)
@@ -224,7 +226,8 @@ class _Panels:
         for paths, alpha in zip(areas, (0.16, 0.34), strict=True):
             if paths:
                 area = Path.make_compound_path(*paths)
-                self.ax.add_patch(PathPatch(area, facecolor=(ACCENT, alpha), edgecolor=ACCENT, linewidth=0.5))
+                # as a patch it would be measured, curve by curve, for limits that are fixed
+                self.ax.add_artist(PathPatch(area, facecolor=(ACCENT, alpha), edgecolor=ACCENT, linewidth=0.5))
         x = np.array([self.across(column, estimates[column]) for _, column in row_column])
         y = np.array([self.up(row, estimates[row]) for row, _ in row_column])
         arm = 0.7 / self.panel_mm
@@ -268,7 +271,20 @@ def _width_mm(text: str, size: float, weight: str = "normal") -> float:
     from matplotlib.textpath import TextPath
 
     font = FontProperties(family="DejaVu Sans", weight=weight)
-    return _MM * max(float(TextPath((0, 0), str.__str__(text), size=size, prop=font).get_extents().x1), size)
+    return _MM * max(_farthest_right(TextPath((0, 0), str.__str__(text), size=size, prop=font)), size)
+
+
+def _farthest_right(path: Path) -> float:
+    """Largest x of a path of lines and quadratic curves, in the steps of its ``get_extents`` but for all curves at once."""
+    x, codes = np.asarray(path.vertices)[:, 0], np.asarray(path.codes)
+    controls = np.flatnonzero(codes == path.CURVE3)[::2]
+    begin, control, end = x[controls - 1], x[controls], x[controls + 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (begin - control) / (begin - 2 * control + end)
+    t = np.where((t > 0) & (t < 1), t, 0.0)
+    turns = (1 - t) ** 2 * begin + 2 * t * (1 - t) * control + t**2 * end
+    corners = x[np.isin(codes, (path.MOVETO, path.LINETO))]
+    return float(max(part.max(initial=-np.inf) for part in (corners, turns, end)))
 
 
 def _ticks(low: float, high: float, most: int) -> tuple[Floats, list[str]]:

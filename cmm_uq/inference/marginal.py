@@ -25,7 +25,7 @@ SIGMA_BOUNDS = (1e-6, 10.0)
 _JITTER = 1e-11
 """Relative; a recording that a model explains to the last digit leaves nothing to factorise."""
 
-_NUMBERS = 4_000_000
+_NUMBERS = 500_000
 """In one batch of matrices."""
 
 _MOST_FREE = 150
@@ -196,7 +196,11 @@ class Marginal:
         own[:, diagonal, diagonal] *= 1 + _JITTER
         own[:, diagonal, diagonal] += np.tile(self._absent, (w, 1))
         factor = _cholesky(own)
-        rows = np.linalg.solve(factor, each[:, :, j:]).reshape(w, blocks * j, -1)
+        rows = each[:, :, j:]
+        for i in range(j):  # forward substitution
+            rows[:, i] /= factor[:, i, i, None]
+            rows[:, i + 1 :] -= factor[:, i + 1 :, i, None] * rows[:, i, None]
+        rows = rows.reshape(w, blocks * j, -1)
         logs = np.log(factor[:, diagonal, diagonal]).reshape(w, -1).sum(axis=1)
         return rows.transpose(0, 2, 1) @ rows, logs
 

@@ -17,7 +17,8 @@ from cmm_uq.files.limits import EFFECTS, LISTED
 class Table(BaseModel):
     """A table: no key beyond the known ones, no text where a number belongs, no NaN."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+    # most tables are never read: what checks them is made when it is first needed
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 LONGEST_MM = 1e7

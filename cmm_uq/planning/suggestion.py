@@ -45,6 +45,9 @@ SET_UPS, REPEATS = 8, 10
 _NEVER = 1e6
 """Amplitude, over the prior standard deviation, of what does not show at all."""
 
+_UNSEEN = 1e-13
+"""Part of what an effect by itself would tell, that rounding may leave of one that is not seen."""
+
 _ROUNDING = 1e-9
 """Part of an effect's information, of what it would be if nothing else were fitted, below which rounding hides it."""
 
@@ -240,10 +243,10 @@ class _Information:
         """Of an effect."""
         return [i for i, owner in enumerate(self.names) if owner == name]
 
-    def left(self, information: Floats, rows: Sequence[int], apart: Sequence[str], other: Sequence[int] = ()) -> Floats:
-        """What (..., r, r) is left on rows once what is fitted is, but for some effects, and further rows."""
+    def left(self, information: Floats, rows: Sequence[int], apart: Sequence[str]) -> Floats:
+        """What (..., r, r) is left on rows once what is fitted is, but for some effects."""
         rest = [i for i, owner in enumerate(self.names) if owner in self.fitted and owner not in apart]
-        return left_of(information + self.told.prior, rows, [*rest, *other])
+        return left_of(information + self.told.prior, rows, rest)
 
 
 def next_plan(
@@ -413,8 +416,9 @@ class _Aims:
         """By how much (c,) a plan falls short of all aims together, in logarithms; 0 where it reaches them."""
         total = np.zeros(len(information))
         for g, group in enumerate(self.groups):
+            left = self._of_group(information, g)
             for a, b in group.pairs:
-                total += np.maximum(np.log(ODDS) - self._log_odds(information, g, a, b), 0.0)
+                total += np.maximum(np.log(ODDS) - self._log_odds(left, g, a, b), 0.0)
         if self.wanted:
             goal = np.array([one.amplitude for one in self.wanted])
             total += np.maximum(2 * np.log(self.amplitudes(information, self.wanted) / goal), 0.0).sum(axis=1)
@@ -425,9 +429,10 @@ class _Aims:
         return tuple(
             Parting(
                 (group.names[a], group.names[b]), float(np.exp(group.log_odds[a] - group.log_odds[b])),
-                float(np.exp(min(self._log_odds(information[None], g, a, b)[0], 50.0))),
+                float(np.exp(min(self._log_odds(left, g, a, b)[0], 50.0))),
             )
             for g, group in enumerate(self.groups)
+            for left in [self._of_group(information[None], g)]
             for a, b in group.pairs
         )  # fmt: skip
 
@@ -447,26 +452,35 @@ class _Aims:
         length = np.array([one.length for one in wanted])
         return np.asarray(np.where(there, length / np.sqrt(np.where(there, left, 1.0)), _NEVER))
 
-    def _log_odds(self, information: Floats, g: int, a: int, b: int) -> Floats:
-        """Expected log odds (c,) of the true one of two over the other, the less of the two cases."""
+    def _of_group(self, information: Floats, g: int) -> Floats:
+        """What (c, r, r) is left on all rows of a group, effect by effect, once what else is fitted is."""
+        names = self.groups[g].names
+        rows = [row for name in names for row in self.known.rows(name)]
+        left = self.known.left(information, rows, names)
+        at = np.arange(len(rows))
+        left[:, at, at] += _UNSEEN * np.einsum("...ii->...i", information)[..., rows]  # what rounding leaves of nothing
+        return left
+
+    def _log_odds(self, left: Floats, g: int, a: int, b: int) -> Floats:
+        """Expected log odds (c,) of the true one of two over the other, the less of the two cases; see :meth:`_of_group`."""
         log_odds = self.groups[g].log_odds
         before = float(log_odds[a] - log_odds[b])
-        return np.minimum(before + self._gain(information, g, a, b), -before + self._gain(information, g, b, a))
+        return np.minimum(before + self._gain(left, g, a, b), -before + self._gain(left, g, b, a))
 
-    def _gain(self, information: Floats, g: int, true: int, other: int) -> Floats:
+    def _gain(self, left: Floats, g: int, true: int, other: int) -> Floats:
         """Expected log odds (c,) for the true one that a recording's own do not contain yet."""
         key = g, true, other
         if key not in self._start:
-            self._start[key] = float(self._expected(self.known.recorded[None], *key)[0])
-        return self._expected(information, *key) - self._start[key]
+            self._start[key] = float(self._expected(self._of_group(self.known.recorded[None], g), *key)[0])
+        return self._expected(left, *key) - self._start[key]
 
-    def _expected(self, information: Floats, g: int, true: int, other: int) -> Floats:
+    def _expected(self, left: Floats, g: int, true: int, other: int) -> Floats:
         names = self.groups[g].names
-        rows, others = self.known.rows(names[true]), self.known.rows(names[other])
+        ends = np.cumsum([0, *(len(self.known.rows(name)) for name in names)]).tolist()
+        rows, others = (range(ends[i], ends[i + 1]) for i in (true, other))
         size = np.zeros(len(rows))  # further set-ups may have coefficients of their own, after those of the recording
         size[: len(self.sizes[names[0], names[true]])] = self.sizes[names[0], names[true]]
-        left = self.known.left(information, rows, names, others)
-        return np.asarray(0.5 * np.einsum("i,cij,j->c", size, left, size))
+        return np.asarray(0.5 * np.einsum("i,cij,j->c", size, left_of(left, rows, others), size))
 
     @cached_property
     def start(self) -> Floats:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
 
-from cmm_uq.documents.corner import corner_plot
+from cmm_uq.documents.corner import _farthest_right, corner_plot
 from cmm_uq.documents.plot_style import ACCENT, INK, MUTED
 from cmm_uq.errors import CmmUqError
 from tests.documents.svg import Drawing, area, outlines, strokes
@@ -34,6 +36,13 @@ def test_the_interval_is_shaded_about_the_estimate() -> None:
     [curve] = [outlines(d)[0] for d in drawing.drawn(stroke=ACCENT, fill="none")]
     sixth = curve[np.argmin(curve[:, 1]), 0]  # the mode, at zero
     assert (estimate - sixth) / np.ptp(shade) == pytest.approx(0.5 / 3.0, abs=0.05)
+
+
+@pytest.mark.parametrize("text", ["12.5", "−3.10", "Scale X / 10⁻⁶", "Squareness YZ / ″", "C", "Ω%&@Sß 8", "ç∂é"])
+@pytest.mark.parametrize("weight", ["normal", "bold"])
+def test_words_are_as_wide_as_matplotlib_measures_them(text: str, weight: str) -> None:
+    path = TextPath((0, 0), text, size=6.8, prop=FontProperties(family="DejaVu Sans", weight=weight))
+    assert _farthest_right(path) == pytest.approx(path.get_extents().x1, rel=1e-12)
 
 
 def test_a_prior_is_drawn_to_the_posteriors_scale() -> None:

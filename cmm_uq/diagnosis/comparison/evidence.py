@@ -32,6 +32,9 @@ _WIDE = 30
 _KEPT = 8_000_000
 """Numbers that are kept of what follows from what was given last."""
 
+_LARGEST_EXPONENT = 600.0
+"""Of a factor that says how little something counts."""
+
 _BLOCK, _COLUMNS = 150_000, 500
 """Numbers of a block that a processor's cache holds; columns weighed at a time."""
 
@@ -50,8 +53,12 @@ class _Noise:
 
     def __call__(self, columns: Floats) -> Floats:
         """Precision times columns (m, b)."""
-        whole = self.whitening.T @ (self.whitening @ columns)
+        whole = self._transposed @ (self.whitening @ columns)
         return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
+
+    @cached_property
+    def _transposed(self) -> sparse.csc_array:
+        return self.whitening.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,12 +203,17 @@ class Comparison:
 
     def over_sigma(self, squares: Floats) -> Floats:
         """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape: in closed form if ln σ is uniform, else from a table."""
-        found = np.log(np.maximum(squares, 1e-300))
-        if np.ptp(self.log_sigma) > 0:
-            return np.interp(found, *self._table)
-        half = 0.5 * self.degrees_of_freedom
-        found *= -half
-        return found + self._uniform
+        return self._over_sigma(squares.copy())
+
+    def _over_sigma(self, squares: Floats) -> Floats:
+        """The same, in the place of the squares where that is possible."""
+        np.maximum(squares, 1e-300, out=squares)
+        np.log(squares, out=squares)
+        if self._table is not None:
+            return _interpolated(squares, *self._table)
+        squares *= -0.5 * self.degrees_of_freedom
+        squares += self._uniform
+        return squares
 
     @cached_property
     def _uniform(self) -> float:
@@ -210,7 +222,10 @@ class Comparison:
         return float(special.gammaln(half) + (half - 1) * np.log(2) + self.log_sigma[0] - np.log(step))
 
     @cached_property
-    def _table(self) -> tuple[Floats, Floats]:
+    def _table(self) -> tuple[Floats, Floats] | None:
+        """Logarithms of squares and of the integrals over them; none where these have a closed form."""
+        if np.ptp(self.log_sigma) == 0:
+            return None
         nodes = np.linspace(-16.0, 8.0, 1500) + np.log(max(float(self.left @ self.left), 1e-300))
         exponent = (
             self.log_sigma - self.degrees_of_freedom * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
@@ -262,8 +277,8 @@ class Comparison:
     def _total(self, known: _Beside, among: Container[int] | None = None) -> Floats:
         """Log evidence (c, b) of each explanation, its versions and sizes summed."""
         total = np.full((len(self.explanations), known.squares.shape[1]), -np.inf)
-        for group, each in self._each(known, among):
-            gains = _log_sum(each, 1) - np.log(AMPLITUDES) + group.weight[:, None]
+        for group, each in self._each(known, among, sizes=False):
+            gains = each[:, 0] - np.log(AMPLITUDES) + group.weight[:, None]
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
         return total
@@ -293,7 +308,7 @@ class Comparison:
         most, best = total.copy(), {}
         for group, cube in self.each(None, given, among):
             each = cube[:, :, 0]
-            gains = _log_sum(each, 1) - np.log(AMPLITUDES) + group.weight
+            gains = _log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
             largest = each.max(axis=1) + group.weight
@@ -337,7 +352,10 @@ class Comparison:
         """Log evidence (M, a, b) of members at every size beside what is given, by groups; ``among`` are wanted at least."""
         yield from self._each(self._beside(data, given), among)
 
-    def _each(self, known: _Beside, among: Container[int] | None) -> Iterator[tuple[Group, Floats]]:
+    def _each(
+        self, known: _Beside, among: Container[int] | None, *, sizes: bool = True
+    ) -> Iterator[tuple[Group, Floats]]:
+        """Log evidence (M, a, b) of members at every size, or (M, 1, b) of all sizes together, by groups."""
         stack, groups = self._stack
         kinds, b = known.squares.shape
         for group, blocks in zip(groups, self._blocks, strict=True):
@@ -346,15 +364,15 @@ class Comparison:
             if not len(chosen.start):
                 continue
             seen = (chosen.columns(stack).T @ known.seen_by).reshape(len(chosen.start), group.r, kinds, -1)
-            total = np.empty((len(chosen.start), AMPLITUDES, b))
+            total = np.empty((len(chosen.start), AMPLITUDES if sizes else 1, b))
             size = max(1, _BLOCK // (kinds * AMPLITUDES * b))
             for begin in range(0, len(total), size):
                 some = slice(begin, begin + size)
-                total[some] = self._under(known, chosen.amplitudes[some], blocks[:, part][:, some], seen[some])
+                total[some] = self._under(known, chosen.amplitudes[some], blocks[:, part][:, some], seen[some], sizes)
             yield chosen, total
 
-    def _under(self, known: _Beside, amplitudes: Floats, blocks: Floats, seen: Floats) -> Floats:
-        """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise.
+    def _under(self, known: _Beside, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
+        """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise, or (M, 1, b) over the sizes too.
 
         Parameters
         ----------
@@ -375,11 +393,39 @@ class Comparison:
         variance = (amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
         gain, square = variance / (1 + ratio), shown**2
-        explained = np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None] if b == 1 else gain @ square
-        squares = known.squares[:, None, None, :] - explained
-        log = self.over_sigma(squares)
-        log += (known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3))[..., None]
-        return np.asarray(np.logaddexp.reduce(log, axis=0), dtype=np.float64)
+        constant = known.log[:, None, None] - 0.5 * np.einsum("kmar->kma", np.log1p(ratio))
+        log, offset = self._integrated(known.squares, gain, square, constant)
+        return (_log_sum_in(log, 0 if sizes else (0, 2)) + offset).reshape(len(amplitudes), -1, b)
+
+    def _integrated(
+        self, squares: Floats, gain: Floats, square: Floats, constant: Floats
+    ) -> tuple[Floats, float]:  # fmt: skip
+        """Log evidence (k, M, a, b), but for a number that is to be added, over the noise.
+
+        Parameters
+        ----------
+        squares : (k, b) of the data; members with gains (k, M, a, r) explain of them the squares (k, M, r, b) along them.
+        constant : (k, M, a) to be added.
+        """
+        half = 0.5 * self.degrees_of_freedom
+        every = squares[:, None, None, :]
+        if squares.shape[1] == 1:
+            found = self._over_sigma(every - np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None])
+            found += constant[..., None]
+            return found, 0.0
+        whole = np.concatenate([square, np.broadcast_to(every, (*square.shape[:2], 1, every.shape[3]))], axis=2)
+        if self._table is not None or not half:
+            found = self._over_sigma(np.concatenate([-gain, np.ones_like(gain[..., :1])], axis=3) @ whole)
+            found += constant[..., None]
+            return found, 0.0
+        # of many data: constants are factors of the squares ahead of the logarithm, where they are few
+        most = float(constant.max())
+        factor = np.exp(np.minimum((most - constant) / half, _LARGEST_EXPONENT))[..., None]
+        found = np.concatenate([-factor * gain, factor], axis=3) @ whole
+        np.maximum(found, 1e-300, out=found)
+        np.log(found, out=found)
+        found *= -half
+        return found, most + self._uniform
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
@@ -435,7 +481,7 @@ class Comparison:
         if rows.shape[1]:
             weighed = weighed - rows.swapaxes(1, 2) @ (rows @ taken)
         factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ weighed)
-        more = np.linalg.solve(factor, weighed.swapaxes(1, 2))
+        more = np.linalg.inv(factor) @ weighed.swapaxes(1, 2)
         logs = logs + np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
         return np.concatenate([rows, more], axis=1), logs
 
@@ -473,6 +519,27 @@ def _log_sum(log: Floats, axis: int) -> Floats:
     count = most.sum(axis=axis, keepdims=True, dtype=np.float64)
     others = np.exp(np.where(most, -np.inf, log) - largest).sum(axis=axis, keepdims=True)
     return np.asarray((np.log1p(others / count) + np.log(count) + largest).squeeze(axis), dtype=np.float64)
+
+
+def _interpolated(at: Floats, nodes: Floats, values: Floats) -> Floats:
+    """What ``np.interp`` gives for nodes (n,) at equal distances, which need no search; ``at`` is overwritten."""
+    last = len(nodes) - 1
+    at -= nodes[0]
+    at *= last / (nodes[-1] - nodes[0])
+    np.clip(at, 0, last, out=at)
+    before = np.minimum(at.astype(np.int64), last - 1)
+    at -= before
+    at *= np.diff(values)[before]
+    at += values[before]
+    return at
+
+
+def _log_sum_in(log: Floats, axis: int | tuple[int, ...]) -> Floats:
+    """Logarithm of sums of what has these logarithms, which are overwritten; of each sum one is finite."""
+    largest = log.max(axis=axis, keepdims=True)
+    log -= largest
+    np.exp(log, out=log)
+    return np.asarray(np.log(log.sum(axis=axis)) + largest.squeeze(axis), dtype=np.float64)
 
 
 def _eigen(blocks: Floats) -> tuple[Floats, Floats]:

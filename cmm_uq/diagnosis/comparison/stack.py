@@ -57,17 +57,22 @@ class Group:
     @cached_property
     def first(self) -> Ints:
         """Where each explanation's members begin; they follow one another."""
-        return np.flatnonzero(np.diff(self.explanation, prepend=-1))
+        others = self.explanation[1:] != self.explanation[:-1]
+        return np.flatnonzero(np.concatenate([[True], others]))
 
     def part(self, among: Container[int] | None) -> slice:
         """Members from the first to the last of some explanations; all by default."""
         if among is None:
             return slice(None)
-        chosen = [k for k, i in enumerate(self.explanation[self.first].tolist()) if i in among]
-        if not chosen:
-            return slice(0, 0)
-        ends = np.append(self.first[1:], len(self.explanation))
-        return slice(int(self.first[chosen[0]]), int(ends[chosen[-1]]))
+        chosen = [part for i, part in self._parts if i in among]
+        return slice(chosen[0].start, chosen[-1].stop) if chosen else slice(0, 0)
+
+    @cached_property
+    def _parts(self) -> list[tuple[int, slice]]:
+        """Each explanation with its members."""
+        begin = self.first.tolist()
+        owners = self.explanation[self.first].tolist()
+        return [(i, slice(*ends)) for i, *ends in zip(owners, begin, [*begin[1:], len(self.explanation)], strict=True)]
 
     def only(self, part: slice) -> Group:
         """The group of some members."""

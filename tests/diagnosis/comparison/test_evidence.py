@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.diagnosis.comparison.evidence import Comparison, _eigen, _log_sum
+from cmm_uq.diagnosis.comparison.evidence import Comparison, _eigen, _interpolated, _log_sum
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation, Member
 from cmm_uq.diagnosis.comparison.lack_of_fit import tail_probability
 from cmm_uq.diagnosis.comparison.stack import Version
@@ -68,6 +68,30 @@ def test_the_evidence_is_that_of_a_multivariate_normal() -> None:
     assert float(nothing[0]) == pytest.approx(direct(c, None), abs=2e-4)
     for i, explanation in enumerate(c.explanations):
         assert something[i, 0] == pytest.approx(direct(c, explanation.members), abs=2e-4)
+
+
+@pytest.mark.parametrize("stated", [None, 0.07])
+def test_the_evidence_of_many_recordings_is_that_of_each_by_itself(stated: float | None) -> None:
+    """What is integrated in closed form, or from a table; from no effect to one a thousand times as large as the noise."""
+    c = comparison()
+    sigma, log_sigma = sigma_grid(stated, 0.08)
+    c = replace(c, sigma=sigma, log_sigma=log_sigma)
+    effect = c.rest(c.explanations[0].members[0].columns / c.noise_scale[:, None])[:, 0]
+    data = np.column_stack([c.left + size * effect for size in (0.0, 0.1, 50.0)])
+    given = Version(1, 0, 2.0)
+    for beside in ((), (given,)):
+        nothing, something = c.log_evidence(data, beside)
+        for i, own in enumerate(data.T):
+            alone, each = c.log_evidence(own[:, None], beside)
+            assert nothing[i] == pytest.approx(float(alone[0]), rel=1e-11)
+            np.testing.assert_allclose(something[:, i], each[:, 0], rtol=1e-11)
+
+
+def test_a_table_with_equal_steps_is_read_as_numpy_reads_any() -> None:
+    nodes = np.linspace(-3.0, 5.0, 41)
+    values = np.sin(nodes) - 20 * nodes
+    at = np.concatenate([np.random.default_rng(3).uniform(-4, 6, 500), nodes, [-np.inf, np.inf]])
+    np.testing.assert_allclose(_interpolated(at.copy(), nodes, values), np.interp(at, nodes, values), rtol=1e-12)
 
 
 def singles(c: Comparison, member: Member) -> dict[float, float]:
