@@ -143,7 +143,7 @@ def _effect(found: Diagnosed, item: LeftOut) -> Facts:
     """One effect: what it is, how large, what to look at, how sure."""
     d = found.diagnosis
     size = size_of(effect_of(item.effect, d.after.effects), item.parameters)
-    told = (say("{size:capital}.", size=size), other_periods(item.modes), contained(found.simulated, item.effect))
+    told = (say("{size:capital}.", size=size), other_periods(item), contained(found.simulated, item.effect))
     return Facts((
         (say("Effect"), item.title),
         (say("Size"), sentences(filter(None, told))),

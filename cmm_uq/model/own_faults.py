@@ -36,6 +36,9 @@ _CERTIFIED, _CHANGED, _UNKNOWN = 0.1, 0.3, 2.0
 _MEASURED_KELVIN, _ASSUMED_KELVIN = 0.3, 1.0
 """Standard deviation of the artefact's temperature where it was recorded, and where it was not."""
 
+_FAR_KELVIN = 3.0
+"""The same, ten times more rarely, where a thermometer is wrong, hangs elsewhere, or the artefact came from another room."""
+
 _TEMPERATURE = 0.3
 """Weight of the artefact's temperature: rooms and thermometers are mostly right; of two dates, nothing is likelier."""
 
@@ -118,9 +121,10 @@ def faults(
 def temperatures(own: Owner, weight: float) -> Iterable[Effect]:
     """That the artefact had another temperature than is known: in all set-ups, or in each its own."""
     kelvin = _MEASURED_KELVIN if "temp_artefact_c" in own.points.columns else _ASSUMED_KELVIN
-    yield TEMPERATURE.made(replace(own, size=kelvin, weight=weight, mostly=1.0))
+    far = replace(own, size=_FAR_KELVIN, weight=weight, mostly=kelvin / _FAR_KELVIN)
+    yield TEMPERATURE.made(far)
     if len(np.unique(own.points.measurement)) > 1:
-        yield SET_UP_TEMPERATURE.made(replace(own, size=kelvin, weight=weight * _TEMPERATURE, mostly=1.0))
+        yield SET_UP_TEMPERATURE.made(replace(far, weight=weight * _TEMPERATURE))
 
 
 def temperature_of(facts: ArtefactFacts, points: Points) -> Effect:
