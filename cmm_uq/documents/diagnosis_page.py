@@ -286,7 +286,11 @@ def _consequences(found: Diagnosed) -> tuple[Block, ...]:
         note = say(
             "± is the expanded uncertainty for 95 %, for repetitions of the recording with the correction as it stands."
         )
-        blocks.append(Table(say("Figures of performance"), heads, tuple(rows), (note,)))
+        known = say(
+            "What was found repeats as it is and is no noise here, neither as recorded nor corrected. A certificate is of the "
+            "job's own model: what that leaves out counts as noise in its uncertainties of the same figures."
+        )
+        blocks.append(Table(say("Figures of performance"), heads, tuple(rows), (note, known)))
     decisions = tuple(
         (
             say("{standard}, {quantity}", standard=Verbatim(before.facts.standard), quantity=before.quantity),

@@ -176,7 +176,8 @@ RESULTS: Mapping[str, str] = MappingProxyType(
         "diagnosis.averaged.decisions[].KEY": "Probability of each outcome of a statement of conformity.",
         "diagnosis.compared_on": "Number of observations compared, where not all were.",
         "diagnosis.corrected": "What a correction would change; null where there is none.",
-        "diagnosis.corrected.KEY": "Figures and statements before and after it.",
+        "diagnosis.corrected.KEY": "Figures and statements before and after it; U takes what was found as known, that "
+        "of accuracy_uncertainty as noise.",
         "screening[].kind": "What is odd in the recording.",
         "screening[].rows": "Measurements that it concerns.",
         "screening[].lines": "Lines of the file.",
