@@ -274,17 +274,17 @@ def asserted(combinations: Combinations) -> Key:
 def _in_place_of_functions(combinations: Combinations) -> Key:
     """Effects to which nothing is more probable than one or two nonparametric terms that could pass for all of them.
 
-    They are the most probable set of known effects. Each is asserted as one of a group, to which the terms belong, if it is
-    probable enough to be named at all where those before it are taken as found.
+    They are the most probable set of known effects. Each is asserted as one of a group, to which the terms belong, if it or an
+    effect that cannot be told from it is probable enough to be named at all, where those before it are taken as found.
     """
     known = {key: p for key, p in combinations.of_effects.items() if key}
     best = max(known, key=lambda key: known[key]) if known else frozenset()
     found: Key = frozenset()
     for i in sorted(best, key=lambda i: -combinations.of(i)):
-        beside = sum(p for key, p in known.items() if found <= key)
-        own = sum(p for key, p in known.items() if found | {i} <= key)
-        together = rivals_of(combinations, best, i) | combinations.imitating(i) | {i}
-        if own >= _MECHANISM * (beside if found else 1.0) and combinations.of_any(together) >= ASSERTED:
+        alike = rivals_of(combinations, best, i) | {i}
+        beside = sum(p for key, p in known.items() if found <= key) if found else 1.0
+        own = sum(p for key, p in known.items() if found <= key and alike & key)
+        if own >= _MECHANISM * beside and combinations.of_any(alike | combinations.imitating(i)) >= ASSERTED:
             found |= {i}
     return found
 
