@@ -68,7 +68,9 @@ def test_effects_that_a_function_could_be_are_named_with_it_one_after_the_other(
     found = combinations(((3,), 0.65), ((0, 1), 0.25), ((0,), 0.05), ((2,), 0.05))
     assert asserted(found) == {0, 1}
     assert asserted(combinations(((3,), 0.65), ((0, 1), 0.04), ((0,), 0.26), ((2,), 0.05))) == {0}
-    assert asserted(combinations(((3,), 0.78), ((0,), 0.12), ((2,), 0.1))) == {0}, "by 0.22 with what cannot be told from it"
+    assert asserted(combinations(((3,), 0.78), ((0,), 0.12), ((2,), 0.1))) == {0}, (
+        "by 0.22 with what cannot be told from it"
+    )
     assert asserted(combinations(((3,), 0.82), ((0,), 0.1), ((2,), 0.08))) == frozenset(), "improbable even so"
 
 
