@@ -180,8 +180,8 @@ def _more(shapes: Shapes, densities: Sequence[_Density]) -> Shapes:
 def _representative(sizes: Sizes, prior: Floats, share: Floats) -> tuple[list[int], Floats]:
     """Shapes that stand for all, and their weights: those of what each stands for (systematic resampling).
 
-    They are taken in an order in which neighbours are alike, by slow noise first, so that each kind of it has its places: whether
-    there is any is what the evidence of an effect depends on most.
+    They are taken in an order in which neighbours are alike, by slow noise first, so that each kind of it has its places:
+    whether there is any is what the evidence of an effect depends on most.
     """
     table = np.column_stack(
         [np.where(sizes.slow > 0, sizes.rate, 0), sizes.slow, sizes.placing, sizes.growth, sizes.reading]
