@@ -70,7 +70,8 @@ def there(name: str, truth: dict, group: Iterable[str]) -> tuple[bool, bool]:
     if truth["kind"] in FAULTS:
         own = [each.startswith(OF_THE_ARTEFACT) for each in (name, *group)]
         return own[0], any(own)
-    return name in truth["hidden"], bool(set(group) & set(truth["hidden"]))
+    function = truth["kind"] == "outside" and any(" " in each for each in group)  # no effect, but one of no known form
+    return name in truth["hidden"], function or bool(set(group) & set(truth["hidden"]))
 
 
 def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:

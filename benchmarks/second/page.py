@@ -55,12 +55,12 @@ of the package.
 
 
 def write(truths: list[dict], found: Records, oracles: Records, mark: str, asked: tuple[int, int, int],
-          docs: Path | None) -> None:  # fmt: skip
-    """Print the page, and write it with its picture into ``docs`` where that is given."""
+          docs: Path | None, note: str = "") -> None:  # fmt: skip
+    """Print the page, with what is to be said of the run, and write it with its picture into ``docs`` where that is given."""
     faults = [(t["name"], found[t["name"]]["fault"]) for t in truths if "fault" in found.get(t["name"], {})]
     pairs = [(t, found[t["name"]]) for t in truths if t["name"] in found and "fault" not in found[t["name"]]]
     both = [(t, f, oracles[t["name"]]) for t, f in pairs if "estimates" in oracles.get(t["name"], {})]
-    page = ["# A second concealed study", "", *_state(truths, pairs, faults, mark, asked), ""]
+    page = ["# A second concealed study", "", *_state(truths, pairs, faults, mark, asked), *filter(None, [note]), ""]
     for part in (_wanted(pairs, both), _nothing(pairs, oracles), _found(both), _artefact(pairs), _others(pairs), _said(pairs),
                  _coverage(pairs)):  # fmt: skip
         page += [*part, ""]

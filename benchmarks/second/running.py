@@ -95,7 +95,8 @@ def diagnosed(job: Path, *, whole: bool = False) -> dict[str, Any]:
         "effects": {
             each["effect"]: {
                 "probability": each["probability"], "together": each.get("probability_together", each["probability"]),
-                "group": each.get("group", []), "periods": [p["value"] for p in each.get("other_periods_mm", [])],
+                "group": each.get("group", []),
+                "periods": [p["value"] for p in (*each.get("periods_mm", ()), *each.get("other_periods_mm", ()))],
                 "parameters": {k: [q["value"], q["u"], *q["interval95"]] for k, q in each["parameters"].items()},
             }
             for each in said["effects"]

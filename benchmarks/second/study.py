@@ -2,7 +2,8 @@
 
 Cases are made first and their truth is sealed by a hash; then they are diagnosed and searched by two oracles. Every result is
 a line in ``FOLDER``, so that a run can be stopped and taken up again, and more cases added with larger numbers.
-``--only make``, ``diagnose`` or ``search`` does one part; ``--page docs`` counts what is there and writes the page.
+``--only make``, ``diagnose`` or ``search`` does one part; ``--page docs`` counts what is there and writes the page, with what
+``FOLDER/note.txt`` says of the run, if anything.
 """
 
 from __future__ import annotations
@@ -42,7 +43,9 @@ def main() -> None:
     found, oracles = (
         {record["name"]: record for record in lines(chosen.folder / f"{what}.jsonl")} for what in PARTS[1:]
     )
-    write(truths, found, oracles, mark, (chosen.cases, chosen.nulls, chosen.seed), chosen.page)
+    note = chosen.folder / "note.txt"
+    said = note.read_text(encoding="utf-8").strip() if note.exists() else ""
+    write(truths, found, oracles, mark, (chosen.cases, chosen.nulls, chosen.seed), chosen.page, said)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
 """What may be asserted of the effects that a search found, and why others are withheld.
 
 A probable effect is no finding where the recording does not say of which size it is: where the interval of its size holds
-zero, where it takes no more of the misfit than noise gives to something tried as often, where several periods fit, or where
-the phase of a period is open. An effect less probable than one half is asserted as one of a group, whose names go with it.
+zero, where it takes no more of the misfit than noise gives to something tried as often, where no period of several that fit
+is more probable than not, or where the phase of a period is open. That an error of an axis is periodic is one statement, its
+period another: without a settled period the first alone is asserted, where all else is as good as excluded. An effect less
+probable than one half is asserted as one of a group, whose names go with it.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from cmm_uq.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.diagnosis.comparison.explanations import effect_of
 from cmm_uq.diagnosis.comparison.search import ASSERTED, Found, rivals_of, without
 from cmm_uq.diagnosis.joint import Joint
-from cmm_uq.diagnosis.periods import Mode, modes_of, resolved
+from cmm_uq.diagnosis.periods import Mode, modes_of, whole
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.messages import Text, say
@@ -30,7 +32,14 @@ _COVERED = 0.95
 _BY_NOISE = 0.05
 """Probability, under noise, of taking as much of the misfit, from which on it is the noise's share."""
 
+_SURE = 0.99
+"""Probability from which an error is said to be periodic, or at least to go by the reading, without saying its period."""
+
+_FEW = 100
+"""Draws within the most probable mode from which its sizes are judged by these."""
+
 UNRESOLVED = say("the positions do not tell its period from others that fit as well")
+NOT_WHOLE = say("the readings do not hold a whole one of its periods, of which any curve can be a part")
 PHASE_OPEN = say("the positions leave its phase open")
 HOLDS_ZERO = say("the interval of its size holds zero")
 WITHIN_NOISE = say("it explains no more of the misfit than noise alone would give it")
@@ -55,14 +64,40 @@ class Withheld:
     modes: tuple[Mode, ...] = ()
 
 
-def with_resolved_periods(found: Found) -> tuple[Found, tuple[Withheld, ...]]:
-    """Without the effects whose period is not resolved by the positions, and these."""
+def with_periods(found: Found) -> tuple[Found, tuple[Withheld, ...]]:
+    """Without the effects that have a period, and of which the positions tell too little, and these."""
     gone = {}
     for i in sorted(found.chosen):
         modes = modes_of(found, i)
-        if modes and not resolved(found, i, modes):
-            gone[i] = replace(_withheld(found, i, UNRESOLVED), modes=modes)
+        if modes and (why := _too_little(found, i, modes)) is not None:
+            gone[i] = replace(_withheld(found, i, why), modes=modes)
     return (without(found, frozenset(gone)), tuple(gone.values())) if gone else (found, ())
+
+
+def settled(found: Found, index: int, modes: tuple[Mode, ...]) -> bool:
+    """Whether an effect with the most probable of its periods is more probable than not, as asked of any effect."""
+    combinations = found.combinations
+    if combinations is None:
+        return False
+    group = group_of(combinations, found.chosen, index) | {index}
+    return combinations.of_any(group) * modes[0].probability >= ASSERTED
+
+
+def _too_little(found: Found, index: int, modes: tuple[Mode, ...]) -> Text | None:
+    """Why neither an error with a period nor one without is asserted."""
+    combinations = found.combinations
+    if combinations is None or not whole(found, index, modes[0]):
+        return NOT_WHOLE
+    if settled(found, index, modes):
+        return None
+    sure = combinations.of(index) >= ASSERTED and combinations.of_any(combinations.imitating(index) | {index}) >= _SURE
+    return None if sure else UNRESOLVED
+
+
+def unpredicted(found: Found, unseen: Text) -> tuple[Withheld, ...]:
+    """All that was found, withheld because held-out placings, or points, do not speak for it."""
+    why = say("it does not predict {unseen} that the fit had not seen better than noise would", unseen=unseen)
+    return tuple(replace(_withheld(found, i, why), modes=modes_of(found, i)) for i in sorted(found.chosen))
 
 
 def with_sizes(found: Found, joint: Joint) -> tuple[Found, tuple[Withheld, ...]]:
@@ -70,16 +105,17 @@ def with_sizes(found: Found, joint: Joint) -> tuple[Found, tuple[Withheld, ...]]
     gone, shares = {}, _chance(found, joint)
     for i in sorted(found.chosen):
         effect = effect_of(found.first.explanations[i])
-        sizes = _sizes(found, joint, effect)
+        modes = modes_of(found, i)
+        sizes = _sizes(found, joint, effect, modes)
         why = None
         if _holds_zero(sizes):
             why = HOLDS_ZERO
-        elif effect.shape and effect.shape[0].period_along and not _phase_known(sizes):
+        elif modes and not _phase_known(sizes):
             why = PHASE_OPEN
         elif shares[effect.name] * _tried(found, i) > _BY_NOISE:
             why = WITHIN_NOISE
         if why is not None:
-            gone[i] = replace(_withheld(found, i, why), modes=modes_of(found, i))
+            gone[i] = replace(_withheld(found, i, why), modes=modes)
     return (without(found, frozenset(gone)), tuple(gone.values())) if gone else (found, ())
 
 
@@ -88,8 +124,7 @@ def group_of(combinations: Combinations, chosen: Key, index: int) -> Key:
     group = rivals_of(combinations, chosen, index)
     if combinations.of_any(group | {index}) >= ASSERTED:
         return group
-    effect = combinations.explanations[index]
-    return group | {j for j, function in enumerate(combinations.explanations) if function.could_be(effect)}
+    return group | combinations.imitating(index)
 
 
 def _withheld(found: Found, index: int, why: Text) -> Withheld:
@@ -104,8 +139,11 @@ def _tried(found: Found, index: int) -> float:
     return float(sum(member.weight for member in explanation.members)) if explanation.shaped else 1.0
 
 
-def _sizes(found: Found, joint: Joint, effect: Effect) -> Floats:
-    """Draws (N, k) of an effect's coefficients; of a period those of its sine and cosine about the middle of the readings."""
+def _sizes(found: Found, joint: Joint, effect: Effect, modes: tuple[Mode, ...]) -> Floats:
+    """Draws (N, k) of an effect's coefficients; of a period those of its sine and cosine about the middle of the readings.
+
+    They are of the most probable of its periods: those of several have phases that say nothing together.
+    """
     column = {unknown.key: i for i, unknown in enumerate(joint.posterior.unknowns)}
     draws = joint.posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
     axis = effect.shape[0].period_along if effect.shape else None
@@ -113,7 +151,11 @@ def _sizes(found: Found, joint: Joint, effect: Effect) -> Floats:
         return draws
     readings = found.first.model.artefact.points.readings[axis]
     middle = 0.5 * (float(readings.min()) + float(readings.max()))
-    turned = (draws[:, 0] + 1j * draws[:, 1]) * np.exp(2j * np.pi * middle / joint.shapes[effect.name][:, 0])
+    period = joint.shapes[effect.name][:, 0]
+    own = modes[0].holds(period) if modes else np.ones(len(period), dtype=np.bool_)
+    if own.sum() >= _FEW:
+        draws, period = draws[own], period[own]
+    turned = (draws[:, 0] + 1j * draws[:, 1]) * np.exp(2j * np.pi * middle / period)
     return np.column_stack([turned.real, turned.imag])
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import special
 
-from cmm_uq.diagnosis.asserting import Withheld, group_of, with_resolved_periods, with_sizes
+from cmm_uq.diagnosis.asserting import Withheld, group_of, settled, unpredicted, with_periods, with_sizes
 from cmm_uq.diagnosis.compared import compared_on
 from cmm_uq.diagnosis.comparison.search import Found, ModelComparison, search, without
 from cmm_uq.diagnosis.held_out import Improvement, improvement
@@ -25,6 +25,7 @@ from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.display import of_last_digit
 from cmm_uq.model.kind import Observed
+from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, unit
@@ -53,7 +54,8 @@ class LeftOut:
     together : probability of it or one that these data cannot tell from it.
     points_to : what a technician should look at.
     group : what these data cannot tell from it; with a probability below one half it is asserted as one of these.
-    modes : other periods that fit, where it has one.
+    modes : other periods that fit, where it has one; all that fit, where none of them is settled.
+    settled : whether its period, where it has one, is among the parameters.
     """
 
     effect: str
@@ -65,6 +67,7 @@ class LeftOut:
     points_to: Text
     group: tuple[Text, ...] = ()
     modes: tuple[Mode, ...] = ()
+    settled: bool = True
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,7 @@ def diagnose(
     found, joint, withheld = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
     gain = improvement(model, found.model)
     if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
+        withheld = (*withheld, *unpredicted(found, gain.unseen))
         found = _of_all(without(found, found.chosen), model)
         gain, joint = improvement(model, model), joint_posterior(found, seed, progress, known)
     noise = _noise(found, joint, stated)
@@ -163,7 +167,7 @@ def _asserted(
     found: Found, model: MeasurementModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
 ) -> tuple[Found, Joint, tuple[Withheld, ...]]:
     """What of a search may be asserted, estimated from all observations, and what is withheld."""
-    found, gone = with_resolved_periods(found)
+    found, gone = with_periods(found)
     while True:
         found = _of_all(found, model)
         joint = joint_posterior(found, seed, progress, known)
@@ -202,11 +206,12 @@ def _left_out(found: Found, joint: Joint, before: MeasurementModel) -> tuple[Lef
     total = first - _squares(linear, ())
     listed = []
     for effect in (e for e in found.model.effects if e.name in found.effects):
-        probability, together, group = _probability(found, index[effect.name])
         modes = modes_of(found, index[effect.name])
+        known = not modes or settled(found, index[effect.name], modes)
+        probability, together, group = _probability(found, index[effect.name], known=known)
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
-        if modes:  # what is reported of a period is reported of one
+        if modes and known:  # what is reported of a period is reported of one
             own = modes[0].holds(shapes[:, 0])
             draws, shapes = (draws[own], shapes[own]) if own.any() else (draws, shapes)
         reported = effect.to_reported(draws, shapes)
@@ -215,21 +220,32 @@ def _left_out(found: Found, joint: Joint, before: MeasurementModel) -> tuple[Lef
         parameters = {
             name: Quantity.of_draws(_unwrapped(values) if name == "phase_rad" else values, units[name])
             for name, values in reported.items()
+            if known or name not in _of_a_period(effect)
         }
         explained = max(share, 0.0) if total > 0 else 0.0
         item = LeftOut(
-            effect.name, effect.title, probability, parameters, explained, together, effect.points_to, group, modes[1:]
-        )
+            effect.name, effect.title, probability, parameters, explained, together, effect.points_to, group,
+            modes[1:] if known else modes, known,
+        )  # fmt: skip
         listed.append(item)
     return tuple(sorted(listed, key=lambda item: -item.probability))
 
 
-def _probability(found: Found, index: int) -> tuple[float, float, tuple[Text, ...]]:
-    """Of an effect by itself, and with all that could stand in its place; and the names of those."""
+def _of_a_period(effect: Effect) -> frozenset[str]:
+    """What is reported of an effect with one period only: another has another phase."""
+    return frozenset({"phase_rad", *(shape.name for shape in effect.shape)})
+
+
+def _probability(found: Found, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
+    """Of an effect by itself, and with all that could stand in its place; and the names of those.
+
+    Without a known period these are the functions of the reading, too.
+    """
     combinations = found.combinations
     if combinations is None:
         return 0.0, 0.0, ()
     group = group_of(combinations, found.chosen, index)
+    group |= frozenset() if known else combinations.imitating(index)
     names = tuple(
         combinations.explanations[i].name
         for i in sorted(group, key=lambda i: -combinations.of(i))

@@ -1,7 +1,8 @@
-"""Which periods fit a recording: every mode of the posterior, and whether the positions tell one from all others."""
+"""Which periods fit a recording: every mode of the posterior, each with its interval and its probability."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,18 +10,18 @@ from scipy import special
 
 from cmm_uq.diagnosis.comparison.explanations import STEP, effect_of, evenly, unevenly
 from cmm_uq.diagnosis.comparison.search import Found
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import Unit
-
-RESOLVED = 0.95
-"""Probability of one mode from which a period counts as resolved."""
 
 _LIKELY = 1e-4
 """Part of the largest probability below which a trial parts one mode from the next."""
 
 _APART = 0.5
 """Frequencies that are this far apart, over one in the range of the readings, with nothing likely between, are two modes."""
+
+_VALLEY = 0.1
+"""Evidence over that of the lower of two peaks below which what lies between parts two modes."""
 
 _TOLD = 1e-3
 """Probability from which a mode is told."""
@@ -57,19 +58,22 @@ def modes_of(found: Found, index: int) -> tuple[Mode, ...]:
     if not (effect.shape and effect.shape[0].period_along):
         return ()
     given = [v for v in found.versions if v.explanation != index]
-    log, shape = [np.zeros(0)], [np.zeros(0)]
+    log, before, shape = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
     for group, cube in found.first.comparison.each(None, given, (index,)):
         own = group.explanation == index
-        log.append(special.logsumexp(cube[own, :, 0], axis=1) + group.weight[own])
+        log.append(special.logsumexp(cube[own, :, 0], axis=1))
+        before.append(group.weight[own])
         shape.append(np.array([explanation.members[m].shape[0] for m in group.member[own]]))
-    weight = np.exp(np.concatenate(log) - special.logsumexp(np.concatenate(log)))
+    evidence = np.concatenate(log)
+    total = evidence + np.concatenate(before)
+    weight = np.exp(total - special.logsumexp(total))
     frequency = evenly(effect, np.concatenate(shape))
     likely = np.flatnonzero(weight > _LIKELY * weight.max())
     likely = likely[np.argsort(frequency[likely])]
     span = _span(found, effect.shape[0].period_along)
-    parts = np.split(likely, np.flatnonzero(np.diff(frequency[likely]) > _APART / span) + 1)
+    apart = np.split(likely, np.flatnonzero(np.diff(frequency[likely]) > _APART / span) + 1)
     found_modes = []
-    for part in parts:
+    for part in (peak for trials in apart for peak in _peaks(trials, evidence)):
         step = 0.5 * STEP / span
         ends = unevenly(effect, np.array([frequency[part].max() + step, max(frequency[part].min() - step, 1e-9)]))
         period = _within(unevenly(effect, frequency[part]), weight[part], effect.shape[0].unit, ends)
@@ -77,13 +81,22 @@ def modes_of(found: Found, index: int) -> tuple[Mode, ...]:
     return tuple(sorted((m for m in found_modes if m.probability > _TOLD), key=lambda m: -m.probability))
 
 
-def resolved(found: Found, index: int, modes: tuple[Mode, ...]) -> bool:
-    """Whether the positions tell one period from all others, and hold a whole one: less is a bow, or any other curve."""
-    effect = effect_of(found.first.explanations[index])
-    axis = effect.shape[0].period_along if effect.shape else None
-    if axis is None:
-        return True
-    return modes[0].probability >= RESOLVED and modes[0].period.interval95[1] <= _span(found, axis)
+def whole(found: Found, index: int, mode: Mode) -> bool:
+    """Whether the readings hold a whole period of an effect: less is a bow, or any other curve."""
+    axis = effect_of(found.first.explanations[index]).shape[0].period_along
+    return axis is None or mode.period.interval95[1] <= _span(found, axis)
+
+
+def _peaks(trials: Ints, evidence: Floats) -> Iterator[Ints]:
+    """Trials in order of frequency, parted at the deepest valley between two peaks, and so on."""
+    log = evidence[trials]
+    lower = np.minimum(np.maximum.accumulate(log), np.maximum.accumulate(log[::-1])[::-1])
+    valley = int(np.argmin(log - lower))
+    if log[valley] - lower[valley] < np.log(_VALLEY):
+        yield from _peaks(trials[:valley], evidence)
+        yield from _peaks(trials[valley:], evidence)
+    else:
+        yield trials
 
 
 def _span(found: Found, axis: str) -> float:

@@ -29,6 +29,9 @@ _MORE, _ENOUGH = 256, 32
 """Drawn from what the recording says, with and without something missing; how many draws must matter for none of these."""
 
 
+_NANOMETRE = 1e-6
+"""mm: noise is not taken for less."""
+
 _READINGS = 24
 """Sizes of the reading noise that are tried beside a display's steps."""
 
@@ -59,12 +62,15 @@ def kinds(
         Marginal(linear, components, estimate),
         Marginal(_with_rivals(linear, rivals), components, _without_rivals(estimate, rivals.shape[1])),
     )
-    few = [_Density.of(marginal, components.fewer) for marginal in either]
+    taken = (0.0, _determined(linear, rivals, estimate.sigma_of_residuals))
+    few = [_Density.of(*each, components.fewer) for each in zip(either, taken, strict=True)]
     shapes = Shapes(drawn_shapes(components), np.full(SHAPES, 1 / SHAPES))
     shares = [density.share(shapes) for density in few]
     if SLOW in components.possible and min(1 / np.sum(share**2) for share in shares) < _ENOUGH:
         quick = np.mean(shares, axis=0) @ components.fewer.quick(components.sizes(shapes.latent))
-        told = few if quick < NEGLIGIBLE else [_Density.of(marginal, components) for marginal in either]
+        told = few
+        if quick >= NEGLIGIBLE:
+            told = [_Density.of(*each, components) for each in zip(either, taken, strict=True)]
         shapes = _more(shapes, told)
         shares = [density.share(shapes) for density in told]
     kept, weight = _representative(components.sizes(shapes.latent), shapes.weight, np.mean(shares, axis=0))
@@ -114,24 +120,29 @@ class _Density:
     ----------
     marginal : with the noise in its own size, not that for a unit.
     sigma : mm, near which the reading noise is.
+    count : observations that are left for the noise.
     """
 
     marginal: Marginal
     sigma: float
+    count: float
 
     @classmethod
-    def of(cls, marginal: Marginal, components: Components) -> _Density:
-        """Of a model's marginal density, with components for a unit."""
-        sigma = marginal.estimate.sigma_of_residuals or 1.0
-        return cls(replace(marginal, noise=replace(components, display=sigma * components.display)), sigma)
+    def of(cls, marginal: Marginal, taken: float, components: Components) -> _Density:
+        """Of a model's marginal density, ``taken`` observations being used up by rivals, with components for a unit."""
+        sigma, count = marginal.estimate.sigma_of_residuals or 1.0, max(marginal.estimate.degrees_of_freedom - taken, 1)
+        return cls(replace(marginal, noise=replace(components, display=sigma * components.display)), sigma, count)
 
     def log_probability(self, shapes: Floats) -> Floats:
-        """Of each shape (n,): the sum of squares has a gamma distribution given the shape."""
+        """Of each shape (n,): the sum of squares has a gamma distribution given the shape.
+
+        Its degrees of freedom are those of the noise alone: what any noise leaves of the coefficients' prior goes with its
+        size, to the power of how many the recording determines.
+        """
         at = shapes.copy()
         at[:, 0] += np.log(self.sigma)
         log, squares = self.marginal.log_likelihood(self.marginal.noise.sizes(at))
-        count = max(self.marginal.estimate.degrees_of_freedom, 1)
-        value = log - 0.5 * count * np.log(np.maximum(squares, 1e-12))
+        value = log - 0.5 * self.count * np.log(np.maximum(squares, 1e-12))
         return np.where(np.isfinite(value), value, -np.inf)
 
     def share(self, shapes: Shapes) -> Floats:
@@ -167,9 +178,13 @@ def _more(shapes: Shapes, densities: Sequence[_Density]) -> Shapes:
 
 
 def _representative(sizes: Sizes, prior: Floats, share: Floats) -> tuple[list[int], Floats]:
-    """Shapes that stand for all, and their weights: those of what each stands for (systematic resampling)."""
+    """Shapes that stand for all, and their weights: those of what each stands for (systematic resampling).
+
+    They are taken in an order in which neighbours are alike, by slow noise first, so that each kind of it has its places:
+    whether there is any is what the evidence of an effect depends on most.
+    """
     table = np.column_stack(
-        [sizes.reading, sizes.placing, sizes.growth, sizes.slow, np.where(sizes.slow > 0, sizes.rate, 0)]
+        [np.where(sizes.slow > 0, sizes.rate, 0), sizes.slow, sizes.placing, sizes.growth, sizes.reading]
     )
     _, first, index = np.unique(np.round(table, 9), axis=0, return_index=True, return_inverse=True)
     before, part = (np.bincount(index.ravel(), each, len(first)) for each in (prior, share))
@@ -186,6 +201,17 @@ def _representative(sizes: Sizes, prior: Floats, share: Floats) -> tuple[list[in
     weight = np.where(certain, 1.0, taken) * before
     chosen = np.flatnonzero(weight > 0)
     return first[chosen].tolist(), np.asarray(weight[chosen], dtype=np.float64)
+
+
+def _determined(linear: LinearModel, rivals: Floats, sigma: float) -> float:
+    """How many coefficients of columns (m, r) with standard deviation one a recording determines beside its model."""
+    if not rivals.shape[1]:
+        return 0.0
+    basis, s, _ = np.linalg.svd(linear.reduced.design, full_matrices=False)
+    basis = basis[:, s > 1e-9 * s.max(initial=0.0)]
+    rest = linear.reduce(rivals)
+    strengths = np.linalg.eigvalsh((rest - basis @ (basis.T @ rest)).T @ rest) / max(sigma, _NANOMETRE) ** 2
+    return float(np.sum(np.maximum(strengths, 0.0) / (1 + np.maximum(strengths, 0.0))))
 
 
 def _with_rivals(linear: LinearModel, rivals: Floats) -> LinearModel:

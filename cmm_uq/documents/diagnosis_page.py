@@ -143,7 +143,7 @@ def _effect(found: Diagnosed, item: LeftOut) -> Facts:
     """One effect: what it is, how large, what to look at, how sure."""
     d = found.diagnosis
     size = size_of(effect_of(item.effect, d.after.effects), item.parameters)
-    told = (say("{size:capital}.", size=size), other_periods(item.modes), contained(found.simulated, item.effect))
+    told = (say("{size:capital}.", size=size), other_periods(item), contained(found.simulated, item.effect))
     return Facts((
         (say("Effect"), item.title),
         (say("Size"), sentences(filter(None, told))),
@@ -286,7 +286,11 @@ def _consequences(found: Diagnosed) -> tuple[Block, ...]:
         note = say(
             "± is the expanded uncertainty for 95 %, for repetitions of the recording with the correction as it stands."
         )
-        blocks.append(Table(say("Figures of performance"), heads, tuple(rows), (note,)))
+        known = say(
+            "What was found repeats as it is and is no noise here, neither as recorded nor corrected. A certificate is of the "
+            "job's own model: what that leaves out counts as noise in its uncertainties of the same figures."
+        )
+        blocks.append(Table(say("Figures of performance"), heads, tuple(rows), (note, known)))
     decisions = tuple(
         (
             say("{standard}, {quantity}", standard=Verbatim(before.facts.standard), quantity=before.quantity),

@@ -90,7 +90,7 @@ def sentence(item: LeftOut, gain: Improvement, own: Iterable[Effect] = ()) -> Te
         title=item.title, size=size_of(effect_of(item.effect, own), item.parameters), points_to=item.points_to,
         sure=sure(item), gain=held_out(gain),
     )  # fmt: skip
-    return after(told, other_periods(item.modes))
+    return after(told, other_periods(item))
 
 
 def sure(item: LeftOut) -> Text:

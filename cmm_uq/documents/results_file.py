@@ -156,7 +156,8 @@ def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
     return {
         "effect": item.effect, "probability": item.probability, "probability_together": item.together,
         "group": list(item.group), "explained": item.explained, "parameters": _quantities(item.parameters),
-        **({"other_periods_mm": periods_data(item.modes)} if item.modes else {}), "words": sentence(item, gain),
+        **({"other_periods_mm" if item.settled else "periods_mm": periods_data(item.modes)} if item.modes else {}),
+        "words": sentence(item, gain),
     }  # fmt: skip
 
 

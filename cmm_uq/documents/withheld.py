@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from cmm_uq.diagnosis.asserting import Withheld
+from cmm_uq.diagnosis.diagnosis import LeftOut
 from cmm_uq.diagnosis.periods import Mode
 from cmm_uq.documents.wording import probability
 from cmm_uq.messages import NOTHING, Text, commas, say
@@ -26,9 +27,17 @@ def sentences(withheld: Sequence[Withheld]) -> list[Text]:
     ]  # fmt: skip
 
 
-def other_periods(modes: Sequence[Mode]) -> Text:
+def other_periods(item: LeftOut) -> Text:
     """A sentence on further periods that fit, to follow that on an effect; nothing where there are none."""
-    return say("Other periods that fit: {periods}.", periods=_listed(modes)) if modes else NOTHING
+    if not item.modes:
+        return NOTHING
+    if item.settled:
+        return say("Other periods that fit: {periods}.", periods=_listed(item.modes))
+    return say(
+        "The positions do not tell its period; a correction would hold where was measured, not between. "
+        "Periods that fit: {periods}.",
+        periods=_listed(item.modes),
+    )  # fmt: skip
 
 
 def withheld_data(withheld: Sequence[Withheld]) -> list[dict[str, Any]]:
@@ -42,9 +51,15 @@ def withheld_data(withheld: Sequence[Withheld]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def periods_data(modes: Sequence[Mode]) -> list[dict[str, float]]:
+def periods_data(modes: Sequence[Mode]) -> list[dict[str, Any]]:
     """Every period that fits, for results.json."""
-    return [{"value": m.period.value, "u": m.period.u, "probability": m.probability} for m in modes]
+    return [
+        {
+            "value": m.period.value, "u": m.period.u, "interval95": list(m.period.interval95),
+            "probability": m.probability,
+        }
+        for m in modes
+    ]  # fmt: skip
 
 
 def _told(modes: Sequence[Mode]) -> Text:

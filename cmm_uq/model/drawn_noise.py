@@ -65,7 +65,7 @@ class Noise:
 
 def distances_in_placing(xyz: Floats, points: Points) -> Floats:
     """Distance (n,), mm, of each point from the first of its placing."""
-    order = np.lexsort((points.point, points.measurement))
+    order = np.lexsort((points.repeat, points.point, points.measurement))
     _, starts, index = np.unique(points.measurement[order], return_index=True, return_inverse=True)
     first = np.empty(len(order), dtype=np.int64)
     first[order] = order[starts][index.ravel()]

@@ -23,8 +23,15 @@ _LEAST_TIMES = 8
 _WHOLE = 100
 """Repeats whose mean and contrasts are one matrix without zeros; of more the matrix would fill the memory."""
 
-_LEAST_SPREAD = 1.5
-"""Longest over median length from which on noise may be seen to grow with it."""
+_LEAST_SPREAD = 1.45
+"""Longest over median length from which on noise may be seen to grow with it.
+
+Of three by three places, seen from a corner, they are 1.41, of four by four 1.5: the last digits of a recording decide of
+neither.
+"""
+
+_NO_LENGTH = 1e-3
+"""Part of the longest length that is none."""
 
 
 def noise_of(
@@ -62,8 +69,7 @@ def noise_of(
     slow, frequency, gap, part = _slow(model, chosen, sensitivity, along)
     possible = {
         AXES: _axes_differ(axes), PLACING: bool(np.any(np.bincount(block) > 1)),
-        GROWTH: bool(length.max() > _LEAST_SPREAD * np.median(length[length > 0])) if np.any(length > 0) else False,
-        SLOW: slow.shape[1] > 0,
+        GROWTH: _lengths_differ(length), SLOW: slow.shape[1] > 0,
     }  # fmt: skip
     return Components(
         turn, shares, slow, frequency, tuple(name for name, can in possible.items() if can), model.sigma, gap, step,
@@ -201,6 +207,12 @@ def _axes_differ(axes: Floats) -> bool:
     """Whether at least two axes show, and not in one proportion throughout."""
     parts = axes / axes.sum(axis=1, keepdims=True)
     return bool(np.sum(np.ptp(parts, axis=0) > _LEAST_SHARE) >= 2)
+
+
+def _lengths_differ(length: Floats) -> bool:
+    """Whether lengths (m,) differ by so much that noise may be seen to grow with them."""
+    longer = length[length > _NO_LENGTH * length.max(initial=0.0)]
+    return bool(len(longer)) and bool(longer.max() > _LEAST_SPREAD * np.median(longer))
 
 
 def growing_lengths(model: MeasurementModel, xyz: Floats) -> Floats:

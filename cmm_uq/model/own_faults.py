@@ -1,9 +1,10 @@
 """What may be wrong with an artefact itself, as large and as likely as what is known of it allows.
 
-Sizes and weights are judgements, stated here once. A certificate with an uncertainty leaves little: three times its standard
-uncertainty, a tenth as readily thought of as an error of the machine; ten times more rarely it is plainly wrong, or the
-artefact has changed since, and may then be off like one without a certificate. Where nothing
-is certified it is the other way round: holes and balls were placed by a machine, and mostly by a worse one than the machine
+Sizes and weights are judgements, stated here once. A certificate with an uncertainty leaves little: mostly three times its
+standard uncertainty, and is less readily doubted than the machine. One time in three it is plainly wrong, or the artefact has
+changed since, and may then be off like one without a certificate: what a single set-up shows beyond the certificate's
+uncertainty is the artefact's with odds of one to ten, and both are named until another set-up tells. Where nothing is
+certified it is the other way round: holes and balls were placed by a machine, and mostly by a worse one than the machine
 that measures them.
 """
 
@@ -30,11 +31,15 @@ _CERTIFICATES = 3.0
 _LEAST_UM = 0.1
 """However small the uncertainty that a certificate states: balls have dirt on them, and glue creeps."""
 
-_CERTIFIED, _CHANGED, _UNKNOWN = 0.1, 0.3, 2.0
-"""Weights of faults: of a certified artefact, of one compared with itself at an earlier date, of an uncalibrated one."""
+_CERTIFIED, _CHANGED, _UNKNOWN, _ROUND = 0.3, 0.3, 2.0, 0.1
+"""Weights of faults: of a certified artefact, of one compared with itself at an earlier date, of an uncalibrated one, and of
+a sphere's form."""
 
 _MEASURED_KELVIN, _ASSUMED_KELVIN = 0.3, 1.0
 """Standard deviation of the artefact's temperature where it was recorded, and where it was not."""
+
+_FAR_KELVIN = 3.0
+"""The same, one time in three, where a thermometer is wrong, hangs elsewhere, or the artefact came from another room."""
 
 _TEMPERATURE = 0.3
 """Weight of the artefact's temperature: rooms and thermometers are mostly right; of two dates, nothing is likelier."""
@@ -118,14 +123,15 @@ def faults(
 def temperatures(own: Owner, weight: float) -> Iterable[Effect]:
     """That the artefact had another temperature than is known: in all set-ups, or in each its own."""
     kelvin = _MEASURED_KELVIN if "temp_artefact_c" in own.points.columns else _ASSUMED_KELVIN
-    yield TEMPERATURE.made(replace(own, size=kelvin, weight=weight, mostly=1.0))
+    far = replace(own, size=_FAR_KELVIN, weight=weight, mostly=kelvin / _FAR_KELVIN)
+    yield TEMPERATURE.made(far)
     if len(np.unique(own.points.measurement)) > 1:
-        yield SET_UP_TEMPERATURE.made(replace(own, size=kelvin, weight=weight * _TEMPERATURE, mostly=1.0))
+        yield SET_UP_TEMPERATURE.made(replace(far, weight=weight * _TEMPERATURE))
 
 
 def temperature_of(facts: ArtefactFacts, points: Points) -> Effect:
     """That an artefact of one length had another temperature than is known, or another length than is certified."""
-    own = Owner(Body.of(points, points.xyz), points, 0.0, _CERTIFIED, 1, expansion_of(facts))
+    own = Owner(Body.of(points, points.xyz), points, 0.0, _TEMPERATURE, 1, expansion_of(facts))
     return next(iter(temperatures(own, _TEMPERATURE)))
 
 
@@ -137,7 +143,7 @@ def form_faults(facts: ArtefactFacts, form_um: float | None, points: Points) -> 
     form_um : form deviation by its certificate, µm, which is about four standard deviations of it.
     """
     um = _UNKNOWN_FORM_UM if form_um is None else max(form_um, _LEAST_FORM_UM) / _FORM
-    own = Owner(Body.of(points, points.xyz), points, um, _CERTIFIED, 3, expansion_of(facts))
+    own = Owner(Body.of(points, points.xyz), points, um, _ROUND, 3, expansion_of(facts))
     yield LOBES.made(own)
     yield FORM.made(replace(own, size=um / len(FORM.made(own).coefficients) ** 0.5))
 

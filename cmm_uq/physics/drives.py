@@ -31,7 +31,13 @@ class PeriodicScale(Harmonic):
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
         """See :meth:`Effect.meaning`."""
-        amplitude, period = (amounts[parameter.name].size for parameter in (self.amplitude, self.shape[0]))
+        amplitude = amounts[self.amplitude.name].size
+        if self.shape[0].name not in amounts:
+            return say(
+                "the error of {axis} swings to either side by {amplitude} and repeats with one of several periods",
+                axis=Verbatim(self.axis.upper()), amplitude=amplitude,
+            )  # fmt: skip
+        period = amounts[self.shape[0].name].size
         return say(
             "the error of {axis} swings to either side by {amplitude} and repeats every {period}",
             axis=Verbatim(self.axis.upper()), amplitude=amplitude, period=period,

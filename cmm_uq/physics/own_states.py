@@ -64,7 +64,7 @@ class OfSetUps(OwnFault, CommonSize):
     def made(self, owner: Owner) -> OwnFault:
         """See :meth:`OwnFault.made`."""
         found = copy(self)
-        found.owner, found.coefficients = owner, self.sized(owner)
+        found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
         found.size = Parameter(self.size.name, self.size.unit, owner.size)
         return found
 

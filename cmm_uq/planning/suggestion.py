@@ -379,7 +379,10 @@ def _size(after: MeasurementModel, name: str, group: Sequence[str]) -> Floats:
     """Size at which one effect of a group, without the others, explains the recording, over its prior standard deviation."""
     others = tuple(effect for effect in after.effects if effect.name not in group)
     model = _with_all(replace(after, effects=others), [name])
-    value = model.estimate().least_squares.value / scales(model.unknowns)
+    try:
+        value = model.estimate().least_squares.value / scales(model.unknowns)
+    except CmmUqError:  # alone it would have to be larger than any machine's: as large as physics allows
+        value = np.ones(len(model.unknowns))
     return np.asarray([v for v, u in zip(value, model.unknowns, strict=True) if u.key[0] == name], dtype=np.float64)
 
 

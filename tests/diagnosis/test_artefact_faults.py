@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.diagnosis.diagnosis import Diagnosis, diagnose
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.kinds import artefact_facts, artefact_of
 from cmm_uq.model import MeasurementModel
@@ -61,9 +62,9 @@ def like_a_yaw(yaw: float) -> Floats:
     return found
 
 
-def diagnosed(points: Points, named: Sequence[str] = IN_PLANE) -> Diagnosis:
-    model = MeasurementModel(artefact_of(DRILLED, points), effects(named))
-    return diagnose(model, stated_um=1.0, alpha=0.01, seed=0, observe=lambda some: artefact_of(DRILLED, some))
+def diagnosed(points: Points, named: Sequence[str] = IN_PLANE, facts: ArtefactFacts = DRILLED) -> Diagnosis:
+    model = MeasurementModel(artefact_of(facts, points), effects(named))
+    return diagnose(model, stated_um=1.0, alpha=0.01, seed=0, observe=lambda some: artefact_of(facts, some))
 
 
 @cache
@@ -121,6 +122,16 @@ def test_in_one_attitude_nothing_tells_the_plate_from_the_machine() -> None:
     assert item.effect == "artefact_rotation_x_z", "of an uncalibrated plate its holes are the likelier cause"
     assert 0.5 < item.probability < 0.8, "twice as likely beforehand, and no better beside the recording"
     assert item.together > 0.98
+
+
+def test_in_one_attitude_a_certificate_speaks_for_the_plate_as_far_as_its_uncertainty() -> None:
+    """Nothing else tells the two apart: holes 5 µm off, by a certificate of 0.5 µm, may be the machine's or the plate's."""
+    certified = artefact_facts(kind="plate", u_um=0.5)
+    found = diagnosed(recorded([AS_IT_LIES], like_a_yaw(40.0)), facts=certified)
+    (item,) = found.effects
+    assert item.effect == "rotation_x_z"
+    assert 0.85 < item.probability < 0.95, "ten to one beforehand"
+    assert ("rotation_x_z", "artefact_rotation_x_z") in [group[:2] for group in found.indistinguishable]
 
 
 def test_turning_the_plate_is_what_is_suggested() -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from cmm_uq.diagnosis import diagnosis
 from cmm_uq.diagnosis.asserting import _holds_zero, _phase_known, group_of
 from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
+from cmm_uq.diagnosis.comparison.search import asserted
 from cmm_uq.diagnosis.diagnosis import LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.diagnosis_words import sentence
@@ -15,6 +19,7 @@ from cmm_uq.messages import say
 from cmm_uq.physics.effect import Nonparametric
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import unit
+from tests.diagnosis.test_invariance import diagnosed, recording
 
 DRAWS = np.random.default_rng(2).standard_normal((20_000, 2))
 
@@ -56,6 +61,37 @@ def test_a_group_is_what_could_stand_in_the_place_of_an_effect() -> None:
 def test_a_function_belongs_to_it_where_effects_alone_are_no_more_than_one_half() -> None:
     found = combinations(((0,), 0.3), ((2,), 0.005), ((3,), 0.695))
     assert group_of(found, frozenset({0}), 0) == {3}
+
+
+def test_effects_that_a_function_could_be_are_named_with_it_one_after_the_other() -> None:
+    """The most probable effects; the second by what it has where the first is found, 0.25 of 0.3."""
+    found = combinations(((3,), 0.65), ((0, 1), 0.25), ((0,), 0.05), ((2,), 0.05))
+    assert asserted(found) == {0, 1}
+    assert asserted(combinations(((3,), 0.65), ((0, 1), 0.04), ((0,), 0.26), ((2,), 0.05))) == {0}
+    assert asserted(combinations(((3,), 0.78), ((0,), 0.12), ((2,), 0.1))) == {0}, (
+        "by 0.22 with what cannot be told from it"
+    )
+    assert asserted(combinations(((3,), 0.82), ((0,), 0.1), ((2,), 0.08))) == frozenset(), "improbable even so"
+
+
+def test_effects_that_a_function_could_not_be_are_not_named_with_it() -> None:
+    found = combinations(((3,), 0.65), ((0,), 0.3), ((2,), 0.05))
+    strange = [replace(e, imitated_by=()) for e in found.explanations]
+    assert asserted(found) == {0}
+    assert asserted(replace(found, explanations=strange)) == frozenset()
+    assert asserted(replace(found, explanations=strange, imitated={0: frozenset({3})})) == {0}, (
+        "as this recording shows it"
+    )
+
+
+def test_what_held_out_placings_do_not_bear_out_is_said_to_be_withheld(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a comparison that finds no gain; what remains is unexplained."""
+    monkeypatch.setattr(diagnosis, "improvement", lambda *_: Improvement(4.0, 1.0, 4.0, 4.0, 0.5, 1.0))
+    found = diagnosed(recording())
+    assert (found.verdict, found.effects) == ("unexplained", ())
+    (withheld,) = found.withheld
+    assert withheld.effect == "hysteresis_x"
+    assert "does not predict set-ups that the fit had not seen" in withheld.why
 
 
 def test_below_one_half_the_sentence_names_the_group() -> None:

@@ -11,10 +11,11 @@ import pytest
 from cmm_uq.commands.diagnosing import screened_model
 from cmm_uq.commands.reading import read_job
 from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Sizes
-from cmm_uq.kinds import kind_of
+from cmm_uq.kinds import artefact_facts, artefact_of, kind_of
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.model.noise import mean_and_contrasts, noise_of
 from cmm_uq.points import Floats
+from tests.kinds.constructions import plate
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -73,6 +74,26 @@ def test_the_order_of_the_rows_says_nothing_without_a_time() -> None:
 @pytest.mark.parametrize(("name", "cosines"), [("plate-simulated", 3 * 73), ("sphere-simulated", 3 * 25)])
 def test_observations_along_one_axis_each_see_more_cosines_than_those_along_several(name: str, cosines: int) -> None:
     assert noise_of(example(name, 2, timed=True)).slow.shape[1] == cosines
+
+
+@pytest.mark.parametrize(("side", "grows"), [(3, False), (4, True)])
+def test_the_last_digits_of_a_square_plate_do_not_decide_whether_noise_may_grow(side: int, *, grows: bool) -> None:
+    """Its longest distance from a corner is √2 and 1.5 times the median one, whatever noise and order it is read with."""
+    points = plate([(0.0, 0.0, 0.0), (0.0, 0.0, 90.0)], side=side)
+    twice = replace(
+        points, xyz=np.tile(points.xyz, (2, 1)), measurement=np.tile(points.measurement, 2), point=np.tile(points.point, 2),
+        repeat=np.repeat([1, 2], len(points)), columns={k: np.tile(v, 2) for k, v in points.columns.items()},
+        lines=np.arange(2 * len(points)),
+    )  # fmt: skip
+    random, facts = np.random.default_rng(3), artefact_facts(kind="plate", nominal=True)
+    for sd in (0.0, 1e-6, 1e-3, 1e-2):
+        order = random.permutation(len(twice))
+        read = replace(
+            twice, xyz=(twice.xyz + random.normal(0, sd, twice.xyz.shape))[order], measurement=twice.measurement[order],
+            point=twice.point[order], repeat=twice.repeat[order], columns={k: v[order] for k, v in twice.columns.items()},
+        )  # fmt: skip
+        possible = noise_of(MeasurementModel(artefact_of(facts, read), ())).possible
+        assert (GROWTH in possible) is grows, sd
 
 
 def test_turning_keeps_every_length() -> None:

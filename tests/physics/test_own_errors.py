@@ -214,7 +214,7 @@ def test_a_kind_has_only_the_faults_that_it_can_have(facts: object, points: Poin
 def test_a_certificate_leaves_less_than_a_drawing_and_is_rarely_thought_of() -> None:
     certified = artefact_of(artefact_facts(kind="plate", u_um=0.5), PLATE).faults["artefact_pattern"]
     drilled = of("artefact_pattern")
-    assert certified.prior_weight == pytest.approx(0.1)
+    assert certified.prior_weight == pytest.approx(0.3)
     assert drilled.prior_weight == pytest.approx(2.0)
     assert certified.mostly * certified.coefficients[0].prior_sd == pytest.approx(1.5), "three standard uncertainties"
     assert drilled.mostly == 1

@@ -63,6 +63,9 @@ def test_something_unknown_is_recognised_by_the_verdict() -> None:
 
 def test_an_effect_is_there_by_itself_or_with_its_group() -> None:
     assert there("drift_x", TRUTH, {"drift_x", "scale_x"}) == (False, True)
+    outside = {"kind": "outside", "hidden": {}}
+    assert there("drift_x", outside, ("scale_x", "error along X as a function of the place")) == (False, True)
+    assert there("drift_x", outside, ("scale_x",)) == (False, False)
     assert there("artefact_pattern", {"kind": "artefact, pattern", "hidden": {}}, ()) == (True, True)
 
 

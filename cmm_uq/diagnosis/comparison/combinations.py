@@ -7,7 +7,7 @@ known effect has its posterior probability by summing over the combinations that
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -49,10 +49,12 @@ class Combinations:
     ----------
     explanations : of which they are made.
     found : by the indices of their explanations.
+    imitated : nonparametric terms that leave next to nothing of an effect in this recording.
     """
 
     explanations: Sequence[Explanation]
     found: Mapping[Key, Combination]
+    imitated: Mapping[int, Key] = field(default_factory=dict)
 
     @cached_property
     def probability(self) -> dict[Key, float]:
@@ -77,6 +79,12 @@ class Combinations:
         """Of the most probable combination with these known effects, or more."""
         keys = [key for key in self.found if self.effects_of(key) >= effects]
         return self.found[max(keys, key=lambda key: self.found[key].log_posterior)].versions
+
+    def imitating(self, index: int) -> Key:
+        """Nonparametric terms that could pass for an effect: by its form, or in this recording."""
+        effect = self.explanations[index]
+        by_form = {j for j, function in enumerate(self.explanations) if function.could_be(effect)}
+        return frozenset(by_form) | self.imitated.get(index, frozenset())
 
     def unknown_beside(self, effects: Key) -> float:
         """Probability that something unknown acts besides, given these known effects."""

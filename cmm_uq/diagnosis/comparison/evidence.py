@@ -334,6 +334,13 @@ class Comparison:
                 most[column] = flat[at[column], column]
         return found
 
+    def left_of(self, version: Version, given: Sequence[Version]) -> float:
+        """Part of the squared visible length of a version that is left beside what is given."""
+        columns = self._columns(version)
+        alone, beside = (self._weigh(columns, others).squares.sum(axis=1) for others in ((), given))
+        probability = self.noise_probability(given)
+        return float(probability @ beside / max(float(probability @ alone), 1e-300))
+
     def log_evidence_of(self, given: Sequence[Version], left: Floats | None = None) -> Floats:
         """Log evidence (b,) of what is given, at its size, for data (m, b)."""
         known = self._beside(left, given)

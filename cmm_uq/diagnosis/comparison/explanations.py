@@ -35,7 +35,7 @@ _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
 _ROUGH = 0.25
 """Probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest."""
 
-_BEYOND = 0.1
+_BEYOND = 0.5
 """How readily an effect is thought of beyond the size that it mostly keeps to (:attr:`Effect.mostly`)."""
 
 _MOST_PERIODS, _MOST_SHORTER = 240, 800

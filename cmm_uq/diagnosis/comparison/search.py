@@ -15,7 +15,16 @@ from scipy import special
 
 from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.diagnosis.comparison.evidence import Comparison
-from cmm_uq.diagnosis.comparison.explanations import Explanation, Member, finer, known, several, shorter
+from cmm_uq.diagnosis.comparison.explanations import (
+    EFFECT,
+    UNKNOWN,
+    Explanation,
+    Member,
+    finer,
+    known,
+    several,
+    shorter,
+)
 from cmm_uq.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Version
 from cmm_uq.diagnosis.comparison.unknown_functions import unknown
@@ -52,6 +61,9 @@ _IMPROBABLE = 12.0
 
 _AGAIN = 3
 """Times that everything is compared again about what was found."""
+
+_PASSES = 0.1
+"""Part of an effect's squared visible length up to which a nonparametric term that leaves no more of it could pass for it."""
 
 NOT_TOLD_APART = 0.02
 """Odds from which another effect in the place of one counts as not told apart from it."""
@@ -167,6 +179,7 @@ def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: i
         ]
         first = replace(first, comparison=replace(first.comparison, explanations=explanations))
         combinations = explore(first.comparison, combinations, frozenset(shaped))
+    combinations = replace(combinations, imitated=_imitated(first.comparison, combinations))
     chosen = asserted(combinations)
     versions = combinations.versions(chosen)
     found = model if not chosen else with_effects(first, versions, chosen)
@@ -252,8 +265,46 @@ def _gains(first: ModelComparison, explanation: Explanation, others: Sequence[Ve
 def asserted(combinations: Combinations) -> Key:
     """The most probable set of known effects, without those that something else could well be instead."""
     chosen = max(combinations.of_effects, key=lambda key: combinations.of_effects[key])
+    if not chosen:
+        return _in_place_of_functions(combinations)
     doubtful = [i for i in chosen if combinations.of(i) < ASSERTED and with_rivals(combinations, chosen, i) < ASSERTED]
     return (chosen - frozenset(doubtful)) | _of_any_form(combinations, chosen)
+
+
+def _in_place_of_functions(combinations: Combinations) -> Key:
+    """Effects to which nothing is more probable than one or two nonparametric terms that could pass for all of them.
+
+    They are the most probable set of known effects. Each is asserted as one of a group, to which the terms belong, if it or an
+    effect that cannot be told from it is probable enough to be named at all, where those before it are taken as found.
+    """
+    known = {key: p for key, p in combinations.of_effects.items() if key}
+    best = max(known, key=lambda key: known[key]) if known else frozenset()
+    found: Key = frozenset()
+    for i in sorted(best, key=lambda i: -combinations.of(i)):
+        alike = rivals_of(combinations, best, i) | {i}
+        beside = sum(p for key, p in known.items() if found <= key) if found else 1.0
+        own = sum(p for key, p in known.items() if found <= key and alike & key)
+        if own >= _MECHANISM * beside and combinations.of_any(alike | combinations.imitating(i)) >= ASSERTED:
+            found |= {i}
+    return found
+
+
+def _imitated(comparison: Comparison, combinations: Combinations) -> dict[int, Key]:
+    """Of each effect that may be asserted, the probable functions that leave next to nothing of it."""
+    probable = [i for i in range(len(combinations.explanations)) if combinations.of(i) > _PROBABLE]
+    kinds = {kind: [i for i in probable if combinations.explanations[i].kind == kind] for kind in (EFFECT, UNKNOWN)}
+    best = {i: _version(combinations, i) for i in probable}
+    return {
+        i: frozenset(j for j in kinds[UNKNOWN] if comparison.left_of(best[i], [best[j]]) < _PASSES)
+        for i in kinds[EFFECT]
+    }
+
+
+def _version(combinations: Combinations, index: int) -> Version:
+    """The version of an explanation in the most probable combination that contains it."""
+    keys = [key for key in combinations.found if index in key]
+    most = max(keys, key=lambda key: combinations.found[key].log_posterior)
+    return next(v for v in combinations.found[most].versions if v.explanation == index)
 
 
 def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
@@ -263,23 +314,17 @@ def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
     """
     found = set()
     instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
-    for j, function in enumerate(combinations.explanations):
-        for i, effect in enumerate(combinations.explanations):
-            if not function.could_be(effect) or i in instead or combinations.of(i) < _MECHANISM:
-                continue
-            if combinations.of_any(frozenset((i, j))) >= ASSERTED:
-                found.add(i)
+    for i, effect in enumerate(combinations.explanations):
+        if effect.kind != EFFECT or i in instead or combinations.of(i) < _MECHANISM:
+            continue
+        if any(combinations.of_any(frozenset((i, j))) >= ASSERTED for j in combinations.imitating(i)):
+            found.add(i)
     return frozenset(found)
 
 
 def _less_than_function(combinations: Combinations, index: int) -> bool:
     """Whether an effect is less probable than a nonparametric term that could be it: its form is not the effect's own."""
-    effect = combinations.explanations[index]
-    return any(
-        combinations.of(j) > combinations.of(index)
-        for j, function in enumerate(combinations.explanations)
-        if function.could_be(effect)
-    )
+    return any(combinations.of(j) > combinations.of(index) for j in combinations.imitating(index))
 
 
 def with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
