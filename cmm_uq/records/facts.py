@@ -1,0 +1,206 @@
+"""What records are asked for: machines, artefacts, certificates with their values, series of a value."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+STATES = ("draft", "released", "withdrawn", "replaced")
+"""States of a certificate."""
+
+STANDING = ("draft", "released")
+"""States of a certificate that counts: neither withdrawn nor replaced."""
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """A machine.
+
+    Parameters
+    ----------
+    serial : by which it is asked for; its name where it has no serial number. Of two machines with one serial number the
+        second has its manufacturer behind it.
+    name, manufacturer, model, place : as its newest certificate has them.
+    adjusted : days on which it was adjusted, sorted.
+    by_name : whether it has no serial number and is recognised by its name.
+    """
+
+    serial: str
+    name: str
+    manufacturer: str
+    model: str
+    place: str
+    adjusted: tuple[dt.date, ...] = ()
+    by_name: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ArtefactRow:
+    """An artefact, with its newest certificate.
+
+    Parameters
+    ----------
+    serial : its serial number, or the number of its certificate, or its name.
+    kind : of the measurement it was last used in.
+    certificate, laboratory : of its own calibration.
+    calibrated, due : days of that.
+    """
+
+    serial: str
+    kind: str
+    certificate: str
+    laboratory: str
+    calibrated: dt.date | None
+    due: dt.date | None
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """One error factor, size or figure of performance of one certificate.
+
+    Parameters
+    ----------
+    name : ``scale_x.ppm``, ``artefact.length_mm``, ``accuracy.b89_range_um``, ``performance:E0``.
+    quantity : how it is called in the field, as printed.
+    unit : as printed.
+    value, u : estimate and standard uncertainty.
+    lower, upper : the stated 95 % interval.
+    u_artefact : part of ``u`` that comes from what is certified of the artefact, common to certificates made with the same
+        artefact; 0 where it is unknown.
+    limit : the value conforms while its amount is no larger; ``None`` where none is set.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    value: float
+    u: float
+    lower: float
+    upper: float
+    u_artefact: float = 0.0
+    limit: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """One certificate, interim check or diagnosis as recorded.
+
+    Parameters
+    ----------
+    entry : its number.
+    job : id of the job.
+    machine : serial of the machine.
+    artefact : serial of the artefact; empty where the job says nothing of it.
+    kind : of the measurement.
+    origin : measured, simulated or compensated.
+    day : of the measurement.
+    recorded : moment of recording.
+    adjusted_since : last adjustment of the machine before the recording, as the job or an entry says.
+    state : one of :data:`STATES`.
+    decision : the worst of its statements of conformity, in the words of results.json; ``none`` where it states none.
+    diagnosis : verdict of the diagnosis; empty where there is none.
+    interim : whether it is an interim check and no certificate.
+    folder : where its files are.
+    version : of the package that made it.
+    results_sha256 : of its results.json.
+    number : of the certificate.
+    command : that made it: report or diagnose.
+    values : what it states.
+    covariance : names, and lower triangle row by row, of what is stated with one.
+    """
+
+    entry: int
+    job: str
+    machine: str
+    artefact: str
+    kind: str
+    origin: str
+    day: dt.date
+    recorded: dt.datetime
+    adjusted_since: dt.date | None
+    state: str
+    decision: str
+    diagnosis: str
+    interim: bool
+    folder: str
+    version: str
+    results_sha256: str
+    number: str
+    command: str
+    values: tuple[Value, ...] = ()
+    covariance: tuple[tuple[str, ...], tuple[float, ...]] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """Who released, withdrew or replaced a certificate.
+
+    Parameters
+    ----------
+    entry : number of this entry.
+    certificate : number of the certificate's.
+    what : release, withdrawal or replacement.
+    by : the person.
+    reason : given.
+    at : moment.
+    replaced_by : number of the entry of the certificate in its place.
+    """
+
+    entry: int
+    certificate: int
+    what: str
+    by: str
+    reason: str
+    at: dt.datetime
+    replaced_by: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One value of one machine over its certificates and interim checks, by day; each array is (n,).
+
+    Parameters
+    ----------
+    name, quantity, unit : of the value.
+    limit : that the newest certificate with one sets.
+    day : of the measurement, proleptic Gregorian ordinal.
+    value, u, u_artefact : in the unit.
+    artefact : serials.
+    entry : numbers.
+    adjusted_since : day of the last adjustment before, ordinal; 0 where none is known.
+    interim : whether it is of an interim check.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    limit: float | None
+    day: NDArray[np.int64]
+    value: NDArray[np.float64]
+    u: NDArray[np.float64]
+    u_artefact: NDArray[np.float64]
+    artefact: NDArray[np.str_]
+    entry: NDArray[np.int64]
+    adjusted_since: NDArray[np.int64]
+    interim: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something that is not as it was recorded.
+
+    Parameters
+    ----------
+    kind : chain, index, file or missing: a file that is not there any more may only have been moved.
+    problem : in words.
+    entry : number of the entry that it is about.
+    """
+
+    kind: str
+    problem: str
+    entry: int | None = None
