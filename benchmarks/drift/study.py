@@ -36,7 +36,7 @@ from cmm_uq.recertification.crossing import DAYS, Crossings, crossings
 from cmm_uq.recertification.drift import History, side_by_side
 from cmm_uq.recertification.drift_filter import filtered
 from cmm_uq.recertification.drift_prior import default_prior
-from cmm_uq.recertification.fleet import Fleet, Member, fit_fleet
+from cmm_uq.recertification.fleet import Fleet, Member, belonging, fit_fleet
 
 HERE = Path(__file__).parent
 SEAL, RESULT = HERE / "seal.json", HERE / "result.json"
@@ -154,12 +154,14 @@ def told(life: Life) -> dict[str, object]:
 
 
 def run(seed: int, machines: int, calibrated: int, targets: Sequence[float]) -> dict[str, object]:
-    made = [machine for machine, _, _ in fleet(seed, machines)]
-    truth = np.array([crossed(machine) for machine in made])
-    for machine in made:
+    made, days = [], []
+    for machine, _, _ in fleet(seed, machines):
+        days.append(crossed(machine))
         machine.raw = machine.raw[:0]  # the future stays behind
+        made.append(machine)
+    truth = np.array(days)
     begun = time.process_time()
-    learnt = fit_fleet(members(made), learnt_from=100)
+    learnt = fit_fleet(members(made))
     fitted = time.process_time() - begun
     found = learnt.estimates.crossing
     assert found is not None
@@ -181,7 +183,7 @@ def run(seed: int, machines: int, calibrated: int, targets: Sequence[float]) -> 
         "rate_error": {
             "fleet": _rms(learnt.estimates.rate, made), "alone": _rms(alone.rate, made),
         },
-        "not_belonging": int((learnt.estimates.belongs == 0).sum()),
+        "not_belonging": int((~belonging(learnt.estimates.p)).sum()),
         "chains": {"rhat_max": learnt.chains.rhat_max, "ess_min": learnt.chains.ess_min, "steps": learnt.chains.steps,
                    "converged": learnt.chains.converged},
         "spreads": [[s.name, s.median, s.lower, s.upper] for s in learnt.spreads],

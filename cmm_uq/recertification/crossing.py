@@ -67,6 +67,13 @@ class Crossings:
         )
         return Crossings(last, parts[0].days, *rest)
 
+    def some(self, i: int) -> Crossings:
+        """Of one machine only."""
+        return Crossings(
+            self.last[i : i + 1], self.days, self.probability[i : i + 1], self.level[i : i + 1], self.u_level[i : i + 1],
+            self.rate[i : i + 1], self.u_rate[i : i + 1],
+        )  # fmt: skip
+
     def by(self, days: Floats) -> Floats:
         """Probability of having crossed by so many days after the last certificate, (N,)."""
         logs = _log_survival(self.probability)

@@ -10,20 +10,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Chains, run_ensembles
 from cmm_uq.inference.proposals import tempered
-from cmm_uq.points import Floats, Ints
+from cmm_uq.points import Floats
 from cmm_uq.recertification.crossing import Crossings, crossings
 from cmm_uq.recertification.drift import History, SideBySide, side_by_side
 from cmm_uq.recertification.drift_filter import Filtered, Start, filtered, usual_start
 from cmm_uq.recertification.drift_prior import MEDIANS, NAMES, SPREADS, Prior, learnt_prior, limit_for
 from cmm_uq.recertification.fleet_model import Shared, log_posterior, messages, others, shared_by, together
 
-LEARNT_FROM = 100
-"""Machines at most that the hyper-parameters are sampled from: they know a spread between machines to 7 %."""
+LEARNT_FROM = 200
+"""Machines at most that the hyper-parameters are sampled from: they know a spread between machines to 5 %."""
 
 DRAWS, LEAST_DRAWS, MANY = 24, 6, 20_000
 """Draws of the hyper-parameters that machines are estimated at: fewer where there are many machines."""
@@ -86,7 +87,6 @@ class Estimates:
     rate, u_rate : (N,) with the fleet as prior.
     expected, u_expected : (N,) what all others say of a machine of its model and place, before its own certificates.
     p : (N,) probability of a rate as far from that or farther, 1 where its certificates say nothing of it.
-    belongs : (N,) whether it passes at the rate of false discoveries.
     crossing : where there is a limit.
     """
 
@@ -95,7 +95,6 @@ class Estimates:
     expected: Floats
     u_expected: Floats
     p: Floats
-    belongs: Ints
     crossing: Crossings | None
 
 
@@ -287,7 +286,7 @@ def _estimated(
         parts.append((_rates(state, prior, some), crossings(few, prior, state, limit[which], paths=paths)))
     rate, u, expected, u_expected, p = np.concatenate([part for part, _ in parts], axis=1)
     crossing = Crossings.joined([part for _, part in parts]) if np.isfinite(limit).any() else None
-    return Estimates(rate, u, expected, u_expected, p, belonging(p), crossing)
+    return Estimates(rate, u, expected, u_expected, p, crossing)
 
 
 def _rates(state: Filtered, prior: Prior, start: Start) -> Floats:
@@ -313,10 +312,10 @@ def _rates(state: Filtered, prior: Prior, start: Start) -> Floats:
     return np.stack([mean, np.sqrt(total), expected, u_expected, p])
 
 
-def belonging(p: Floats, false_discoveries: float = FALSE_DISCOVERIES) -> Ints:
-    """1 where a machine belongs, 0 where not: Benjamini and Hochberg's step-up procedure over (N,) probabilities."""
+def belonging(p: Floats, false_discoveries: float = FALSE_DISCOVERIES) -> NDArray[np.bool_]:
+    """Whether machines belong, by Benjamini and Hochberg's step-up procedure over all (N,) probabilities."""
     n = len(p)
     order = np.sort(p)
     passed = np.flatnonzero(order <= false_discoveries * np.arange(1, n + 1) / n)
     threshold = order[passed[-1]] if len(passed) else -1.0
-    return np.asarray(p > threshold, dtype=np.int64)
+    return np.asarray(p > threshold)
