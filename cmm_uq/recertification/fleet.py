@@ -32,7 +32,9 @@ DRAWS, LEAST_DRAWS, MANY = 24, 6, 20_000
 FALSE_DISCOVERIES = 0.05
 """Part of the machines said not to belong that may well belong (Benjamini and Hochberg 1995)."""
 
-_WALKERS = 16
+_WALKERS, _STEPS = 16, 50
+"""Of each of the four ensembles, and between two looks at how well they have mixed."""
+
 _AT_ONCE = 8000
 _FILTERED_AT_ONCE = 6000
 _LEAST_SHIFT = 0.02
@@ -227,7 +229,7 @@ def _sampled(
 
     proposal = tempered(density, np.log(MEDIANS), np.diag(SPREADS), seed)
     chains = run_ensembles(density, proposal, seed, progress, effective_samples=LEAST_EFFECTIVE_SAMPLES,
-                           steps_at_once=100, walkers=_WALKERS)  # fmt: skip
+                           steps_at_once=_STEPS, walkers=_WALKERS)  # fmt: skip
     return chains, len(which)
 
 
