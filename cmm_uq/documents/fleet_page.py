@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import datetime as dt
+
 import numpy as np
 
 from cmm_uq import __version__
@@ -9,7 +11,7 @@ from cmm_uq.documents.document import Block, Column, Document, Overview, Paragra
 from cmm_uq.documents.fleet_data import day_of
 from cmm_uq.documents.fleet_plot import fleet_plot
 from cmm_uq.documents.in_short import Summary, Verdict
-from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, signed
+from cmm_uq.messages import DASH, NOTHING, Number, Text, Verbatim, commas, day, number, plural, say, signed
 from cmm_uq.recertification.fleet import FALSE_DISCOVERIES, Spread, Usual
 from cmm_uq.recertification.fleet_found import FleetFound, OfValue
 from cmm_uq.units import unit_as_written
@@ -34,8 +36,12 @@ def fleet_document(found: FleetFound) -> Document:
     word, standing, rows = _verdict(found)
     return Document(
         title=say("Drift of a fleet"),
-        number=_machines(found),
-        subject=plural(len(found.values), one=say("one value"), many=say("{count} values", count=len(found.values))),
+        number=_newest(found),
+        subject=say(
+            "{machines}, {values}",
+            machines=_machines(found),
+            values=plural(len(found.values), one=say("one value"), many=say("{count} values", count=len(found.values))),
+        ),
         issuer=(),
         particulars=(),
         warnings=tuple(_warnings(found)),
@@ -45,7 +51,17 @@ def fleet_document(found: FleetFound) -> Document:
         attachments=(Verbatim("fleet.json"),),
         produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=found.seed),
         end=say("End of page"),
-        overview=Overview(word, standing, rows),
+        overview=Overview(
+            word,
+            standing,
+            (
+                *rows,
+                *(
+                    (say("{quantity}, average machine", quantity=Verbatim(of.quantity)), _usual_rate(of))
+                    for of in found.values
+                ),
+            ),
+        ),
     )
 
 
@@ -81,6 +97,12 @@ def _machines(found: FleetFound) -> Text:
     return _counted(len({member.machine for of in found.values for member in of.members}))
 
 
+def _newest(found: FleetFound) -> Text:
+    """Day of the newest certificate: what the page is as of."""
+    newest = max(float(member.history.day[-1]) for of in found.values for member in of.members)
+    return day(dt.date.fromordinal(int(newest)))
+
+
 def _counted(count: int) -> Text:
     return plural(count, one=say("one machine"), many=say("{count} machines", count=count))
 
@@ -111,9 +133,20 @@ def _digits(of: OfValue) -> str:
     return f".{int(np.clip(1 - np.floor(np.log10(u)), 0, 9))}f" if u > 0 else ".3g"
 
 
+def _signed(rate: float, spec: str) -> Number:
+    """Without a sign where nothing is left of it."""
+    text = format(rate, spec)
+    return number(0.0, spec) if float(text) == 0 else signed(rate, spec)
+
+
 def _rate(rate: float, U: float, of: OfValue) -> Text:
     spec = _digits(of)
-    return say("{rate} ± {U} {unit}", rate=signed(rate, spec), U=number(U, spec), unit=_per_year(of))
+    return say("{rate} ± {U} {unit}", rate=_signed(rate, spec), U=number(U, spec), unit=_per_year(of))
+
+
+def _usual_rate(of: OfValue) -> Text:
+    average = of.fleet.usual[0]
+    return _rate(average.rate, 1.96 * average.u, of)
 
 
 def _differs(of: OfValue, i: int) -> Text:
@@ -149,7 +182,7 @@ def _blocks(of: OfValue) -> tuple[Block, ...]:
     picture = fleet_plot(
         of.fleet.usual[:40], [group_words(each) for each in of.fleet.usual[:40]],
         axis=say("Rate in {unit}, with 95 % interval", unit=_per_year(of)), caption=say("Usual drift of models and places."),
-        alternative=say("Average machine: {rate}.", rate=_rate(of.fleet.usual[0].rate, 1.96 * of.fleet.usual[0].u, of)),
+        alternative=say("Average machine: {rate}.", rate=_usual_rate(of)),
     )  # fmt: skip
     return (groups, picture, *_outsiders(of), _each(of), _spreads(of), Paragraph(_sampled(of), tone="note"))
 
@@ -161,7 +194,7 @@ def _usual(of: OfValue) -> Table:
         Column(say("U (95 %)"), _per_year(of)),
     )  # fmt: skip
     rows = tuple(
-        (group_words(each), number(each.machines), signed(each.rate, spec), number(1.96 * each.u, spec))
+        (group_words(each), number(each.machines), _signed(each.rate, spec), number(1.96 * each.u, spec))
         for each in of.fleet.usual
     )
     note = say("A model at the fleet's average place; a place for the fleet's average machine.")
@@ -205,8 +238,8 @@ def _row(of: OfValue, i: int) -> tuple[Text, ...]:
     e, member, spec = of.fleet.estimates, of.members[i], _digits(of)
     return (
         Verbatim(member.machine), Verbatim(member.model) if member.model else DASH,
-        Verbatim(member.place) if member.place else DASH, number(len(member.history.day)), signed(e.rate[i], spec),
-        number(1.96 * e.u_rate[i], spec), signed(e.expected[i], spec), number(e.p[i], ".2g"), *_crossed(of, i),
+        Verbatim(member.place) if member.place else DASH, number(len(member.history.day)), _signed(e.rate[i], spec),
+        number(1.96 * e.u_rate[i], spec), _signed(e.expected[i], spec), number(e.p[i], ".2g"), *_crossed(of, i),
     )  # fmt: skip
 
 
@@ -216,13 +249,11 @@ def _crossed(of: OfValue, i: int) -> tuple[Text, Text]:
     if crossing is None or of.members[i].limit is None:
         return DASH, DASH
     one, last = crossing.some(i), int(crossing.last[i])
-    low, middle, high = (_day(last, float(one.quantile(part)[0])) for part in (0.05, 0.5, 0.95))
-    return middle, say("{low} to {high}", low=low, high=high)
-
-
-def _day(last: int, days: float) -> Text:
-    found = day_of(last, days)
-    return say("not in 40 years") if found is None else day(found)
+    low, middle, high = (day_of(last, float(one.quantile(part)[0])) for part in (0.05, 0.5, 0.95))
+    when = say("not in 40 years") if middle is None else day(middle)
+    if low is None or high is None:
+        return when, DASH if low is None else say("from {low}", low=day(low))
+    return when, say("{low} to {high}", low=day(low), high=day(high))
 
 
 def _spreads(of: OfValue) -> Table:

@@ -19,14 +19,14 @@ from cmm_uq.inference.proposals import tempered
 from cmm_uq.points import Floats
 from cmm_uq.recertification.crossing import Crossings, crossings
 from cmm_uq.recertification.drift import History, SideBySide, side_by_side
-from cmm_uq.recertification.drift_filter import Filtered, Start, filtered, usual_start
+from cmm_uq.recertification.drift_filter import Filtered, Start, filtered, log_sum, usual_start
 from cmm_uq.recertification.drift_prior import MEDIANS, NAMES, SPREADS, Prior, learnt_prior, limit_for
 from cmm_uq.recertification.fleet_model import Shared, log_posterior, messages, others, shared_by, together
 
 LEARNT_FROM = 200
 """Machines at most that the hyper-parameters are sampled from: they know a spread between machines to 5 %."""
 
-DRAWS, LEAST_DRAWS, MANY = 24, 6, 20_000
+DRAWS, LEAST_DRAWS, MANY = 64, 6, 20_000
 """Draws of the hyper-parameters that machines are estimated at: fewer where there are many machines."""
 
 FALSE_DISCOVERIES = 0.05
@@ -307,11 +307,26 @@ def _rates(state: Filtered, prior: Prior, start: Start) -> Floats:
     left = (of_node * (variance + (rate - at_node[..., None]) ** 2)).sum(axis=2)
     gained = np.maximum(spread - left, 0.0)
     z = np.abs(at_node - before) / np.sqrt(np.maximum(gained, _LEAST_SHIFT * spread))
-    node = weight.sum(axis=2)
+    node = weight.sum(axis=2) * _without_it(state, prior)[:, prior.group]
+    node /= node.sum(axis=1, keepdims=True)
     p = (node * 2 * special.ndtr(-z)).sum(axis=1)
     expected = (node * before).sum(axis=1)
     u_expected = np.sqrt((node * (spread + (before - expected[:, None]) ** 2)).sum(axis=1))
     return np.stack([mean, np.sqrt(total), expected, u_expected, p])
+
+
+def _without_it(state: Filtered, prior: Prior) -> Floats:
+    """Weights (N, g) that make draws of a fleet's posterior those of the same fleet without the machine.
+
+    They are the inverse of the density of its certificates given those of the others, truncated (Ionides 2008): a machine far
+    from its fleet has widened what it is compared with.
+    """
+    each = np.array([prior.weight[row > 0].sum() for row in prior.members])
+    log = state.log_evidence + np.log(prior.weight)
+    of_group = np.stack([log_sum(np.where(row > 0, log, -np.inf)) for row in prior.members], axis=-1) - np.log(each)
+    weight = np.exp(of_group.min(axis=1, keepdims=True) - of_group)
+    weight /= weight.mean(axis=1, keepdims=True)
+    return np.asarray(np.minimum(weight, np.sqrt(len(each))), dtype=np.float64)
 
 
 def belonging(p: Floats, false_discoveries: float = FALSE_DISCOVERIES) -> NDArray[np.bool_]:
