@@ -34,11 +34,11 @@ CONTENTS: dict[str, list[str]] = {
         "certificate", "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
-        "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
+        "uncertainty/index", "uncertainty/methods", "uncertainty/budgets", "records/drift", "records/fleet",
     ],
     "What it rests on": [
         "validation", "coverage-study", "noise-ranks", "diagnosis-study", "diagnosis-second-study", "mutation-study",
-        "hostile-study", "uncertainty/validation", "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
+        "hostile-study", "records/drift-study", "uncertainty/validation", "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
         "peers", "sources", "machine/source-errors", "uncertainty/harris-2004",
     ],
     "The project": ["/README", "/CHANGELOG", "/CONTRIBUTING", "layout"],

@@ -10,8 +10,6 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.recertification.crossing import Crossings
 from cmm_uq.recertification.drift import YEAR
-from cmm_uq.recertification.drift_prior import NAMES
-from cmm_uq.recertification.fleet import Fleet
 from cmm_uq.recertification.fleet_found import FleetFound, OfValue
 
 SCHEMA = "cmm-uq/fleet/1"
@@ -42,16 +40,7 @@ def _value(of: OfValue) -> dict[str, Any]:
             "converged": chains.converged, "rhat_max": chains.rhat_max, "ess_min": chains.ess_min, "steps": chains.steps,
             "sampler": chains.sampler, "machines": fleet.learnt_from,
         },
-        "prior": _prior(fleet),
-    }  # fmt: skip
-
-
-def _prior(fleet: Fleet) -> dict[str, Any]:
-    """Draws of the hyper-parameters, and at each the Gaussian of what models and places add to the rate."""
-    models, places, mean, covariance = fleet.effects
-    return {
-        "unit": fleet.unit, "hyper_parameters": list(NAMES), "log": fleet.theta.tolist(), "models": list(models),
-        "places": list(places), "effects": mean.tolist(), "covariance": covariance.tolist(),
+        "prior": fleet.data(),
     }  # fmt: skip
 
 

@@ -19,9 +19,10 @@ from cmm_uq.inference.proposals import tempered
 from cmm_uq.points import Floats
 from cmm_uq.recertification.crossing import Crossings, crossings
 from cmm_uq.recertification.drift import History, SideBySide, side_by_side
-from cmm_uq.recertification.drift_filter import Filtered, Start, filtered, log_sum, usual_start
+from cmm_uq.recertification.drift_filter import Filtered, Start, filtered, log_sum
 from cmm_uq.recertification.drift_prior import MEDIANS, NAMES, SPREADS, Prior, learnt_prior, limit_for
 from cmm_uq.recertification.fleet_model import Shared, log_posterior, messages, others, shared_by, together
+from cmm_uq.recertification.fleet_prior import FleetPrior
 
 LEARNT_FROM = 200
 """Machines at most that the hyper-parameters are sampled from: they know a spread between machines to 5 %."""
@@ -101,13 +102,11 @@ class Estimates:
 
 
 @dataclass(frozen=True, eq=False)
-class Fleet:
-    """What was learnt.
+class Fleet(FleetPrior):
+    """What was learnt: the prior for a further machine, and all else.
 
     Attributes
     ----------
-    unit : what hyper-parameters are in units of; see :func:`limit_for`.
-    theta : (g, 8) logarithms of hyper-parameters, draws of their posterior.
     usual, spreads : what is usual, and how much differs.
     machines : names, in the order of the estimates.
     estimates : of each.
@@ -115,59 +114,12 @@ class Fleet:
     chains : of emcee.
     """
 
-    unit: float
-    theta: Floats
     usual: tuple[Usual, ...]
     spreads: tuple[Spread, ...]
     machines: tuple[str, ...]
     estimates: Estimates
     learnt_from: int
     chains: Chains
-    effects: tuple[tuple[str, ...], tuple[str, ...], Floats, Floats]
-
-    def prior(self, model: str = "", place: str = "") -> Prior:
-        """Of a machine of a model at a place; either may be new to the fleet.
-
-        Parameters
-        ----------
-        model, place : names.
-        """
-        rate, rate_sd = self._usual_rate(model, place)
-        return learnt_prior(self.theta, rate, rate_sd, self.unit)
-
-    def start(self, machines: SideBySide, models: Sequence[str], places: Sequence[str]) -> tuple[Prior, Start]:
-        """The same of many machines, side by side: nodes common to all, and the rate of each.
-
-        Parameters
-        ----------
-        machines : their histories.
-        models, places : of each.
-        """
-        known = {of: self._usual_rate(*of) for of in set(zip(models, places, strict=True))}
-        rates = np.array([known[of] for of in zip(models, places, strict=True)])
-        prior = self.prior()
-        start = usual_start(machines, prior)
-        start.mean[0] = rates[:, 0][:, prior.group]
-        start.covariance[0, 0] = rates[:, 1][:, prior.group] ** 2
-        return prior, start
-
-    def _usual_rate(self, model: str, place: str) -> tuple[Floats, Floats]:
-        """Mean and standard deviation (g,) of the rate of a machine at each draw."""
-        models, places, mean, covariance = self.effects
-        row = np.zeros(mean.shape[1])
-        row[0] = 1.0
-        sizes = np.exp(self.theta) * self.unit
-        variance = sizes[:, NAMES.index("rate_sd")] ** 2
-        for name, known, first, of in (
-            (model, models, 1, "model_sd"),
-            (place, places, 1 + len(models), "place_sd"),
-        ):
-            if name in known:
-                row[first + known.index(name)] = 1.0
-            else:
-                variance = variance + sizes[:, NAMES.index(of)] ** 2
-        variance = variance + np.einsum("i,wij,j->w", row, covariance, row)
-        return mean @ row, np.sqrt(variance)
 
 
 def fit_fleet(
@@ -203,11 +155,11 @@ def fit_fleet(
     mean = (covariance @ all_together.linear[..., None])[..., 0]
     start = others(said, all_together, shared, theta, unit)
     estimates = _estimated(machines, start, theta, unit, [each.limit for each in members], crossing_paths)
-    first = 1 + len(shared.models) + len(shared.places)
+    effects = 1 + len(shared.models) + len(shared.places)
     return Fleet(
-        unit, theta, _usual(members, shared, mean, covariance), _spreads(chains.draws, unit),
-        tuple(each.machine for each in members), estimates, count, chains,
-        (shared.models, shared.places, mean[:, :first], covariance[:, :first, :first]),
+        unit, theta, shared.models, shared.places, mean[:, :effects], covariance[:, :effects, :effects],
+        _usual(members, shared, mean, covariance), _spreads(chains.draws, unit), tuple(each.machine for each in members),
+        estimates, count, chains,
     )  # fmt: skip
 
 

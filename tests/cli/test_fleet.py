@@ -12,10 +12,12 @@ import pytest
 from cmm_uq.commands.fleet import fleet
 from cmm_uq.documents.fleet_data import fleet_data
 from cmm_uq.documents.fleet_page import fleet_document, fleet_summary
+from cmm_uq.errors import CmmUqError
 from cmm_uq.recertification.crossing import crossing
 from cmm_uq.recertification.drift import history
 from cmm_uq.recertification.fleet import Member, fit_fleet
 from cmm_uq.recertification.fleet_found import FleetFound, judged
+from cmm_uq.recertification.fleet_prior import FleetPrior
 from cmm_uq.records import open_records
 from tests.cli.process import run
 from tests.documents.saying import strangers
@@ -65,8 +67,9 @@ def test_the_data_have_every_machine_and_a_prior_that_is_the_fleet_s(
     with open_records(lab, read_only=True) as records:
         series = records.series(one["machine"], [NAME])[NAME]
     found = fleet(lab, [NAME]).values[0].fleet
-    np.testing.assert_allclose(found.theta, value["prior"]["log"])
-    again = crossing(history(series), one["limit"], found.prior(one["model"], one["place"]))
+    kept = FleetPrior.from_data(value["prior"])
+    np.testing.assert_allclose(kept.covariance, found.covariance, rtol=1e-8)
+    again = crossing(history(series), one["limit"], kept.prior(one["model"], one["place"]))
     assert again.rate == pytest.approx(one["rate"], abs=one["u"])
     assert one["crossing"]["last"] == again.last.isoformat()
 
@@ -101,6 +104,14 @@ def test_bad_input_is_one_line_and_nothing_is_written(
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert words in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "change", [{"log": [[0.0]]}, {"unit": "none"}, {"hyper_parameters": []}, {"models": ["one", "more"]}]
+)
+def test_a_prior_of_another_version_is_refused(change: dict[str, object], alone: FleetFound) -> None:
+    with pytest.raises(CmmUqError, match="no prior of a fleet"):
+        FleetPrior.from_data(alone.values[0].fleet.data() | change)
 
 
 def test_records_without_a_certificate_are_refused_in_words(tmp_path: Path) -> None:
