@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +39,7 @@ def fleet(
     """
     with open_records(where, read_only=True) as records:
         frame = records.all_series(names or None)
+        adjusted = {one.serial: one.adjusted[-1].toordinal() for one in records.machines() if one.adjusted}
         known = set(frame["name"]) if not names else set(records.all_series()["name"]) if frame.empty else set()
         called = {
             name: (series.quantity, series.unit)
@@ -50,7 +51,7 @@ def fleet(
     for i, name in enumerate(wanted):
         rows = frame[frame["name"] == name]
         usable = rows[np.isfinite(rows["value"]) & np.isfinite(rows["u"]) & (rows["u"] > 0)]
-        members = tuple(_members(usable))
+        members = tuple(_members(usable, adjusted))
         quantity, unit = called.get(name, (name, ""))
 
         def told(part: float, i: int = i, quantity: str = quantity) -> None:
@@ -96,13 +97,13 @@ def _wanted(frame: pd.DataFrame, names: Collection[str], known: Collection[str])
     return sorted(limited or there)
 
 
-def _members(rows: pd.DataFrame) -> Iterator[Member]:
-    """Machines with what their certificates say; the newest limit, model and place count."""
+def _members(rows: pd.DataFrame, adjusted: Mapping[str, int]) -> Iterator[Member]:
+    """Machines with what their certificates say; the newest limit, model and place count, and the newest adjustment."""
     for machine, of in rows.groupby("machine", sort=True):
-        last = of.iloc[-1]
+        last, known = of.iloc[-1], history(_Columns(of), adjusted.get(str(machine)))
         limits = of["limit"].dropna()
         yield Member(
-            str(machine), str(last["model"] or ""), str(last["place"] or ""), history(_Columns(of)),
+            str(machine), str(last["model"] or ""), str(last["place"] or ""), known,
             float(limits.iloc[-1]) if len(limits) and limits.iloc[-1] > 0 else None,
         )  # fmt: skip
 

@@ -44,7 +44,7 @@ class Crossings:
 
     Attributes
     ----------
-    last : (N,) ordinal of each machine's last certificate.
+    last : (N,) ordinal of each machine's last certificate, or of an adjustment after it.
     days, probability : (G,) and (N, G), of having been beyond the limit at some time until so many days after it.
     level, u_level : (N,) the error at the last certificate, given all certificates, and its standard uncertainty.
     rate, u_rate : (N,) per year.
@@ -93,7 +93,7 @@ class Crossing:
 
     Attributes
     ----------
-    last : day of the last certificate.
+    last : day of the last certificate, or of an adjustment after it: from here on is looked ahead.
     days, probability : (G,) of having crossed until so many days after it.
     level, u_level, rate, u_rate : the error then and its rate per year, with standard uncertainties.
     """

@@ -52,6 +52,7 @@ class History:
     u_artefact : (n,) the part of u that comes from the artefact, common to all certificates made with it.
     artefact : n names.
     adjusted_since : (n,) ordinal of the last adjustment before each certificate, NaN where none is known.
+    adjusted_after : ordinal of an adjustment after the last certificate, NaN for none: nobody has seen what it left.
 
     Raises
     ------
@@ -64,6 +65,7 @@ class History:
     u_artefact: Floats
     artefact: tuple[str, ...]
     adjusted_since: Floats
+    adjusted_after: float = float("nan")
 
     def __post_init__(self) -> None:
         n = len(self.day)
@@ -78,13 +80,19 @@ class History:
                              fix="Leave it out, or state u")  # fmt: skip
         if (self.u_artefact < 0).any() or (self.u_artefact > self.u).any():
             raise CmmUqError("the artefact's part of an uncertainty is more than the whole", fix="Correct u_artefact")
-        if (np.diff(self.day) < 0).any() or (self.adjusted_since > self.day).any():
+        late = (self.adjusted_since > self.day).any() or self.adjusted_after < self.day[-1]
+        if (np.diff(self.day) < 0).any() or late:
             raise CmmUqError("the days of a history run backwards, or an adjustment comes after its certificate",
                              fix="Correct the dates")  # fmt: skip
 
 
-def history(series: RecordedSeries) -> History:
+def history(series: RecordedSeries, adjusted_after: float | None = None) -> History:
     """A series of the records as the model takes it.
+
+    Parameters
+    ----------
+    series : of the records.
+    adjusted_after : ordinal of the machine's newest adjustment; it counts where it is after the last certificate.
 
     Raises
     ------
@@ -95,7 +103,10 @@ def history(series: RecordedSeries) -> History:
         for column in (series.day, series.value, series.u, series.u_artefact, series.adjusted_since)
     )
     known = np.where(adjusted > 0, adjusted, np.nan)
-    return History(day, value, u, shared, tuple(map(str, series.artefact)), known)
+    after = adjusted_after is not None and len(day) > 0 and adjusted_after > day[-1]
+    return History(
+        day, value, u, shared, tuple(map(str, series.artefact)), known, float(adjusted_after or 0) if after else np.nan
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +122,8 @@ class SideBySide:
     given : (n, N) whether the machine has so many certificates.
     artefacts : (N, q) numbers into ``names``, −1 where a machine used fewer.
     names : of the artefacts.
-    last : (N,) ordinal of the last certificate.
+    last : (N,) ordinal of the last certificate, or of an adjustment after it.
+    adjusted_after : (N,) whether there is one.
     """
 
     value: Floats
@@ -123,6 +135,7 @@ class SideBySide:
     artefacts: Ints
     names: tuple[str, ...]
     last: Floats
+    adjusted_after: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.last)
@@ -133,6 +146,7 @@ class SideBySide:
         return SideBySide(
             self.value[:most, which], self.u[:most, which], self.shared[:most][:, :, which], self.years[:most, which],
             self.adjusted[:most, which], self.given[:most, which], self.artefacts[which], self.names, self.last[which],
+            self.adjusted_after[which],
         )  # fmt: skip
 
 
@@ -151,8 +165,9 @@ def side_by_side(histories: Sequence[History]) -> SideBySide:
         adjusted[:k, i], years[:k, i] = _since(each)
         artefacts[i, : len(mine)] = [number[name] for name in mine]
         shared[np.arange(k), [mine.index(name) for name in each.artefact], i] = each.u_artefact
-    last = np.array([each.day[-1] for each in histories])
-    return SideBySide(value, u, shared, years, adjusted, given, artefacts, tuple(names), last)
+    after = np.array([each.adjusted_after for each in histories])
+    last = np.where(np.isnan(after), [each.day[-1] for each in histories], after)
+    return SideBySide(value, u, shared, years, adjusted, given, artefacts, tuple(names), last, np.isfinite(after))
 
 
 def _since(of: History) -> tuple[NDArray[np.bool_], Floats]:

@@ -40,7 +40,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """After the last certificate, for N machines, K nodes and M tales.
+    """After the last certificate, or an adjustment after it, for N machines, K nodes and M tales.
 
     Attributes
     ----------
@@ -117,7 +117,25 @@ def filtered(machines: SideBySide, prior: Prior, start: Start | None = None, kep
     for k, left in enumerate(machines.given.sum(axis=1)):
         done.append(state.between(left, None))
         state = _measured(_moved(state.between(0, left), machines, prior, k), machines, prior, k, kept)
-    return _side_by_side([state, *reversed(done)], np.argsort(order))
+    return _since_adjusted(
+        _side_by_side([state, *reversed(done)], np.argsort(order)), machines, prior, np.argsort(order)
+    )
+
+
+def _since_adjusted(state: Filtered, machines: SideBySide, prior: Prior, order: NDArray[np.intp]) -> Filtered:
+    """Set back where an adjustment came after the last certificate, in place; the rate has gone on."""
+    after = machines.adjusted_after[order][:, None, None]
+    if after.any():
+        _set_back(state, after, prior)
+    return state
+
+
+def _set_back(state: Filtered, adjusted: NDArray[np.bool_], prior: Prior) -> None:
+    """The level as an adjustment leaves it, in place; ``adjusted`` is (N, 1, 1)."""
+    state.mean[0] *= ~adjusted
+    state.covariance[0] *= ~adjusted
+    state.covariance[:, 0] *= ~adjusted
+    state.covariance[0, 0] += adjusted * (prior.as_left_sd**2)[:, None]
 
 
 def _side_by_side(parts: list[Filtered], order: NDArray[np.intp]) -> Filtered:
@@ -140,10 +158,7 @@ def _moved(state: Filtered, machines: SideBySide, prior: Prior, k: int) -> Filte
     mean, covariance, N = state.mean, state.covariance, len(state.log_weight)
     adjusted, years = machines.adjusted[k, :N, None, None], machines.years[k, :N, None, None]
     if adjusted.any():
-        mean[0] *= ~adjusted
-        covariance[0] *= ~adjusted
-        covariance[:, 0] *= ~adjusted
-        covariance[0, 0] += adjusted * (prior.as_left_sd**2)[:, None]
+        _set_back(state, adjusted, prior)
     mean[0] += years * mean[1]
     covariance[0] += years * covariance[1]
     covariance[:, 0] += years * covariance[:, 1]

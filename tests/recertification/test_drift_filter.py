@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from cmm_uq.points import Floats
 from cmm_uq.recertification.drift import History, side_by_side
@@ -39,8 +43,10 @@ def test_evidence_level_and_rate_are_those_of_dense_matrices_over_every_tale(nam
 
 def test_machines_side_by_side_are_what_they_are_alone() -> None:
     prior = default_prior(10.0, 4)
-    together = filtered(side_by_side(list(HISTORIES.values())), prior)
-    for i, of in enumerate(HISTORIES.values()):
+    one = HISTORIES["one artefact"]
+    every = [replace(one, adjusted_after=one.day[-1] + 9), *HISTORIES.values()]
+    together = filtered(side_by_side(every), prior)
+    for i, of in enumerate(every):
         alone = filtered(side_by_side([of]), prior)
         np.testing.assert_allclose(together.log_evidence[i], alone.log_evidence[0], rtol=1e-12)
         np.testing.assert_allclose(together.collapsed()[0][:2, i], alone.collapsed()[0][:2, 0], rtol=1e-9, atol=1e-12)
@@ -65,6 +71,39 @@ def test_a_shared_artefact_leaves_the_rate_and_blurs_the_level() -> None:
     assert own[1, 1] == pytest.approx(2 * (0.25 + wrong), rel=1e-3)
     assert common[1, 1] == pytest.approx(2 * (0.25 - 0.16 + wrong), rel=1e-3)
     assert common[0, 0] == pytest.approx(own[0, 0], rel=1e-3) == pytest.approx(0.25 + wrong, rel=1e-3)
+
+
+def test_an_adjustment_after_the_last_certificate_sets_the_level_back_and_leaves_the_rate() -> None:
+    """The level then is what adjustments leave, N(0, as_left_sd²), whatever was certified before."""
+    before = machine([0, 1, 2], [0.0, 3.0, 6.0], 0.3)
+    after = replace(before, adjusted_after=before.day[-1] + 30)
+    (one, mean, covariance), (other, mean_after, covariance_after) = found(before, one_node()), found(after, one_node())
+    assert one == other
+    assert (mean_after[0], covariance_after[0, 1]) == (0.0, 0.0)
+    assert covariance_after[0, 0] == pytest.approx(1.0)
+    assert (mean_after[1], covariance_after[1, 1]) == (mean[1], covariance[1, 1])
+    assert side_by_side([before, after]).last.tolist() == [before.day[-1], before.day[-1] + 30]
+
+
+@given(
+    st.lists(st.tuples(st.floats(0, 3), st.floats(-20, 20)), min_size=1, max_size=4),
+    st.sampled_from([-1.0, 1e-3, 250.0]),
+)
+@settings(max_examples=25, deadline=None)
+def test_sign_and_unit_of_the_values_are_a_matter_of_words(
+    given_values: list[tuple[float, float]], factor: float
+) -> None:
+    """Level and rate go with the values; a density of n values by the n-th power of the unit."""
+    years, values = np.cumsum([gap for gap, _ in given_values]), np.array([value for _, value in given_values])
+    of = machine(list(years), list(values), 0.5, 0.3)
+    scale = abs(factor)
+    other = machine(list(years), list(values * factor), 0.5 * scale, 0.3 * scale)
+    prior = default_prior(10.0, 1)
+    one, mean, covariance = found(of, prior)
+    same, moved, spread = found(other, default_prior(10.0 * scale, 1))
+    assert same == pytest.approx(one - len(values) * np.log(scale), abs=1e-6)
+    np.testing.assert_allclose(moved, factor * mean, rtol=1e-6, atol=1e-8 * scale)
+    np.testing.assert_allclose(spread, scale**2 * covariance, rtol=1e-6, atol=1e-10 * scale**2)
 
 
 def test_nodes_of_a_group_are_weighed_by_the_data_and_groups_are_not() -> None:
