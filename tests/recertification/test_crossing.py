@@ -80,6 +80,15 @@ def test_a_line_crosses_when_it_must_whatever_the_unit() -> None:
         assert (median - found.last).days == pytest.approx(3 * YEAR, rel=0.01)
 
 
+def test_the_lower_limit_is_watched_between_the_days_as_the_upper_is() -> None:
+    """A mirrored machine crosses at the other limit on the same days, on the coarse grid too, where the bridges count most."""
+    found = []
+    for sign in (1.0, -1.0):
+        arrays, prior = side_by_side([machine([0], [sign], EXACT)]), one_node(rate=sign, rate_sd=EXACT, walk=1.5)
+        found.append(crossings(arrays, prior, filtered(arrays, prior), 4.0).probability[0])
+    assert np.abs(found[0] - found[1]).max() < 3 * np.sqrt(2) * 0.5 / np.sqrt(2048)
+
+
 def test_quantiles_and_probabilities_are_each_other_s_inverse() -> None:
     found = crossing(machine([0, 1], [0.0, 1.0]), 4.0)
     for part in (0.05, 0.3, 0.6):
