@@ -22,6 +22,7 @@ ROOT = Path(__file__).parents[1]
 
 def pytest_configure(config: pytest.Config) -> None:
     """Workers of one run share what takes long to make: see tests/kinds/simulated.py."""
+    os.environ["CMM_UQ_RECORDS"] = "none"  # what is tested of records names them
     if hasattr(config, "workerinput"):
         os.environ["CMM_UQ_TESTS_SHARE"] = str(Path(config.option.basetemp).parent)
 

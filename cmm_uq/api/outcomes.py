@@ -19,6 +19,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
 from cmm_uq.jobs.job import Job
 from cmm_uq.notebook import html_table
+from cmm_uq.records.place import NONE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,16 +69,19 @@ class Found:
         """Whether all is well: what ``--strict`` on the command line asks."""
         return self.outcome.conforming
 
-    def write(self, folder: str | Path | None = None, *, force: bool = False) -> dict[str, Path]:
-        """Write the files that the command of the same name writes, all or none.
+    def write(
+        self, folder: str | Path | None = None, *, force: bool = False, records: str | Path | None = NONE
+    ) -> dict[str, Path]:
+        """Write the files that the command of the same name writes, all or none, and record it with that.
 
         Parameters
         ----------
         folder : to write to; without one, that of the command: below ``reports/<job id>``.
         force : as of :meth:`cmm_uq.jobs.job.Job.write`, which says too what is given back, and what is refused.
+        records : file or URL of the records that it is kept in; ``none`` for none, ``None`` for those that the command takes.
         """
         out = None if folder is None else Path(folder)
-        return self.form.write(self.job, lambda: self.outcome, out, force=force).files
+        return self.form.write(self.job, lambda: self.outcome, out, force=force, records=records).files
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.job.facts.job.id}: {self._said()}>"

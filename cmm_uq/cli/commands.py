@@ -10,6 +10,7 @@ import typer
 from cmm_uq.cli import (
     BAD_INPUT,
     acquire,
+    affected,
     budget,
     check,
     compensate,
@@ -20,6 +21,8 @@ from cmm_uq.cli import (
     new,
     plan,
     prove,
+    records,
+    release,
     report,
     schema,
     selftest,
@@ -51,6 +54,8 @@ for module, short in {
     compensate: "A recording corrected by its machine's error maps.",
     fleet: "The drift that is usual for all machines of the records, and who differs.",
     budget: "The uncertainty of any measurement model in a file.",
+    release: "A certificate released, withdrawn or replaced.",
+    affected: "Which certificates a correction of the package touches.",
     schema: "JSON Schema of a file, for editors that complete and explain.",
     selftest: "Published reference figures, computed here and compared.",
 }.items():
@@ -58,6 +63,7 @@ for module, short in {
     app.command(name, short_help=short, epilog=module.EXAMPLES)(module.command)
 
 app.add_typer(instruments.app, name="instruments", short_help="Instruments: ready profiles, tried at a port, new ones.")
+app.add_typer(records.app, name="records", short_help="The history: verified, imported, backed up, brought up to date.")
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
 and the calibration certificates that state it.

@@ -39,6 +39,17 @@ Json = Annotated[
     bool,
     typer.Option("--json", help="Print one JSON object instead of the summary; an error is one too."),
 ]
+Records = Annotated[
+    str | None,
+    typer.Option(
+        "--records",
+        help="Records that it is kept in: a file, a postgresql:// URL, or none.",
+        metavar="WHERE",
+        envvar="CMM_UQ_RECORDS",
+        show_default="records.db beside the reports",
+        show_envvar=False,
+    ),
+]
 Force = Annotated[
     bool,
     typer.Option("--force", help="Keep what stands in the way as NAME.previous instead of refusing."),

@@ -150,5 +150,10 @@ def conclude(ended: Written, *, json: bool, quiet: bool, strict: bool, verbose: 
         job = ended.found.job
         banner = BANNERS.get(job.origin, "")
         show_summary(ended.summary, ended.files, verbose=verbose, name=job.facts.job.id, banner=banner)
+        if ended.records:
+            nameless = (
+                "" if job.facts.machine.serial else "; the machine has no [machine] serial and is known by its name"
+            )
+            say(f"Recorded in {ended.records}{nameless}.")
     if strict and not ended.conforming:
         raise typer.Exit(NOT_CONFORMING)

@@ -12,10 +12,11 @@ from cmm_uq.documents.diagnosis_next import TO_FILL_IN
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
 from cmm_uq.plugins import naming_package
+from cmm_uq.records.place import NONE
 
 CERTIFICATE, DIAGNOSIS = ("certificate.html", "certificate.pdf"), ("diagnosis.html", "diagnosis.pdf")
-REPORT = Form("report", CERTIFICATE)
-DIAGNOSE = Form("diagnose", DIAGNOSIS, "diagnosis", (TO_FILL_IN,))
+REPORT = Form("report", CERTIFICATE, recorded=True)
+DIAGNOSE = Form("diagnose", DIAGNOSIS, "diagnosis", (TO_FILL_IN,), recorded=True)
 
 
 @naming_package()
@@ -41,7 +42,7 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent) -> Outcome
 
 def write_report(
     job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
-    told: Told | None = None,
+    told: Told | None = None, records: str | Path | None = NONE,
 ) -> Written:  # fmt: skip
     """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
 
@@ -55,6 +56,7 @@ def write_report(
     force : keep what stands in the way as ``NAME.previous`` instead of refusing.
     stage : told of progress.
     told : of the job, before anything is computed.
+    records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
 
     Raises
     ------
@@ -67,7 +69,8 @@ def write_report(
     analysis.report_recipe(read)  # refused before anything is made
     if told is not None:
         told(read)
-    return REPORT.write(read, lambda: report_outcome(read, seed=seed, stage=tell), out, force=force, stage=tell)
+    return REPORT.write(read, lambda: report_outcome(read, seed=seed, stage=tell), out, force=force, stage=tell,
+                        records=records)  # fmt: skip
 
 
 @naming_package()
@@ -104,6 +107,7 @@ def write_diagnosis(
     force: bool = False,
     stage: Stage | None = None,
     told: Told | None = None,
+    records: str | Path | None = NONE,
 ) -> Written:
     """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
 
@@ -119,6 +123,7 @@ def write_diagnosis(
     force : keep what stands in the way as ``NAME.previous`` instead of refusing.
     stage : told of progress.
     told : of the job, before anything is computed.
+    records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
 
     Raises
     ------
@@ -131,8 +136,9 @@ def write_diagnosis(
     if told is not None:
         told(read)
     return DIAGNOSE.write(
-        read, lambda: diagnosis_outcome(read, seed=seed, alpha=alpha, stage=tell), out, force=force, stage=tell
-    )
+        read, lambda: diagnosis_outcome(read, seed=seed, alpha=alpha, stage=tell), out, force=force, stage=tell,
+        records=records,
+    )  # fmt: skip
 
 
 def _sampled(what: str, part: float) -> str:

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from cmm_uq.commands.recording import ledger_of, opened
 from cmm_uq.documents.in_short import Summary
 from cmm_uq.documents.outcome import Found, Outcome
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.records.place import NONE
 from cmm_uq.writing import Owner, staged
 
 Stage = Callable[[str, float], None]
@@ -34,11 +36,13 @@ class Written:
     outcome : what was found.
     results : contents of results.json.
     files : what was written, by name.
+    records : what it was recorded in, as it is shown; empty where it was not.
     """
 
     outcome: Outcome
     results: bytes
     files: dict[str, Path]
+    records: str = ""
 
     @property
     def found(self) -> Found:
@@ -66,12 +70,14 @@ class Form:
     documents : their names; those of a recording that was not measured carry its origin.
     below : folder in ``reports/<job id>`` that is written to by default.
     further : names of files that come with it.
+    recorded : whether what it writes is kept in records.
     """
 
     command: str
     documents: tuple[str, ...]
     below: str = ""
     further: tuple[str, ...] = ()
+    recorded: bool = False
 
     def write(
         self,
@@ -81,8 +87,9 @@ class Form:
         *,
         force: bool = False,
         stage: Stage = silent,
+        records: str | Path | None = NONE,
     ) -> Written:
-        """Make sure of the folder, then compute, render and write, all or none.
+        """Make sure of the folder, then compute, render and write, all or none, and record it with that.
 
         Parameters
         ----------
@@ -91,22 +98,28 @@ class Form:
         out : folder to write to.
         force : keep what stands in the way as ``NAME.previous`` instead of refusing.
         stage : told of progress.
+        records : file or URL of the records; ``none`` for none, ``None`` for those of the environment, else beside the folder.
 
         Raises
         ------
         CmmUqError : as computing does, or something in the folder that this command did not write for this job.
-        OutputError : the folder cannot be written to.
+        OutputError : the folder, or the records, cannot be written to.
         """
         owner = Owner(self.command, job.facts.job.id, job.origin)
         folder = out or REPORTS / owner.job / self.below
         expected = (*self._names(job), RESULTS, *self.further)
-        with staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place:
+        with (
+            opened(records if self.recorded else NONE, out) as history,
+            staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
+        ):
             found = outcome()
             contents = self.contents(found, stage)
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
-            files = place.write(contents)
+            ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
+            files = place.write(contents, ledger=ledger)
+            where = "" if history is None else history.shown
         stage("Done", 1.0)
-        return Written(found, contents[RESULTS], files)
+        return Written(found, contents[RESULTS], files, where)
 
     def contents(self, outcome: Outcome, stage: Stage = silent) -> dict[str, bytes]:
         """Bytes of every file, by name."""

@@ -23,7 +23,7 @@ from cmm_uq.jobs.reference_file import reference_file
 
 PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100
-OF_THE_CERTIFICATE = ("number", "issued", "recalibration_agreed", "as_found")
+OF_THE_CERTIFICATE = ("number", "issued", "recalibration_agreed", "as_found", "interim")
 """Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
 OF_THE_RECORDED_MACHINE = ("short_gauge", "simulation")
 """Tables that speak of the machine as it was recorded, not of one simulated or compensated."""

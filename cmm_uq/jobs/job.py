@@ -82,6 +82,10 @@ class JobFacts(Table):
     """Whether the whole diagnosis is printed in the certificate's annex."""
     recalibration_agreed: dt.date | None = None
     """Date of the next calibration, where the customer agreed to be told one (7.8.4.3); no other is printed."""
+    adjusted_since: dt.date | None = None
+    """Day on which the machine was last adjusted before this recording; trends in the records begin anew there."""
+    interim: bool = False
+    """Whether this is an interim check between two calibrations, and no certificate."""
     as_found: str | None = None
     """`results.json`, or the folder with it inside the job's, of the machine before it was adjusted (7.8.4.1 d)."""
     origin: Origin = MEASURED
@@ -94,6 +98,15 @@ class JobFacts(Table):
         if self.derived_from is not None and self.origin == MEASURED:
             raise ValueError(
                 'derived_from says that the recording was made from another: origin must be "simulated" or "compensated"'
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _adjusted_before(self) -> Self:
+        if self.adjusted_since is not None and self.adjusted_since > self.date:
+            raise ValueError(
+                f"adjusted_since = {self.adjusted_since} is after the measurement of {self.date}: give the last day of an "
+                "adjustment before it"
             )
         return self
 

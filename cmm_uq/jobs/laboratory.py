@@ -69,5 +69,7 @@ class Laboratory(Table):
     """Who authorises the certificate (7.8.2.1 o)."""
     signatory_role: str = ""
     """Function of who authorises it."""
+    four_eyes: bool = False
+    """Whether two persons, neither of them the operator, must release a certificate before it is released."""
     cmc: Capability | None = None
     """Calibration and measurement capability: the least U (95 %, k = 2) that a certificate may state."""

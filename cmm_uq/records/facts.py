@@ -110,6 +110,7 @@ class Certificate:
     results_sha256 : of its results.json.
     number : of the certificate.
     command : that made it: report or diagnose.
+    artefact_due : day by which the artefact was to be calibrated again, as the job said.
     values : what it states.
     covariance : names, and lower triangle row by row, of what is stated with one.
     """
@@ -132,8 +133,14 @@ class Certificate:
     results_sha256: str
     number: str
     command: str
+    artefact_due: dt.date | None = None
     values: tuple[Value, ...] = ()
     covariance: tuple[tuple[str, ...], tuple[float, ...]] | None = None
+
+    @property
+    def artefact_overdue(self) -> bool:
+        """Whether the artefact was due for calibration before the day of the measurement: it must not be released."""
+        return self.artefact_due is not None and self.artefact_due < self.day
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,6 +93,7 @@ class Indexer:
             "decision": data.get("decision") or "none", "diagnosis": data.get("diagnosis") or "",
             "interim": bool(data.get("interim")) or entry.kind == "check", "folder": data.get("folder") or "",
             "version": data.get("version") or "", "results_sha256": data.get("results_sha256") or "",
+            "artefact_due": used.get("due") or None,
         }  # fmt: skip
         self._rows[certificates].append(row)
         self._certificates[entry.number] = row

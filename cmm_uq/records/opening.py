@@ -23,10 +23,10 @@ APPLICATION = 0x434D4D55
 PATIENCE_S = 15.0
 """How long to wait for another process that writes."""
 
-REVISION = "0001"
+REVISION = "0002"
 """Newest revision of the tables; see :mod:`cmm_uq.records.migrations`."""
 
-KNOWN = ("0001",)
+KNOWN = ("0001", "0002")
 """All revisions, oldest first."""
 
 
@@ -262,6 +262,14 @@ _WORDS: tuple[tuple[str, str, str, type[CmmUqError]], ...] = (
     ("disk is full", "the disk of the records is full", "Free it; nothing was recorded", OutputError),
     ("disk I/O error", "the disk of the records fails", "Free or mend it; nothing was recorded", OutputError),
     ("unable to open", "cannot be opened", "Mend the permissions of the file and its folder", OutputError),
+    (
+        "connection failed",
+        "the server of the records cannot be reached",
+        "Start it, or mend host and port",
+        OutputError,
+    ),
+    ("connection to server", "the server of the records cannot be reached", "Start it, or mend the URL", OutputError),
+    ("password", "the server of the records refuses the login", "Mend user and password", OutputError),
     ("not a database", "is no database", "Name the file of the records, or restore a backup", CmmUqError),
     ("malformed", "the file of the records is damaged", "Restore a backup: cmm-uq records restore FILE", CmmUqError),
     ("never changed", "entries are never changed", "Record what is right as a new entry", CmmUqError),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import os
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +31,7 @@ from cmm_uq.records.tables import (
 if TYPE_CHECKING:
     import pandas as pd
 
-_TOGETHER = 500
+_TOGETHER = 2000
 """Certificates whose values are asked for in one query."""
 
 _COLUMNS = (
@@ -162,7 +163,7 @@ def named(connection: Connection, name: str, home: Path | None) -> list[Certific
     return []
 
 
-def latest_of(connection: Connection, home: Path | None) -> list[Certificate]:
+def latest_of(connection: Connection, home: Path | None, *, values: bool = True) -> list[Certificate]:
     """Newest of each machine; see :meth:`cmm_uq.records.store.Records.latest`."""
     newest = certificates.alias()
     of_machine = (
@@ -171,11 +172,12 @@ def latest_of(connection: Connection, home: Path | None) -> list[Certificate]:
                newest.c.state.in_(STANDING), newest.c.interim.is_(False))
         .order_by(newest.c.day.desc(), newest.c.entry.desc()).limit(1).correlate(machines).scalar_subquery()
     )  # fmt: skip
-    entries = tuple(connection.execute(select(of_machine).select_from(machines)).scalars())
-    rows = []
-    for block in _blocks([entry for entry in entries if entry is not None]):
+    found = connection.execute(select(of_machine).select_from(machines)).scalars()
+    entries = sorted(entry for entry in found if entry is not None)
+    rows: list[Certificate] = []
+    for block in _blocks(entries):
         query = select(*_COLUMNS).select_from(_JOINED).where(certificates.c.entry.in_(block))
-        rows += _certificates(connection, query, values=True, home=home)
+        rows += _certificates(connection, query, values=values, home=home)
     return sorted(rows, key=lambda one: (one.machine, one.entry))
 
 
@@ -203,14 +205,15 @@ def _certificates(
     stated = _values(connection, entries) if values else {}
     together = _together(connection, entries) if values else {}
     adjusted = _adjusted(connection, {row.machine for row in rows})
+    base, day_of, moment_of = _folder(home), dt.date.fromisoformat, dt.datetime.fromisoformat
     return [
         Certificate(
-            row.entry, row.job, row.machine_called, row.artefact_called, row.kind, row.origin, dt.date.fromisoformat(row.day),
-            dt.datetime.fromisoformat(row.at), _since(row.adjusted_since, row.day, adjusted[row.machine]), row.state,
-            row.decision, row.diagnosis, bool(row.interim), _folder(row.folder, home), row.version, row.results_sha256,
-            row.number, row.command, tuple(stated.get(row.entry, ())), together.get(row.entry),
+            entry, job, machine_called, artefact_called, kind, origin, day_of(day), moment_of(at),
+            _since(since, day, adjusted[machine]), state, decision, diagnosis, bool(interim), base(folder), version, results,
+            number, command, _day(due), tuple(stated.get(entry, ())), together.get(entry),
         )
-        for row in rows
+        for (entry, machine, _, command, job, number, kind, origin, day, at, since, state, decision, diagnosis, interim,
+             folder, version, results, due, machine_called, artefact_called) in rows
     ]  # fmt: skip
 
 
@@ -221,8 +224,8 @@ def _values(connection: Connection, entries: Sequence[int]) -> dict[int, list[Va
     for block in _blocks(entries):
         query = select(f.certificate, f.quantity, f.value, f.u, f.lower, f.upper, f.u_artefact, f.at_most)
         query = query.where(f.certificate.in_(block)).order_by(f.certificate, f.place)
-        for certificate, quantity, *rest in connection.execute(query).all():
-            found[certificate].append(Value(*names[quantity], *rest))
+        for certificate, quantity, value, u, lower, upper, common, limit in connection.execute(query).all():
+            found[certificate].append(Value(*names[quantity], value, u, lower, upper, common, limit))
     return found
 
 
@@ -327,8 +330,14 @@ def all_series_of(connection: Connection, names: Collection[str] | None, origin:
     return frame.sort_values(["machine", "name", "day", "entry"], kind="stable", ignore_index=True)
 
 
-def _folder(folder: str, home: Path | None) -> str:
-    return folder if home is None or not folder else str(home / folder)
+def _folder(home: Path | None) -> Callable[[str], str]:
+    """A recorded folder as a path that can be opened."""
+    before = "" if home is None else f"{home}{os.sep}"
+    return lambda folder: f"{before}{folder}" if folder and before and not _is_absolute(folder) else folder
+
+
+def _is_absolute(folder: str) -> bool:
+    return folder[:1] in "/\\" or folder[1:2] == ":"
 
 
 def _day(text: str | None) -> dt.date | None:

@@ -22,6 +22,8 @@ from cmm_uq.records.tables import entries
 if TYPE_CHECKING:
     import pandas as pd
 
+    from cmm_uq.writing import Ledger
+
 T = TypeVar("T")
 
 New = tuple[str, Mapping[str, Any], dt.datetime | None]
@@ -56,11 +58,16 @@ class Records:
         self.close()
 
     def __repr__(self) -> str:
-        return f"<Records {shown(self.place)}>"
+        return f"<Records {self.shown}>"
 
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+    @property
+    def shown(self) -> str:
+        """Where they are, without a password."""
+        return shown(self.place)
 
     @property
     def home(self) -> Path | None:
@@ -138,9 +145,14 @@ class Records:
         """
         return self._read(lambda connection: queries.named(connection, certificate, self.home))
 
-    def latest(self) -> list[Certificate]:
-        """Newest measured certificate, not withdrawn nor replaced, of each machine; interim checks are none."""
-        return self._read(lambda connection: queries.latest_of(connection, self.home))
+    def latest(self, *, values: bool = True) -> list[Certificate]:
+        """Newest measured certificate, not withdrawn nor replaced, of each machine, by serial; interim checks are none.
+
+        Parameters
+        ----------
+        values : whether what they state is read too.
+        """
+        return self._read(lambda connection: queries.latest_of(connection, self.home, values=values))
 
     def series(
         self, machine: str, names: Collection[str] | None = None, origin: str = "measured"
@@ -225,11 +237,26 @@ class Records:
     def writing(self) -> Writing:
         """A transaction that writes: what is added in it is there when it ends, or nothing of it."""
         if self.read_only:
-            raise OutputError("the records were opened to be read only", where=shown(self.place))
+            raise OutputError("the records were opened to be read only", where=self.shown)
         return Writing(self)
 
     def settle(self) -> None:
         """Complete or take back what a crash left between files and records; see :mod:`cmm_uq.records.pending`."""
+        from cmm_uq.records.pending import settle
+
+        settle(self)
+
+    def ledger(self, kind: str, content: Mapping[str, Any]) -> Ledger:
+        """For a set of files that is to be recorded as it is put in place; see :mod:`cmm_uq.records.pending`.
+
+        Parameters
+        ----------
+        kind : of the entry.
+        content : of the entry; its ``results_sha256`` is recorded once, however often the same results are written.
+        """
+        from cmm_uq.records.pending import Intended
+
+        return Intended(self, kind, content)
 
     def verify(self, head: str | None = None, *, files: bool = True) -> list[Finding]:
         """Compare everything with the chain; see :mod:`cmm_uq.records.verifying`.
@@ -289,6 +316,9 @@ class Writing:
                     self.connection.commit()
                 else:
                     self.connection.rollback()
+            except BaseException:
+                self.connection.invalidate()  # a transaction whose end failed must not come back from the pool
+                raise
             finally:
                 self.connection.close()
         except BaseException as failed:
@@ -303,12 +333,24 @@ class Writing:
         ------
         CmmUqError : one says something that no entry before it allows.
         """
+        return self._all(self._following(new))
+
+    def copy(self, whole: Iterable[Entry]) -> None:
+        """Add entries of other records as they are, into records that hold none."""
+        self._all(whole)
+
+    def _following(self, new: Iterable[New]) -> Iterator[Entry]:
         number, previous = last(self.connection)
-        indexer, block, added = Indexer(self.connection), [], []
         for kind, content, at in new:
             number += 1
             entry = following(previous, number, at or self.records.clock(), kind, content)
             previous = entry.hash
+            yield entry
+
+    def _all(self, whole: Iterable[Entry]) -> list[Entry]:
+        indexer, added = Indexer(self.connection), []
+        block: list[Entry] = []
+        for entry in whole:
             indexer.add(entry)
             block.append(entry)
             if len(block) == _BLOCK:

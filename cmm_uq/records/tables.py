@@ -110,6 +110,7 @@ certificates = Table(
     Column("folder", Text, nullable=False),
     Column("version", Text, nullable=False),
     Column("results_sha256", String(64), nullable=False),
+    Column("artefact_due", DAY),
     Index(None, "machine", "command", "origin", "day", "entry"),
     Index(None, "command", "origin", "day", "entry"),
     Index(None, "artefact", "day"),

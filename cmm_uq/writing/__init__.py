@@ -7,8 +7,9 @@ written last. What a kill left is completed or rolled back by the next command i
 from __future__ import annotations
 
 from cmm_uq.writing.manifest import MANIFEST, Manifest, Owner, read_manifest, sha256_of
-from cmm_uq.writing.staging import Staged, finish_interrupted, staged
+from cmm_uq.writing.staging import InDoubtError, Ledger, Staged, finish_interrupted, is_writing, staged
 
 __all__ = [
-    "MANIFEST", "Manifest", "Owner", "Staged", "finish_interrupted", "read_manifest", "sha256_of", "staged",
+    "MANIFEST", "InDoubtError", "Ledger", "Manifest", "Owner", "Staged", "finish_interrupted", "is_writing", "read_manifest",
+    "sha256_of", "staged",
 ]  # fmt: skip

@@ -2,7 +2,8 @@
 
 ``.unfinished-X`` is staged by the process that holds the lock ``.unfinished-X.lock``. Renamed to ``.placing`` it has the
 output folder for itself; from the moment its ``journal.json`` stands there, the set will be put in place, if need be by the
-next command. Before that moment nothing in the folder has changed.
+next command. Before that moment nothing in the folder has changed. A :class:`Ledger` that is told of a set knows of it from
+before that moment, and has it from when all of it is in place.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import file_digest, sha256
 from pathlib import Path
+from typing import Protocol
 
 from cmm_uq.errors import CmmUqError, OutputError
 from cmm_uq.writing import interruption
@@ -29,6 +31,30 @@ STAGE, LOCK, PLACING = ".unfinished-", ".lock", ".placing"
 _STAGED = re.compile(rf"{re.escape(STAGE)}([0-9a-f]{{12}})(?:{re.escape(LOCK)})?")
 PATIENCE_S = 5.0
 """How long to wait for another process that is putting its files into the same folder: renames take milliseconds."""
+
+
+class InDoubtError(OutputError):
+    """A ledger cannot say whether it has a set: its files stay, and the next command settles it."""
+
+
+class Ledger(Protocol):
+    """What is to know of every set that is in place, and of no other.
+
+    What a kill left between a set and its ledger is told by the set: it is in place where :data:`MANIFEST` has the hash that
+    was intended, once :func:`finish_interrupted` was there and nobody :func:`is_writing` any more.
+    """
+
+    def intend(self, token: str, folder: Path, manifest: str) -> None:
+        """Note that a set is to be put in place: the token of its stage, and the SHA-256 of its manifest."""
+        ...
+
+    def commit(self, token: str) -> None:
+        """Have the set, all of which is in place. What is raised takes its files back, unless it is :class:`InDoubtError`."""
+        ...
+
+    def forget(self, token: str) -> None:
+        """The set was not put in place."""
+        ...
 
 
 @dataclass(eq=False)
@@ -63,13 +89,16 @@ class Staged:
         self._check(name)
         return self.stage / NEW / name
 
-    def write(self, contents: Mapping[str, bytes], large: Iterable[str] = ()) -> dict[str, Path]:
+    def write(
+        self, contents: Mapping[str, bytes], large: Iterable[str] = (), *, ledger: Ledger | None = None
+    ) -> dict[str, Path]:
         """Put a set of files in place, the manifest last.
 
         Parameters
         ----------
         contents : of each file by its name inside the folder.
         large : names of files that were written into their :meth:`room`.
+        ledger : that is to have the set if it is put in place, and only then.
 
         Returns
         -------
@@ -78,7 +107,7 @@ class Staged:
         Raises
         ------
         CmmUqError : something that is not this owner's stands in the way.
-        OutputError : the disk is full, or the place cannot be written to; what stood there before is untouched.
+        OutputError : the disk is full, or the place cannot be written to, or the ledger; what stood there before is untouched.
         """
         with _told(self.folder):
             hashes = {name: sha256(content).hexdigest() for name, content in contents.items()}
@@ -89,8 +118,15 @@ class Staged:
             for name, content in whole.items():
                 self._check(name)
                 _write(self.stage / NEW / name, content)
-            with interruption.placing(self.folder):
-                self._commit(tuple(hashes), hashes)
+            if ledger is not None:
+                ledger.intend(self.token, self.folder.absolute(), sha256(whole[MANIFEST]).hexdigest())
+            try:
+                with interruption.placing(self.folder):
+                    self._commit(tuple(hashes), hashes, ledger)
+            except BaseException:
+                if ledger is not None and not self._in_doubt():
+                    ledger.forget(self.token)
+                raise
         self.made.clear()
         return {name: self.folder / name for name in (*hashes, MANIFEST)}
 
@@ -98,7 +134,11 @@ class Staged:
         if not plain_name(name):
             raise CmmUqError(f"{name!r} cannot be the name of an output", where=str(self.folder))
 
-    def _commit(self, names: tuple[str, ...], hashes: Mapping[str, str]) -> None:
+    def _in_doubt(self) -> bool:
+        """Whether the set could neither be put in place nor be taken back: the next command in the folder will."""
+        return _token(self.folder / PLACING) == self.token
+
+    def _commit(self, names: tuple[str, ...], hashes: Mapping[str, str], ledger: Ledger | None) -> None:
         placing = self._alone()
         try:
             journal = journal_for(
@@ -111,7 +151,7 @@ class Staged:
         except BaseException:
             _drop(self.folder, self.token)
             raise
-        _finish(self.folder, placing, journal)
+        _finish(self.folder, placing, journal, ledger)
 
     def _alone(self) -> Path:
         """The stage renamed to ``.placing``, which only one process can have."""
@@ -215,6 +255,11 @@ def finish_interrupted(folder: Path) -> None:
                 (folder / f"{STAGE}{staged_by[1]}{LOCK}").unlink()
 
 
+def is_writing(folder: Path, token: str) -> bool:
+    """Whether the process that staged a set in a folder is still at it."""
+    return _alive(folder, token)
+
+
 def synced(folder: Path) -> None:
     """Have a folder's names on the disk, where the system can do that."""
     with contextlib.suppress(OSError, AttributeError):
@@ -255,14 +300,18 @@ def _alive(folder: Path, token: str) -> bool:
     return False
 
 
-def _finish(folder: Path, placing: Path, journal: Journal) -> None:
+def _finish(folder: Path, placing: Path, journal: Journal, ledger: Ledger | None = None) -> None:
     try:
         place(folder, placing, journal)
-    except OSError:
+        synced(folder)
+        if ledger is not None:
+            ledger.commit(journal.token)
+    except InDoubtError:
+        raise
+    except (OSError, CmmUqError):
         if rolled_back(folder, placing, journal):
             _drop(folder, journal.token)
         raise
-    synced(folder)
     _drop(folder, journal.token)
 
 

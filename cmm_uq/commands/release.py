@@ -1,0 +1,141 @@
+"""A certificate released, withdrawn or replaced by a named person, with date and reason in the chain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.records.facts import STANDING, Certificate
+from cmm_uq.records.recognised import spelled
+
+if TYPE_CHECKING:
+    from cmm_uq.records.store import Records
+
+TWO_EYES, FOUR_EYES = 1, 2
+"""How many persons release a certificate."""
+
+
+@dataclass(frozen=True)
+class Signed:
+    """What a signature did.
+
+    Parameters
+    ----------
+    certificate : as it is now.
+    waiting : how many persons more must release it.
+    """
+
+    certificate: Certificate
+    waiting: int = 0
+
+
+def certificate_named(records: Records, name: str) -> Certificate:
+    """The certificate of a number, job, folder or hash of results.json: the newest that counts, else the newest.
+
+    Raises
+    ------
+    CmmUqError : there is none.
+    """
+    found = [one for one in records.named(name) if one.command == "report"]
+    if not found:
+        raise CmmUqError(f"no certificate {name!r} is recorded", where=records.shown,
+                         fix="Give its number, the id of its job, or the number of its entry")  # fmt: skip
+    counting = [one for one in found if one.state in STANDING]
+    return (counting or found)[-1]
+
+
+def release(records: Records, name: str, *, by: str, reason: str = "") -> Signed:
+    """Release a certificate, or sign it as the first of two persons.
+
+    Parameters
+    ----------
+    records : that it is in.
+    name : of the certificate; see :func:`certificate_named`.
+    by : who releases it.
+    reason : for the record.
+
+    Raises
+    ------
+    CmmUqError : it must not be released, or not by this person.
+    """
+    certificate, person = certificate_named(records, name), _person(by)
+    if (why := blocked(certificate)) is not None:
+        raise CmmUqError(f"{certificate.number} cannot be released: {why}", where=records.shown)
+    content = next(records.entries(certificate.entry)).data
+    needed = FOUR_EYES if content.get("four_eyes") else TWO_EYES
+    maker = str(content.get("operator") or "")
+    if needed == FOUR_EYES and spelled(maker) == spelled(person):
+        raise CmmUqError(f"{person} made the certificate {certificate.number}, and another must release it",
+                         where=records.shown, fix="[laboratory] four_eyes = true asks for others")  # fmt: skip
+    signed = {spelled(one.by) for one in records.signatures(certificate.entry) if one.what == "release"}
+    if spelled(person) in signed:
+        raise CmmUqError(f"{person} has signed the certificate {certificate.number} already", where=records.shown,
+                         fix="A second person must")  # fmt: skip
+    waiting = needed - len(signed) - 1
+    _sign(records, "release", certificate, person, reason, complete=waiting <= 0)
+    return Signed(records.certificate(certificate.entry), max(0, waiting))
+
+
+def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: str | None = None) -> Signed:
+    """Withdraw a certificate, or put another in its place.
+
+    Parameters
+    ----------
+    records : that it is in.
+    name : of the certificate.
+    by : who withdraws it.
+    reason : why.
+    replaced_by : the certificate in its place, which must be released.
+
+    Raises
+    ------
+    CmmUqError : it does not count any more, or what is to replace it does not.
+    """
+    certificate, person = certificate_named(records, name), _person(by)
+    if not reason.strip():
+        raise CmmUqError(
+            "a certificate is withdrawn for a reason", where="--reason", fix="Say it: it stays in the records"
+        )
+    if certificate.state not in STANDING:
+        raise CmmUqError(f"{certificate.number} is {certificate.state} already", where=records.shown)
+    if replaced_by is None:
+        _sign(records, "withdrawal", certificate, person, reason)
+        return Signed(records.certificate(certificate.entry))
+    other = certificate_named(records, replaced_by)
+    if other.entry == certificate.entry:
+        raise CmmUqError("a certificate does not replace itself", where="--replaced-by", fix="Name the new one's entry")
+    if other.state != "released" or other.machine != certificate.machine:
+        why = f"is {other.state}" if other.state != "released" else f"is of {other.machine}, not {certificate.machine}"
+        raise CmmUqError(
+            f"{other.number} {why}", where="--replaced-by", fix="Name a released certificate of this machine"
+        )
+    _sign(records, "replacement", certificate, person, reason, replaced_by=other.entry)
+    return Signed(records.certificate(certificate.entry))
+
+
+def blocked(certificate: Certificate) -> str | None:
+    """Why a certificate must not be released; ``None`` where nothing stands against it."""
+    if certificate.origin != "measured":
+        return f"its recording is {certificate.origin}"
+    if certificate.interim:
+        return "it is an interim check and no certificate"
+    if certificate.state != "draft":
+        return f"it is {certificate.state} already"
+    if certificate.artefact_overdue:
+        return f"its artefact {certificate.artefact} was due for calibration on {certificate.artefact_due}"
+    return None
+
+
+def _person(name: str) -> str:
+    person = " ".join(name.split())
+    if not person:
+        raise CmmUqError("a person must be named", where="--by", fix='--by "NAME"')
+    return person
+
+
+def _sign(
+    records: Records, kind: str, certificate: Certificate, by: str, reason: str, **further: bool | int
+) -> None:  # fmt: skip
+    content = {"certificate": certificate.entry, "by": by, "reason": reason.strip(), **further}
+    records.append(kind, content | {"results_sha256": certificate.results_sha256})
