@@ -20,6 +20,9 @@ from cmm_uq.points import Floats, Ints
 YEAR = 365.25
 """Days: rates and spreads are stated per year."""
 
+MOST_SHARED = 0.999
+"""Of u, that certificates by one artefact have in common at most: two of one day never agree to the last digit."""
+
 
 class RecordedSeries(Protocol):
     """What is asked of a series of the records: arrays of n certificates, ordered by day and entry.
@@ -164,7 +167,9 @@ def side_by_side(histories: Sequence[History]) -> SideBySide:
         value[:k, i], u[:k, i], given[:k, i] = each.value, each.u, True
         adjusted[:k, i], years[:k, i] = _since(each)
         artefacts[i, : len(mine)] = [number[name] for name in mine]
-        shared[np.arange(k), [mine.index(name) for name in each.artefact], i] = each.u_artefact
+        shared[np.arange(k), [mine.index(name) for name in each.artefact], i] = np.minimum(
+            each.u_artefact, MOST_SHARED * each.u
+        )
     after = np.array([each.adjusted_after for each in histories])
     last = np.where(np.isnan(after), [each.day[-1] for each in histories], after)
     return SideBySide(value, u, shared, years, adjusted, given, artefacts, tuple(names), last, np.isfinite(after))

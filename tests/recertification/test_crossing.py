@@ -136,6 +136,12 @@ def test_a_history_that_cannot_be_used_is_refused_in_words(change: dict[str, obj
         replace(machine([0, 1], [0.0, 1.0]), **change)  # type: ignore[arg-type]
 
 
+def test_certificates_whose_whole_uncertainty_is_their_artefact_s_can_be_followed() -> None:
+    """Two of one day with one artefact tell one thing twice: the level is known to that artefact's u, no better."""
+    found = crossing(machine([0, 0], [1.0, 1.0], 0.5, 0.5), 5.0, one_node(first_sd=100.0))
+    assert (found.level, found.u_level) == (pytest.approx(1.0, abs=0.001), pytest.approx(0.5, rel=0.01))
+
+
 def test_certificates_all_of_one_day_tell_a_level_and_leave_the_rate_to_the_prior() -> None:
     found = crossing(machine([0, 0, 0], [1.0, 1.2, 0.8]), 5.0, one_node(rate=0.4, rate_sd=0.9))
     assert (found.rate, found.u_rate) == (pytest.approx(0.4), pytest.approx(0.9))
