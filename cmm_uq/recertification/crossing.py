@@ -140,7 +140,7 @@ def crossing(
     ----------
     series : of the records, or a history.
     limit : the error conforms while |error| ≤ limit, or error ≤ limit.
-    prior : of the machine's fleet (:meth:`cmm_uq.recertification.fleet.Fleet.prior`), or none.
+    prior : of the machine's fleet (:meth:`cmm_uq.recertification.fleet_prior.FleetPrior.prior`), or none.
     one_sided : only what is above the limit is beyond it.
     paths : how many are drawn.
 

@@ -105,11 +105,13 @@ def history(series: RecordedSeries, adjusted_after: float | None = None) -> Hist
         np.asarray(column, dtype=np.float64)
         for column in (series.day, series.value, series.u, series.u_artefact, series.adjusted_since)
     )
+    names = tuple(map(str, series.artefact))
+    shared = np.where(
+        [bool(name) for name in names], shared, 0.0
+    )  # by an unknown artefact nothing is known to be common
     known = np.where(adjusted > 0, adjusted, np.nan)
     after = adjusted_after is not None and len(day) > 0 and adjusted_after > day[-1]
-    return History(
-        day, value, u, shared, tuple(map(str, series.artefact)), known, float(adjusted_after or 0) if after else np.nan
-    )
+    return History(day, value, u, shared, names, known, float(adjusted_after or 0) if after else np.nan)
 
 
 @dataclass(frozen=True, eq=False)

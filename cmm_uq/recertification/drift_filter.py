@@ -65,9 +65,8 @@ class Filtered:
     def weights(self, prior: Prior) -> Floats:
         """Of nodes and tales given the certificates, (N, K, M), one in all for each machine."""
         evidence = self.log_evidence + np.log(prior.weight)
-        members = prior.members.astype(bool)
-        of_group = np.stack([log_sum(np.where(row, evidence, -np.inf)) for row in members], axis=-1)
-        each = np.array([prior.weight[row].sum() for row in members])
+        of_group = np.stack([log_sum(np.where(row, evidence, -np.inf)) for row in prior.members], axis=-1)
+        each = np.array([prior.weight[row].sum() for row in prior.members])
         node = np.exp(evidence - of_group[:, prior.group]) * each[prior.group]
         return np.asarray(node[..., None] * np.exp(self.log_weight - self.log_evidence[..., None]), dtype=np.float64)
 
@@ -117,14 +116,8 @@ def filtered(machines: SideBySide, prior: Prior, start: Start | None = None, kep
     for k, left in enumerate(machines.given.sum(axis=1)):
         done.append(state.between(left, None))
         state = _measured(_moved(state.between(0, left), machines, prior, k), machines, prior, k, kept)
-    return _since_adjusted(
-        _side_by_side([state, *reversed(done)], np.argsort(order)), machines, prior, np.argsort(order)
-    )
-
-
-def _since_adjusted(state: Filtered, machines: SideBySide, prior: Prior, order: NDArray[np.intp]) -> Filtered:
-    """Set back where an adjustment came after the last certificate, in place; the rate has gone on."""
-    after = machines.adjusted_after[order][:, None, None]
+    back = np.argsort(order)
+    state, after = _side_by_side([state, *reversed(done)], back), machines.adjusted_after[back][:, None, None]
     if after.any():
         _set_back(state, after, prior)
     return state
@@ -204,15 +197,16 @@ def _kept(
         chosen = np.broadcast_to(np.arange(4 * M), flat.shape)
     of, tale = (rows * M + chosen % M).ravel(), (rows * 4 * M + chosen).ravel()
 
-    def taken(values: Floats, which: NDArray[np.intp]) -> Floats:
-        lead = values.shape[: values.ndim - (4 if values is spread or values is log_weight else 3)]
+    def taken(values: Floats, which: NDArray[np.intp], own: int = 3) -> Floats:
+        """Of the last ``own`` axes: machine, node, and what tales are made of."""
+        lead = values.shape[: values.ndim - own]
         return values.reshape(*lead, -1).take(which, axis=-1).reshape(*lead, N, K, few)
 
     mean, covariance, seen = taken(state.mean, of), taken(state.covariance, of), taken(seen, of)
     stepped = (chosen // M >= 2).reshape(N, K, few) * size
     seen[0] += stepped
     covariance[0, 0] += stepped
-    gain = seen / taken(spread, tale)
+    gain = seen / taken(spread, tale, 4)
     mean += gain * taken(missed, of)
     covariance -= gain[:, None] * seen
-    return Filtered(mean, covariance, taken(log_weight, tale))
+    return Filtered(mean, covariance, taken(log_weight, tale, 4))

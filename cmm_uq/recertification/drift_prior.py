@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.points import Floats, Ints
@@ -69,9 +70,9 @@ class Prior:
         return len(self.rate)
 
     @cached_property
-    def members(self) -> Floats:
-        """(groups, K) 1 where a node is of a group."""
-        return np.asarray(self.group == np.arange(self.group.max() + 1)[:, None], dtype=np.float64)
+    def members(self) -> NDArray[np.bool_]:
+        """(groups, K) whether a node is of a group."""
+        return np.asarray(self.group == np.arange(self.group.max() + 1)[:, None])
 
 
 def limit_for(limit: float | None, u: Floats) -> float:
@@ -85,7 +86,7 @@ def default_prior(unit: float, nodes: int = NODES) -> Prior:
     Parameters
     ----------
     unit : the limit; see :func:`limit_for`.
-    nodes : how many, at the points of a lattice (Korobov's with the golden ratio's generalisation, Roberts 2018, R-sequence).
+    nodes : how many, at the points of Roberts' sequence (2018), the golden ratio's generalisation to more dimensions.
     """
     d = len(NAMES)
     root = 2.0

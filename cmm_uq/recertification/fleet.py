@@ -89,7 +89,7 @@ class Estimates:
     ----------
     rate, u_rate : (N,) with the fleet as prior.
     expected, u_expected : (N,) what all others say of a machine of its model and place, before its own certificates.
-    p : (N,) probability of a rate as far from that or farther, 1 where its certificates say nothing of it.
+    p : (N,) probability of a rate as far from that or farther, near 1 where its certificates say nothing of it.
     crossing : where there is a limit.
     """
 
@@ -273,9 +273,9 @@ def _without_it(state: Filtered, prior: Prior) -> Floats:
     They are the inverse of the density of its certificates given those of the others, truncated (Ionides 2008): a machine far
     from its fleet has widened what it is compared with.
     """
-    each = np.array([prior.weight[row > 0].sum() for row in prior.members])
+    each = np.array([prior.weight[row].sum() for row in prior.members])
     log = state.log_evidence + np.log(prior.weight)
-    of_group = np.stack([log_sum(np.where(row > 0, log, -np.inf)) for row in prior.members], axis=-1) - np.log(each)
+    of_group = np.stack([log_sum(np.where(row, log, -np.inf)) for row in prior.members], axis=-1) - np.log(each)
     weight = np.exp(of_group.min(axis=1, keepdims=True) - of_group)
     weight /= weight.mean(axis=1, keepdims=True)
     return np.asarray(np.minimum(weight, np.sqrt(len(each))), dtype=np.float64)

@@ -19,6 +19,9 @@ from cmm_uq.recertification.drift_filter import Filtered, Start, filtered, log_s
 from cmm_uq.recertification.drift_prior import NAMES, USUAL_RATE_SD, Prior, learnt_prior, log_density
 
 _RATE, _MODEL, _PLACE = (NAMES.index(name) for name in ("rate_sd", "model_sd", "place_sd"))
+MOST_ARTEFACTS = 100
+"""Of those that several machines were measured with: the others, used least, count as each machine's own."""
+
 _KEPT = 4
 """Tales that hyper-parameters are learnt from."""
 
@@ -55,7 +58,7 @@ def shared_by(machines: SideBySide, models: Sequence[str], places: Sequence[str]
     """What machines of these models and places share; an artefact of one machine only is the machine's own."""
     N, q = machines.artefacts.shape
     used = np.bincount(machines.artefacts[machines.artefacts >= 0], minlength=len(machines.names))
-    common = np.flatnonzero(used > 1)
+    common = np.sort(np.argsort(-used, kind="stable")[: min(MOST_ARTEFACTS, int((used > 1).sum()))])
     all_models, all_places = sorted(set(models)), sorted(set(places))
     first = 1 + len(all_models) + len(all_places)
     design, rows = np.zeros((N, 1 + q, first + len(common))), np.arange(N)

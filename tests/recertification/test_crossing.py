@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.recertification.crossing import DAYS, HORIZON, Crossing, crossing, crossings
-from cmm_uq.recertification.drift import YEAR, side_by_side
+from cmm_uq.recertification.drift import YEAR, history, side_by_side
 from cmm_uq.recertification.drift_filter import filtered
 from tests.recertification.drifting import machine, one_node
 
@@ -134,6 +134,24 @@ def test_a_limit_that_cannot_be_crossed_is_refused(limit: float) -> None:
 def test_a_history_that_cannot_be_used_is_refused_in_words(change: dict[str, object], words: str) -> None:
     with pytest.raises(CmmUqError, match=words):
         replace(machine([0, 1], [0.0, 1.0]), **change)  # type: ignore[arg-type]
+
+
+def test_certificates_by_unknown_artefacts_have_nothing_in_common() -> None:
+    """An empty name is no artefact; a known one is."""
+
+    @dataclass
+    class Series:
+        artefact: tuple[str, ...]
+        day = np.array([730_000, 730_365])
+        value, u, u_artefact = np.array([1.0, 2.0]), np.array([0.5, 0.5]), np.array([0.3, 0.3])
+        adjusted_since = np.array([0, 730_100])
+
+    known = history(Series(("BB-7", "")))
+    assert known.u_artefact.tolist() == [0.3, 0.0]
+    assert np.isnan(known.adjusted_since[0])
+    assert (known.adjusted_since[1], np.isnan(known.adjusted_after)) == (730_100.0, True)
+    assert history(Series(("", "")), 730_400).adjusted_after == 730_400
+    assert np.isnan(history(Series(("", "")), 730_365).adjusted_after)
 
 
 def test_certificates_whose_whole_uncertainty_is_their_artefact_s_can_be_followed() -> None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from cmm_uq.points import Floats
-from cmm_uq.recertification import drift_filter, drift_prior
+from cmm_uq.recertification import drift_filter, drift_prior, fleet_model
 from cmm_uq.recertification.drift import YEAR, side_by_side
 from cmm_uq.recertification.drift_prior import MEDIANS, NAMES, USUAL_RATE_SD, learnt_prior
 from cmm_uq.recertification.fleet_model import messages, others, shared_by, together
@@ -101,3 +101,9 @@ def test_an_artefact_of_one_machine_only_is_its_own() -> None:
     shared = shared_by(side_by_side(MACHINES), MODELS, PLACES)
     assert (shared.models, shared.places, shared.artefacts) == (("M", "N"), ("p", "q"), ("A", "B"))
     assert shared.design[:, 0].sum(axis=1).tolist() == [3, 3, 3, 3]
+
+
+def test_of_very_many_artefacts_those_of_most_machines_are_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet_model, "MOST_ARTEFACTS", 1)
+    every = [*MACHINES, machine([0], [0.0], 0.6, 0.3, "B")]
+    assert shared_by(side_by_side(every), [*MODELS, "M"], [*PLACES, "p"]).artefacts == ("B",)
