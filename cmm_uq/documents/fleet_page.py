@@ -249,11 +249,14 @@ def _crossed(of: OfValue, i: int) -> tuple[Text, Text]:
     if crossing is None or of.members[i].limit is None:
         return DASH, DASH
     one, last = crossing.some(i), int(crossing.last[i])
-    low, middle, high = (day_of(last, float(one.quantile(part)[0])) for part in (0.05, 0.5, 0.95))
+    days = [float(one.quantile(part)[0]) for part in (0.05, 0.5, 0.95)]
+    if days[1] == 0:
+        return say("already"), DASH
+    low, middle, high = (day_of(last, each) for each in days)
     when = say("not in 40 years") if middle is None else day(middle)
     if low is None or high is None:
         return when, DASH if low is None else say("from {low}", low=day(low))
-    return when, say("{low} to {high}", low=day(low), high=day(high))
+    return when, say("{low} to\n{high}", low=day(low), high=day(high))
 
 
 def _spreads(of: OfValue) -> Table:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from subprocess import CompletedProcess
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.commands.fleet import fleet
+from cmm_uq.documents.document import Table
 from cmm_uq.documents.fleet_data import fleet_data
 from cmm_uq.documents.fleet_page import fleet_document, fleet_summary
 from cmm_uq.errors import CmmUqError
@@ -75,8 +77,23 @@ def test_the_data_have_every_machine_and_a_prior_that_is_the_fleet_s(
 
 
 def test_every_text_of_the_page_can_be_translated(alone: FleetFound) -> None:
-    document = fleet_document(alone)
-    assert strangers(document, "Scale a.ppm 7 emcee fleet.json cmm-uq") == []
+    """With a machine that belongs, and with one that does not."""
+    odd = replace(alone, values=(replace(alone.values[0], belongs=np.array([False])),))
+    for found in (alone, odd):
+        assert strangers(fleet_document(found), "Scale a.ppm 7 emcee fleet.json cmm-uq") == []
+    assert fleet_summary(odd).verdicts[0].word == "DIFFERS"
+    assert len(fleet_document(odd).sections[0].blocks) == len(fleet_document(alone).sections[0].blocks)
+
+
+def test_a_machine_beyond_its_limit_is_said_to_be_so_already() -> None:
+    """And one that is far within has a date, or from when on it may cross."""
+    both = tuple(
+        Member(name, "", "", machine([0, 1, 2], [level] * 3, 0.1), 4.0) for name, level in (("in", 0.0), ("out", 9.0))
+    )
+    found = judged([("a.ppm", "Scale", "ppm", both, fit_fleet(both), 0)], 1)
+    rows = next(block for block in fleet_document(found).sections[0].blocks
+                if isinstance(block, Table) and block.caption == "Machines").rows  # fmt: skip
+    assert [(row[0], row[-2] == "already") for row in rows] == [("out", True), ("in", False)]
 
 
 def test_what_a_fleet_cannot_say_is_said(alone: FleetFound) -> None:
