@@ -23,6 +23,7 @@ CONTENTS: dict[str, list[str]] = {
         "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*",
         "import/index", "import/*", "instruments/index", "instruments/*",
     ],
+    "Records": ["records/index", "records/*"],
     "Reference": [
         "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
         "reference/instrument",

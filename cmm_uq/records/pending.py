@@ -91,12 +91,12 @@ def settle(records: Records) -> None:
 
 
 def _record(writing: Writing, token: str) -> None:
-    """Add the entry that is pending, once; the same results are recorded once."""
+    """Add the entry that is pending, once; the same results are recorded once, and anew after they were withdrawn."""
     row = _row(writing.connection, token)
     if row is None:
         return
     content = json.loads(row.content)
-    if entry_of_results(writing.connection, content.get("results_sha256") or "") is None:
+    if entry_of_results(writing.connection, content.get("results_sha256") or "", standing=True) is None:
         writing.add([(row.kind, content, None)])
     writing.connection.execute(delete(pending).where(pending.c.token == token))
 

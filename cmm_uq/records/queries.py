@@ -190,9 +190,11 @@ def signatures_of(connection: Connection, certificate: int) -> list[Signature]:
     ]  # fmt: skip
 
 
-def entry_of_results(connection: Connection, results_sha256: str) -> int | None:
-    """Number of the entry that recorded them."""
+def entry_of_results(connection: Connection, results_sha256: str, *, standing: bool = False) -> int | None:
+    """Number of the first entry that recorded them, of those that count where ``standing`` says so."""
     query = select(func.min(certificates.c.entry)).where(certificates.c.results_sha256 == results_sha256)
+    if standing:
+        query = query.where(certificates.c.state.in_(STANDING))
     found = connection.execute(query).scalar()
     return None if found is None else int(found)
 

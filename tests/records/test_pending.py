@@ -245,6 +245,10 @@ def test_the_same_results_are_recorded_once(tmp_path: Path) -> None:
         report(place, value)
     with open_records(place) as records:
         assert [entry.data["results_sha256"] for entry in records.entries()] == [digest(1), digest(2)]
+        records.append("withdrawal", {"certificate": 1, "by": "A. Huber", "reason": "too early"})
+    report(place, 1)
+    with open_records(place) as records:
+        assert [one.state for one in records.certificates(values=False)] == ["withdrawn", "draft", "draft"]
 
 
 def test_a_set_that_is_being_written_is_left_to_its_process(tmp_path: Path) -> None:
