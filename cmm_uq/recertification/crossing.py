@@ -30,8 +30,8 @@ def grid(gaps: int) -> Floats:
     return np.concatenate([[0.0], np.geomspace(7.0, HORIZON * YEAR, gaps)])
 
 
-DAYS, FINE = grid(48), grid(240)
-"""A sixth further each, for many machines whose dates are wide; a thirtieth, for one."""
+DAYS, FINE = grid(48), grid(160)
+"""A sixth further each, for many machines whose dates are wide; a twentieth, for one."""
 
 PATHS = 2048
 _AT_ONCE = 2_000_000
@@ -132,7 +132,7 @@ def crossing(
     prior: Prior | None = None,
     *,
     one_sided: bool = False,
-    paths: int = 2 * PATHS,
+    paths: int = PATHS,
 ) -> Crossing:
     """When one machine's error will first be beyond its limit.
 

@@ -26,7 +26,7 @@ def test_from_a_known_state_the_day_is_that_of_a_wiener_process_with_drift(rate:
     t, a = found.days[1:] / YEAR, 3.0
     s = walk * np.sqrt(t)
     exact = ndtr((rate * t - a) / s) + np.exp(2 * a * rate / walk**2) * ndtr((-a - rate * t) / s)
-    assert np.abs(found.probability[1:] - exact).max() < 3 * 0.5 / np.sqrt(4096)  # three standard errors of 4096 paths
+    assert np.abs(found.probability[1:] - exact).max() < 3 * 0.5 / np.sqrt(2048)  # three standard errors of 2048 paths
 
 
 def test_between_two_limits_with_steps_and_an_uncertain_state_it_is_that_of_paths_walked_day_by_day() -> None:
@@ -54,7 +54,7 @@ def replace_day(found: Crossing, days: int):  # type: ignore[no-untyped-def]
 
 def test_a_machine_that_hardly_moves_crosses_never_and_one_beyond_the_limit_has_already() -> None:
     still = one_node(rate_sd=EXACT, walk=EXACT, steps_per_year=1e-12, first_sd=100.0)
-    inside, beyond = (crossing(machine([0], [value], 0.1), 5.0, still) for value in (1.0, -6.0))
+    inside, beyond = (crossing(machine([0], [value], 0.1), 5.0, still) for value in (1.0, -9.0))
     assert (inside.already, inside.quantile(0.5), inside.interval()) == (0.0, None, (None, None))
     assert beyond.already == 1.0
     assert beyond.quantile(0.05) == beyond.quantile(0.95) == beyond.last
