@@ -20,8 +20,7 @@ from cmm_uq import __version__  # noqa: E402
 CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "overview", "gallery"],
     "How to": [
-        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "records/scheduled", "howto/python",
-        "notebooks/*",
+        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*",
         "import/index", "import/*", "instruments/index", "instruments/*",
     ],
     "Records": ["records/index", "records/*"],
@@ -36,11 +35,11 @@ CONTENTS: dict[str, list[str]] = {
         "certificate", "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
-        "uncertainty/index", "uncertainty/methods", "uncertainty/budgets", "records/due", "records/history",
+        "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],
     "What it rests on": [
         "validation", "coverage-study", "noise-ranks", "diagnosis-study", "diagnosis-second-study", "mutation-study",
-        "hostile-study", "uncertainty/validation", "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
+        "hostile-study", "records/drift-study", "uncertainty/validation", "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
         "peers", "sources", "machine/source-errors", "uncertainty/harris-2004",
     ],
     "The project": ["/README", "/CHANGELOG", "/CONTRIBUTING", "layout"],

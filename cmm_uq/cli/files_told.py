@@ -28,6 +28,8 @@ _WHAT = {
     "job.toml": "the job",
     "truth.toml": "what it was drawn from",
     "compensation.json": "how the coordinates came about",
+    "fleet.html": "what the machines have in common",
+    "fleet.json": "every figure, for other programs",
     MANIFEST: "name, size and hash of each file",
 }
 

@@ -1,0 +1,75 @@
+"""A fleet for other programs: ``fleet.json``, whose ``prior`` is all that is needed to judge a further machine by it."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Any
+
+import numpy as np
+
+from cmm_uq import __version__
+from cmm_uq.recertification.crossing import Crossings
+from cmm_uq.recertification.drift import YEAR
+from cmm_uq.recertification.fleet_found import FleetFound, OfValue
+
+SCHEMA = "cmm-uq/fleet/1"
+
+
+def fleet_data(found: FleetFound) -> dict[str, Any]:
+    """All that was found, rates per year in the unit of the value."""
+    return {
+        "schema": SCHEMA, "software": {"name": "cmm-uq", "version": __version__}, "seed": found.seed,
+        "values": [_value(each) for each in found.values],
+    }  # fmt: skip
+
+
+def _value(of: OfValue) -> dict[str, Any]:
+    fleet, chains = of.fleet, of.fleet.chains
+    return {
+        "name": of.name, "quantity": of.quantity, "unit": of.unit, "machines": _machines(of),
+        "certificates_left_out": of.left_out,
+        "usual": [
+            {"kind": each.kind, "name": each.name, "machines": each.machines, "rate": each.rate, "u": each.u,
+             "lower": each.lower, "upper": each.upper}
+            for each in fleet.usual
+        ],
+        "spreads": [
+            {"name": each.name, "median": each.median, "lower": each.lower, "upper": each.upper} for each in fleet.spreads
+        ],
+        "convergence": {
+            "converged": chains.converged, "rhat_max": chains.rhat_max, "ess_min": chains.ess_min, "steps": chains.steps,
+            "sampler": chains.sampler, "machines": fleet.learnt_from,
+        },
+        "prior": fleet.data(),
+    }  # fmt: skip
+
+
+def _machines(of: OfValue) -> list[dict[str, Any]]:
+    e = of.fleet.estimates
+    return [
+        {
+            "machine": member.machine, "model": member.model, "place": member.place,
+            "certificates": len(member.history.day), "rate": float(e.rate[i]), "u": float(e.u_rate[i]),
+            "expected": float(e.expected[i]), "u_expected": float(e.u_expected[i]), "p": float(e.p[i]),
+            "belongs": bool(of.belongs[i]), "limit": member.limit,
+            "crossing": None if e.crossing is None or member.limit is None else crossing_data(e.crossing, i),
+        }
+        for i, member in enumerate(of.members)
+    ]  # fmt: skip
+
+
+def crossing_data(crossing: Crossings, i: int) -> dict[str, Any]:
+    """When one machine's error will be beyond its limit: days, ``null`` beyond the horizon, and probabilities."""
+    last = int(crossing.last[i])
+    one = crossing.some(i)
+    dates = {f"day_{round(100 * part)}": day_of(last, float(one.quantile(part)[0])) for part in (0.05, 0.5, 0.95)}
+    return {
+        "last": dt.date.fromordinal(last).isoformat(), **{
+            name: None if day is None else day.isoformat() for name, day in dates.items()},
+        "already": float(crossing.probability[i, 0]), "within_a_year": float(one.by(np.array([YEAR]))[0]),
+    }  # fmt: skip
+
+
+def day_of(last: int, days: float) -> dt.date | None:
+    """So many days after an ordinal; None where they are infinite."""
+    return dt.date.fromordinal(last + int(days)) if np.isfinite(days) else None
