@@ -39,7 +39,8 @@ CONTENTS: dict[str, list[str]] = {
     ],
     "What it rests on": [
         "validation", "coverage-study", "noise-ranks", "diagnosis-study", "diagnosis-second-study", "mutation-study",
-        "hostile-study", "records/drift-study", "uncertainty/validation", "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
+        "hostile-study", "records/drift-study", "uncertainty/validation",
+        "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
         "peers", "sources", "machine/source-errors", "uncertainty/harris-2004",
     ],
     "The project": ["/README", "/CHANGELOG", "/CONTRIBUTING", "layout"],
