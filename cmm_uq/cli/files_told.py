@@ -30,6 +30,7 @@ _WHAT = {
     "compensation.json": "how the coordinates came about",
     "fleet.html": "what the machines have in common",
     "fleet.json": "every figure, for other programs",
+    "fleet.csv": "every machine and value, for a spreadsheet",
     MANIFEST: "name, size and hash of each file",
 }
 

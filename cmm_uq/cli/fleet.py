@@ -33,7 +33,7 @@ def command(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for fleet.html and fleet.json.", metavar="DIR", show_default="none")
+        Path | None, typer.Option(help="Folder for fleet.html, fleet.json and fleet.csv.", metavar="DIR", show_default="none")
     ] = None,
     seed: Seed = 1,
     force: Force = False,
@@ -54,7 +54,7 @@ def command(
 
         put_data(fleet_data(found))
     elif not quiet:
-        from cmm_uq.documents.fleet_page import fleet_summary
+        from cmm_uq.documents.fleet_summary import fleet_summary
 
         show_summary(fleet_summary(found), files, verbose=verbose)
     if strict and found.outsiders:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Line = tuple[tuple[str, str], ...]
 """Parts of a line, each with its style in the words of rich; none for the usual one."""
 
-COLOURS: dict[Standing, str] = {"good": "bold green", "open": "bold yellow", "bad": "bold red"}
+COLOURS: dict[Standing, str] = {"good": "bold green", "open": "bold yellow", "bad": "bold red", "unknown": "bold"}
 HEADING, FAINT = "bold", "dim"
 
 LINES, WARNING_LINES = 3, 2

@@ -18,7 +18,7 @@ from cmm_uq.records import open_records
 if TYPE_CHECKING:
     import pandas as pd
 
-FILES = ("fleet.html", "fleet.json")
+FILES = ("fleet.html", "fleet.json", "fleet.csv")
 
 
 def fleet(
@@ -120,14 +120,14 @@ class _Columns:
 
 
 def write_fleet(found: FleetFound, folder: Path, *, force: bool = False) -> dict[str, Path]:
-    """Write ``fleet.html`` and ``fleet.json``, all or none.
+    """Write ``fleet.html``, ``fleet.json`` and ``fleet.csv``, all or none.
 
     Raises
     ------
     CmmUqError : something in the folder is not this command's.
     OutputError : the folder cannot be written to.
     """
-    from cmm_uq.documents.fleet_data import fleet_data
+    from cmm_uq.documents.fleet_data import fleet_csv, fleet_data
     from cmm_uq.documents.fleet_page import fleet_document
     from cmm_uq.documents.html import render_html
     from cmm_uq.documents.results_file import as_json
@@ -135,4 +135,5 @@ def write_fleet(found: FleetFound, folder: Path, *, force: bool = False) -> dict
 
     with staged(folder, Owner("fleet", "records"), force=force, expected=FILES) as place:
         page = render_html(fleet_document(found)).encode()
-        return place.write({"fleet.html": page, "fleet.json": as_json(fleet_data(found))})
+        data = fleet_data(found)
+        return place.write({"fleet.html": page, "fleet.json": as_json(data), "fleet.csv": fleet_csv(data)})

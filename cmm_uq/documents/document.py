@@ -88,8 +88,8 @@ class Decision:
     kind: ClassVar[str] = "decision"
 
 
-Standing = Literal["good", "open", "bad"]
-"""Whether nothing is left to do, something is, or the machine is not what it should be."""
+Standing = Literal["good", "open", "bad", "unknown"]
+"""Whether nothing is left to do, something is, the machine is not what it should be, or nothing can be said of it."""
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,20 @@
-"""A fleet for other programs: ``fleet.json``, whose ``prior`` is all that is needed to judge a further machine by it."""
+"""A fleet for other programs: ``fleet.json``, whose ``prior`` is all that is needed to judge a further machine by it.
+
+``fleet.csv`` has its machines alone, for a spreadsheet.
+"""
 
 from __future__ import annotations
 
+import csv
 import datetime as dt
+import io
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from cmm_uq import __version__
+from cmm_uq.files.cells import FORMULA
 from cmm_uq.recertification.crossing import Crossings
 from cmm_uq.recertification.drift import YEAR
 from cmm_uq.recertification.fleet_found import FleetFound, OfValue
@@ -27,7 +34,7 @@ def _value(of: OfValue) -> dict[str, Any]:
     fleet, chains = of.fleet, of.fleet.chains
     return {
         "name": of.name, "quantity": of.quantity, "unit": of.unit, "machines": _machines(of),
-        "certificates_left_out": of.left_out,
+        "certificates_left_out": of.left_out, "compared": of.compared,
         "usual": [
             {"kind": each.kind, "name": each.name, "machines": each.machines, "rate": each.rate, "u": each.u,
              "lower": each.lower, "upper": each.upper}
@@ -73,3 +80,28 @@ def crossing_data(crossing: Crossings, i: int) -> dict[str, Any]:
 def day_of(last: int, days: float) -> dt.date | None:
     """So many days after an ordinal; None where they are infinite."""
     return dt.date.fromordinal(last + int(days)) if np.isfinite(days) else None
+
+
+def fleet_csv(data: Mapping[str, Any]) -> bytes:
+    """A row a machine and value, of what :func:`fleet_data` gave; rates per year in the unit of the row.
+
+    A name that a spreadsheet would compute has an apostrophe before it, as a spreadsheet marks text.
+    """
+    rows = [
+        {"value": of["name"], "quantity": of["quantity"], "unit": of["unit"], **one} | (one["crossing"] or {})
+        for of in data["values"]
+        for one in of["machines"]
+    ]
+    text = io.StringIO()
+    columns = [*(name for name in rows[0] if name not in ("crossing", *_CROSSING)), *_CROSSING]
+    writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({name: _cell(cell) for name, cell in row.items()} for row in rows)
+    return text.getvalue().encode()
+
+
+_CROSSING = ("last", "day_5", "day_50", "day_95", "already", "within_a_year")
+
+
+def _cell(cell: Any) -> Any:
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell

@@ -44,6 +44,7 @@ GOOD, OPEN, BAD = "#1f6b3a", "#8a5300", "#9c2420"
 """A verdict: nothing to do, something to do, something wrong; white on them at least 6 : 1. A sign and words go with them."""
 COLOURS = {
     "ink": INK, "muted": MUTED, "rule": RULE, "tint": TINT, "accent": ACCENT, "good": GOOD, "open": OPEN, "bad": BAD,
+    "unknown": MUTED,
 }  # fmt: skip
 """The same, for the templates."""
 DIVERGING = ("#0b5c7a", "#3f86a0", "#86b1c2", "#c3ccd0", "#e0b48a", "#cc7f3c", "#a84e08")

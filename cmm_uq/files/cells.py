@@ -12,7 +12,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import text_of
 from cmm_uq.files.limits import CELL, CELLS, COLUMN_NAME, COLUMNS, LINE, LINES, ROWS, Limit
 
-_FORMULA = tuple("=+-@＝＋－＠")
+FORMULA = tuple("=+-@＝＋－＠")
 """What makes a spreadsheet compute a cell instead of showing it."""
 
 
@@ -74,7 +74,7 @@ def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS, d
 
 def column_problem(name: str) -> str | None:
     """Why a column cannot bear this name, or ``None``; names are written into new files as they are."""
-    if name.startswith(_FORMULA):
+    if name.startswith(FORMULA):
         return f"the column {name!r} begins as a formula does"
     if any(unicodedata.category(c)[0] == "C" for c in name):
         return f"the column {name!r} has a control character in its name"

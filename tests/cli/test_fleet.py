@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from subprocess import CompletedProcess
 
@@ -11,19 +10,13 @@ import numpy as np
 import pytest
 
 from cmm_uq.commands.fleet import fleet
-from cmm_uq.documents.document import Table
-from cmm_uq.documents.fleet_data import fleet_data
-from cmm_uq.documents.fleet_page import fleet_document, fleet_summary
 from cmm_uq.errors import CmmUqError
 from cmm_uq.recertification.crossing import crossing
 from cmm_uq.recertification.drift import history
-from cmm_uq.recertification.fleet import Member, fit_fleet
-from cmm_uq.recertification.fleet_found import FleetFound, judged
 from cmm_uq.recertification.fleet_prior import FleetPrior
 from cmm_uq.records import open_records
 from tests.cli.process import run
-from tests.documents.saying import strangers
-from tests.recertification.drifting import machine
+from tests.documents.fleets import alone
 from tests.records.histories import made
 
 NAME = "squareness_xy.angle_arcsec"
@@ -41,19 +34,12 @@ def written(lab: Path) -> tuple[CompletedProcess[str], Path]:
     return run("fleet", "--records", lab, "--name", NAME, "--out", lab.parent / "out"), lab.parent / "out"
 
 
-@pytest.fixture(scope="module")
-def alone() -> FleetFound:
-    """One machine, all its certificates of one day, and no limit."""
-    only = Member("7", "", "", machine([0, 0], [1.0, 1.2]))
-    return judged([("a.ppm", "Scale", "ppm", (only,), fit_fleet([only]), 2)], 1)
-
-
 def test_it_says_what_is_usual_and_writes_page_and_data(written: tuple[CompletedProcess[str], Path]) -> None:
     done, out = written
     assert (done.returncode, done.stderr) == (0, "")
     assert "No machine drifts unlike its fleet" in done.stdout
     assert "Squareness of x and y: average machine" in done.stdout
-    assert {path.name for path in out.iterdir()} >= {"fleet.html", "fleet.json"}
+    assert {path.name for path in out.iterdir()} >= {"fleet.html", "fleet.json", "fleet.csv"}
     assert "Usual drift" in (out / "fleet.html").read_text(encoding="utf-8")
 
 
@@ -76,36 +62,6 @@ def test_the_data_have_every_machine_and_a_prior_that_is_the_fleet_s(
     assert one["crossing"]["last"] == again.last.isoformat()
 
 
-def test_every_text_of_the_page_can_be_translated(alone: FleetFound) -> None:
-    """With a machine that belongs, and with one that does not."""
-    odd = replace(alone, values=(replace(alone.values[0], belongs=np.array([False])),))
-    for found in (alone, odd):
-        assert strangers(fleet_document(found), "Scale a.ppm 7 emcee fleet.json cmm-uq") == []
-    assert fleet_summary(odd).verdicts[0].word == "DIFFERS"
-    assert len(fleet_document(odd).sections[0].blocks) == len(fleet_document(alone).sections[0].blocks)
-
-
-def test_a_machine_beyond_its_limit_is_said_to_be_so_already() -> None:
-    """And one that is far within has a date, or from when on it may cross."""
-    both = tuple(
-        Member(name, "", "", machine([0, 1, 2], [level] * 3, 0.1), 4.0) for name, level in (("in", 0.0), ("out", 9.0))
-    )
-    found = judged([("a.ppm", "Scale", "ppm", both, fit_fleet(both), 0)], 1)
-    rows = next(block for block in fleet_document(found).sections[0].blocks
-                if isinstance(block, Table) and block.caption == "Machines").rows  # fmt: skip
-    assert [(row[0], row[-2] == "already") for row in rows] == [("out", True), ("in", False)]
-
-
-def test_what_a_fleet_cannot_say_is_said(alone: FleetFound) -> None:
-    warnings = [str.__str__(text) for text in fleet_summary(alone).warnings]
-    assert warnings == [
-        "Scale (a.ppm): 2 certificates state no uncertainty and cannot be weighed",
-        "Scale (a.ppm): one machine is no fleet; what machines have in common is assumed, not learnt",
-        "Scale (a.ppm): no machine has certificates of two days; drift is assumed, not learnt",
-    ]
-    assert fleet_data(alone)["values"][0]["machines"][0]["crossing"] is None
-
-
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
@@ -126,9 +82,9 @@ def test_bad_input_is_one_line_and_nothing_is_written(
 @pytest.mark.parametrize(
     "change", [{"log": [[0.0]]}, {"unit": "none"}, {"hyper_parameters": []}, {"models": ["one", "more"]}]
 )
-def test_a_prior_of_another_version_is_refused(change: dict[str, object], alone: FleetFound) -> None:
+def test_a_prior_of_another_version_is_refused(change: dict[str, object]) -> None:
     with pytest.raises(CmmUqError, match="no prior of a fleet"):
-        FleetPrior.from_data(alone.values[0].fleet.data() | change)
+        FleetPrior.from_data(alone().values[0].fleet.data() | change)
 
 
 def test_records_without_a_certificate_are_refused_in_words(tmp_path: Path) -> None:
