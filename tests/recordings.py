@@ -8,8 +8,9 @@ import numpy as np
 
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.kinds import artefact_facts, kind_named
+from cmm_uq.planning.advice import Suggestion, suggestions
 from cmm_uq.planning.setting import Planning
-from cmm_uq.planning.suggestion import Suggestion, next_plan, suggestions
+from cmm_uq.planning.suggestion import next_plan
 from cmm_uq.points import Floats, Machine, Points
 from cmm_uq.screening import screened as screening
 from cmm_uq.screening.screened import Screened

@@ -30,8 +30,9 @@ from cmm_uq.kinds import kind_of
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.kind import Kind, Observe
 from cmm_uq.overflow import refusing_overflow
+from cmm_uq.planning.advice import NextPlan, Wanted, suggestions
 from cmm_uq.planning.setting import Planning
-from cmm_uq.planning.suggestion import NextPlan, Wanted, next_plan, suggestions
+from cmm_uq.planning.suggestion import next_plan
 from cmm_uq.screening.screened import Finding
 
 

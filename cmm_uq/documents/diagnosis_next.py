@@ -15,7 +15,7 @@ from cmm_uq.messages import NOTHING, Text, number, plural, say, semicolons, toge
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect
-from cmm_uq.planning.suggestion import ODDS, NextPlan, Shown, odds_words, rounded
+from cmm_uq.planning.advice import ODDS, NextPlan, Shown, odds_words, rounded
 
 TO_FILL_IN = "next_plan.csv"
 """File that a diagnosis writes the set-ups to."""

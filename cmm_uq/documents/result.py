@@ -22,7 +22,7 @@ from cmm_uq.inference.posterior import NoisyPosterior
 from cmm_uq.jobs.job import Job
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
-from cmm_uq.planning.suggestion import NextPlan, Suggestion
+from cmm_uq.planning.advice import NextPlan, Suggestion
 from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding
 from cmm_uq.uncertainty.covariance import Covariance

@@ -8,7 +8,7 @@ import pytest
 from cmm_uq.documents.diagnosis_next import next_data
 from cmm_uq.kinds import artefact_facts, artefact_of
 from cmm_uq.physics.catalogue import every
-from cmm_uq.planning.suggestion import NextPlan, Shown
+from cmm_uq.planning.advice import NextPlan, Shown
 from tests.kinds.constructions import plate
 
 

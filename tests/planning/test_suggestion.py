@@ -15,10 +15,11 @@ from cmm_uq.kinds import artefact_of, kind_named
 from cmm_uq.kinds.ballbar.plan import ballbar
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
+from cmm_uq.planning.advice import ODDS, NextPlan, Wanted, suggestions
 from cmm_uq.planning.placing import Placing, along, joined
 from cmm_uq.planning.ready import ready_plan
 from cmm_uq.planning.setting import Planning
-from cmm_uq.planning.suggestion import ODDS, NextPlan, Wanted, next_plan, suggestions
+from cmm_uq.planning.suggestion import next_plan
 from cmm_uq.points import Points
 from tests.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting
 

@@ -15,9 +15,10 @@ from cmm_uq.messages import say
 from cmm_uq.physics import catalogue
 from cmm_uq.physics.effect import Effect, Parameter
 from cmm_uq.planning import suggestion
+from cmm_uq.planning.advice import NextPlan
 from cmm_uq.planning.ready import ready_plan
 from cmm_uq.planning.setting import Planning
-from cmm_uq.planning.suggestion import NextPlan, next_plan
+from cmm_uq.planning.suggestion import next_plan
 from cmm_uq.planning.turned import turned_placings
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import ARCSECOND, unit
