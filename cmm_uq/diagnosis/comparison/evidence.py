@@ -13,14 +13,13 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, sparse, special
 
 from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of
 from cmm_uq.diagnosis.comparison.explanations import Explanation
+from cmm_uq.diagnosis.comparison.quick import eigen, interpolated, log_diagonal, log_sum, log_sum_in
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
 from cmm_uq.diagnosis.noise import Kind
 from cmm_uq.model.display import Display
@@ -153,14 +152,14 @@ class Comparison:
         found = []
         for kind in self.kinds:
             Q, R = np.linalg.qr(kind.white(self._reached))
-            log = float(np.log(kind.probability)) + kind.log_factor + kind.log_whitening - _log_diagonal(R)
+            log = float(np.log(kind.probability)) + kind.log_factor + kind.log_whitening - log_diagonal(R)
             rows = kind.whitening.T @ Q
             shared = [columns for columns in (self.certified, kind.slow) if columns.size]
             if shared:
                 white = kind.white(np.hstack(shared))
                 white -= Q @ (Q.T @ white)
                 factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white)
-                log -= _log_diagonal(factor)
+                log -= log_diagonal(factor)
                 certified = np.linalg.solve(factor, white.T)
                 rows = np.hstack([rows, kind.whitening.T @ certified.T])
             found.append(_Noise(kind.whitening, np.asarray(rows.T, dtype=np.float64), log))
@@ -210,7 +209,7 @@ class Comparison:
         np.maximum(squares, 1e-300, out=squares)
         np.log(squares, out=squares)
         if self._table is not None:
-            return _interpolated(squares, *self._table)
+            return interpolated(squares, *self._table)
         squares *= -0.5 * self.degrees_of_freedom
         squares += self._uniform
         return squares
@@ -298,7 +297,7 @@ class Comparison:
         """
         known = self._beside(signal, ())
         known = replace(known, squares=known.squares + self.lengths(noise[:, None]))
-        return self._total(known) - _log_sum(self.over_sigma(known.squares) + known.log[:, None], 0)
+        return self._total(known) - log_sum(self.over_sigma(known.squares) + known.log[:, None], 0)
 
     def beside(
         self, given: Sequence[Version] = (), among: Container[int] | None = None
@@ -308,7 +307,7 @@ class Comparison:
         most, best = total.copy(), {}
         for group, cube in self.each(None, given, among):
             each = cube[:, :, 0]
-            gains = _log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
+            gains = log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
             largest = each.max(axis=1) + group.weight
@@ -345,7 +344,7 @@ class Comparison:
         """Log evidence (b,) of what is given, at its size, for data (m, b)."""
         known = self._beside(left, given)
         every = self.over_sigma(known.squares) + known.log[:, None]
-        return _log_sum(every, 0)
+        return log_sum(every, 0)
 
     def noise_probability(self, given: Sequence[Version]) -> Floats:
         """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
@@ -395,14 +394,14 @@ class Comparison:
         if blocks.shape[3] == 1:
             strengths = blocks[..., 0]
         else:
-            strengths, turn = _eigen(blocks)
+            strengths, turn = eigen(blocks)
             shown = turn.swapaxes(2, 3) @ shown
         variance = (amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
         gain, square = variance / (1 + ratio), shown**2
         constant = known.log[:, None, None] - 0.5 * np.einsum("kmar->kma", np.log1p(ratio))
         log, offset = self._integrated(known.squares, gain, square, constant)
-        return (_log_sum_in(log, 0 if sizes else (0, 2)) + offset).reshape(len(amplitudes), -1, b)
+        return (log_sum_in(log, 0 if sizes else (0, 2)) + offset).reshape(len(amplitudes), -1, b)
 
     def _integrated(
         self, squares: Floats, gain: Floats, square: Floats, constant: Floats
@@ -514,61 +513,6 @@ class Comparison:
         if key not in self._weighed:
             self._weighed[key] = self._by_noise(self._columns(version))
         return self._weighed[key]
-
-
-def _log_sum(log: Floats, axis: int) -> Floats:
-    """Logarithm of sums of what has these finite logarithms, in the steps of ``scipy.special.logsumexp``.
-
-    A search asks for thousands of small ones, and what scipy does beside these steps takes thrice their time.
-    """
-    largest = log.max(axis=axis, keepdims=True)
-    most = log == largest
-    count = most.sum(axis=axis, keepdims=True, dtype=np.float64)
-    others = np.exp(np.where(most, -np.inf, log) - largest).sum(axis=axis, keepdims=True)
-    return np.asarray((np.log1p(others / count) + np.log(count) + largest).squeeze(axis), dtype=np.float64)
-
-
-def _interpolated(at: Floats, nodes: Floats, values: Floats) -> Floats:
-    """What ``np.interp`` gives for nodes (n,) at equal distances, which need no search; ``at`` is overwritten."""
-    last = len(nodes) - 1
-    at -= nodes[0]
-    at *= last / (nodes[-1] - nodes[0])
-    np.clip(at, 0, last, out=at)
-    before = np.minimum(at.astype(np.int64), last - 1)
-    at -= before
-    at *= np.diff(values)[before]
-    at += values[before]
-    return at
-
-
-def _log_sum_in(log: Floats, axis: int | tuple[int, ...]) -> Floats:
-    """Logarithm of sums of what has these logarithms, which are overwritten; of each sum one is finite."""
-    largest = log.max(axis=axis, keepdims=True)
-    log -= largest
-    np.exp(log, out=log)
-    return np.asarray(np.log(log.sum(axis=axis)) + largest.squeeze(axis), dtype=np.float64)
-
-
-def _eigen(blocks: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues (…, r) of symmetric matrices and their eigenvectors (…, r, r); of two columns, which abound, by a rotation.
-
-    The rotation is Jacobi's (Golub, Van Loan 2013, Matrix Computations, section 8.5.2), as exact as what is iterated.
-    """
-    if blocks.shape[-1] != 2:
-        strengths, turn = np.linalg.eigh(blocks)
-        return np.asarray(strengths), np.asarray(turn)
-    first, second, twice = blocks[..., 0, 0], blocks[..., 1, 1], blocks[..., 0, 1] + blocks[..., 1, 0]
-    apart = second - first
-    length = np.abs(apart) + np.hypot(apart, twice)
-    tangent = np.where(apart < 0, -twice, twice) / np.maximum(length, 1e-300)
-    cosine = 1 / np.sqrt(1 + tangent**2)
-    sine, shift = tangent * cosine, 0.5 * tangent * twice
-    turn = np.stack([np.stack([cosine, sine], axis=-1), np.stack([-sine, cosine], axis=-1)], axis=-2)
-    return np.stack([first - shift, second + shift], axis=-1), turn
-
-
-def _log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
-    return float(np.log(np.abs(np.diag(triangular))).sum())
 
 
 @dataclass(frozen=True, eq=False)

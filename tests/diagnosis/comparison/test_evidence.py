@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.diagnosis.comparison.evidence import Comparison, _eigen, _interpolated, _log_sum
+from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation, Member
 from cmm_uq.diagnosis.comparison.lack_of_fit import tail_probability
 from cmm_uq.diagnosis.comparison.stack import Version
@@ -87,13 +87,6 @@ def test_the_evidence_of_many_recordings_is_that_of_each_by_itself(stated: float
             np.testing.assert_allclose(something[:, i], each[:, 0], rtol=1e-11)
 
 
-def test_a_table_with_equal_steps_is_read_as_numpy_reads_any() -> None:
-    nodes = np.linspace(-3.0, 5.0, 41)
-    values = np.sin(nodes) - 20 * nodes
-    at = np.concatenate([np.random.default_rng(3).uniform(-4, 6, 500), nodes, [-np.inf, np.inf]])
-    np.testing.assert_allclose(_interpolated(at.copy(), nodes, values), np.interp(at, nodes, values), rtol=1e-12)
-
-
 def singles(c: Comparison, member: Member) -> dict[float, float]:
     """Log evidence of one version at each size that is tried, by its size, the choice between them included."""
     Q, found = rest(c), {}
@@ -167,20 +160,6 @@ def test_what_is_given_is_noise_of_its_covariance(columns: int) -> None:
         versions = [Version(i, 0, amplitude) for i, amplitude in given]
         expected = float(special.logsumexp(total))
         assert float(c.log_evidence_of(versions)[0]) == pytest.approx(expected, abs=2e-4)
-
-
-def test_two_columns_have_the_principal_axes_of_any_others() -> None:
-    """Against LAPACK, of matrices of all conditions: equal, dependent and absent columns too."""
-    columns = np.random.default_rng(9).standard_normal((200, 6, 2)) * [1.0, 1e-5]
-    blocks = np.concatenate([columns.swapaxes(1, 2) @ columns, np.diag([1.0, 2.0])[None], np.diag([2.0, 1.0])[None],
-                             np.ones((1, 2, 2)), 2 * np.eye(2)[None] - 1, np.eye(2)[None], np.zeros((1, 2, 2))])  # fmt: skip
-    strengths, axes = _eigen(blocks)
-    largest = np.abs(blocks).max(axis=(1, 2))
-    expected = np.linalg.eigvalsh(blocks)
-    assert np.all(np.abs(np.sort(strengths, axis=1) - expected).max(axis=1) <= 1e-15 * 4 * largest)
-    np.testing.assert_allclose(axes.swapaxes(1, 2) @ axes, np.broadcast_to(np.eye(2), blocks.shape), atol=1e-14)
-    back = axes @ (strengths[:, :, None] * axes.swapaxes(1, 2))
-    assert np.all(np.abs(back - blocks).max(axis=(1, 2)) <= 1e-14 * largest)
 
 
 def test_kind_and_size_of_the_noise_are_as_probable_as_the_observations_make_them() -> None:
@@ -338,14 +317,6 @@ def test_the_shapes_that_are_kept_stand_for_all(slow: float) -> None:
         total.append(float(nothing[0]))
     assert odds[0] == pytest.approx(odds[1], abs=0.7)
     assert total[0] == pytest.approx(total[1], abs=1.0)  # of heavy tails a factor of e is no news
-
-
-@pytest.mark.parametrize(("shape", "axis"), [((650, 7, 1), 1), ((133, 7, 20), 1), ((8, 20), 0), ((1, 1), 0)])
-def test_sums_of_logarithms_are_scipys_to_the_last_bit(shape: tuple[int, ...], axis: int) -> None:
-    random = np.random.default_rng(1)
-    log = random.normal(-50, 20, shape)
-    for values in (log, np.round(log), np.zeros(shape)):  # the largest once, now and then several times, always
-        np.testing.assert_array_equal(_log_sum(values, axis), special.logsumexp(values, axis=axis))
 
 
 @pytest.mark.parametrize("least", [0.04, 0.3])

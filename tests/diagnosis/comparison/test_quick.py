@@ -1,0 +1,38 @@
+"""Quick sums, tables and eigenvalues are those of numpy and scipy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import special
+
+from cmm_uq.diagnosis.comparison.quick import eigen, interpolated, log_sum
+
+
+def test_a_table_with_equal_steps_is_read_as_numpy_reads_any() -> None:
+    nodes = np.linspace(-3.0, 5.0, 41)
+    values = np.sin(nodes) - 20 * nodes
+    at = np.concatenate([np.random.default_rng(3).uniform(-4, 6, 500), nodes, [-np.inf, np.inf]])
+    np.testing.assert_allclose(interpolated(at.copy(), nodes, values), np.interp(at, nodes, values), rtol=1e-12)
+
+
+def test_two_columns_have_the_principal_axes_of_any_others() -> None:
+    """Against LAPACK, of matrices of all conditions: equal, dependent and absent columns too."""
+    columns = np.random.default_rng(9).standard_normal((200, 6, 2)) * [1.0, 1e-5]
+    blocks = np.concatenate([columns.swapaxes(1, 2) @ columns, np.diag([1.0, 2.0])[None], np.diag([2.0, 1.0])[None],
+                             np.ones((1, 2, 2)), 2 * np.eye(2)[None] - 1, np.eye(2)[None], np.zeros((1, 2, 2))])  # fmt: skip
+    strengths, axes = eigen(blocks)
+    largest = np.abs(blocks).max(axis=(1, 2))
+    expected = np.linalg.eigvalsh(blocks)
+    assert np.all(np.abs(np.sort(strengths, axis=1) - expected).max(axis=1) <= 1e-15 * 4 * largest)
+    np.testing.assert_allclose(axes.swapaxes(1, 2) @ axes, np.broadcast_to(np.eye(2), blocks.shape), atol=1e-14)
+    back = axes @ (strengths[:, :, None] * axes.swapaxes(1, 2))
+    assert np.all(np.abs(back - blocks).max(axis=(1, 2)) <= 1e-14 * largest)
+
+
+@pytest.mark.parametrize(("shape", "axis"), [((650, 7, 1), 1), ((133, 7, 20), 1), ((8, 20), 0), ((1, 1), 0)])
+def test_sums_of_logarithms_are_scipys_to_the_last_bit(shape: tuple[int, ...], axis: int) -> None:
+    random = np.random.default_rng(1)
+    log = random.normal(-50, 20, shape)
+    for values in (log, np.round(log), np.zeros(shape)):  # the largest once, now and then several times, always
+        np.testing.assert_array_equal(log_sum(values, axis), special.logsumexp(values, axis=axis))
