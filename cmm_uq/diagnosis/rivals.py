@@ -212,7 +212,8 @@ def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(17,)))
     scale = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    half = vectors * np.sqrt(np.maximum(values, 0.0))
+    root = scale[:, None] * (half @ vectors.T)  # symmetric: axes of equal length turn with last digits, their sum does not
     normal = random.standard_normal((_DRAWS, len(mean)))
     wider = np.sqrt(degrees / random.chisquare(degrees, _DRAWS))
     return np.asarray(mean + wider[:, None] * (normal @ root.T))
