@@ -199,9 +199,11 @@ def test_what_was_reported_and_sent_is_in_the_records_and_a_dry_run_only_reads_t
             assert of_job(done.stdout)["state"] == "unchanged"
             assert where.read_bytes() == before
     with open_records(where, read_only=True) as records:
-        assert [entry.kind for entry in records.entries()] == ["report", "sent"]
-        sent = list(records.entries())[1].data
-    assert (sent["event"], sent["about"]) == ("fail", "iota-1102-20C")
+        entries = list(records.entries())
+    assert [entry.kind for entry in entries] == ["report", "sent", "sent"]
+    # a machine that does not conform is due at once
+    told = [(entry.data["event"], entry.data["about"]) for entry in entries[1:]]
+    assert told == [("fail", "iota-1102-20C"), ("due", "machine 1102")]
     assert len(taken.requests) == 1
 
 
