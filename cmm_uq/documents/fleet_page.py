@@ -8,10 +8,10 @@ import numpy as np
 
 from cmm_uq import __version__
 from cmm_uq.documents.document import Block, Column, Document, Overview, Paragraph, Section, Standing, Table
-from cmm_uq.documents.fleet_data import day_of
 from cmm_uq.documents.fleet_plot import fleet_plot
 from cmm_uq.documents.in_short import Summary, Verdict
 from cmm_uq.messages import DASH, NOTHING, Number, Text, Verbatim, commas, day, number, plural, say, signed
+from cmm_uq.recertification.drift import PARTS
 from cmm_uq.recertification.fleet import FALSE_DISCOVERIES, Spread, Usual
 from cmm_uq.recertification.fleet_found import FleetFound, OfValue
 from cmm_uq.units import unit_as_written
@@ -248,11 +248,10 @@ def _crossed(of: OfValue, i: int) -> tuple[Text, Text]:
     crossing = of.fleet.estimates.crossing
     if crossing is None or of.members[i].limit is None:
         return DASH, DASH
-    one, last = crossing.some(i), int(crossing.last[i])
-    days = [float(one.quantile(part)[0]) for part in (0.05, 0.5, 0.95)]
-    if days[1] == 0:
+    one = crossing.one(i)
+    if one.already >= 0.5:
         return say("already"), DASH
-    low, middle, high = (day_of(last, each) for each in days)
+    low, middle, high = map(one.quantile, PARTS)
     when = say("not in 40 years") if middle is None else day(middle)
     if low is None or high is None:
         return when, DASH if low is None else say("from {low}", low=day(low))
