@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.commands.due import WhatIsDue, what_is_due, write_due
 from cmm_uq.commands.history import history_of, write_history
 from cmm_uq.notebook import html_table
+from cmm_uq.recertification.drift import PARTS
 from cmm_uq.recertification.history import MachineHistory
 
 if TYPE_CHECKING:
@@ -71,19 +72,19 @@ class History:
 
     @property
     def values(self) -> pd.DataFrame:
-        """A row a value, by its name: the last one, what it changed by, its trend, its limit, and when it meets that."""
+        """A row a value, by its name: the last one, what it changed by, its trend, its limit, and when it crosses that."""
         import pandas as pd
 
         rows = {}
         for one in self.found.values:
-            series, changed, line, met = one.series, one.change, one.line, one.meeting
+            series, changed, line, met = one.series, one.change, one.line, one.crossing
+            days = tuple(map(met.quantile, PARTS)) if met else (None, None, None)
             rows[series.name] = {
                 "quantity": series.quantity, "unit": series.unit, "value": float(series.value[-1]), "u": float(series.u[-1]),
                 "change": changed.value if changed else None, "u_change": changed.u if changed else None,
                 "adjusted": one.adjusted, "significant": self.found.significant(one),
                 "per_year": line.slope if line else None, "u_per_year": line.u_slope if line else None,
-                "limit": series.limit, "early": _date(met.early if met else None),
-                "middle": _date(met.middle if met else None), "late": _date(met.late if met else None),
+                "limit": series.limit, **dict(zip(("early", "middle", "late"), days, strict=True)),
             }  # fmt: skip
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("name")
 
@@ -174,5 +175,5 @@ def _day(on: dt.date | str | None) -> dt.date | None:
     return dt.date.fromisoformat(on) if isinstance(on, str) else on
 
 
-def _date(ordinal: int | None) -> dt.date | None:
-    return None if ordinal is None else dt.date.fromordinal(ordinal)
+def _date(ordinal: int) -> dt.date:
+    return dt.date.fromordinal(ordinal)

@@ -11,20 +11,13 @@ from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.cli.options import Force, Json, Quiet, Seed, Verbose, examples
 from cmm_uq.cli.printing import put_data, show_summary
 from cmm_uq.cli.progress import shown
+from cmm_uq.cli.recording_options import Records
 
 EXAMPLES = examples("fleet", "fleet --name scale_x.ppm --out DIR", "fleet --records lab.db --json")
 
 
 def command(
-    records: Annotated[
-        str | None,
-        typer.Option(
-            "--records",
-            help="The records: a file, or the URL of a PostgreSQL database.",
-            metavar="WHERE",
-            show_default="CMM_UQ_RECORDS, or reports/records.db",
-        ),
-    ] = None,
+    records: Records = None,
     name: Annotated[
         list[str] | None,
         typer.Option(

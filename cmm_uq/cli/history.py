@@ -32,7 +32,7 @@ def command(
     verbose: Verbose = False,
     json: Json = False,
 ) -> None:
-    """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be met."""
+    """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed."""
     from cmm_uq.commands.history import history_of, write_history
 
     found = history_of(machine, records, on=day_of(on))
@@ -48,7 +48,7 @@ def command(
 def _show(found: MachineHistory, files: dict[str, Path], *, verbose: bool) -> None:
     from cmm_uq.cli.files_told import folder_of
     from cmm_uq.cli.layout import COLOURS, HEADING
-    from cmm_uq.documents.history_words import summary_row
+    from cmm_uq.documents.history_words import summary_row, terminal_note
 
     machine = found.machine
     serial = "" if machine.by_name else f", serial number {machine.serial}"
@@ -56,6 +56,8 @@ def _show(found: MachineHistory, files: dict[str, Path], *, verbose: bool) -> No
     recordings = "one recording" if count == 1 else f"{count} recordings"
     show([((f"{machine.name}{serial}", HEADING), (f": {recordings} up to {found.on.isoformat()}", ""))])
     show(layout(verbose=verbose).table([summary_row(found, one) for one in found.values]))
+    if found.values:
+        show([((terminal_note(found), ""),)])
     show([((text, COLOURS["open"]),) for text in found.remarks])
     if files:
         show([(("Written to ", HEADING), (folder_of(files), ""))])

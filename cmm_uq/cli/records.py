@@ -24,6 +24,10 @@ SHOWN = 50
 """Findings that are printed."""
 
 
+def _entries(count: int) -> str:
+    return "1 entry" if count == 1 else f"{count} entries"
+
+
 @app.command("verify", epilog=examples("records verify", "records verify --head 5f2c… --no-files"))
 def verify(
     records: Records = None,
@@ -60,7 +64,7 @@ def verify(
             )
         if len(found) > SHOWN:
             say(f"and {len(found) - SHOWN} more")
-        say(f"{number} entries, {'sound' if not wrong else 'NOT sound'}; the last has the hash {last}")
+        say(f"{_entries(number)}, {'sound' if not wrong else 'NOT sound'}; the last has the hash {last}")
     if wrong:
         raise typer.Exit(NOT_CONFORMING)
 
@@ -113,7 +117,7 @@ def backup(
     with open_records(records) as opened:
         number, last = back_up(opened, file)
     if not quiet:
-        say(f"{number} entries in {file}; the last has the hash {last}")
+        say(f"{_entries(number)} in {file}; the last has the hash {last}")
 
 
 @app.command("restore", epilog=examples("records restore records-2026-11-22.db --records reports/records.db"))
@@ -131,7 +135,7 @@ def restore(
         raise CmmUqError("no records are asked for", where="--records none", fix="Name a file or a URL")
     number, last = backups.restore(file, place)
     if not quiet:
-        say(f"{number} entries restored; the last has the hash {last}")
+        say(f"{_entries(number)} restored; the last has the hash {last}")
 
 
 @app.command("retain", epilog=examples("records retain --keep-years 10 --dry-run"))

@@ -9,18 +9,14 @@ import typer
 
 from cmm_uq.cli.options import Quiet, examples
 from cmm_uq.cli.printing import say_now
+from cmm_uq.cli.recording_options import Records
 from cmm_uq.writing.interruption import keeping
 
 EXAMPLES = examples("serve", "serve --records lab.db --open", "serve --records postgresql://lab@db/records --port 9000")
 
 
 def command(
-    records: Annotated[
-        str | None,
-        typer.Option(
-            help="File or URL of the records.", metavar="WHERE", show_default="CMM_UQ_RECORDS, else reports/records.db"
-        ),
-    ] = None,
+    records: Records = None,
     port: Annotated[
         int, typer.Option(help="Port to listen on; 0 takes a free one.", metavar="N", min=0, max=65535)
     ] = 8765,
@@ -39,17 +35,13 @@ def command(
             show_default="this machine's own",
         ),
     ] = None,
-    months: Annotated[
-        int,
-        typer.Option(help="Months after its newest certificate when a machine is due.", metavar="N", min=1, max=1200),
-    ] = 12,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Show the records in a browser: what is due or fails, trends, certificates, artefacts. Nothing can be changed there."""
-    from cmm_uq.serving import FixedInterval, Server, Site
+    from cmm_uq.serving import Server, Site
 
-    site = Site(records, due=FixedInterval(months))
+    site = Site(records)
     with Server(site.answer, bind=bind, port=port, names=name or ()) as server, keeping(lambda: "the page is closed"):
         if not quiet:
             say_now(f"{site.place} at {server.url} until Ctrl-C")

@@ -10,7 +10,7 @@ from typing import Any
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.schedule import CLOCK, schedule_of
-from cmm_uq.commands.scheduled_records import due_notices, opened
+from cmm_uq.commands.scheduled_records import drift_notices, due_notices, opened
 from cmm_uq.errors import CmmUqError, OutputError
 from cmm_uq.jobs.job import Job
 from cmm_uq.messages import plural, say
@@ -83,7 +83,8 @@ def run_scheduled(asked: Asked, tell: Tell = lambda told: None, clock: Clock = C
             state = InFolder(reports) if records is None else InRecords(records, reports)
             outbox = Outbox(reports, ways, state, clock.moment)
             seed = facts.run.seed if asked.seed is None else asked.seed
-            work = Work(reports, state, lambda job: _reported(job, reports, seed, place or NONE), outbox.add)
+            work = Work(reports, state, lambda job: _reported(job, reports, seed, place or NONE), outbox.add,
+                        lambda job: drift_notices(records, job.id, clock.now().date()))  # fmt: skip
             within = dt.timedelta(days=facts.run.due_within_days)
             roots = [folder.absolute() for folder in asked.folders]
             run = Run(roots, facts.run, work, outbox, lambda on: due_notices(records, on, within), tell, log.write, clock,

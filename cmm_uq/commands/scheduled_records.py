@@ -8,10 +8,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cmm_uq.commands.due import due_in
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import say
+from cmm_uq.messages import Verbatim
+from cmm_uq.recertification.history import machine_history
 from cmm_uq.records.place import is_url
-from cmm_uq.scheduling.notices import Notice, of_due
+from cmm_uq.scheduling.notices import Notice, of_drift, of_due
 
 if TYPE_CHECKING:
     from cmm_uq.records.store import Records
@@ -62,10 +64,33 @@ def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> I
     if records is None:
         return
     _check_clock(records, on)
-    for artefact in records.artefacts():
-        if artefact.due is not None and artefact.due <= on + within:
-            why = say("its own certificate says so, and no certificate can rest on it afterwards")
-            yield of_due("artefact", artefact.serial, artefact.due, on, why)
+    if not records.head()[0]:
+        return
+    for one in due_in(records, (), on):
+        if one.due is not None and one.due <= on + within:
+            yield of_due(one.item, one.serial, one.due, on, one.why)
+
+
+def drift_notices(records: Records | None, job: str, on: dt.date) -> Iterable[Notice]:
+    """Whether a machine changed by more than chance since the recording before that of a job.
+
+    Parameters
+    ----------
+    records : that hold both.
+    job : id of the job that was recorded last.
+    on : today.
+    """
+    newest = [] if records is None else records.certificates(job=job, limit=1, values=False)
+    if records is None or not newest:
+        return
+    machine = records.machine(newest[-1].machine)
+    history = machine_history(
+        machine, records.certificates(machine.serial, values=False), records.series(machine.serial), on
+    )
+    changed = [Verbatim(one.series.quantity) for one in history.values if history.significant(one)
+               and int(one.series.entry[-1]) == newest[-1].entry]  # fmt: skip
+    if changed:
+        yield of_drift(machine.serial, changed, newest[-1].entry)
 
 
 def _check_clock(records: Records, on: dt.date) -> None:

@@ -6,17 +6,12 @@
 from __future__ import annotations
 
 import csv
-import datetime as dt
 import io
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from cmm_uq import __version__
 from cmm_uq.files.cells import FORMULA
-from cmm_uq.recertification.crossing import Crossings
-from cmm_uq.recertification.drift import YEAR
 from cmm_uq.recertification.fleet_found import FleetFound, OfValue
 
 SCHEMA = "cmm-uq/fleet/1"
@@ -59,27 +54,10 @@ def _machines(of: OfValue) -> list[dict[str, Any]]:
             "certificates": len(member.history.day), "rate": float(e.rate[i]), "u": float(e.u_rate[i]),
             "expected": float(e.expected[i]), "u_expected": float(e.u_expected[i]), "p": float(e.p[i]),
             "belongs": bool(of.belongs[i]), "limit": member.limit,
-            "crossing": None if e.crossing is None or member.limit is None else crossing_data(e.crossing, i),
+            "crossing": None if e.crossing is None or member.limit is None else e.crossing.one(i).data(),
         }
         for i, member in enumerate(of.members)
     ]  # fmt: skip
-
-
-def crossing_data(crossing: Crossings, i: int) -> dict[str, Any]:
-    """When one machine's error will be beyond its limit: days, ``null`` beyond the horizon, and probabilities."""
-    last = int(crossing.last[i])
-    one = crossing.some(i)
-    dates = {f"day_{round(100 * part)}": day_of(last, float(one.quantile(part)[0])) for part in (0.05, 0.5, 0.95)}
-    return {
-        "last": dt.date.fromordinal(last).isoformat(), **{
-            name: None if day is None else day.isoformat() for name, day in dates.items()},
-        "already": float(crossing.probability[i, 0]), "within_a_year": float(one.by(np.array([YEAR]))[0]),
-    }  # fmt: skip
-
-
-def day_of(last: int, days: float) -> dt.date | None:
-    """So many days after an ordinal; None where they are infinite."""
-    return dt.date.fromordinal(last + int(days)) if np.isfinite(days) else None
 
 
 def fleet_csv(data: Mapping[str, Any]) -> bytes:

@@ -7,10 +7,10 @@ import datetime as dt
 import numpy as np
 
 from cmm_uq.documents.document import Block, Column, Paragraph, Table
-from cmm_uq.documents.fleet_data import day_of
 from cmm_uq.documents.fleet_words import called, date_of, digits, group_words, per_year, signed_rate, usual_rate
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, day, number, plural, say
 from cmm_uq.points import Ints
+from cmm_uq.recertification.drift import PARTS
 from cmm_uq.recertification.fleet import FALSE_DISCOVERIES, Spread, Usual
 from cmm_uq.recertification.fleet_found import FleetFound, OfValue
 from cmm_uq.units import unit_as_written
@@ -170,8 +170,8 @@ def _crossed(of: OfValue, i: int) -> tuple[Text, Text, Text]:
         return DASH, DASH, DASH
     if of.beyond[i]:
         return say("already"), DASH, DASH
-    one, last = crossing.some(i), int(crossing.last[i])
-    middle, low, high = (_day(day_of(last, float(one.quantile(part)[0]))) for part in (0.5, 0.05, 0.95))
+    one = crossing.one(i)
+    low, middle, high = (_day(one.quantile(part)) for part in PARTS)
     return middle, low, high
 
 

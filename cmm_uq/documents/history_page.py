@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cmm_uq import __version__
 from cmm_uq.documents.document import Block, Column, Document, Facts, Overview, Paragraph, Section, Standing, Table
-from cmm_uq.documents.history_words import HEADINGS, STATE_WORDS, WORDS, notes, value_row
+from cmm_uq.documents.history_words import HEADINGS, STATE_WORDS, WORDS, meets, notes, value_row
 from cmm_uq.documents.trend_plot import trend_plot
 from cmm_uq.documents.wording import OUTCOME_WORDS
 from cmm_uq.messages import DASH, Text, Verbatim, commas, day, plural, say
@@ -57,12 +57,15 @@ def overview_of(history: MachineHistory) -> Overview:
     if changed:
         rows.append((say("Changed significantly"), commas(changed)))
     nearest = min(
-        (one for one in history.values if one.meeting is not None and one.meeting.middle is not None and not one.beyond),
-        key=lambda one: (one.meeting.middle if one.meeting else None) or 0, default=None,
+        (
+            (day, i) for i, one in enumerate(history.values)
+            if one.crossing is not None and not one.beyond and (day := one.crossing.quantile(0.5)) is not None
+        ), default=None,
     )  # fmt: skip
     if nearest is not None:
-        rows.append((say("First to meet its limit"), say(
-            "{name}: {when}", name=Verbatim(nearest.series.quantity), when=value_row(history, nearest)[-1],
+        first = history.values[nearest[1]]
+        rows.append((say("First to cross its limit"), say(
+            "{name}: {when}", name=Verbatim(first.series.quantity), when=meets(first, history.on),
         )))  # fmt: skip
     return Overview(verdict, standing, tuple(rows))
 

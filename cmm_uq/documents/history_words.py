@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, day, number, say
+from cmm_uq.recertification.drift import HORIZON, PARTS
 from cmm_uq.recertification.history import MachineHistory, ValueHistory
-from cmm_uq.recertification.trend import Meeting
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import unit_as_written
 
@@ -19,9 +19,9 @@ COVERAGE = 2.0
 
 HEADINGS: tuple[Text, ...] = (
     say("Quantity"), say("Last value"), say("U"), say("Unit"), say("Change"), say("U of the change"), say("Trend per year"),
-    say("U of the trend"), say("Limit"), say("Meets its limit"),
+    say("U of the trend"), say("Limit"), say("Crosses its limit"),
 )  # fmt: skip
-WORDS = {say("Quantity"), say("Unit"), say("Meets its limit")}
+WORDS = {say("Quantity"), say("Unit"), say("Crosses its limit")}
 """Headings of columns that hold no figures."""
 
 STATE_WORDS: Mapping[str, Text] = {
@@ -56,29 +56,41 @@ def _trend(one: ValueHistory) -> tuple[Text, Text]:
 
 
 def meets(one: ValueHistory, on: dt.date) -> Text:
-    """When a value meets its limit, should it go on as it did."""
+    """When a value crosses its limit, by the drift model."""
     if one.series.limit is None:
         return DASH
     if one.beyond:
         return say("is beyond it")
-    if one.meeting is None:
-        return say("no trend yet")
-    early, middle, late = (_date(one_) for one_ in (one.meeting.early, one.meeting.middle, one.meeting.late))
+    if one.crossing is None:
+        return say("cannot be foreseen")
+    early, middle, late = map(one.crossing.quantile, PARTS)
     if early is None:
-        return say("not within 20 years")
+        return say("not within {horizon} years", horizon=number(HORIZON, "g"))
     begins = say("perhaps already") if early <= on else say("not before {early}", early=day(early))
     if middle is None:
-        return begins
-    about = say("probably already") if middle <= on else say("about {middle}", middle=day(middle))
+        return say("{begins}, perhaps never", begins=begins)
     if middle <= on:
-        return about
+        return say("probably already")
+    about = say("about {middle}", middle=day(middle))
     if late is None:
-        return say("{about}, {begins}", about=about, begins=begins)
+        return say("{about}, {begins}, perhaps never", about=about, begins=begins)
     return say("{about}, {begins}, by {late}", about=about, begins=begins, late=day(late))
 
 
-def _date(ordinal: int | None) -> dt.date | None:
-    return None if ordinal is None else dt.date.fromordinal(ordinal)
+def model_note() -> Text:
+    """Which model the days of crossing are of."""
+    return say(
+        "The day on which a limit is crossed is by the drift model without a fleet (about: with a probability of 50 %; not "
+        "before: 5 %; by: 95 %; never: later than {horizon} years), not by the straight line.", horizon=number(HORIZON, "g"),
+    )  # fmt: skip
+
+
+def terminal_note(history: MachineHistory) -> Text:
+    """What the rows of a terminal mean, in one line."""
+    factor = say("Every ± has k = 2.")
+    if all(one.crossing is None or one.beyond for one in history.values):
+        return factor
+    return say("{factor} {model}", factor=factor, model=model_note())
 
 
 def notes() -> tuple[Text, ...]:
@@ -90,10 +102,8 @@ def notes() -> tuple[Text, ...]:
             "was the same one. It is called significant where, had nothing changed, chance would call any of them so "
             "once in twenty times."
         ),
-        say(
-            "The trend is a straight line through the recordings since the last adjustment, and the limit is met by it with "
-            "a probability of 50 %, from 2.5 % to 97.5 %, should the machine go on as it did."
-        ),
+        say("The trend is a straight line through the recordings since the last adjustment."),
+        model_note(),
     )
 
 
@@ -140,7 +150,7 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
              "entry": int(entry), "interim": bool(interim)}
             for date, value, u, common, artefact, entry, interim in rows
         ],
-        "change": None, "trend": None, "meets_limit": None,
+        "change": None, "trend": None, "crosses_limit": None,
     }  # fmt: skip
     if one.change is not None:
         found["change"] = {
@@ -152,12 +162,6 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
             "date": dt.date.fromordinal(one.line.day).isoformat(), "value": one.line.value, "per_year": one.line.slope,
             "u_per_year": one.line.u_slope, "count": one.line.count, "birge_ratio": one.line.excess,
         }  # fmt: skip
-    if one.meeting is not None:
-        found["meets_limit"] = _meeting_data(one.meeting)
+    if one.crossing is not None:
+        found["crosses_limit"] = {"model": "drift", **one.crossing.data()}
     return found
-
-
-def _meeting_data(found: Meeting) -> dict[str, str | None]:
-    named = (("p2_5", found.early), ("p50", found.middle), ("p97_5", found.late))
-    dates = ((name, _date(ordinal)) for name, ordinal in named)
-    return {name: None if date is None else date.isoformat() for name, date in dates}

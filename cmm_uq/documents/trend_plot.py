@@ -80,8 +80,9 @@ def _line(ax: Axes, one: ValueHistory, last: float) -> float:
         return last + 0.5
     series, line = one.series, one.line
     first = int(series.day[epochs(series)[-1]][0])
-    middle = one.meeting.middle if one.meeting is not None else None
-    end = line.day + int(max(_AHEAD * 365.25, min((middle or 0) - line.day + 180, 3 * (line.day - first))))
+    middle = one.crossing.quantile(0.5) if one.crossing is not None else None
+    ahead = middle.toordinal() - line.day if middle is not None else 0
+    end = line.day + int(max(_AHEAD * 365.25, min(ahead + 180, 3 * (line.day - first))))
     days = np.linspace(first, end, 60)
     value, u = line.at(days)
     x = _years(days)
@@ -113,7 +114,7 @@ def _legend(one: ValueHistory, *, adjusted: bool, checked: bool) -> Text:
     parts = [
         say("bars: U (k = 2)"),
         say("dashed: limits") if one.series.limit is not None else NOTHING,
-        say("line: trend with its U") if one.line is not None else NOTHING,
+        say("line: straight trend with its U") if one.line is not None else NOTHING,
         say("dotted: adjusted") if adjusted else NOTHING,
         say("hollow: interim checks") if checked else NOTHING,
     ]

@@ -11,18 +11,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy import special
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.points import Floats, Ints
-from cmm_uq.recertification.drift import YEAR, History, RecordedSeries, SideBySide, history, side_by_side
+from cmm_uq.recertification.drift import (
+    HORIZON,
+    PARTS,
+    YEAR,
+    History,
+    RecordedSeries,
+    SideBySide,
+    history,
+    side_by_side,
+)
 from cmm_uq.recertification.drift_filter import Filtered, filtered
 from cmm_uq.recertification.drift_prior import Prior, default_prior, limit_for
-
-HORIZON = 40.0
-"""Years that are looked ahead; what is later is never."""
 
 
 def grid(gaps: int) -> Floats:
@@ -67,11 +74,11 @@ class Crossings:
         )
         return Crossings(last, parts[0].days, *rest)
 
-    def some(self, i: int) -> Crossings:
-        """Of one machine only."""
-        return Crossings(
-            self.last[i : i + 1], self.days, self.probability[i : i + 1], self.level[i : i + 1], self.u_level[i : i + 1],
-            self.rate[i : i + 1], self.u_rate[i : i + 1],
+    def one(self, i: int) -> Crossing:
+        """Of one machine."""
+        return Crossing(
+            date.fromordinal(int(self.last[i])), self.days, self.probability[i], float(self.level[i]), float(self.u_level[i]),
+            float(self.rate[i]), float(self.u_rate[i]),
         )  # fmt: skip
 
     def by(self, days: Floats) -> Floats:
@@ -113,8 +120,11 @@ class Crossing:
 
     def by(self, day: date) -> float:
         """Probability that the error has been beyond the limit by a day."""
-        after = max(float(day.toordinal() - self.last.toordinal()), 0.0)
-        return float(-np.expm1(np.interp(after, self.days, _log_survival(self.probability))))
+        return self.after(max(float(day.toordinal() - self.last.toordinal()), 0.0))
+
+    def after(self, days: float) -> float:
+        """The same by so many days after the last certificate."""
+        return float(-np.expm1(np.interp(days, self.days, _log_survival(self.probability))))
 
     def quantile(self, part: float) -> date | None:
         """Day by which the limit is crossed with a probability; None where that is beyond the horizon."""
@@ -124,6 +134,14 @@ class Crossing:
     def interval(self, coverage: float = 0.9) -> tuple[date | None, date | None]:
         """Days between which the limit is crossed with a probability, as much before as after them."""
         return self.quantile((1 - coverage) / 2), self.quantile((1 + coverage) / 2)
+
+    def data(self) -> dict[str, Any]:
+        """For other programs: days, ``None`` beyond the horizon, and probabilities."""
+        dates = {f"day_{round(100 * part)}": self.quantile(part) for part in PARTS}
+        return {
+            "last": self.last.isoformat(), **{name: day.isoformat() if day else None for name, day in dates.items()},
+            "already": self.already, "within_a_year": self.after(YEAR),
+        }  # fmt: skip
 
 
 def crossing(
@@ -154,10 +172,7 @@ def crossing(
     prior = prior or default_prior(limit_for(limit, known.u))
     machines = side_by_side([known])
     many = crossings(machines, prior, filtered(machines, prior), limit, one_sided=one_sided, paths=paths, days=FINE)
-    return Crossing(
-        date.fromordinal(int(many.last[0])), many.days, many.probability[0], float(many.level[0]), float(many.u_level[0]),
-        float(many.rate[0]), float(many.u_rate[0]),
-    )  # fmt: skip
+    return many.one(0)
 
 
 def crossings(

@@ -20,6 +20,12 @@ from cmm_uq.points import Floats, Ints
 YEAR = 365.25
 """Days: rates and spreads are stated per year."""
 
+HORIZON = 40.0
+"""Years that are looked ahead; what is later is never."""
+
+PARTS = (0.05, 0.5, 0.95)
+"""Probabilities at which the day of a crossing is stated: the ends of a 90 % interval, and its median."""
+
 MOST_SHARED = 0.999
 """Of u, that certificates by one artefact have in common at most: two of one day never agree to the last digit."""
 

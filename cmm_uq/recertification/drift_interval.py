@@ -1,22 +1,16 @@
-"""The interval by the drift model: until the probability that an error has crossed its limit is no longer small enough.
-
-The model, :mod:`cmm_uq.recertification.crossing`, is loaded when a rule first asks for it.
-"""
+"""The interval by the drift model: until the probability that an error has crossed its limit is no longer small enough."""
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Sequence
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import say
+from cmm_uq.recertification.crossing import crossing
+from cmm_uq.recertification.observed import calibrations, is_of_machine
 from cmm_uq.records import Certificate, Series
-
-MODEL = "cmm_uq.recertification.crossing"
 
 
 def series_from(certificates: Sequence[Certificate], name: str) -> Series:
@@ -41,11 +35,11 @@ def series_from(certificates: Sequence[Certificate], name: str) -> Series:
 
 
 def drift_interval(certificates: Sequence[Certificate], reliability: float) -> tuple[float, str]:
-    """Days after the last certificate until the first of the errors may have crossed its limit, and which one it is.
+    """Days after the last calibration until the first of the errors may have crossed its limit, and which one it is.
 
     Parameters
     ----------
-    certificates : of the machine, by day, the last one its newest calibration.
+    certificates : of the machine, by day, interim checks too: the model takes all that was seen, as its history does.
     reliability : probability with which no single error has crossed yet.
 
     Returns
@@ -56,16 +50,16 @@ def drift_interval(certificates: Sequence[Certificate], reliability: float) -> t
     ------
     CmmUqError : no value has a limit, or none of them a history that the model takes.
     """
-    last = certificates[-1]
-    limited = [one for one in last.values if one.limit]
+    last = calibrations(certificates)[-1]
+    stated = (series_from(certificates, one.name) for one in last.values if is_of_machine(one.unit))
+    limited = [(one, one.limit) for one in stated if one.limit]
     if not limited:
         raise CmmUqError(say("its certificate has no limits"))
-    crossing: Any = import_module(MODEL).crossing
     found: list[tuple[float, str]] = []
     refused: CmmUqError | None = None
-    for one in limited:
+    for one, limit in limited:
         try:
-            crossed: dt.date | None = crossing(series_from(certificates, one.name), one.limit).quantile(1 - reliability)
+            crossed = crossing(one, limit).quantile(1 - reliability)
         except CmmUqError as error:
             refused = error
             continue

@@ -132,7 +132,9 @@ def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Poo
         return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted)))
     if last.decision in BEYOND:
         return last.day, say("its last certificate finds it beyond its limits")
-    interval = interval_by(rule, known[: known.index(last) + 1], pool)
+    # the drift model takes checks after the calibration too; other methods count what calibrations found
+    seen = known if rule.method == "drift" else known[: known.index(last) + 1]
+    interval = interval_by(rule, seen, pool)
     planned = _ends(last.day, interval)
     checks = check_standings(last, [one for one in known[known.index(last) + 1 :] if one.interim])
     return _checked(rule, last, planned, interval.why, checks)

@@ -1,16 +1,22 @@
-"""The history of one machine: every value over its certificates, what it changed by, and when it will meet its limit."""
+"""The history of one machine: every value over its certificates, what it changed by, and when it will cross its limit."""
 
 from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, day, plural, say
 from cmm_uq.recertification.change import Change, Stated, change
 from cmm_uq.recertification.observed import is_of_machine
-from cmm_uq.recertification.trend import Line, Meeting, meeting, trend
+from cmm_uq.recertification.trend import Line, trend
 from cmm_uq.records import Certificate, Machine, Series
+
+if TYPE_CHECKING:
+    from cmm_uq.recertification.crossing import Crossing
 
 
 @dataclass(frozen=True)
@@ -23,14 +29,30 @@ class ValueHistory:
     change : since the recording before the last; ``None`` where there is one only.
     adjusted : whether the machine was adjusted between the two.
     line : through the values since the last adjustment; ``None`` where they do not give one.
-    meeting : when the line leaves the limits; ``None`` without a line or a limit.
+    adjusted_after : ordinal of the machine's newest adjustment; ``None`` where none is known.
     """
 
     series: Series
     change: Change | None
     adjusted: bool
     line: Line | None
-    meeting: Meeting | None
+    adjusted_after: int | None = None
+
+    @cached_property
+    def crossing(self) -> Crossing | None:
+        """When the limit will be crossed by the drift model; ``None`` without a limit, or a history that the model takes.
+
+        Worked out when it is first asked for: the model takes longer to load than all the rest.
+        """
+        if not self.series.limit:
+            return None
+        from cmm_uq.recertification.crossing import crossing
+        from cmm_uq.recertification.drift import history
+
+        try:
+            return crossing(history(self.series, self.adjusted_after), self.series.limit)
+        except CmmUqError:
+            return None
 
     @property
     def beyond(self) -> bool:
@@ -38,9 +60,8 @@ class ValueHistory:
         return self.series.limit is not None and abs(float(self.series.value[-1])) > self.series.limit
 
     def probably_beyond(self, on: dt.date) -> bool:
-        """Whether the line is more probably beyond the limit on a day than not, although the last value was not."""
-        middle = None if self.meeting is None else self.meeting.middle
-        return not self.beyond and middle is not None and middle <= on.toordinal()
+        """Whether the limit has more probably been crossed by a day than not, although the last value was within it."""
+        return not self.beyond and self.crossing is not None and self.crossing.by(on) >= 0.5
 
 
 @dataclass(frozen=True)
@@ -93,7 +114,8 @@ def machine_history(
         )
         remarks.append(plural(late, one=one, many=many))
     cut = (_until(one, on) for one in series.values())
-    values = tuple(_value(one) for one in cut if len(one.day) and is_of_machine(one.unit))
+    adjusted = max((one.toordinal() for one in machine.adjusted if one <= on), default=None)
+    values = tuple(_value(one, adjusted) for one in cut if len(one.day) and is_of_machine(one.unit))
     if values and not any(one.series.limit is not None for one in values):
         remarks.append(say("No certificate has limits, so that none can be met."))
     if known and len({one.day for one in known}) == 1:
@@ -110,8 +132,8 @@ def _until(series: Series, on: dt.date) -> Series:
     return replace(series, **{name: getattr(series, name)[rows] for name in names})
 
 
-def _value(series: Series) -> ValueHistory:
-    found = changed = None
+def _value(series: Series, adjusted_after: int | None) -> ValueHistory:
+    changed = None
     adjusted = False
     if len(series.day) > 1:
         before, now = (
@@ -120,7 +142,4 @@ def _value(series: Series) -> ValueHistory:
         )
         changed = change(before, now)
         adjusted = bool(series.adjusted_since[-2] != series.adjusted_since[-1])
-    line = trend(series)
-    if line is not None and series.limit:
-        found = meeting(line, series.limit)
-    return ValueHistory(series, changed, adjusted, line, found)
+    return ValueHistory(series, changed, adjusted, trend(series), adjusted_after)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, Verbatim, foreign, plural, say
@@ -46,14 +47,11 @@ def interval_by(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> 
     Parameters
     ----------
     rule : of the machine.
-    certificates : of the machine, by day, the last one its newest calibration.
+    certificates : of the machine, by day, up to its newest calibration; with later interim checks for the drift model.
     pool : intervals of all machines of its model.
     """
     if rule.method == "fixed":
-        months = months_of(rule)
-        stated = say("fixed interval of {months}", months=months)
-        usual = say("{months}, as its job does not say otherwise", months=months)
-        return Interval(None, rule.every_months, stated if rule.stated else usual)
+        return _fixed(rule)
     from cmm_uq.recertification.methods import METHODS  # numpy and scipy: a fixed interval need not wait for them
 
     try:
@@ -65,6 +63,15 @@ def interval_by(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> 
                 why=foreign(error.problem)),
         )  # fmt: skip
     return Interval(days, None, why)
+
+
+@lru_cache(maxsize=100)
+def _fixed(rule: Rule) -> Interval:
+    """A fixed interval; thousands of machines share a rule, and putting it into words takes longer than all else of it."""
+    months = months_of(rule)
+    stated = say("fixed interval of {months}", months=months)
+    usual = say("{months}, as its job does not say otherwise", months=months)
+    return Interval(None, rule.every_months, stated if rule.stated else usual)
 
 
 def months_of(rule: Rule) -> Text:

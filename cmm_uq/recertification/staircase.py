@@ -1,8 +1,8 @@
 """Automatic adjustment, or staircase (ILAC-G24 / OIML D 10:2022, method 1): each calibration changes the interval.
 
-A calibration that finds the machine well within its limits (to 80 %, as the guide suggests) lengthens the next interval by a
-step up; one that finds it beyond a limit shortens it by a step down; between, it stays. The guide leaves the steps open. Here
-they follow from the reliability R that is wanted: where R of the calibrations go up and 1 − R down, the logarithm of the
+A calibration that finds the machine well within its limits (to 80 %) lengthens the next interval by a
+step up; one that finds it beyond a limit shortens it by a step down; between, it stays. The steps
+follow from the reliability R that is wanted: where R of the calibrations go up and 1 − R down, the logarithm of the
 interval does not move, R·ln(1 + a) + (1 − R)·ln(1 − b) = 0. A step up is a tenth, or less where a step down would then be
 more than an interval may shrink by at once.
 """
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from cmm_uq.recertification.changing import USUAL, Changing
 
 WELL_WITHIN = 0.8
-"""Part of the limit up to which the interval is lengthened (ILAC-G24 / OIML D 10:2022, 6.2)."""
+"""Part of the limit up to which the interval is lengthened; remembered of ILAC-G24 / OIML D 10, not checked against it."""
 
 STEP_UP = 0.1
 """Part by which an interval is lengthened at most."""

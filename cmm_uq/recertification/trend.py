@@ -1,4 +1,4 @@
-"""A straight line through the values of one machine since it was last adjusted, and the day on which it meets a limit.
+"""A straight line through the values of one machine since it was last adjusted.
 
 Generalised least squares: the values are as uncertain as their certificates say, and what comes from the artefact is common
 to all that were made with it. A common error shifts the line and does not tilt it. Where the values scatter about the line by
@@ -7,7 +7,6 @@ more than their uncertainties allow, the line is as much more uncertain (Birge r
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,14 +19,8 @@ from cmm_uq.records import Series
 YEAR = 365.2425
 """Days."""
 
-_HORIZON = 20 * YEAR
-"""How far ahead a crossing is looked for."""
-
 _LEAST = 1e-9
 """Standard uncertainty of a value that is stated without one, as a part of the largest value."""
-
-
-_erfc = np.frompyfunc(math.erfc, 1, 1)
 
 
 @dataclass(frozen=True)
@@ -61,15 +54,6 @@ class Line:
     def u_slope(self) -> float:
         """Standard uncertainty of the slope."""
         return float(np.sqrt(self.covariance[1, 1]))
-
-
-@dataclass(frozen=True)
-class Meeting:
-    """When the line meets a limit: ordinals at which it has with a probability of 2.5 %, 50 % and 97.5 %; ``None`` beyond."""
-
-    early: int | None
-    middle: int | None
-    late: int | None
 
 
 def epochs(series: Series) -> list[slice]:
@@ -106,22 +90,3 @@ def trend(series: Series) -> Line | None:
     chi2 = float(left @ np.linalg.solve(covariance, left))
     excess = max(1.0, float(np.sqrt(chi2 / freedoms))) if freedoms else 1.0
     return Line(len(day), int(day[-1]), float(found[0]), float(found[1]), excess**2 * spread, excess)
-
-
-def meeting(line: Line, limit: float) -> Meeting:
-    """When the line leaves ±limit, should the value go on as it did; first days at which the probability is reached."""
-    days = line.day + np.arange(0.0, _HORIZON, 7.0)
-    value, u = line.at(days)
-    u = np.maximum(u, 1e-300)
-    beyond = _below((value - limit) / u) + _below((-limit - value) / u)
-
-    def first(level: float) -> int | None:
-        reached = np.flatnonzero(beyond >= level)
-        return int(days[reached[0]]) if len(reached) else None
-
-    return Meeting(first(0.025), first(0.5), first(0.975))
-
-
-def _below(z: Floats) -> Floats:
-    """Probability (n,) of a standard normal deviate below ``z`` (n,); scipy alone would take as long as all the rest."""
-    return np.asarray(0.5 * _erfc(-z / math.sqrt(2)), dtype=np.float64)

@@ -2,7 +2,7 @@
 
 What a value changed by over each interval is fitted by a polynomial through zero. The interval ends where the probability that
 the value still lies within its limits falls to the target, or where its uncertainty grows to a target.
-Source: H. Castrup, Calibration intervals from variables data, NCSLI 2005; NASA-HDBK-8739.19-5, chapter 7.
+Source: suncal 1.7.1 and its tests, which quote NASA-HDBK-8739.19-5, chapter 7.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from sqlalchemy import ColumnElement, Connection, func, or_, select
 from cmm_uq.records.entries import Entry
 from cmm_uq.records.facts import STANDING, Machine
 from cmm_uq.records.opening import told
-from cmm_uq.records.queries import _since as last_adjusted
+from cmm_uq.records.queries import adjusted_before
 from cmm_uq.records.recognised import BY_NAME, spelled
 from cmm_uq.records.store import Records
 from cmm_uq.records.tables import artefacts, certificates, entries, figures, machines, quantities
@@ -266,7 +266,7 @@ def courses(records: Records, machine: Machine, most: int) -> list[Course]:
         course = found.setdefault((row.name, row.unit), Course(row.name, row.quantity, row.unit, []))
         course.stated.append(
             Stated(row.entry, dt.date.fromisoformat(row.day), row.value, row.lower, row.upper, row.at_most, bool(row.interim),
-                   last_adjusted(row.adjusted_since, row.day, adjusted))
+                   adjusted_before(row.adjusted_since, row.day, adjusted))
         )  # fmt: skip
     for course in found.values():
         course.stated.reverse()

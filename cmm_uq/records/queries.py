@@ -242,8 +242,8 @@ def _certificates(
     return [
         Certificate(
             entry, job, machine_called, artefact_called, kind, origin, day_of(day), moment_of(at),
-            _since(since, day, adjusted[machine]), state, decision, diagnosis, bool(interim), base(folder), version, results,
-            number, command, _day(due), tuple(stated.get(entry, ())), together.get(entry),
+            adjusted_before(since, day, adjusted[machine]), state, decision, diagnosis, bool(interim), base(folder), version,
+            results, number, command, _day(due), tuple(stated.get(entry, ())), together.get(entry),
         )
         for (entry, machine, _, command, job, number, kind, origin, day, at, since, state, decision, diagnosis, interim,
              folder, version, results, due, machine_called, artefact_called) in rows
@@ -282,7 +282,7 @@ def _adjusted(connection: Connection, of: Collection[int]) -> dict[int, list[str
     return found
 
 
-def _since(stated: str | None, day: str, adjusted: Sequence[str]) -> dt.date | None:
+def adjusted_before(stated: str | None, day: str, adjusted: Sequence[str]) -> dt.date | None:
     """The adjustment before a recording: stated with it, or the last known before its day.
 
     On the day itself only what is stated counts: a machine is recorded as found and as left on one day.
@@ -308,7 +308,7 @@ def series_of(
     found = {}
     for name, of_name in by_name.items():
         limits = [row.limit for row in of_name if row.limit is not None]
-        since = (_since(row.adjusted_since, row.day, adjusted) for row in of_name)
+        since = (adjusted_before(row.adjusted_since, row.day, adjusted) for row in of_name)
         found[name] = Series(
             name, of_name[-1].quantity, of_name[-1].unit, limits[-1] if limits else None,
             np.array([dt.date.fromisoformat(row.day).toordinal() for row in of_name]),
@@ -346,7 +346,7 @@ def all_series_of(connection: Connection, names: Collection[str] | None, origin:
     known = {row.id: row for row in connection.execute(select(machines))}
     adjusted = _adjusted(connection, set(known))
     ordinal = {day: dt.date.fromisoformat(day).toordinal() for day in {row.day for row in rows}}
-    since = [_since(row.adjusted_since, row.day, adjusted[row.machine]) for row in rows]
+    since = [adjusted_before(row.adjusted_since, row.day, adjusted[row.machine]) for row in rows]
     frame = pd.DataFrame(
         {
             "machine": [known[row.machine].called for row in rows],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -114,6 +114,22 @@ def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text) -> Noti
     text = say("{item} {called} is {state}: {why}.", item=Verbatim(item.capitalize()), called=Verbatim(called), state=state,
                why=why)  # fmt: skip
     return Notice("due", f"{item} {called}", title, text, f"{due.isoformat()} {'overdue' if overdue else 'due'}")
+
+
+def of_drift(machine: str, changed: Sequence[Text], entry: int) -> Notice:
+    """What has to be said of a machine that changed by more than chance since the recording before.
+
+    Parameters
+    ----------
+    machine : its serial number.
+    changed : what did.
+    entry : number of the newer certificate's entry.
+    """
+    of = say("machine {machine}", machine=Verbatim(machine))
+    text = say(
+        "{of} changed by more than chance since the recording before: {changed}.", of=of, changed=commas(changed)
+    )
+    return Notice("drift", f"machine {machine}", say("drift: {of}", of=of), text, str(entry))
 
 
 def decisions(results: Mapping[str, Any]) -> list[str]:

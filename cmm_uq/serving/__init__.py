@@ -7,8 +7,8 @@ from a keyboard.
 
 from __future__ import annotations
 
-from cmm_uq.serving.due import Due, DueDates, FixedInterval
+from cmm_uq.serving.due import Due, DueDates
 from cmm_uq.serving.server import Server
 from cmm_uq.serving.site import Site
 
-__all__ = ["Due", "DueDates", "FixedInterval", "Server", "Site"]
+__all__ = ["Due", "DueDates", "Server", "Site"]

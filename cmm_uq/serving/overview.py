@@ -78,7 +78,7 @@ def overview(records: Records, due: DueDates, today: dt.date) -> tuple[Stands, .
     CmmUqError : the records are damaged or locked.
     """
     newest = standing_of_all(records)
-    days = due(records, newest, today)
+    days = due(records, today)
     return in_order(
         [Stands(one, days.get(one.machine.serial), groups(one, days.get(one.machine.serial), today)) for one in newest]
     )

@@ -23,7 +23,7 @@ from cmm_uq.serving.artefacts_page import artefacts_page
 from cmm_uq.serving.certificate_page import certificate_page, recorded_file
 from cmm_uq.serving.certificates_page import certificates_page, diagnoses_page
 from cmm_uq.serving.checking import Checking
-from cmm_uq.serving.due import DueDates, FixedInterval
+from cmm_uq.serving.due import DueDates, by_rule
 from cmm_uq.serving.exchange import Answer, Asked, Refused
 from cmm_uq.serving.file_page import dropped_page, file_page
 from cmm_uq.serving.html import icon, render_page, style
@@ -62,11 +62,11 @@ class Site:
     """
 
     def __init__(
-        self, where: str | Path | None = None, *, due: DueDates | None = None, today: Callable[[], dt.date] = dt.date.today
+        self, where: str | Path | None = None, *, due: DueDates = by_rule, today: Callable[[], dt.date] = dt.date.today
     ) -> None:  # fmt: skip
         with open_records(where, read_only=True) as records:  # what is wrong with them is told before anybody looks
             self._where = records.place
-        self._due, self._today = due or FixedInterval(), today
+        self._due, self._today = due, today
         self._lock = threading.Lock()
         self._kept: tuple[tuple[int, str, dt.date], Sequence[Stands]] | None = None
         self.checking = Checking(self.opened)

@@ -43,6 +43,7 @@ def test_a_history_has_its_values_and_all_that_was_recorded(place: Path, tmp_pat
     row = found.values.loc["scale_x.ppm"]
     assert (row["value"], row["change"], row["u_change"]) == (3.0, 2.0, pytest.approx(0.18**0.5))
     assert row["per_year"] == pytest.approx(2 * 365.2425 / 365)
+    assert dt.date(2026, 3, 2) < row["early"] < row["middle"]
     assert found.recorded["value"].tolist() == [1.0, 3.0]
     assert "Scale error of x" in found._repr_html_()
     assert set(found.write(tmp_path / "out")) == {"history.html", "history.json", "manifest.json"}

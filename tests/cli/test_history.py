@@ -37,7 +37,9 @@ def drifting(tmp_path: Path) -> Path:
 def test_every_value_has_its_change_its_trend_and_its_limit(drifting: Path) -> None:
     done = run("history", "1102", "--records", drifting, "--on", ON)
     assert (done.returncode, done.stderr) == (0, "")
-    head, row = done.stdout.splitlines()
+    head, row, *note = done.stdout.splitlines()
+    assert "k = 2" in note[0]
+    assert "by the drift model" in " ".join(note)
     assert head == "Machine 1102, serial number 1102: 6 recordings up to 2026-11-22"
     assert "5.0 ± 1.0 ppm" in row
     assert "change 3.00 significant ± 0.85" in row  # 2·√(2·0.25 − 2·0.16)
@@ -61,7 +63,8 @@ def test_the_data_of_a_history(drifting: Path) -> None:
     assert value["trend"]["per_year"] == pytest.approx(
         1.6, abs=0.01
     )  # of 0, 1, 2, 5: (−1.5·0 − 0.5·1 + 0.5·2 + 1.5·5)/5
-    assert value["meets_limit"]["p2_5"] <= value["meets_limit"]["p50"]
+    assert value["crosses_limit"]["last"] == "2026-03-02"
+    assert value["crosses_limit"]["day_5"] < value["crosses_limit"]["day_50"]
     assert data["machine"]["adjusted"] == ["2023-02-20"]
 
 

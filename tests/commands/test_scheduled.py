@@ -18,7 +18,7 @@ from unittest import mock
 
 import pytest
 
-from cmm_uq.commands.scheduled_records import due_notices
+from cmm_uq.commands.scheduled_records import drift_notices, due_notices
 from cmm_uq.errors import CmmUqError
 from cmm_uq.records import open_records
 from cmm_uq.writing import read_manifest, sha256_of
@@ -199,10 +199,12 @@ def test_what_was_reported_and_sent_is_in_the_records_and_a_dry_run_only_reads_t
             assert of_job(done.stdout)["state"] == "unchanged"
             assert where.read_bytes() == before
     with open_records(where, read_only=True) as records:
-        assert [entry.kind for entry in records.entries()] == ["report", "sent"]
-        sent = list(records.entries())[1].data
-    assert (sent["event"], sent["about"]) == ("fail", "iota-1102-20C")
-    assert len(taken.requests) == 1
+        entries = list(records.entries())
+    assert [entry.kind for entry in entries] == ["report", "sent", "sent"]
+    # a machine that does not conform is due at once
+    told = {(entry.data["event"], entry.data["about"]) for entry in entries[1:]}
+    assert told == {("fail", "iota-1102-20C"), ("due", "machine DEA Iota 1102")}
+    assert len(taken.requests) == 2
 
 
 def test_records_that_cannot_be_written_end_the_run_before_any_job_and_somebody_is_told_once(
@@ -237,21 +239,36 @@ def test_another_programs_database_is_bad_input(jobs: Path) -> None:
     assert "is no database" in done.stderr
 
 
-def test_an_artefact_that_is_due_is_told_and_with_a_clock_behind_the_records_nothing_is_due(tmp_path: Path) -> None:
-    """The made-up certificate's artefact is due on 2027-06-01."""
+def test_what_is_due_is_told_and_with_a_clock_behind_the_records_nothing_is_due(tmp_path: Path) -> None:
+    """The made-up certificate's artefact is due on 2027-06-01, its machine a year after the certificate of 2026-03-02."""
     with open_records(tmp_path / "lab.db", create=True) as records:
         records.append("report", certificate(), at=dt.datetime(2027, 5, 1, tzinfo=dt.UTC))
         told = {on: list(due_notices(records, dt.date.fromisoformat(on), dt.timedelta(days=29))) for on in (
             "2027-05-02", "2027-05-03", "2027-06-01", "2027-06-02",
         )}  # fmt: skip
         titles = {on: [str(notice.title) for notice in notices] for on, notices in told.items()}
+        machine = "overdue since 2027-03-02: machine 1102"
         assert titles == {
-            "2027-05-02": [],
-            "2027-05-03": ["due on 2027-06-01: artefact BB-7"],
-            "2027-06-01": ["due on 2027-06-01: artefact BB-7"],
-            "2027-06-02": ["overdue since 2027-06-01: artefact BB-7"],
+            "2027-05-02": [machine],
+            "2027-05-03": [machine, "due on 2027-06-01: artefact BB-7"],
+            "2027-06-01": [machine, "due on 2027-06-01: artefact BB-7"],
+            "2027-06-02": [machine, "overdue since 2027-06-01: artefact BB-7"],
         }
-        assert len({notice.key for notices in told.values() for notice in notices}) == 2
+        assert len({notice.key for notices in told.values() for notice in notices}) == 3
         with pytest.raises(CmmUqError, match="the clock says 2027-04-20"):
             list(due_notices(records, dt.date(2027, 4, 20), dt.timedelta(days=60)))
     assert list(due_notices(None, dt.date(2027, 6, 1), dt.timedelta(days=30))) == []
+
+
+@pytest.mark.parametrize(("value", "told"), [(2.5, False), (9.0, True)])
+def test_a_machine_that_changed_by_more_than_chance_drifts(tmp_path: Path, value: float, told: bool) -> None:
+    """Against the change worked by hand: 2.0 ± 0.5 before; 0.5 more is 0.7 u, 7 more is 10 u."""
+    with open_records(tmp_path / "lab.db", create=True) as records:
+        for day, measured in ((dt.date(2025, 3, 1), 2.0), (dt.date(2026, 3, 1), value)):
+            row = ("scale_x.ppm", "Scale error of x", "ppm", measured, 0.5, measured - 1, measured + 1, 0.0, 8.0)
+            records.append("report", certificate(day=day, values=(row,)))
+        notices = list(drift_notices(records, "1102-2026-03-01", dt.date(2026, 4, 1)))
+        assert list(drift_notices(records, "1102-2025-03-01", dt.date(2026, 4, 1))) == []
+    assert [notice.text for notice in notices] == [
+        "machine 1102 changed by more than chance since the recording before: Scale error of x."
+    ] * told

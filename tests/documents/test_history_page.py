@@ -6,13 +6,15 @@ import datetime as dt
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from cmm_uq.documents.document import Document
 from cmm_uq.documents.due_page import due_document
 from cmm_uq.documents.history_page import history_document, overview_of
-from cmm_uq.documents.history_words import meets
+from cmm_uq.documents.history_words import history_data, meets, notes, terminal_note
 from cmm_uq.documents.html import render_html
+from cmm_uq.recertification.crossing import Crossing, crossing
 from cmm_uq.recertification.due import Due, Known, artefact_due, machine_due
 from cmm_uq.recertification.history import MachineHistory, machine_history
 from cmm_uq.recertification.rule import Rule
@@ -71,13 +73,46 @@ def test_what_stands_out(numbers: tuple[float, ...], standing: str, verdict: str
     assert (found.standing, found.verdict) == (standing, verdict)
 
 
-def test_when_a_limit_is_met_in_words() -> None:
+def test_when_a_limit_is_crossed_in_words() -> None:
     """From 2024-03-01 on: 300 days apart, to 2025-10-22; asked on 2026-06-01."""
     assert meets(history(1.0, 2.0, 9.5).values[0], ON) == "is beyond it"
-    assert meets(history(1.0).values[0], ON) == "no trend yet"
     assert meets(history(1.0, 2.0, 3.0, limit=None).values[0], ON) == "–"
     assert meets(history(2.0, 4.5, 7.0).values[0], ON) == "probably already"
-    assert meets(history(0.0, 0.0, 0.0, limit=800.0).values[0], ON) == "not within 20 years"
+    alone = meets(history(1.0).values[0], ON)  # one certificate has no line, and the model a wide guess
+    assert alone.startswith("about 20")
+    assert alone.endswith("perhaps never")
+    unknown = machine_history(MACHINE, [certificate(FIRST)], {"scale_x.ppm": series([0], [1.0], 0.0)}, ON)
+    assert meets(unknown.values[0], ON) == "cannot be foreseen"  # stated without an uncertainty
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "words"),
+    [
+        ((0.00, 0.04), "not within 40 years"),
+        ((0.00, 0.40), "not before 2026-11-27, perhaps never"),
+        ((0.00, 0.90), "about 2029-02-07, perhaps already, perhaps never"),
+        ((0.10, 0.90), "about 2028-09-26, perhaps already, perhaps never"),
+        ((0.00, 0.9999), "about 2026-08-19, perhaps already, by 2029-05-15"),
+        ((0.60, 0.9999), "probably already"),
+    ],
+)
+def test_the_days_of_a_crossing_in_words(probabilities: tuple[float, float], words: str) -> None:
+    """A constant hazard over 4000 days after 2025-10-22: the days from ln(1 − p), by hand."""
+    value = history(1.0, 2.0, 3.0).values[0]
+    known = Crossing(dt.date(2025, 10, 22), np.array([0.0, 4000.0]), np.array(probabilities), 0, 1, 0, 1)
+    vars(value)["crossing"] = known
+    assert meets(value, ON) == words
+
+
+def test_which_model_the_day_of_a_crossing_is_of_is_said_and_the_data_have_it() -> None:
+    made = history(1.0, 2.0, 3.0)
+    assert "drift model" in terminal_note(made)
+    assert "not by the straight line" in " ".join(notes())
+    assert "drift model" not in terminal_note(history(1.0, limit=None))
+    data = history_data(made)["values"]["scale_x.ppm"]["crosses_limit"]
+    again = crossing(made.values[0].series, 8.0)
+    assert data["model"] == "drift"
+    assert [data["day_5"], data["day_50"]] == [str(again.quantile(0.05)), str(again.quantile(0.5))]
 
 
 def test_a_history_fits_a_telephone(browser: Browser, tmp_path: Path) -> None:

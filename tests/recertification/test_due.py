@@ -9,7 +9,9 @@ from typing import Any
 
 import pytest
 
+from cmm_uq.recertification.drift_interval import series_from
 from cmm_uq.recertification.due import Due, Known, after_months, artefact_due, in_order, machine_due
+from cmm_uq.recertification.history import machine_history
 from cmm_uq.recertification.rule import Rule
 from cmm_uq.records import ArtefactRow, Certificate, Machine
 from tests.recertification.made import FIRST, MACHINE, certificate, value
@@ -39,7 +41,8 @@ def check(day: dt.date, number: float, **further: Any) -> Certificate:
     [
         ("2024-03-01", 12, "2025-03-01"), ("2024-02-29", 12, "2025-02-28"), ("2024-01-31", 1, "2024-02-29"),
         ("9999-06-01", 12, "9999-12-31"),
-        ("2024-12-15", 1, "2025-01-15"), ("2023-11-30", 3, "2024-02-29"), ("2024-06-30", 24, "2026-06-30"),
+        ("2024-12-15", 1, "2025-01-15"), ("2023-11-30", 3, "2024-02-29"), ("2026-03-31", 25, "2028-04-30"),
+        ("2024-06-30", 24, "2026-06-30"),
     ],
 )  # fmt: skip
 def test_months_end_on_the_same_day_or_the_months_last(start: str, months: int, end: str) -> None:
@@ -184,3 +187,24 @@ def test_an_artefact_is_due_as_its_certificate_says() -> None:
 def test_the_first_comes_first_and_what_has_no_date_last() -> None:
     first, later, never = due(certificate(FIRST)), artefact_due(BALLBAR), due()
     assert in_order([never, later, first]) == [first, later, never]
+
+
+def test_by_the_drift_model_a_machine_is_due_when_its_history_says_that_its_limit_may_be_crossed() -> None:
+    """The same day by both ways to it, to which an interim check after the calibration counts; a size in mm to neither."""
+    numbers = ((0.0, 1.0), (1.5, 1.1), (3.2, 0.9), (3.9, 1.0))
+    days = (FIRST - dt.timedelta(days=700), FIRST - dt.timedelta(days=350), FIRST, FIRST + dt.timedelta(days=120))
+    done = [
+        certificate(
+            day, value(a), value(b, name="scale_y.ppm"),
+            replace(value(7.9, name="length"), unit="mm"), interim=i == 3, entry=i + 1,
+        )
+        for i, (day, (a, b)) in enumerate(zip(days, numbers, strict=True))
+    ]  # fmt: skip
+    found = due(*done, rule={"method": "drift", "reliability": 0.95})
+    series = {name: series_from(done, name) for name in ("scale_x.ppm", "scale_y.ppm", "length")}
+    history = machine_history(MACHINE, done, series, ON)
+    crossed = {one.series.name: one.crossing.quantile(0.05) for one in history.values if one.crossing is not None}
+    assert found.due == crossed["scale_x.ppm"]
+    assert crossed.keys() == {"scale_x.ppm", "scale_y.ppm"}
+    assert "drift model: quantity scale_x.ppm has not crossed its limit with 95 %" in found.why
+    assert found.due != due(*done[:3], rule={"method": "drift", "reliability": 0.95}).due

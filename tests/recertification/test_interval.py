@@ -110,7 +110,6 @@ def test_no_interval_is_longer_than_its_longest(longest: int | None, wanted: int
 
 
 def test_the_drift_model_gives_a_day() -> None:
-    pytest.importorskip("cmm_uq.recertification.crossing")
     found = interval_by(Rule.of({"method": "drift", "reliability": 0.9}), yearly(0.0, 2.0, 4.1, 6.0), list)
     assert found.days is not None
     assert 14 <= found.days < 2 * 365

@@ -1,13 +1,12 @@
-"""Trends: the same line by another computation, and limits met on days that are known."""
+"""Trends: the same line by another computation."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 
-from cmm_uq.recertification.trend import YEAR, Line, epochs, meeting, trend
-from tests.recertification.made import FIRST, series
+from cmm_uq.recertification.trend import YEAR, epochs, trend
+from tests.recertification.made import series
 
 DAYS, VALUES = [0, 360, 740, 1100], [1.0, 1.9, 3.4, 3.8]
 U, COMMON, WITH = [0.5, 0.4, 0.6, 0.5], [0.3, 0.2, 0.4, 0.3], ["A", "A", "B", "A"]
@@ -65,17 +64,3 @@ def test_values_without_an_uncertainty_have_a_line_too() -> None:
     line = trend(series([0, 365, 730], [1.0, 2.0, 3.0], 0.0))
     assert line is not None
     assert line.slope == pytest.approx(YEAR / 365)
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_limit_is_met_when_the_line_and_its_interval_do(sign: float) -> None:
-    """1 a year from 2 with u = 0.5 throughout: limit 5 after 3 years, and 1.96·0.5 years before and after."""
-    line = Line(3, FIRST.toordinal(), 2.0 * sign, 1.0 * sign, np.diag([0.25, 0.0]), 1.0)
-    met = meeting(line, 5.0)
-    wanted = [FIRST.toordinal() + (3 + norm.ppf(p) * 0.5) * YEAR for p in (0.025, 0.5, 0.975)]
-    assert [met.early, met.middle, met.late] == pytest.approx(wanted, abs=7)
-
-
-def test_a_level_line_meets_no_limit() -> None:
-    met = meeting(Line(3, FIRST.toordinal(), 0.0, 0.0, np.diag([0.25, 0.0]), 1.0), 5.0)
-    assert (met.early, met.middle, met.late) == (None, None, None)

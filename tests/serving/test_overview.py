@@ -8,7 +8,7 @@ import pytest
 
 from cmm_uq.messages import say
 from cmm_uq.records.listing import Called, Listed, Newest
-from cmm_uq.serving.due import Due, FixedInterval, months_after
+from cmm_uq.serving.due import Due
 from cmm_uq.serving.overview import Stands, groups, in_order
 
 TODAY = dt.date(2026, 11, 22)
@@ -61,16 +61,3 @@ def test_what_is_longest_overdue_comes_first_then_what_fails() -> None:
         for one, (_, days) in zip(machines, known.values(), strict=True)
     ]
     assert [one.serial for one in in_order(stands)] == ["later", "late", "fails", "soon", "in order"]
-
-
-@pytest.mark.parametrize(("day", "months", "then"), [
-    ("2026-01-31", 1, "2026-02-28"), ("2024-01-31", 1, "2024-02-29"), ("2026-12-01", 12, "2027-12-01"),
-    ("2026-11-30", 3, "2027-02-28"), ("2026-03-31", 25, "2028-04-30"),
-])  # fmt: skip
-def test_an_interval_of_months_ends_on_the_same_day_or_the_last(day: str, months: int, then: str) -> None:
-    assert months_after(dt.date.fromisoformat(day), months).isoformat() == then
-
-
-def test_the_fixed_interval_begins_with_the_newest_certificate() -> None:
-    found = FixedInterval(13)(None, [newest("7"), Newest(newest("8").machine, None)], TODAY)  # type: ignore[arg-type]
-    assert {serial: one.day for serial, one in found.items()} == {"7": dt.date(2027, 2, 28)}
