@@ -213,9 +213,8 @@ def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -
     scale = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     half = vectors * np.sqrt(np.maximum(values, 0.0))
-    root = scale[:, None] * (
-        half @ vectors.T
-    )  # symmetric: axes of equal length turn with last digits, their sum does not
+    # The symmetric root: axes of equal length turn with the last digits, their sum does not.
+    root = scale[:, None] * (half @ vectors.T)
     normal = random.standard_normal((_DRAWS, len(mean)))
     wider = np.sqrt(degrees / random.chisquare(degrees, _DRAWS))
     return np.asarray(mean + wider[:, None] * (normal @ root.T))

@@ -32,9 +32,13 @@ def certificate_page(view: View, asked: Asked) -> Page:
     one, entry = _named(view, asked)
     folder = Path(one.folder)
     files = files_of(entry, folder)
-    title = say("Diagnosis {number}", number=Verbatim(one.number)) if one.command != "report" else say(
-        "Interim check {number}" if one.interim else "Certificate {number}", number=Verbatim(one.number)
-    )  # fmt: skip
+    number = Verbatim(one.number)
+    if one.command != "report":
+        title = say("Diagnosis {number}", number=number)
+    else:
+        title = (
+            say("Interim check {number}", number=number) if one.interim else say("Certificate {number}", number=number)
+        )
     return Page(
         title, "/certificates",
         lead=_lead(one),

@@ -9,7 +9,7 @@ import pytest
 from cmm_uq.cli.progress import shown
 from tests.cli.terminal import on_terminal
 
-ANSWER = "cmm-uq: No such option: --sed. Did you mean --seed? cmm-uq report --help lists its options"
+ANSWER = "cmm-uq: No such option: --seeed. Did you mean --seed? cmm-uq report --help lists its options"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals of POSIX")
@@ -19,7 +19,7 @@ ANSWER = "cmm-uq: No such option: --sed. Did you mean --seed? cmm-uq report --he
 def test_an_error_is_folded_between_words_and_red_only_where_colour_is_wanted(
     environment: dict[str, str], coloured: bool
 ) -> None:
-    code, told = on_terminal("report", "x", "--sed", "3", columns=60, environment=environment)
+    code, told = on_terminal("report", "x", "--seeed", "3", columns=60, environment=environment)
     assert code == 2
     assert ("\x1b[1;31mcmm-uq:\x1b[0m" in told) is coloured
     plain = told.replace("\x1b[1;31m", "").replace("\x1b[0m", "")
