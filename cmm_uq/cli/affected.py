@@ -54,13 +54,14 @@ def command(
         from cmm_uq.commands.written import silent
         from cmm_uq.records import open_records
 
+        last = __version__ if to is None else to
         with open_records(records, read_only=write is None) as opened:
             where = str(opened.place)
             found = list(
                 affected(
                     opened,
                     version,
-                    to or __version__,
+                    last,
                     recompute=not only_list,
                     out=write,
                     where=where,
@@ -68,7 +69,7 @@ def command(
                 )
             )
     if json:
-        put_data({"from": version, "to": to or __version__, "certificates": [_data(one) for one in found]})
+        put_data({"from": version, "to": last, "certificates": [_data(one) for one in found]})
     elif not quiet:
         for one in found:
             _tell(one)

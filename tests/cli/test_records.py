@@ -216,11 +216,8 @@ def test_what_is_no_records_is_refused_in_a_line(place: str, words: str, tmp_pat
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("records", "head"),
         ("records", "import", "reports"),
-        ("records", "backup", "new.db"),
         ("records", "migrate"),
-        ("records", "retain", "--keep-years", "1"),
         ("release", "K-1", "--by", "A"),
         ("affected", "--version", "0.1.0"),
     ],
@@ -239,7 +236,7 @@ def test_the_database_of_another_program_is_left_as_it_is(
 
 @pytest.mark.parametrize(
     "arguments",
-    [("records", "verify"), ("records", "head"), ("release", "K", "--by", "A"), ("affected", "--version", "0.1.0")],
+    [("records", "verify"), ("release", "K", "--by", "A"), ("affected", "--version", "0.1.0")],
 )
 def test_with_json_the_refusal_is_an_object(arguments: tuple[str, ...], tmp_path: Path) -> None:
     done = run(*arguments, "--records", "gone.db", "--json", cwd=tmp_path)
