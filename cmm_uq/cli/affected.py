@@ -54,13 +54,14 @@ def command(
         from cmm_uq.commands.written import silent
         from cmm_uq.records import open_records
 
+        last = __version__ if to is None else to
         with open_records(records, read_only=write is None) as opened:
             where = str(opened.place)
             found = list(
                 affected(
                     opened,
                     version,
-                    to or __version__,
+                    last,
                     recompute=not only_list,
                     out=write,
                     where=where,
@@ -68,12 +69,13 @@ def command(
                 )
             )
     if json:
-        put_data({"from": version, "to": to or __version__, "certificates": [_data(one) for one in found]})
+        put_data({"from": version, "to": last, "certificates": [_data(one) for one in found]})
     elif not quiet:
         for one in found:
             _tell(one)
         changed = sum(one.changed for one in found)
-        say(f"{len(found)} certificates touched" + ("" if only_list else f", {changed} of them changed"))
+        touched = "1 certificate touched" if len(found) == 1 else f"{len(found)} certificates touched"
+        say(touched if only_list else f"{touched}, {changed} changed")
     if any(one.changed or (one.problem and not only_list) for one in found):
         raise typer.Exit(NOT_CONFORMING)
 
@@ -86,7 +88,7 @@ def _tell(one: Affected) -> None:
     if one.problem:
         say(printable(f"  not computed again: {one.problem}"))
     for change in one.changes or ():
-        say(printable(f"  {change.quantity}: {_figure(change, change.before)} -> {_figure(change, change.after)}"))
+        say(printable(f"  {change.quantity}: {_changed(change)}"))
     if one.changed and one.decision != c.decision:
         say(f"  decision: {c.decision} -> {one.decision}")
     if one.changed and one.diagnosis != c.diagnosis:
@@ -97,8 +99,19 @@ def _tell(one: Affected) -> None:
         say(printable(f"  draft in {one.written}"))
 
 
+def _changed(change: Change) -> str:
+    before, after = (_figure(change, figures) for figures in (change.before, change.after))
+    if before == after and change.before is not None and change.after is not None:
+        before, after = (
+            f"95 % interval {figures[2]:.10g} to {figures[3]:.10g} {change.unit}"
+            for figures in (change.before, change.after)
+        )
+    return f"{before} -> {after}"
+
+
 def _figure(change: Change, figures: tuple[float, float, float, float] | None) -> str:
-    return "none" if figures is None else f"{figures[0]:.6g} (u {figures[1]:.4g}) {change.unit}"
+    """With the ten digits of results.json: fewer would print a small change as none."""
+    return "none" if figures is None else f"{figures[0]:.10g} (u {figures[1]:.10g}) {change.unit}"
 
 
 def _data(one: Affected) -> dict[str, Any]:

@@ -92,8 +92,9 @@ def import_reports(
     from cmm_uq.commands import records_kept
     from cmm_uq.records import open_records
 
+    reports = records_kept.reports_in(folders)  # told before records are made for them
     with open_records(records, create=True) as opened:
-        done = records_kept.import_reports(opened, folders)
+        done = records_kept.import_reports(opened, reports)
     if not quiet:
         say(f"{len(done.added)} recorded, {len(done.known)} recorded before, {len(done.refused)} refused")
         for path in done.bare:

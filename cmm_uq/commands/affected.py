@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
-from cmm_uq.commands.corrections import Correction, Inputs, between, order
+from cmm_uq.commands.corrections import Correction, Inputs, between, order, said
 from cmm_uq.commands.reading import job_of
 from cmm_uq.commands.recording import called
 from cmm_uq.commands.records_kept import RESULTS, inputs_of
@@ -26,6 +28,8 @@ from cmm_uq.records.place import NONE
 
 if TYPE_CHECKING:
     from cmm_uq.records.store import Records
+
+JOB = "job.toml"
 
 SAME = 1e-9
 """Relative difference within which figures are the same: results.json has ten digits."""
@@ -102,36 +106,49 @@ def affected(
         raise CmmUqError(
             f"this is version {__version__}", where=f"--to {last}", fix="Install the version that has the corrections"
         )
+    if order(first) > order(last):
+        raise CmmUqError(f"{last} is before {first}: nothing was corrected between them", where=f"--version {first}",
+                         fix="Give the version that the oldest certificates were made by")  # fmt: skip
     if recompute and order(last) < order(__version__):
         raise CmmUqError(f"only version {last} computes as version {last} does, and this is {__version__}",
                          where=f"--to {last}", fix="Leave it out, or give --list")  # fmt: skip
     found = [
         one for one in records.certificates(origin=None, states=STANDING, command=None)
-        if one.version and order(first) <= order(one.version) < order(last)
+        if not said(one.version) or order(first) <= said(one.version) < order(last)
     ]  # fmt: skip
+    jobs = Counter((one.command, one.job) for one in found)
     for count, certificate in enumerate(found):
         stage(f"Computing again: {certificate.job}", count / len(found))
-        files, problem = _inputs(certificate)
+        files, problem = _inputs(records, certificate)
         inputs = Inputs.of(files) if files else None
         touching = tuple(one for one in between(certificate.version, last) if one.touches(certificate, inputs))
         if not touching:
             continue
         if recompute and files:
-            yield _again(certificate, touching, files, out, where)
+            one_of_many = jobs[certificate.command, certificate.job] > 1
+            name = f"{certificate.job}-{certificate.entry}" if one_of_many else certificate.job
+            yield _again(certificate, touching, files, out and out / name, where)
         else:
             yield Affected(certificate, touching, problem=problem)
 
 
-def _inputs(certificate: Certificate) -> tuple[dict[str, bytes], str]:
+def _inputs(records: Records, certificate: Certificate) -> tuple[dict[str, bytes], str]:
     """Files of its job as its PDF carries them, or why they are not to be had."""
     try:
-        return inputs_of(Path(certificate.folder)), ""
+        files = inputs_of(Path(certificate.folder))
     except CmmUqError as error:
         return {}, str(error)
+    recorded = next(records.entries(certificate.entry)).data.get("inputs")
+    if recorded != {name: sha256(content).hexdigest() for name, content in files.items()}:
+        return {}, f"{certificate.folder}: holds the report of other inputs by now"
+    if JOB not in files:
+        return {}, f"{certificate.folder}: its PDF carries no {JOB}"
+    return files, ""
 
 
 def _again(
-    certificate: Certificate, touching: tuple[Correction, ...], files: Mapping[str, bytes], out: Path | None, where: str | None
+    certificate: Certificate, touching: tuple[Correction, ...], files: Mapping[str, bytes], folder: Path | None,
+    where: str | None,
 ) -> Affected:  # fmt: skip
     try:
         job = job_of(files)
@@ -140,9 +157,8 @@ def _again(
         changes = tuple(compared(certificate.values, [Value(*row) for row in contents.values(data, called)]))
         verdict = str((data.get("diagnosis") or {}).get("verdict") or "")
         found = Affected(certificate, touching, changes, contents.decision(data), verdict)
-        if out is None or not found.changed:
+        if folder is None or not found.changed:
             return found
-        folder = out / certificate.job
         form = REPORT if certificate.command == "report" else DIAGNOSE
         folder = folder if form is REPORT else folder / form.below
         form.write(job, lambda: outcome, folder, records=where)

@@ -6,10 +6,13 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import Recorded
+from cmm_uq.jobs.recording_file import header, is_own
 from cmm_uq.records.facts import Certificate
 
 FILE = "corrections.toml"
@@ -53,7 +56,7 @@ class Correction:
             (self.effects, lambda: inputs.effects & set(self.effects)),
             (self.standards, lambda: any(name.startswith(self.standards) for name in inputs.standards)),
             (self.keys, lambda: any(inputs.has(key) for key in self.keys)),
-            (self.columns, lambda: inputs.columns & set(self.columns)),
+            (self.columns, lambda: inputs.columns is None or inputs.columns & set(self.columns)),
         )
         return all(found() for named, found in asked if named)
 
@@ -65,11 +68,11 @@ class Inputs:
     Parameters
     ----------
     job : job.toml.
-    columns : of its recordings.
+    columns : of its files; ``None`` where a recording is of another format, whose columns have other names.
     """
 
     job: Mapping[str, Any]
-    columns: frozenset[str] = field(default_factory=frozenset)
+    columns: frozenset[str] | None = field(default_factory=frozenset)
 
     @property
     def effects(self) -> set[str]:
@@ -93,13 +96,14 @@ class Inputs:
     @classmethod
     def of(cls, files: Mapping[str, bytes]) -> Inputs:
         """Of the files of a job: a column of any of them counts."""
-        heads = (
-            content.partition(b"\n")[0].decode("utf-8", "replace")
-            for name, content in files.items()
-            if name != "job.toml"
+        job = tomllib.loads(files["job.toml"].decode("utf-8-sig"))
+        recording = job.get("recording") or {}
+        recordings = [files[name] for key in ("file", "earlier") if (name := str(recording.get(key))) in files]
+        if not set(recording) <= set(Recorded.model_fields) or not all(map(is_own, recordings)):
+            return cls(job, None)
+        return cls(
+            job, frozenset(name for file, content in files.items() if file != "job.toml" for name in header(content))
         )
-        columns = {word.strip().strip('"') for head in heads for word in head.replace(";", ",").split(",")}
-        return cls(tomllib.loads(files["job.toml"].decode()), frozenset(columns))
 
 
 @cache
@@ -119,8 +123,8 @@ def corrections() -> tuple[Correction, ...]:
 
 
 def between(first: str, last: str) -> tuple[Correction, ...]:
-    """Corrections of versions after the first, up to the last."""
-    return tuple(one for one in corrections() if order(first) < order(one.version) <= order(last))
+    """Corrections of versions after the first, that a certificate says of itself, up to the last."""
+    return tuple(one for one in corrections() if said(first) < order(one.version) <= order(last))
 
 
 def order(version: str) -> tuple[int, ...]:
@@ -134,6 +138,11 @@ def order(version: str) -> tuple[int, ...]:
     if not all(part.isascii() and part.isdigit() for part in parts):
         raise CmmUqError(f"{version!r} is no version", fix="Give it as 0.5.0")
     return tuple(int(part) for part in parts)
+
+
+def said(version: str) -> tuple[int, ...]:
+    """The version that a certificate says of itself, for comparing: of ``0.5.0rc1`` 0.5, which is before 0.5.0; of none ()."""
+    return tuple(map(int, takewhile(lambda part: part.isascii() and part.isdigit(), version.split("."))))
 
 
 def _read(text: str, where: str) -> tuple[Correction, ...]:

@@ -57,10 +57,10 @@ def import_reports(records: Records, folders: Iterable[Path]) -> Imported:
     ------
     CmmUqError : a folder is not there, or none holds a report.
     """
-    found = {path.resolve(): path for folder in folders for path in report_folders(folder)}
+    found = reports_in(folders)
     contents: dict[str, tuple[Path, dict[str, Any]]] = {}
     known, refused, bare = [], [], []
-    for path in found.values():
+    for path in found:
         try:
             digest = sha256_of(path / RESULTS) or ""
             if digest in contents or records.has_results(digest) is not None:
@@ -76,6 +76,21 @@ def import_reports(records: Records, folders: Iterable[Path]) -> Imported:
     if ordered:
         records.append_all(("imported", content, None) for _, content in ordered)
     return Imported(tuple(path for path, _ in ordered), tuple(known), tuple(refused), tuple(bare))
+
+
+def reports_in(folders: Iterable[Path]) -> list[Path]:
+    """Folders with a report or a diagnosis, each once.
+
+    Raises
+    ------
+    CmmUqError : a folder is not there, or none holds a report.
+    """
+    asked = tuple(folders)
+    found = {path.resolve(): path for folder in asked for path in report_folders(folder)}
+    if not found:
+        raise CmmUqError("holds no report", where=", ".join(map(str, asked)),
+                         fix="Name folders that cmm-uq report or cmm-uq diagnose wrote")  # fmt: skip
+    return list(found.values())
 
 
 def report_folders(folder: Path) -> Iterator[Path]:

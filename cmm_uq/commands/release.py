@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.records.facts import STANDING, Certificate
 from cmm_uq.records.recognised import spelled
 
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
 
 TWO_EYES, FOUR_EYES = 1, 2
 """How many persons release a certificate."""
+
+_TOLD, _NEWEST = 4, 2000
+"""Entries that a message names, and certificates that an unknown name is compared with."""
 
 
 @dataclass(frozen=True)
@@ -30,19 +34,38 @@ class Signed:
     waiting: int = 0
 
 
-def certificate_named(records: Records, name: str) -> Certificate:
-    """The certificate of a number, job, folder or hash of results.json: the newest that counts, else the newest.
+def certificate_named(records: Records, name: str, states: Collection[str]) -> Certificate:
+    """The certificate of a number, entry, job, folder or hash of results.json; where none is in these states, the newest.
+
+    Parameters
+    ----------
+    records : that it is in.
+    name : of it.
+    states : that are asked for.
 
     Raises
     ------
-    CmmUqError : there is none.
+    CmmUqError : there is none, or several are called so and nobody said which.
     """
     found = [one for one in records.named(name) if one.command == "report"]
     if not found:
-        raise CmmUqError(f"no certificate {name!r} is recorded", where=records.shown,
-                         fix="Give its number, the id of its job, or the number of its entry")  # fmt: skip
-    counting = [one for one in found if one.state in STANDING]
-    return (counting or found)[-1]
+        raise CmmUqError(f"no certificate {name!r} is recorded", where=records.shown, fix=_near(records, name))
+    asked = [one for one in found if one.state in states]
+    if len(asked) > 1:
+        entries = ", ".join(f"{one.entry} ({one.machine}, {one.day}, {one.state})" for one in asked[:_TOLD])
+        more = f" and {len(asked) - _TOLD} more" if len(asked) > _TOLD else ""
+        raise CmmUqError(f"{len(asked)} certificates are called {name!r}", where=records.shown,
+                         fix=f"Give the number of the entry: {entries}{more}")  # fmt: skip
+    return (asked or found)[-1]
+
+
+def _near(records: Records, name: str) -> str:
+    """What the one who asked for a certificate may have meant."""
+    known = records.certificates(origin=None, values=False, limit=_NEWEST)
+    if not known:
+        return "No certificate is recorded yet"
+    near = suggestion(name, {word for one in known for word in (one.number, one.job) if word})
+    return near if near.startswith("Did you mean") else "Give its number, the id of its job, or the number of its entry"
 
 
 def release(records: Records, name: str, *, by: str, reason: str = "") -> Signed:
@@ -59,7 +82,7 @@ def release(records: Records, name: str, *, by: str, reason: str = "") -> Signed
     ------
     CmmUqError : it must not be released, or not by this person.
     """
-    certificate, person = certificate_named(records, name), _person(by)
+    certificate, person = certificate_named(records, name, ("draft",)), _person(by)
     if (why := blocked(certificate)) is not None:
         raise CmmUqError(f"{certificate.number} cannot be released: {why}", where=records.shown)
     content = next(records.entries(certificate.entry)).data
@@ -92,7 +115,7 @@ def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: 
     ------
     CmmUqError : it does not count any more, or what is to replace it does not.
     """
-    certificate, person = certificate_named(records, name), _person(by)
+    certificate, person = certificate_named(records, name, STANDING), _person(by)
     if not reason.strip():
         raise CmmUqError(
             "a certificate is withdrawn for a reason", where="--reason", fix="Say it: it stays in the records"
@@ -102,7 +125,7 @@ def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: 
     if replaced_by is None:
         _sign(records, "withdrawal", certificate, person, reason)
         return Signed(records.certificate(certificate.entry))
-    other = certificate_named(records, replaced_by)
+    other = certificate_named(records, replaced_by, ("released",))
     if other.entry == certificate.entry:
         raise CmmUqError("a certificate does not replace itself", where="--replaced-by", fix="Name the new one's entry")
     if other.state != "released" or other.machine != certificate.machine:

@@ -40,10 +40,14 @@ def read_recording_file(
 
 def is_own(content: bytes) -> bool:
     """Whether a recording is in the project's own format: empty, or a header that names one of its columns between commas."""
+    return not content.strip() or any(name in REQUIRED for name in header(content))
+
+
+def header(content: bytes) -> list[str]:
+    """Names between commas in the first line that is no comment."""
     text = content[:_HEAD].decode("utf-8-sig", errors="replace")
-    header = next((line for line in map(str.strip, text.splitlines()) if line and not line.startswith("#")), "")
-    names = [name.strip().strip('"') for name in header.split(",")]
-    return not content.strip() or any(name in REQUIRED for name in names)
+    line = next((line for line in map(str.strip, text.splitlines()) if line and not line.startswith("#")), "")
+    return [name.strip().strip('"') for name in line.split(",")]
 
 
 def _reach(machine: Machine) -> float | None:

@@ -81,6 +81,8 @@ def restore(file: Path, place: str | Path) -> tuple[int, str]:
         _to_server(file, str(place))
         return head
     target = Path(place)
+    if target.is_dir():
+        raise CmmUqError("is a folder, and records are a file", where=str(target), fix="Name a file in it: records.db")
     with _told(target):
         target.parent.mkdir(parents=True, exist_ok=True)
     with _temporary(target) as path:

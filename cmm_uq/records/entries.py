@@ -57,7 +57,9 @@ class Entry:
 
     @property
     def true(self) -> bool:
-        """Whether the hash is that of the entry."""
+        """Whether the hash is that of the entry; SQLite lets somebody put bytes where a text is to be, which none has."""
+        if not all(isinstance(part, str) for part in (self.previous, self.at, self.kind, self.content)):
+            return False
         return self.hash == hash_of(self.previous, self.number, self.at, self.kind, self.content)
 
 

@@ -267,6 +267,12 @@ _WORDS: tuple[tuple[str, str, str, type[CmmUqError]], ...] = (
     ("connection to server", "the server of the records cannot be reached", "Start it, or mend the URL", OutputError),
     ("password", "the server of the records refuses the login", "Mend user and password", OutputError),
     ("not a database", "is no database", "Name the file of the records, or restore a backup", CmmUqError),
+    (
+        "decode to UTF-8",
+        "a text in the records is none any more",
+        "Restore a backup: cmm-uq records restore FILE",
+        CmmUqError,
+    ),
     ("malformed", "the file of the records is damaged", "Restore a backup: cmm-uq records restore FILE", CmmUqError),
     ("never changed", "entries are never changed", "Record what is right as a new entry", CmmUqError),
     ("no such table", "tables of the records are missing", "Restore a backup: cmm-uq records restore FILE", CmmUqError),
