@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from cmm_uq.commands import affected as corrected
+from cmm_uq.commands.affected import Affected
 from cmm_uq.commands.corrections import Correction, Inputs, said
 from cmm_uq.records import open_records
 from tests.cli.laboratory import kept, older
@@ -87,6 +89,18 @@ def test_a_certificate_that_no_correction_touches_is_not_listed(laboratory: Path
     plate, shift = json.loads(done.stdout)["certificates"]
     assert any("artefact is a suspect" in each["what"] for each in plate["corrections"])
     assert not any("artefact is a suspect" in each["what"] for each in shift["corrections"])
+
+
+def test_drafts_of_two_certificates_of_one_job_have_folders_of_their_own(
+    archive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only the folders: what is computed is left out here."""
+    with open_records(archive / "lab.db") as records:
+        records.append("report", next(records.entries(1)).data | {"results_sha256": "1" * 64})
+    monkeypatch.setattr(corrected, "_again", lambda one, said, _, folder, __: Affected(one, said, (), written=folder))
+    done = run("affected", "--version", "0.4.0", "--write", "drafts", "--records", "lab.db", "--json", cwd=archive)
+    drafts = [one["draft"] for one in json.loads(done.stdout)["certificates"]]
+    assert drafts == [str(Path("drafts") / "mount-1"), str(Path("drafts") / "mount-2")]
 
 
 def test_what_cannot_be_computed_again_is_told_and_ends_with_4(archive: Path) -> None:
