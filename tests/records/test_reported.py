@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmm_uq import __version__
 from cmm_uq.commands import affected as corrected
 from cmm_uq.commands.affected import affected
 from cmm_uq.commands.corrections import Correction, Inputs, between, corrections
@@ -198,11 +199,11 @@ def test_a_correction_is_found_computed_again_and_replaced_by_a_draft(
     records.append("withdrawal", {"certificate": 1, "by": "A", "reason": "stands for the older one"})
     number = records.append("report", old).number
     said = (
-        Correction("0.5.0", "Scales were wrong.", kinds=("ballbar",), effects=("scale_x",)),
-        Correction("0.5.0", "Of plates.", kinds=("plate",)), Correction("0.5.0", "Of times.", columns=("time_s",)),
+        Correction(__version__, "Scales were wrong.", kinds=("ballbar",), effects=("scale_x",)),
+        Correction(__version__, "Of plates.", kinds=("plate",)), Correction(__version__, "Of times.", columns=("time_s",)),
     )  # fmt: skip
     monkeypatch.setattr(corrected, "between", lambda first, last: said)
-    (found,) = affected(records, "0.4.0", "0.5.0", out=tmp_path / "drafts", where=str(records.place))
+    (found,) = affected(records, "0.4.0", __version__, out=tmp_path / "drafts", where=str(records.place))
     assert (found.certificate.entry, found.corrections, found.problem) == (number, said[:1], "")
     (change,) = found.changes or ()
     assert change.name == "scale_x.ppm"
