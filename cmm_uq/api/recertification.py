@@ -138,6 +138,7 @@ def due(
     records: str | Path | None = None,
     on: dt.date | str | None = None,
     within: dt.timedelta | None = None,
+    fleet: str | Path | None = None,
 ) -> DueList:
     """What is due for calibration when, and why.
 
@@ -147,28 +148,37 @@ def due(
     records : file, or URL of a PostgreSQL database; what CMM_UQ_RECORDS names, or reports/records.db, where nothing is said.
     on : the day asked about; today where nothing is said.
     within : only what is due that soon, or has no date; everything where nothing is said.
+    fleet : ``fleet.json`` of the fleet that the drift model is to take as prior; its default one where nothing is said.
 
     Raises
     ------
     CmmUqError : there are no records, or a machine is not in them.
     """
     asked = (machines,) if isinstance(machines, str) else machines
-    return DueList(what_is_due(records, asked, on=_day(on), within=within))
+    return DueList(
+        what_is_due(records, asked, on=_day(on), within=within, fleet=None if fleet is None else Path(fleet))
+    )
 
 
-def history(machine: str, *, records: str | Path | None = None, on: dt.date | str | None = None) -> History:
+def history(
+    machine: str,
+    *,
+    records: str | Path | None = None,
+    on: dt.date | str | None = None,
+    fleet: str | Path | None = None,
+) -> History:
     """Every error factor and figure of performance of a machine over its certificates and interim checks.
 
     Parameters
     ----------
     machine : its serial, or its name.
-    records, on : as for :func:`cmm_uq.due`.
+    records, on, fleet : as for :func:`cmm_uq.due`.
 
     Raises
     ------
     CmmUqError : there are no records, or the machine is not in them.
     """
-    return History(history_of(machine, records, on=_day(on)))
+    return History(history_of(machine, records, on=_day(on), fleet=None if fleet is None else Path(fleet)))
 
 
 def _day(on: dt.date | str | None) -> dt.date | None:

@@ -10,7 +10,7 @@ import typer
 from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.cli.options import Force, Json, Quiet, examples
 from cmm_uq.cli.printing import layout, put_data, show
-from cmm_uq.cli.recording_options import On, Records, day_of, time_of
+from cmm_uq.cli.recording_options import Fleet, On, Records, day_of, time_of
 
 if TYPE_CHECKING:
     from cmm_uq.commands.due import WhatIsDue
@@ -25,6 +25,7 @@ def command(
     ] = None,
     records: Records = None,
     on: On = None,
+    fleet: Fleet = None,
     within: Annotated[
         str | None,
         typer.Option(
@@ -42,7 +43,7 @@ def command(
     """Say which machines and artefacts are due for calibration, when, and why."""
     from cmm_uq.commands.due import what_is_due, write_due
 
-    found = what_is_due(records, machines or (), on=day_of(on), within=time_of(within))
+    found = what_is_due(records, machines or (), on=day_of(on), within=time_of(within), fleet=fleet)
     files = {} if out is None else write_due(found, out, force=force)
     if json:
         put_data(found.data())

@@ -9,7 +9,7 @@ import typer
 
 from cmm_uq.cli.options import Force, Json, Quiet, Verbose, examples
 from cmm_uq.cli.printing import layout, put_data, show
-from cmm_uq.cli.recording_options import On, Records, day_of
+from cmm_uq.cli.recording_options import Fleet, On, Records, day_of
 
 if TYPE_CHECKING:
     from cmm_uq.recertification.history import MachineHistory
@@ -21,6 +21,7 @@ def command(
     machine: Annotated[str, typer.Argument(help="Serial number of the machine, or its name.", metavar="MACHINE")],
     records: Records = None,
     on: On = None,
+    fleet: Fleet = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -35,7 +36,7 @@ def command(
     """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed."""
     from cmm_uq.commands.history import history_of, write_history
 
-    found = history_of(machine, records, on=day_of(on))
+    found = history_of(machine, records, on=day_of(on), fleet=fleet)
     files = {} if out is None else write_history(found, out, force=force)
     if json:
         from cmm_uq.documents.history_words import history_data

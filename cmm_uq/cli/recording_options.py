@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -25,6 +26,14 @@ On = Annotated[
         "--on", help="The day asked about; later recordings do not count.", metavar="DATE", show_default="today"
     ),
 ]
+
+Fleet = Annotated[
+    Path | None,
+    typer.Option(
+        "--fleet", help="fleet.json of the fleet that the drift model takes as prior.", metavar="FILE",
+        show_default="a prior without a fleet",
+    ),
+]  # fmt: skip
 
 _DAYS = {"d": 1, "w": 7, "m": 30, "y": 365}
 _LONGEST = 36_500

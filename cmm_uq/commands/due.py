@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
+from cmm_uq.commands.fleet_file import FleetFile, read_fleet
 from cmm_uq.errors import CmmUqError
 from cmm_uq.recertification.due import Due, Known, artefact_due, in_order, machine_due
 from cmm_uq.recertification.interval import Pool
@@ -70,6 +71,7 @@ def what_is_due(
     *,
     on: dt.date | None = None,
     within: dt.timedelta | None = None,
+    fleet: Path | None = None,
 ) -> WhatIsDue:
     """What is due for calibration when, and why.
 
@@ -79,19 +81,21 @@ def what_is_due(
     machines : serials or names; all machines and all artefacts where none is named.
     on : the day asked about; today where nothing is said.
     within : only what is due that soon, or cannot be dated; everything where nothing is said.
+    fleet : ``fleet.json`` of the fleet that the drift model is to take as prior; its default one where nothing is said.
 
     Raises
     ------
     CmmUqError : there are no records, or a machine is not in them.
     """
     day = on or dt.datetime.now().astimezone().date()
+    learnt = read_fleet(fleet)
     with open_records(where, read_only=True) as records:
-        found = due_in(records, machines, day)
+        found = due_in(records, machines, day, learnt)
     kept = found if within is None else [one for one in found if one.due is None or one.due - day <= within]
     return WhatIsDue(day, WITHIN if within is None else within, tuple(kept))
 
 
-def due_in(records: Records, machines: Collection[str], on: dt.date) -> list[Due]:
+def due_in(records: Records, machines: Collection[str], on: dt.date, fleet: FleetFile | None = None) -> list[Due]:
     """The same of open records, whole.
 
     Raises
@@ -102,7 +106,7 @@ def due_in(records: Records, machines: Collection[str], on: dt.date) -> list[Due
     asked = {one.serial: one for one in map(records.machine, machines)}.values() if machines else records.machines()
     if not asked and not artefacts:
         raise CmmUqError("no machine is recorded yet", where="records", fix="Record one: cmm-uq report JOB")
-    reading = _Reading(records, on, whole=bool(machines))
+    reading = _Reading(records, on, fleet or FleetFile(), whole=bool(machines))
     found = [machine_due(reading.known(one), artefacts, on, reading.pool(one)) for one in asked]
     used = {one.artefact for one in found} if machines else set(artefacts)
     return in_order([*found, *(artefact_due(artefacts[serial]) for serial in used if serial in artefacts)])
@@ -114,11 +118,13 @@ class _Reading:
     Parameters
     ----------
     records, on : where from, and up to which day.
+    fleet : what it taught.
     whole : whether histories are read whole, of the few machines that are asked for.
     """
 
-    def __init__(self, records: Records, on: dt.date, *, whole: bool) -> None:
+    def __init__(self, records: Records, on: dt.date, fleet: FleetFile, *, whole: bool) -> None:
         self.records = records
+        self._fleet = fleet
         self._late = records.dated_after(on)
         self._on = on
         self._newest: dict[str, Certificate] = {}
@@ -141,7 +147,8 @@ class _Reading:
             return Known(machine, rule, [newest], newest.entry not in self._without, late)
         past = self._past(machine.serial)
         limited = any(part_used(one) is not None or one.decision != "none" for one in calibrations(past)[-1:])
-        return Known(machine, rule, past, limited, late)
+        priors = self._fleet.of(machine) if rule.method == "drift" else {}
+        return Known(machine, rule, past, limited, late, priors)
 
     def pool(self, machine: Machine) -> Pool:
         """Intervals of all machines of its model; its own where its model is not known."""

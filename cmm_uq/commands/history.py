@@ -5,13 +5,16 @@ from __future__ import annotations
 import datetime as dt
 from pathlib import Path
 
+from cmm_uq.commands.fleet_file import read_fleet
 from cmm_uq.recertification.history import MachineHistory, machine_history
 from cmm_uq.records import open_records
 
 FILES = ("history.html", "history.json")
 
 
-def history_of(machine: str, where: str | Path | None = None, *, on: dt.date | None = None) -> MachineHistory:
+def history_of(
+    machine: str, where: str | Path | None = None, *, on: dt.date | None = None, fleet: Path | None = None
+) -> MachineHistory:
     """The history of a machine.
 
     Parameters
@@ -19,16 +22,18 @@ def history_of(machine: str, where: str | Path | None = None, *, on: dt.date | N
     machine : its serial, or its name.
     where : the records; see :func:`cmm_uq.records.open_records`.
     on : up to which day; today where nothing is said.
+    fleet : as for :func:`cmm_uq.commands.due.what_is_due`.
 
     Raises
     ------
     CmmUqError : there are no records, or the machine is not in them.
     """
     day = on or dt.datetime.now().astimezone().date()
+    learnt = read_fleet(fleet)
     with open_records(where, read_only=True) as records:
         found = records.machine(machine)
         certificates = records.certificates(found.serial, values=False)
-        return machine_history(found, certificates, records.series(found.serial), day)
+        return machine_history(found, certificates, records.series(found.serial), day, learnt.of(found))
 
 
 def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -> dict[str, Path]:

@@ -98,7 +98,7 @@ def _values(history: MachineHistory) -> tuple[Block, ...]:
         return (Paragraph(say("No value of this machine is recorded.")),)
     columns = tuple(Column(heading, numeric=heading not in WORDS) for heading in HEADINGS)
     rows = tuple(value_row(history, one) for one in history.values)
-    return (Table(say("Error factors and figures of performance"), columns, rows, notes()),)
+    return (Table(say("Error factors and figures of performance"), columns, rows, notes(history)),)
 
 
 def _certificates(history: MachineHistory) -> tuple[Block, ...]:

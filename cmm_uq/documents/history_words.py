@@ -77,11 +77,18 @@ def meets(one: ValueHistory, on: dt.date) -> Text:
     return say("{about}, {begins}, by {late}", about=about, begins=begins, late=day(late))
 
 
-def model_note() -> Text:
+def model_note(history: MachineHistory) -> Text:
     """Which model the days of crossing are of."""
+    learnt = {one.prior is not None for one in history.values if one.series.limit is not None}
+    model = say("the drift model without a fleet")
+    if True in learnt:
+        model = say("the drift model with its fleet")
+        if False in learnt:
+            model = say("the drift model, with its fleet where that has the value")
     return say(
-        "The day on which a limit is crossed is by the drift model without a fleet (about: with a probability of 50 %; not "
-        "before: 5 %; by: 95 %; never: later than {horizon} years), not by the straight line.", horizon=number(HORIZON, "g"),
+        "The day on which a limit is crossed is by {model} (about: with a probability of 50 %; not "
+        "before: 5 %; by: 95 %; never: later than {horizon} years), not by the straight line.",
+        model=model, horizon=number(HORIZON, "g"),
     )  # fmt: skip
 
 
@@ -90,10 +97,10 @@ def terminal_note(history: MachineHistory) -> Text:
     factor = say("Every ± has k = 2.")
     if all(one.crossing is None or one.beyond for one in history.values):
         return factor
-    return say("{factor} {model}", factor=factor, model=model_note())
+    return say("{factor} {model}", factor=factor, model=model_note(history))
 
 
-def notes() -> tuple[Text, ...]:
+def notes(history: MachineHistory) -> tuple[Text, ...]:
     """What the columns of a history mean."""
     return (
         say("U has a coverage factor of 2, for 95 %."),
@@ -103,7 +110,7 @@ def notes() -> tuple[Text, ...]:
             "once in twenty times."
         ),
         say("The trend is a straight line through the recordings since the last adjustment."),
-        model_note(),
+        model_note(history),
     )
 
 
@@ -163,5 +170,5 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
             "u_per_year": one.line.u_slope, "count": one.line.count, "birge_ratio": one.line.excess,
         }  # fmt: skip
     if one.crossing is not None:
-        found["crosses_limit"] = {"model": "drift", **one.crossing.data()}
+        found["crosses_limit"] = {"model": "drift", "fleet": one.prior is not None, **one.crossing.data()}
     return found

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import say
 from cmm_uq.recertification.crossing import crossing
+from cmm_uq.recertification.drift_prior import Prior
 from cmm_uq.recertification.observed import calibrations, is_of_machine
 from cmm_uq.records import Certificate, Series
 
@@ -34,17 +35,20 @@ def series_from(certificates: Sequence[Certificate], name: str) -> Series:
     )  # fmt: skip
 
 
-def drift_interval(certificates: Sequence[Certificate], reliability: float) -> tuple[float, str]:
+def drift_interval(
+    certificates: Sequence[Certificate], reliability: float, priors: Mapping[str, Prior]
+) -> tuple[float, str, bool]:
     """Days after the last calibration until the first of the errors may have crossed its limit, and which one it is.
 
     Parameters
     ----------
     certificates : of the machine, by day, interim checks too: the model takes all that was seen, as its history does.
     reliability : probability with which no single error has crossed yet.
+    priors : of the machine's fleet, by the value's name; the default one where there is none.
 
     Returns
     -------
-    days, infinite beyond the model's horizon, and the quantity's name.
+    days, infinite beyond the model's horizon, the quantity's name, and whether its prior is a fleet's.
 
     Raises
     ------
@@ -55,15 +59,16 @@ def drift_interval(certificates: Sequence[Certificate], reliability: float) -> t
     limited = [(one, one.limit) for one in stated if one.limit]
     if not limited:
         raise CmmUqError(say("its certificate has no limits"))
-    found: list[tuple[float, str]] = []
+    found: list[tuple[float, str, bool]] = []
     refused: CmmUqError | None = None
     for one, limit in limited:
         try:
-            crossed = crossing(one, limit).quantile(1 - reliability)
+            crossed = crossing(one, limit, priors.get(one.name)).quantile(1 - reliability)
         except CmmUqError as error:
             refused = error
             continue
-        found.append((float("inf") if crossed is None else float((crossed - last.day).days), one.quantity))
+        days = float("inf") if crossed is None else float((crossed - last.day).days)
+        found.append((days, one.quantity, one.name in priors))
     if not found:
         raise refused or CmmUqError(say("nothing in its history can be followed"))
     return min(found)

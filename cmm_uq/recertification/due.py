@@ -8,8 +8,8 @@ from __future__ import annotations
 import calendar
 import datetime as dt
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
 
 from cmm_uq.messages import Text, Verbatim, day, foreign, number, say
 from cmm_uq.recertification.checks import Checked, check_standings
@@ -17,6 +17,9 @@ from cmm_uq.recertification.interval import Interval, Pool, interval_by
 from cmm_uq.recertification.observed import BEYOND, calibrations
 from cmm_uq.recertification.rule import Rule
 from cmm_uq.records import ArtefactRow, Certificate, Machine
+
+if TYPE_CHECKING:
+    from cmm_uq.recertification.drift_prior import Prior
 
 State = Literal["overdue", "due", "later", "unknown"]
 
@@ -76,6 +79,7 @@ class Known:
     certificates : measured and standing ones up to the day, by day; of a fixed interval those since the last calibration.
     limited : whether the last calibration sets a limit, or decides on one.
     late : last date of those that are dated after the day; ``None`` where none is.
+    priors : what its fleet taught of each value, by name.
     """
 
     machine: Machine
@@ -83,6 +87,7 @@ class Known:
     certificates: Sequence[Certificate]
     limited: bool = True
     late: dt.date | None = None
+    priors: Mapping[str, Prior] = field(default_factory=dict)
 
 
 def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, pool: Pool) -> Due:
@@ -134,7 +139,7 @@ def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Poo
         return last.day, say("its last certificate finds it beyond its limits")
     # the drift model takes checks after the calibration too; other methods count what calibrations found
     seen = known if rule.method == "drift" else known[: known.index(last) + 1]
-    interval = interval_by(rule, seen, pool)
+    interval = interval_by(rule, seen, pool, of.priors)
     planned = _ends(last.day, interval)
     checks = check_standings(last, [one for one in known[known.index(last) + 1 :] if one.interim])
     return _checked(rule, last, planned, interval.why, checks)

@@ -17,6 +17,7 @@ from cmm_uq.records import Certificate, Machine, Series
 
 if TYPE_CHECKING:
     from cmm_uq.recertification.crossing import Crossing
+    from cmm_uq.recertification.drift_prior import Prior
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class ValueHistory:
     adjusted : whether the machine was adjusted between the two.
     line : through the values since the last adjustment; ``None`` where they do not give one.
     adjusted_after : ordinal of the machine's newest adjustment; ``None`` where none is known.
+    prior : what the machine's fleet taught of this value; ``None`` for the default one.
     """
 
     series: Series
@@ -37,6 +39,7 @@ class ValueHistory:
     adjusted: bool
     line: Line | None
     adjusted_after: int | None = None
+    prior: Prior | None = None
 
     @cached_property
     def crossing(self) -> Crossing | None:
@@ -50,7 +53,7 @@ class ValueHistory:
         from cmm_uq.recertification.drift import history
 
         try:
-            return crossing(history(self.series, self.adjusted_after), self.series.limit)
+            return crossing(history(self.series, self.adjusted_after), self.series.limit, self.prior)
         except CmmUqError:
             return None
 
@@ -89,7 +92,11 @@ class MachineHistory:
 
 
 def machine_history(
-    machine: Machine, certificates: Sequence[Certificate], series: Mapping[str, Series], on: dt.date
+    machine: Machine,
+    certificates: Sequence[Certificate],
+    series: Mapping[str, Series],
+    on: dt.date,
+    priors: Mapping[str, Prior] | None = None,
 ) -> MachineHistory:
     """The history up to a day.
 
@@ -99,6 +106,7 @@ def machine_history(
     certificates : of it, by day.
     series : its values, by name.
     on : the day; what is dated later does not count.
+    priors : what its fleet taught of each value, by name.
     """
     known = tuple(one for one in certificates if one.day <= on)
     remarks: list[Text] = []
@@ -115,7 +123,9 @@ def machine_history(
         remarks.append(plural(late, one=one, many=many))
     cut = (_until(one, on) for one in series.values())
     adjusted = max((one.toordinal() for one in machine.adjusted if one <= on), default=None)
-    values = tuple(_value(one, adjusted) for one in cut if len(one.day) and is_of_machine(one.unit))
+    values = tuple(
+        _value(one, adjusted, (priors or {}).get(one.name)) for one in cut if len(one.day) and is_of_machine(one.unit)
+    )
     if values and not any(one.series.limit is not None for one in values):
         remarks.append(say("No certificate has limits, so that none can be met."))
     if known and len({one.day for one in known}) == 1:
@@ -132,7 +142,7 @@ def _until(series: Series, on: dt.date) -> Series:
     return replace(series, **{name: getattr(series, name)[rows] for name in names})
 
 
-def _value(series: Series, adjusted_after: int | None) -> ValueHistory:
+def _value(series: Series, adjusted_after: int | None, prior: Prior | None) -> ValueHistory:
     changed = None
     adjusted = False
     if len(series.day) > 1:
@@ -142,4 +152,4 @@ def _value(series: Series, adjusted_after: int | None) -> ValueHistory:
         )
         changed = change(before, now)
         adjusted = bool(series.adjusted_since[-2] != series.adjusted_since[-1])
-    return ValueHistory(series, changed, adjusted, trend(series), adjusted_after)
+    return ValueHistory(series, changed, adjusted, trend(series), adjusted_after, prior)

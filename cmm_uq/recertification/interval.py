@@ -8,12 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, Verbatim, foreign, plural, say
 from cmm_uq.recertification.observed import Ended
 from cmm_uq.recertification.rule import Rule
 from cmm_uq.records import Certificate
+
+if TYPE_CHECKING:
+    from cmm_uq.recertification.drift_prior import Prior
 
 METHOD_WORDS: Mapping[str, Text] = {
     "fixed": say("fixed"), "A3": Verbatim("A3"), "S2": Verbatim("S2"), "staircase": say("staircase"),
@@ -41,7 +45,9 @@ class Interval:
     why: Text
 
 
-def interval_by(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> Interval:
+def interval_by(
+    rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Mapping[str, Prior] | None = None
+) -> Interval:
     """The interval after the last of a machine's calibrations.
 
     Parameters
@@ -49,13 +55,14 @@ def interval_by(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> 
     rule : of the machine.
     certificates : of the machine, by day, up to its newest calibration; with later interim checks for the drift model.
     pool : intervals of all machines of its model.
+    priors : what its fleet taught of each value, for the drift model.
     """
     if rule.method == "fixed":
         return _fixed(rule)
     from cmm_uq.recertification.methods import METHODS  # numpy and scipy: a fixed interval need not wait for them
 
     try:
-        days, why = METHODS[rule.method](rule, certificates, pool)
+        days, why = METHODS[rule.method](rule, certificates, pool, priors or {})
     except CmmUqError as error:
         return Interval(
             None, rule.every_months,

@@ -10,6 +10,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, Verbatim, foreign, number, say
 from cmm_uq.recertification.drift_interval import drift_interval
+from cmm_uq.recertification.drift_prior import Prior
 from cmm_uq.recertification.interval import Pool, months_of
 from cmm_uq.recertification.interval_test import interval_test
 from cmm_uq.recertification.observed import adjusted_between, calibrations, ended_intervals
@@ -22,11 +23,13 @@ from cmm_uq.records import Certificate
 LIKE_DAYS, LIKE_PART = 56.0, 0.5
 """An interval is like the assigned one where it differs by no more than eight weeks, nor by half of it (as suncal has it)."""
 
-Method = Callable[[Rule, Sequence[Certificate], Pool], tuple[float, Text]]
-"""Days and the reason, from the rule, the machine's certificates, and the intervals of its model; refuses in words."""
+Priors = Mapping[str, Prior]
+
+Method = Callable[[Rule, Sequence[Certificate], Pool, Priors], tuple[float, Text]]
+"""Days and the reason, from the rule, certificates, intervals of the model and priors of the fleet; refuses in words."""
 
 
-def _a3(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[float, Text]:
+def _a3(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
     assigned = rule.days
     near = min(LIKE_DAYS, LIKE_PART * assigned)
     like = [one for one in pool() if abs(one.days - assigned) <= near]
@@ -42,7 +45,7 @@ def _a3(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[fl
     )  # fmt: skip
 
 
-def _s2(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[float, Text]:
+def _s2(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
     ended = pool()
     if not ended:
         raise CmmUqError(say("no interval has ended with known limits"))
@@ -58,7 +61,7 @@ def _s2(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[fl
     return rule.changing.bounded(found.interval), why
 
 
-def _staircase(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[float, Text]:
+def _staircase(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
     ended = ended_intervals(certificates)
     if not ended:
         raise CmmUqError(say("no interval of this machine has ended with known limits"))
@@ -69,7 +72,7 @@ def _staircase(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> t
     )  # fmt: skip
 
 
-def _control_chart(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[float, Text]:
+def _control_chart(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
     """The least of the intervals after which each value is within its limit with the reliability."""
     done = calibrations(certificates)
     pairs = [(a, b) for a, b in pairwise(done) if b.day > a.day and not adjusted_between(a, b)]
@@ -97,9 +100,10 @@ def _control_chart(rule: Rule, certificates: Sequence[Certificate], pool: Pool) 
     return rule.changing.bounded(length), why
 
 
-def _drift(rule: Rule, certificates: Sequence[Certificate], pool: Pool) -> tuple[float, Text]:
-    length, name = drift_interval(certificates, rule.reliability)
-    why = say("drift model: {name} has not crossed its limit with {target} % for {reached}", name=Verbatim(name),
+def _drift(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
+    length, name, learnt = drift_interval(certificates, rule.reliability, priors)
+    why = say("{model}: {name} has not crossed its limit with {target} % for {reached}", name=Verbatim(name),
+              model=say("drift model with its fleet") if learnt else say("drift model without a fleet"),
               target=_percent(rule.reliability), reached=_lasting(length))  # fmt: skip
     return rule.changing.bounded(length), why
 

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 from pathlib import Path
 from subprocess import CompletedProcess
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from cmm_uq.commands.due import what_is_due
 from cmm_uq.commands.fleet import fleet
 from cmm_uq.errors import CmmUqError
 from cmm_uq.recertification.crossing import crossing
 from cmm_uq.recertification.drift import history
+from cmm_uq.recertification.drift_prior import Prior
 from cmm_uq.recertification.fleet_prior import FleetPrior
 from cmm_uq.records import open_records
 from tests.cli.process import run
+from tests.cli.test_due import recorded
 from tests.documents.fleets import alone
-from tests.records.histories import made
+from tests.records.histories import certificate, made
 
 NAME = "squareness_xy.angle_arcsec"
 
@@ -60,6 +65,49 @@ def test_the_data_have_every_machine_and_a_prior_that_is_the_fleet_s(
     again = crossing(history(series), one["limit"], kept.prior(one["model"], one["place"]))
     assert again.rate == pytest.approx(one["rate"], abs=one["u"])
     assert one["crossing"]["last"] == again.last.isoformat()
+
+
+def test_due_and_history_take_the_fleets_prior_where_its_file_is_named(
+    written: tuple[CompletedProcess[str], Path], tmp_path: Path
+) -> None:
+    """A machine new to the fleet, of its model and place: both name the day that the model finds from the file's prior."""
+    file = written[1] / "fleet.json"
+    value = json.loads(file.read_text(encoding="utf-8"))["values"][0]
+    of = {key: value["machines"][0][key] for key in ("model", "place")}
+    limit = value["machines"][0]["limit"]
+    new = {"serial": "new", "name": "New", "manufacturer": "DEA", "calibrate": {"method": "drift"}} | of
+    row = (NAME, value["quantity"], value["unit"], 0.3 * limit, 0.05 * limit, 0.2 * limit, 0.4 * limit, 0.0, limit)
+    place = recorded(tmp_path, certificate("new", dt.date(2026, 3, 2), (row,), machine=new))
+
+    def told(command: str, *further: str | Path) -> dict[str, Any]:
+        asked = (command, "new", "--records", place, "--on", "2026-11-22", "--json", *further)
+        return cast("dict[str, Any]", json.loads(run(*asked).stdout))
+
+    with open_records(place, read_only=True) as records:
+        series = records.series("new")[NAME]
+    prior = FleetPrior.from_data(value["prior"]).prior(of["model"], of["place"])
+    days = {}
+    asked: tuple[tuple[Prior | None, tuple[str | Path, ...], str], ...] = (
+        (prior, ("--fleet", file), "with its fleet"), (None, (), "without a fleet"),
+    )  # fmt: skip
+    for given, further, words in asked:
+        first = days[words] = crossing(series, limit, given).quantile(0.05)
+        assert first is not None
+        found = next(one for one in told("due", *further)["items"] if one["item"] == "machine")
+        assert words in found["why"]
+        assert f"{(first - dt.date(2026, 3, 2)).days} days" in found["why"]
+        stated = told("history", *further)["values"][NAME]["crosses_limit"]
+        assert (stated["day_5"], stated["fleet"]) == (first.isoformat(), given is not None)
+    assert "with its fleet" in run("history", "new", "--records", place, "--fleet", file).stdout
+    assert days["with its fleet"] != days["without a fleet"]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"values": [{"name": "a", "prior": {}}]}'])
+def test_a_file_that_is_no_fleets_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / "fleet.json").write_text(text, encoding="utf-8")
+    place = recorded(tmp_path, certificate("1"))
+    with pytest.raises(CmmUqError, match=r"fleet\.json.*cmm-uq fleet"):
+        what_is_due(place, fleet=tmp_path / "fleet.json")
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,7 @@ def test_the_days_of_a_crossing_in_words(probabilities: tuple[float, float], wor
 def test_which_model_the_day_of_a_crossing_is_of_is_said_and_the_data_have_it() -> None:
     made = history(1.0, 2.0, 3.0)
     assert "drift model" in terminal_note(made)
-    assert "not by the straight line" in " ".join(notes())
+    assert "not by the straight line" in " ".join(notes(made))
     assert "drift model" not in terminal_note(history(1.0, limit=None))
     data = history_data(made)["values"]["scale_x.ppm"]["crosses_limit"]
     again = crossing(made.values[0].series, 8.0)

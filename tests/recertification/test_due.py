@@ -206,5 +206,5 @@ def test_by_the_drift_model_a_machine_is_due_when_its_history_says_that_its_limi
     crossed = {one.series.name: one.crossing.quantile(0.05) for one in history.values if one.crossing is not None}
     assert found.due == crossed["scale_x.ppm"]
     assert crossed.keys() == {"scale_x.ppm", "scale_y.ppm"}
-    assert "drift model: quantity scale_x.ppm has not crossed its limit with 95 %" in found.why
+    assert "drift model without a fleet: quantity scale_x.ppm has not crossed its limit with 95 %" in found.why
     assert found.due != due(*done[:3], rule={"method": "drift", "reliability": 0.95}).due

@@ -113,4 +113,4 @@ def test_the_drift_model_gives_a_day() -> None:
     found = interval_by(Rule.of({"method": "drift", "reliability": 0.9}), yearly(0.0, 2.0, 4.1, 6.0), list)
     assert found.days is not None
     assert 14 <= found.days < 2 * 365
-    assert "drift model: quantity scale_x.ppm" in found.why
+    assert "drift model without a fleet: quantity scale_x.ppm" in found.why

@@ -203,6 +203,6 @@ def test_on_paper_the_list_is_a_list(tab: Tab) -> None:
     printed = PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True)))
     text = " ".join(" ".join(sheet.extract_text().split()) for sheet in printed.pages)
     assert len(printed.pages) == 1
-    assert re.search(r"K3 Machine K3 ✗ Does not conform 2027-08-01", text)
+    assert re.search(r"K3 Machine K3 ✗ Overdue.* Does not conform 2026-08-01", text)
     assert "Serial, name, model or place" not in text
     assert "Diagnoses" not in text
