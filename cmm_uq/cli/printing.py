@@ -39,6 +39,17 @@ def say(text: str = "") -> None:
     put(f"{text}\n")
 
 
+def helped(context: typer.Context) -> None:
+    """Say the help of a group of commands where none of them is named.
+
+    Raises
+    ------
+    OutputError : nobody takes it.
+    """
+    if context.invoked_subcommand is None:
+        say(context.get_help())
+
+
 def put(text: str) -> None:
     """Text on standard output, as it is.
 

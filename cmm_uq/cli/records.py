@@ -10,15 +10,15 @@ import typer
 
 from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.cli.options import Json, Quiet, Records, examples
-from cmm_uq.cli.printing import put_data, say
+from cmm_uq.cli.printing import helped, put_data, say
 from cmm_uq.errors import CmmUqError, printable
 
 app = typer.Typer(
     help="The history of machines and certificates: verified, backed up, imported, kept small, brought to a new version.",
     epilog=examples("records import reports", "records verify --head HASH", "records backup records-2026.db"),
     rich_markup_mode=None,
-    no_args_is_help=True,
 )
+app.callback(invoke_without_command=True)(helped)
 
 SHOWN = 50
 """Findings that are printed."""

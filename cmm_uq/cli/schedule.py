@@ -10,15 +10,15 @@ import typer
 from cmm_uq.cli import NEEDS_A_PERSON
 from cmm_uq.cli.deferred import defer_scipy
 from cmm_uq.cli.options import Json, examples
-from cmm_uq.cli.printing import put, put_data, say
+from cmm_uq.cli.printing import helped, put, put_data, say
 from cmm_uq.errors import printable
 
 app = typer.Typer(
     help="Scheduled runs: a schedule.toml, a trial of its messages, ready files for cron, systemd and Windows.",
     epilog=examples("schedule new jobs/schedule.toml", "schedule print systemd jobs --at 06:15"),
     rich_markup_mode=None,
-    no_args_is_help=True,
 )
+app.callback(invoke_without_command=True)(helped)
 
 Given = Annotated[
     Path | None,

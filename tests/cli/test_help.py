@@ -66,3 +66,10 @@ def test_a_slip_is_answered_with_what_was_meant(arguments: tuple[str, ...], told
     with pytest.raises(CmmUqError) as error:
         commands.run()
     assert str(error.value) == told
+
+
+@pytest.mark.parametrize("group", ["records", "schedule"])
+def test_a_group_of_commands_alone_shows_its_help(group: str) -> None:
+    done = run(group)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.rstrip() == helped(group).rstrip()
