@@ -87,6 +87,7 @@ def import_reports(
     folders: Annotated[list[Path], typer.Argument(help="Folders that hold reports, at any depth.", metavar="FOLDER…")],
     records: Records = None,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Record reports and diagnoses that were written before; what is recorded already is passed over."""
     from cmm_uq.commands import records_kept
@@ -95,7 +96,13 @@ def import_reports(
     reports = records_kept.reports_in(folders)  # told before records are made for them
     with open_records(records, create=True) as opened:
         done = records_kept.import_reports(opened, reports)
-    if not quiet:
+    if json:
+        put_data({
+            "recorded": len(done.added), "recorded_before": len(done.known),
+            "without_inputs": [str(path) for path in done.bare],
+            "refused": [{"report": str(path), "error": str(error)} for path, error in done.refused],
+        })  # fmt: skip
+    elif not quiet:
         say(f"{len(done.added)} recorded, {len(done.known)} recorded before, {len(done.refused)} refused")
         for path in done.bare:
             say(printable(f"{path}: the inputs of its job cannot be read, so only results.json was gone by"))
@@ -110,6 +117,7 @@ def backup(
     file: Annotated[Path, typer.Argument(help="New file of the backup.", metavar="FILE")],
     records: Records = None,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Write everything into one new SQLite file, while others go on writing, and verify its chain."""
     from cmm_uq.records import open_records
@@ -117,7 +125,9 @@ def backup(
 
     with open_records(records) as opened:
         number, last = back_up(opened, file)
-    if not quiet:
+    if json:
+        put_data({"backup": str(file), "entries": number, "head": last})
+    elif not quiet:
         say(f"{_entries(number)} in {file}; the last has the hash {last}")
 
 
@@ -126,16 +136,19 @@ def restore(
     file: Annotated[Path, typer.Argument(help="File of a backup.", metavar="FILE")],
     records: Records = None,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Make records of a backup whose chain holds; a file in its place is kept as NAME.before-restore."""
     from cmm_uq.records import backup as backups
-    from cmm_uq.records.place import place_of
+    from cmm_uq.records.place import place_of, shown
 
     place = place_of(records)
     if place is None:
         raise CmmUqError("no records are asked for", where="--records none", fix="Name a file or a URL")
     number, last = backups.restore(file, place)
-    if not quiet:
+    if json:
+        put_data({"records": shown(place), "entries": number, "head": last})
+    elif not quiet:
         say(f"{_entries(number)} restored; the last has the hash {last}")
 
 
@@ -145,6 +158,7 @@ def retain(
     records: Records = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Remove the files of older reports; what they stated stays in the records, and so does what was removed.
 
@@ -157,7 +171,11 @@ def retain(
         found = retention(opened, keep_years, dt.datetime.now(dt.UTC).date())
         if not dry_run:
             remove_retained(opened, found, keep_years)
-    if not quiet:
+    if json:
+        put_data({
+            "removed": not dry_run, "files": [str(path) for path in found.files], "certificates": len(found.certificates),
+        })  # fmt: skip
+    elif not quiet:
         for path in found.files:
             say(printable(str(path)))
         would = "would be removed" if dry_run else "removed"
@@ -165,7 +183,7 @@ def retain(
 
 
 @app.command("migrate", epilog=examples("records backup before.db", "records migrate"))
-def migrate(records: Records = None, quiet: Quiet = False) -> None:
+def migrate(records: Records = None, quiet: Quiet = False, json: Json = False) -> None:
     """Bring the tables of an older version to this one; entries stay as they are. Back up first."""
     from cmm_uq.records import migrations
     from cmm_uq.records.place import place_of, shown
@@ -174,6 +192,8 @@ def migrate(records: Records = None, quiet: Quiet = False) -> None:
     if place is None:
         raise CmmUqError("no records are asked for", where="--records none", fix="Name a file or a URL")
     before, after = migrations.migrate(place)
-    if not quiet:
+    if json:
+        put_data({"records": shown(place), "from": before, "to": after})
+    elif not quiet:
         told = f"are of revision {after} already" if before == after else f"brought from revision {before} to {after}"
         say(f"{shown(place)}: {told}")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from cmm_uq.records.opening import REVISION
 from tests.cli.laboratory import PLACE, kept, older
 from tests.cli.process import run
 from tests.records.histories import certificate
@@ -241,3 +242,19 @@ def test_with_json_the_refusal_is_an_object(arguments: tuple[str, ...], tmp_path
     assert (done.returncode, done.stdout) == (2, "")
     told = json.loads(done.stderr)["error"]
     assert (told["problem"], told["where"], told["exit_code"]) == ("there are no records", "gone.db", 2)
+
+
+def test_with_json_each_tells_what_it_did_as_one_object(three: Path, tmp_path: Path) -> None:
+    def told(*arguments: str | Path) -> dict[str, object]:
+        done = run("records", *arguments, "--json")
+        assert (done.returncode, done.stderr) == (0, "")
+        answer: dict[str, object] = json.loads(done.stdout)
+        return answer
+
+    head = told("head", "--records", three)
+    copy, other = tmp_path / "copy.db", tmp_path / "other.db"
+    assert told("backup", copy, "--records", three) == {"backup": str(copy)} | head
+    assert told("restore", copy, "--records", other) == {"records": str(other)} | head
+    assert told("migrate", "--records", other) == {"records": str(other), "from": REVISION, "to": REVISION}
+    kept_files = told("retain", "--keep-years", "1", "--dry-run", "--records", other)
+    assert (kept_files["removed"], kept_files["files"]) == (False, [])
