@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+from unittest import mock
 
 from cmm_uq.scheduling.talking import Talk
 
@@ -42,7 +43,6 @@ class Watch:
 
     def __enter__(self) -> Self:
         ask = Talk.ask
-        self._ask = ask
 
         def timed(talk: Talk, number: int, task: object) -> object:
             began = time.monotonic()
@@ -52,7 +52,8 @@ class Watch:
                 with self._lock:
                     self.busy_s += time.monotonic() - began
 
-        Talk.ask = timed  # type: ignore[assignment,method-assign]
+        self._timed = mock.patch.object(Talk, "ask", timed)
+        self._timed.start()
         self.began, self.cpu_s = time.monotonic(), time.process_time()
         self._thread.start()
         return self
@@ -63,7 +64,7 @@ class Watch:
         self.seconds, self.cpu_s = time.monotonic() - self.began, time.process_time() - self.cpu_s
         self._over.set()
         self._thread.join()
-        Talk.ask = self._ask  # type: ignore[method-assign]
+        self._timed.stop()
 
     def _look(self) -> None:
         while not self._over.wait(self.every_s):

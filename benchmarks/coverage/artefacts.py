@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -100,12 +101,12 @@ def _gauge_lines(
         parts["repeat"].append(np.repeat([1, 2, 3], count)[order])
         parts["reference"].append(np.tile(faces, 3)[order])
         sense.append(np.tile(np.where(np.arange(count)[:, None] == 0, -direction, direction), (3, 1))[order])
-    joined = {name: np.concatenate(values) for name, values in parts.items()}
+    joined: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
     reference, outward = joined.pop("reference"), np.concatenate(sense)
     columns = {"reference_mm": reference}
     if kind == "gauge_blocks":
         columns |= {f"n{a}": outward[:, i] for i, a in enumerate("xyz")}
-    return Placed(kind, **joined, columns=columns, reach=reference, **more)  # type: ignore[arg-type]
+    return Placed(kind, **joined, columns=columns, reach=reference, **more)
 
 
 def step_gauge(random: np.random.Generator) -> Placed:

@@ -61,8 +61,8 @@ def mutations(tally: Tally, options: argparse.Namespace, work: Path, tick: Calla
     """Run the mutated inputs."""
     for record in pool.run_all(range(options.cases), options.seed, options.workers, work):
         found: Any = record["found"]
-        fields = {name: record[name] for name in ("number", "target", "what", "code", "said", "ran")}
-        if tally.add(kind=str(fields.pop("target")), found=found, **fields):  # type: ignore[arg-type]
+        fields: dict[str, Any] = {name: record[name] for name in ("number", "target", "what", "code", "said", "ran")}
+        if tally.add(kind=str(fields.pop("target")), found=found, **fields):
             _keep(int(str(record["number"])), record, options)
         tick()
 
@@ -121,8 +121,8 @@ def repeat(which: str, options: argparse.Namespace) -> None:
     part, number = which.split(":")
     with tempfile.TemporaryDirectory(prefix="hostile-", dir=memory()) as work:
         if part == "mutations":
-            record: object = next(iter(pool.run_all([int(number)], options.seed, 1, Path(work))))
-            _keep(int(number), dict(record), options)  # type: ignore[call-overload]
+            record: Any = next(iter(pool.run_all([int(number)], options.seed, 1, Path(work))))
+            _keep(int(number), dict(record), options)
         else:
             kind, what, run = next(itertools.islice(trials(part, options), int(number), None))
             record = (kind, what, *run(Path(work) / "case"))

@@ -10,6 +10,7 @@ import csv
 from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -54,9 +55,9 @@ class Placed(Design):
     residuals: np.ndarray | None = None
 
 
-def _placed(design: Design, **more: object) -> Placed:
-    kept = {each.name: getattr(design, each.name) for each in fields(Design)}
-    return Placed(**kept, **({"origin": np.zeros(3)} | more))  # type: ignore[arg-type]
+def _placed(design: Design, **more: Any) -> Placed:
+    kept: dict[str, Any] = {each.name: getattr(design, each.name) for each in fields(Design)}
+    return Placed(**kept, **({"origin": np.zeros(3)} | more))
 
 
 def _timed(random: np.random.Generator, recorded: dict) -> dict:

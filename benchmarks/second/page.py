@@ -252,7 +252,8 @@ def _assertions(pairs: Pairs) -> tuple[list[str], list[float], list[float], list
         (t["name"], each["probability"], each["together"], *judging.there(name, t, judging.group_of(name, f)))
         for t, f in pairs for name, each in f["effects"].items()
     ]  # fmt: skip
-    return tuple(map(list, zip(*rows, strict=True))) if rows else ([], [], [], [], [])  # type: ignore[return-value]
+    where, alone, together, right, right_together = ([row[i] for row in rows] for i in range(5))
+    return where, alone, together, right, right_together
 
 
 def _said(pairs: Pairs) -> list[str]:

@@ -69,6 +69,6 @@ def _said(axes: Any, pairs: list) -> None:
     ]
     axes.plot([0, 1], [0, 1], color="0.7")
     if rows:
-        tenths = judging.tenths(*map(list, zip(*rows, strict=True)))  # type: ignore[arg-type]
+        tenths = judging.tenths([said for said, _ in rows], [right for _, right in rows])
         _bars(axes, [row[1] for row in tenths], [row[2] for row in tenths], [row[0] for row in tenths])
     axes.set(xlabel="said probability", ylabel="part that was right", ylim=(0, 1.03))

@@ -28,7 +28,8 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.instruments.ipp.machine import Machine
-from cmm_uq.instruments.source import SYSTEM, Clock, Source, open_source
+from cmm_uq.instruments.opening import open_source
+from cmm_uq.instruments.source import SYSTEM, Clock, Source
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.file_names import inside
 from cmm_uq.jobs.job import Job

@@ -12,8 +12,7 @@ from cmm_uq import __version__
 from cmm_uq.commands.fleet_file import FleetFile, read_fleet
 from cmm_uq.errors import CmmUqError
 from cmm_uq.recertification.due import Due, Known, artefact_due, in_order, machine_due
-from cmm_uq.recertification.interval import Pool
-from cmm_uq.recertification.observed import Ended, calibrations, ended_intervals, part_used
+from cmm_uq.recertification.observed import Ended, Pool, calibrations, ended_intervals, part_used
 from cmm_uq.recertification.rule import Rule
 from cmm_uq.records import Certificate, Machine, open_records
 from cmm_uq.records.facts import STANDING

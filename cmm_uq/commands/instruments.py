@@ -14,8 +14,9 @@ from pathlib import Path
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.instruments.draft import Drafted, drafted
 from cmm_uq.instruments.library import ENDING, profile_named, profile_of, ready
+from cmm_uq.instruments.opening import open_source
 from cmm_uq.instruments.ports import serial_ports
-from cmm_uq.instruments.source import Event, Source, open_source
+from cmm_uq.instruments.source import Event, Source
 from cmm_uq.instruments.trial import Trial
 from cmm_uq.jobs.acquire import DeclaredSource
 from cmm_uq.writing.new_file import write_new

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from cmm_uq.diagnosis.unseen import PLACES, POWER, Periods, Smallest
+from cmm_uq.diagnosis.showing import PLACES
+from cmm_uq.diagnosis.unseen import POWER, Periods, Smallest
 from cmm_uq.documents.document import Column, Paragraph, Section, Table
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, listed, number, say

@@ -13,7 +13,8 @@ from cmm_uq.instruments.conversation import SECOND, Conversation
 from cmm_uq.instruments.framing import Framed, Framer
 from cmm_uq.instruments.introduction import Introduction, another
 from cmm_uq.instruments.parsing import Parser, Understood
-from cmm_uq.instruments.ports import Opened, Port, PortLostError
+from cmm_uq.instruments.port import Port, PortLostError
+from cmm_uq.instruments.ports import Opened
 from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.instruments.reading import Reading
 from cmm_uq.instruments.replay import EndOfFileError, ReplayedFile

@@ -6,24 +6,34 @@ from functools import partial
 from pathlib import Path
 
 from cmm_uq.instruments.instrument import Instrument
+from cmm_uq.instruments.ipp.machine import open_machine
 from cmm_uq.instruments.library import profile_named
 from cmm_uq.instruments.ports import FILE, NETWORK, RFC2217, opener
 from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.instruments.replay import ReplayedFile
-from cmm_uq.instruments.source import Clock, Identity, Source
+from cmm_uq.instruments.source import SYSTEM, Clock, Identity, Source
 from cmm_uq.jobs.acquire import DeclaredSource
 
 
-def opened(declared: DeclaredSource, clock: Clock, folder: Path) -> Source:
-    """See :func:`cmm_uq.instruments.source.open_source`."""
+def open_source(declared: DeclaredSource, *, clock: Clock = SYSTEM, folder: Path = Path()) -> Source:
+    """The source that a job declares, with its port open.
+
+    Parameters
+    ----------
+    declared : one ``[[acquire.source]]``.
+    clock : by which readings are stamped.
+    folder : of the job: profiles and replayed files of its own lie in it.
+
+    Raises
+    ------
+    CmmUqError : there is no such profile, or the port is absent, busy or forbidden.
+    """
     profile = profile_named(declared.profile, folder)
     identity = Identity(
         declared.name, profile.maker or None, profile.model or None, declared.serial or None,
         certificate=declared.certificate or None,
     )  # fmt: skip
     if profile.protocol == "ipp":
-        from cmm_uq.instruments.ipp.machine import open_machine
-
         return open_machine(identity, profile, declared.port, clock)
     return instrument(identity, profile, declared.port, clock, folder)
 

@@ -10,10 +10,12 @@ import socket
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.instruments.port import TICK_S, Port, PortLostError
 from cmm_uq.instruments.profile import Connection
+from cmm_uq.instruments.visa_port import VisaPort
 
 if TYPE_CHECKING:
     import serial
@@ -29,41 +31,8 @@ CONNECT_WITHIN_S = 1.0
 KEPT_ALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3}
 """So that a connection whose other side was switched off is lost after 8 s, where nothing is sent that would show it."""
 
-TICK_S = 0.05
-"""Longest wait for bytes; whoever waits longer looks at the clock in between."""
-
 _CHUNK = 65536
 _ADDRESS = re.compile(r"(?P<scheme>\w+)://(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/]+):(?P<port>\d{1,5})/?")
-
-
-class PortLostError(Exception):
-    """The port is gone: unplugged, closed by the other side, or switched off."""
-
-
-class Port(Protocol):
-    """An open port."""
-
-    def read(self) -> bytes:
-        """What came, as soon as anything comes; empty where nothing did within :data:`TICK_S`.
-
-        Raises
-        ------
-        PortLostError : the port is gone.
-        """
-        ...
-
-    def write(self, data: bytes) -> None:
-        """Send.
-
-        Raises
-        ------
-        PortLostError : the port is gone.
-        """
-        ...
-
-    def close(self) -> None:
-        """Give it back."""
-        ...
 
 
 Opened = Callable[[], Port]
@@ -84,8 +53,6 @@ def opener(port: str, connection: Connection, *, tcp_port: int | None = None) ->
     CmmUqError : the name is none of a port.
     """
     if port.startswith("visa://"):
-        from cmm_uq.instruments.visa_port import VisaPort  # which knows this module
-
         return lambda: VisaPort(port)
     if "://" not in port:
         if not port.strip():

@@ -7,7 +7,8 @@ from urllib.parse import parse_qs
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import check_file
-from cmm_uq.instruments.ports import FILE, PortLostError, file_named
+from cmm_uq.instruments.port import PortLostError
+from cmm_uq.instruments.ports import FILE, file_named
 from cmm_uq.instruments.source import Clock
 
 _CHUNK = 4096

@@ -6,11 +6,9 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 from cmm_uq.instruments.reading import Reading
-from cmm_uq.jobs.acquire import DeclaredSource
 from cmm_uq.messages import Text
 
 
@@ -118,21 +116,3 @@ class SystemClock:
 
 
 SYSTEM: Clock = SystemClock()
-
-
-def open_source(declared: DeclaredSource, *, clock: Clock = SYSTEM, folder: Path = Path()) -> Source:
-    """The source that a job declares, with its port open.
-
-    Parameters
-    ----------
-    declared : one ``[[acquire.source]]``.
-    clock : by which readings are stamped.
-    folder : of the job: profiles and replayed files of its own lie in it.
-
-    Raises
-    ------
-    CmmUqError : there is no such profile, or the port is absent, busy or forbidden.
-    """
-    from cmm_uq.instruments.opening import opened  # which knows every kind of source, and those know this module
-
-    return opened(declared, clock, folder)

@@ -10,7 +10,7 @@ import time
 from typing import Any
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.instruments.ports import TICK_S, PortLostError
+from cmm_uq.instruments.port import TICK_S, PortLostError
 
 SCHEME = "visa://"
 """Begins the name of a port that VISA knows: ``visa://GPIB0::17::INSTR``."""

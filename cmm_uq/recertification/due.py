@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal
 
 from cmm_uq.messages import Text, Verbatim, day, foreign, number, say
 from cmm_uq.recertification.checks import Checked, check_standings
-from cmm_uq.recertification.interval import Interval, Pool, interval_by
-from cmm_uq.recertification.observed import BEYOND, calibrations
+from cmm_uq.recertification.interval import Interval, interval_by
+from cmm_uq.recertification.observed import BEYOND, Pool, calibrations
 from cmm_uq.recertification.rule import Rule
 from cmm_uq.records import ArtefactRow, Certificate, Machine
 

@@ -5,15 +5,15 @@ Where the history does not bear the method, the interval that the rule begins wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import Text, Verbatim, foreign, plural, say
-from cmm_uq.recertification.observed import Ended
-from cmm_uq.recertification.rule import Rule
+from cmm_uq.messages import Text, Verbatim, foreign, say
+from cmm_uq.recertification.observed import Pool
+from cmm_uq.recertification.rule import Rule, months_of
 from cmm_uq.records import Certificate
 
 if TYPE_CHECKING:
@@ -24,9 +24,6 @@ METHOD_WORDS: Mapping[str, Text] = {
     "control chart": say("control chart"), "drift": say("drift"),
 }  # fmt: skip
 """Methods as they are called."""
-
-Pool = Callable[[], Sequence[Ended]]
-"""Intervals of all machines of the model, this one's among them; asked for only by methods that pool."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +76,3 @@ def _fixed(rule: Rule) -> Interval:
     stated = say("fixed interval of {months}", months=months)
     usual = say("{months}, as its job does not say otherwise", months=months)
     return Interval(None, rule.every_months, stated if rule.stated else usual)
-
-
-def months_of(rule: Rule) -> Text:
-    """The interval that a rule begins with, in words."""
-    count = rule.every_months
-    return plural(count, one=say("one month"), many=say("{count} months", count=count))

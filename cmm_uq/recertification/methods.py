@@ -11,11 +11,10 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, Verbatim, foreign, number, say
 from cmm_uq.recertification.drift_interval import drift_interval
 from cmm_uq.recertification.drift_prior import Prior
-from cmm_uq.recertification.interval import Pool, months_of
 from cmm_uq.recertification.interval_test import interval_test
-from cmm_uq.recertification.observed import adjusted_between, calibrations, ended_intervals
+from cmm_uq.recertification.observed import Pool, adjusted_between, calibrations, ended_intervals
 from cmm_uq.recertification.reliability_regression import grouped, reliability_regression
-from cmm_uq.recertification.rule import Rule
+from cmm_uq.recertification.rule import Rule, months_of
 from cmm_uq.recertification.staircase import staircase
 from cmm_uq.recertification.variables import Start, fitted_drift, interval_of_reliability
 from cmm_uq.records import Certificate

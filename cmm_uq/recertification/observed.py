@@ -6,7 +6,7 @@ is compared with its limit as it is, without a guard band: a reliability is that
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -36,6 +36,10 @@ class Ended:
     def in_tolerance(self) -> bool:
         """Whether every value was within its limit."""
         return self.used <= 1
+
+
+Pool = Callable[[], Sequence[Ended]]
+"""Intervals of all machines of the model, this one's among them; asked for only by methods that pool."""
 
 
 def part_used(certificate: Certificate) -> float | None:

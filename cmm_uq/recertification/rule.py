@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+from cmm_uq.messages import Text, plural, say
 from cmm_uq.recertification.changing import Changing
 
 DAYS_A_MONTH = 365.2425 / 12
@@ -59,3 +60,9 @@ class Rule:
         """Within which bounds a method changes it."""
         longest = max(self.longest_months or LONGEST_MONTHS, self.every_months)
         return Changing(shortest_days=self.shortest_months * DAYS_A_MONTH, longest_days=longest * DAYS_A_MONTH)
+
+
+def months_of(rule: Rule) -> Text:
+    """The interval that a rule begins with, in words."""
+    count = rule.every_months
+    return plural(count, one=say("one month"), many=say("{count} months", count=count))

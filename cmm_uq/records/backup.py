@@ -15,14 +15,18 @@ from sqlalchemy import select
 
 from cmm_uq.errors import CmmUqError, OutputError
 from cmm_uq.records.entries import Entry
-from cmm_uq.records.opening import open_records, told
+from cmm_uq.records.opening import open_records
 from cmm_uq.records.place import is_url, shown
+from cmm_uq.records.refusals import told
 from cmm_uq.records.tables import entries
 from cmm_uq.records.verifying import chain
+from cmm_uq.writing.refusing import writing_to
 from cmm_uq.writing.staging import synced
 
 if TYPE_CHECKING:
     from cmm_uq.records.store import Records
+
+_MENDED = "Free the disk, mend the permissions, or name another file"
 
 KEPT = ".before-restore"
 """What restored records are put in place of is kept under its name with this behind it."""
@@ -83,10 +87,10 @@ def restore(file: Path, place: str | Path) -> tuple[int, str]:
     target = Path(place)
     if target.is_dir():
         raise CmmUqError("is a folder, and records are a file", where=str(target), fix="Name a file in it: records.db")
-    with _told(target):
+    with writing_to(target, _MENDED):
         target.parent.mkdir(parents=True, exist_ok=True)
     with _temporary(target) as path:
-        with _told(target):
+        with writing_to(target, _MENDED):
             shutil.copyfile(file, path)
         _set_aside(target)
         _in_place(path, target)
@@ -103,7 +107,7 @@ def _set_aside(target: Path) -> None:
     while os.path.lexists(kept):
         number += 1
         kept = target.with_name(f"{target.name}{KEPT}-{number}")
-    with _told(target):
+    with writing_to(target, _MENDED):
         with contextlib.suppress(sqlite3.Error), _raw(target) as raw:
             raw.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         for end in ("", "-wal", "-shm"):
@@ -159,12 +163,12 @@ def _raw(path: Path) -> Iterator[sqlite3.Connection]:
 @contextlib.contextmanager
 def _temporary(out: Path) -> Iterator[Path]:
     """An empty file beside another, gone afterwards."""
-    with _told(out):
+    with writing_to(out, _MENDED):
         descriptor, name = tempfile.mkstemp(dir=out.absolute().parent, prefix=".unfinished-")
         os.close(descriptor)
     path = Path(name)
     try:
-        with _told(out):
+        with writing_to(out, _MENDED):
             yield path
     finally:
         for end in ("", "-wal", "-shm", "-journal"):
@@ -177,12 +181,3 @@ def _in_place(path: Path, out: Path) -> None:
         os.fsync(file.fileno())
     path.rename(out)
     synced(out.absolute().parent)
-
-
-@contextlib.contextmanager
-def _told(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"cannot be written: {error.strerror}", where=str(path),
-                          fix="Free the disk, mend the permissions, or name another file") from error  # fmt: skip

@@ -14,9 +14,9 @@ from sqlalchemy import ColumnElement, Connection, func, or_, select
 
 from cmm_uq.records.entries import Entry
 from cmm_uq.records.facts import STANDING, Machine
-from cmm_uq.records.opening import told
 from cmm_uq.records.queries import adjusted_before
 from cmm_uq.records.recognised import BY_NAME, spelled
+from cmm_uq.records.refusals import told
 from cmm_uq.records.store import Records
 from cmm_uq.records.tables import artefacts, certificates, entries, figures, machines, quantities
 

@@ -19,9 +19,9 @@ from sqlalchemy import Connection, delete, insert, select
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.records.entries import canonical, moment_of
-from cmm_uq.records.opening import told
 from cmm_uq.records.place import shown
 from cmm_uq.records.queries import entry_of_results
+from cmm_uq.records.refusals import told
 from cmm_uq.records.store import Records, Writing
 from cmm_uq.records.tables import pending
 from cmm_uq.writing import MANIFEST, InDoubtError, finish_interrupted, is_pending, sha256_of

@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+APPLICATION = 0x434D4D55
+"""``application_id`` of the SQLite file: CMMU."""
+
 ENVIRONMENT = "CMM_UQ_RECORDS"
 """Variable that names the records where no option does."""
 

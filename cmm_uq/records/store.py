@@ -15,8 +15,8 @@ from cmm_uq.records import queries
 from cmm_uq.records.entries import BEGINNING, Entry, following, now
 from cmm_uq.records.facts import ArtefactRow, Certificate, Finding, Machine, Series, Signature
 from cmm_uq.records.indexing import Indexer
-from cmm_uq.records.opening import APPLICATION, told
-from cmm_uq.records.place import shown
+from cmm_uq.records.place import APPLICATION, shown
+from cmm_uq.records.refusals import told
 from cmm_uq.records.tables import entries
 
 if TYPE_CHECKING:

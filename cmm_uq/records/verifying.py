@@ -14,7 +14,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.records.entries import BEGINNING, Entry
 from cmm_uq.records.facts import Finding
 from cmm_uq.records.indexing import Indexer
-from cmm_uq.records.opening import told
+from cmm_uq.records.refusals import told
 from cmm_uq.records.tables import INDEX, META, certificates, entries
 from cmm_uq.writing import read_manifest, sha256_of
 

@@ -13,17 +13,20 @@ import json
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.errors import CmmUqError, OutputError
+from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import say
 from cmm_uq.scheduling.locks import turn
 from cmm_uq.scheduling.message import Channel, Message, UndeliveredError
 from cmm_uq.scheduling.notices import Notice
 from cmm_uq.scheduling.state import PRIVATE, State
+from cmm_uq.writing.refusing import writing_to
 from cmm_uq.writing.staging import synced
+
+_MENDED = "Free the disk, or mend the permissions"
 
 MOST = 20
 """Messages that one run sends one by one through a channel; what is beyond goes in one."""
@@ -147,7 +150,7 @@ class Outbox:
                     problem, remark = _attempt(known[name], message)
                 done.append(Delivery(message, name, problem, "" if problem else remark))
                 for path in () if problem else paths:
-                    with _told(path):
+                    with writing_to(path, _MENDED):
                         path.rename(path.with_suffix(_SENT))
         return done
 
@@ -186,7 +189,7 @@ class Outbox:
         place = self.folder / f"{message.key}{_WAITING}"
         if self.state.sent(message.key) or place.exists() or place.with_suffix(_SENT).exists():
             return False
-        with _told(place):
+        with writing_to(place, _MENDED):
             self.folder.mkdir(parents=True, exist_ok=True)
             content = json.dumps({"channel": channel, "message": message.as_data()}, ensure_ascii=False)
             with tempfile.NamedTemporaryFile("wb", dir=self.folder, prefix=_UNFINISHED, delete=False) as file:
@@ -235,12 +238,3 @@ def _attempt(channel: Channel, message: Message) -> tuple[str, str]:
 def _drop(path: Path) -> None:
     with contextlib.suppress(OSError):
         path.unlink()
-
-
-@contextlib.contextmanager
-def _told(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"cannot be written: {error.strerror}", where=str(path),
-                          fix="Free the disk, or mend the permissions") from error  # fmt: skip

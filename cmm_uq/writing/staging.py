@@ -25,10 +25,12 @@ from cmm_uq.writing import interruption
 from cmm_uq.writing.locking import locked
 from cmm_uq.writing.manifest import MANIFEST, Manifest, Owner, plain_name
 from cmm_uq.writing.placing import JOURNAL, NEW, Journal, place, rolled_back
+from cmm_uq.writing.refusing import writing_to
 from cmm_uq.writing.replacing import journal_for
 
 STAGE, LOCK, PLACING = ".unfinished-", ".lock", ".placing"
 _STAGED = re.compile(rf"{re.escape(STAGE)}([0-9a-f]{{12}})(?:{re.escape(LOCK)})?")
+_MENDED = "Free the disk, mend the permissions, or choose another --out"
 PATIENCE_S = 5.0
 """How long to wait for another process that is putting its files into the same folder: renames take milliseconds."""
 
@@ -109,7 +111,7 @@ class Staged:
         CmmUqError : something that is not this owner's stands in the way.
         OutputError : the disk is full, or the place cannot be written to, or the ledger; what stood there before is untouched.
         """
-        with _told(self.folder):
+        with writing_to(self.folder, _MENDED):
             hashes = {name: sha256(content).hexdigest() for name, content in contents.items()}
             sizes = {name: len(content) for name, content in contents.items()}
             for name in large:
@@ -208,12 +210,12 @@ def staged(
     OutputError : the place cannot be written to.
     """
     given = tuple(inputs)
-    with _told(folder):
+    with writing_to(folder, _MENDED):
         made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     place = Staged(folder, owner, given, force, "", made)
     with interruption.staged(place):
         try:
-            with _told(folder):
+            with writing_to(folder, _MENDED):
                 if folder.exists() and not folder.is_dir():
                     raise CmmUqError(
                         "is a file, not a folder", where=str(folder), fix="Choose another folder with --out"
@@ -244,7 +246,7 @@ def finish_interrupted(folder: Path) -> None:
         with _of_the_dead(folder, token) as dead:
             journal = Journal.read(placing) if dead else None
             if journal is not None:
-                with _told(folder):
+                with writing_to(folder, _MENDED):
                     _finish(folder, placing, journal)
             elif dead and _token(placing) == token:  # nobody was faster
                 _drop(folder, token)
@@ -364,13 +366,3 @@ def _synced_file(path: Path) -> tuple[str, int]:
     with path.open("rb+") as file:
         os.fsync(file.fileno())
         return file_digest(file, "sha256").hexdigest(), path.stat().st_size
-
-
-@contextlib.contextmanager
-def _told(folder: Path) -> Iterator[None]:
-    try:
-        yield
-    except (OSError, ValueError) as error:
-        what = error.strerror or error if isinstance(error, OSError) else error
-        raise OutputError(f"cannot be written: {what}", where=str(folder),
-                          fix="Free the disk, mend the permissions, or choose another --out") from error  # fmt: skip

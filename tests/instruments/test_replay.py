@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.instruments.opening import open_source
 from cmm_uq.instruments.reading import Reading
-from cmm_uq.instruments.source import Gap, open_source
+from cmm_uq.instruments.source import Gap
 from cmm_uq.jobs.acquire import DeclaredSource
 
 

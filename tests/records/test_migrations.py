@@ -10,7 +10,8 @@ import pytest
 from cmm_uq.errors import CmmUqError
 from cmm_uq.records import open_records
 from cmm_uq.records.migrations import migrate, upgrade
-from cmm_uq.records.opening import APPLICATION, KNOWN, REVISION, engine_of
+from cmm_uq.records.opening import KNOWN, REVISION, engine_of
+from cmm_uq.records.place import APPLICATION
 from tests.records.histories import history
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from cmm_uq.errors import CmmUqError
 from cmm_uq.instruments.ipp.line import BadLineError, Term, arguments_of, number_text, terms_of
 from cmm_uq.instruments.ipp.transaction import ANSWER_WITHIN_S, FaultError, Heard, NoAnswerError, Transactions
-from cmm_uq.instruments.ports import Port
+from cmm_uq.instruments.port import Port
 from cmm_uq.instruments.source import Clock
 
 MOVED_WITHIN_S = 300.0

@@ -13,7 +13,8 @@ from cmm_uq.instruments.conversation import SECOND
 from cmm_uq.instruments.ipp.client import Client
 from cmm_uq.instruments.ipp.line import DATA, ERROR, BadLineError, Term, arguments_of, by_name, fault_of
 from cmm_uq.instruments.ipp.transaction import ANSWER_WITHIN_S, FaultError, Heard, NoAnswerError
-from cmm_uq.instruments.ports import NETWORK, Opened, PortLostError, opener
+from cmm_uq.instruments.port import PortLostError
+from cmm_uq.instruments.ports import NETWORK, Opened, opener
 from cmm_uq.instruments.profile import Connection, Positions, ProfileFile
 from cmm_uq.instruments.reading import Reading
 from cmm_uq.instruments.source import Clock, Event, Gap, Identity, Returned

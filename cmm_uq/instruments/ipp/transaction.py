@@ -18,7 +18,7 @@ from cmm_uq.instruments.ipp.line import (
     fault_of,
     response_of,
 )
-from cmm_uq.instruments.ports import Port
+from cmm_uq.instruments.port import Port
 from cmm_uq.instruments.profile import Frame
 from cmm_uq.instruments.source import Clock
 

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmm_uq.records.opening import KNOWN, REVISION, check_revision, engine_of, state_of, told
+from cmm_uq.records.opening import KNOWN, REVISION, check_revision, engine_of, state_of
+from cmm_uq.records.refusals import told
 
 if TYPE_CHECKING:
     from alembic.config import Config

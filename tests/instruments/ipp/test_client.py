@@ -12,7 +12,8 @@ from cmm_uq.instruments.ipp.client import Client
 from cmm_uq.instruments.ipp.line import terms_of
 from cmm_uq.instruments.ipp.server import SimulatedMachine
 from cmm_uq.instruments.ipp.transaction import FaultError, NoAnswerError
-from cmm_uq.instruments.ports import PortLostError, TcpPort
+from cmm_uq.instruments.port import PortLostError
+from cmm_uq.instruments.ports import TcpPort
 from cmm_uq.instruments.source import SYSTEM
 
 

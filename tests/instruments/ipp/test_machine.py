@@ -14,8 +14,9 @@ from cmm_uq.instruments.ipp.line import BadLineError, response_of
 from cmm_uq.instruments.ipp.machine import Machine
 from cmm_uq.instruments.ipp.server import SimulatedMachine
 from cmm_uq.instruments.ipp.transaction import Heard
+from cmm_uq.instruments.opening import open_source
 from cmm_uq.instruments.reading import Reading
-from cmm_uq.instruments.source import Gap, Returned, open_source
+from cmm_uq.instruments.source import Gap, Returned
 from cmm_uq.jobs.acquire import DeclaredSource
 from tests.instruments.listening import listening
 
