@@ -27,11 +27,12 @@ def noise_found(noise: Noise) -> Text:
     hidden: list[Text] = []
     if "placing" not in noise.components:
         hidden.append(say("set-up offsets (no repeats)"))
-    if "slow" not in noise.components:
-        hidden.append(say("slow noise (no time_s)"))
-    return (
-        say("{found}; not to be seen in this recording: {what}", found=found, what=listed(hidden)) if hidden else found
+    hidden.append(
+        say("a drift that ended with the first readings")
+        if "slow" in noise.components
+        else say("slow noise (no time_s)")
     )
+    return say("{found}; not to be seen in this recording: {what}", found=found, what=listed(hidden))
 
 
 def _found(noise: Noise) -> list[Text]:

@@ -34,5 +34,13 @@ def test_what_is_probably_there_is_named_with_its_size_and_what_it_does_to_the_u
     assert "up to 1.84 times" in said
 
 
+def test_with_times_too_it_says_which_drift_it_cannot_have_seen() -> None:
+    """Under a walk that has gone most of its way at the beginning intervals hold too seldom: docs/coverage-study.md."""
+    said = noise_found(noise({"placing": size(0.1, 0.1), "slow": size(0.1, 0.1)}))
+    assert said == (
+        "independent readings, nothing else; not to be seen in this recording: a drift that ended with the first readings"
+    )
+
+
 def test_the_steps_of_a_display_are_named() -> None:
     assert "and the steps of the display, 5 µm" in noise_found(replace(noise({}), display_um=5.0))
