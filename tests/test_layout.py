@@ -15,7 +15,7 @@ PACKAGE = ROOT / "cmm_uq"
 ROWS = [line.split("|")[1] for line in (ROOT / "docs" / "layout.md").read_text(encoding="utf-8").splitlines()
         if line.startswith("| `")]  # fmt: skip
 ORDER = {name.removesuffix(".py"): place for place, row in enumerate(ROWS) for name in re.findall(r"`([^`]+)`", row)}
-KNOW_KINDS = ("kinds", "commands", "geometry")
+KNOW_KINDS = ("kinds", "commands", "geometry", "parts")
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path.name not in ("__main__.py", "__init__.py"))
 
 
