@@ -6,14 +6,15 @@ is from the association itself is looked at in every run (:mod:`cmm_uq.parts.vir
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.geometry.association import Association, associate
 from cmm_uq.geometry.repeated import Drawn, Repeated
-from cmm_uq.parts.plan import DIRECTED, Association, Feature
+from cmm_uq.parts.plan import DIRECTED, Feature
 from cmm_uq.points import Floats
 
 _STEP = 1e-3
@@ -54,7 +55,7 @@ class Features:
         return self.values[:, 6]
 
 
-class Associated:
+class ProbedFeature:
     """A feature to be associated many times.
 
     Parameters
@@ -108,10 +109,33 @@ class Associated:
     def _associated(self, displacements: Floats) -> Drawn:
         if self.association == "least_squares":
             return self._repeated.least_squares(displacements)
-        if self.association == "minimum_zone":
-            return self._repeated.minimum_zone(displacements)
-        raise CmmUqError(f"the association {self.association} is not there for virtual measurements",
-                         where=f"feature {self.feature.name!r}", fix="Use least_squares or minimum_zone")  # fmt: skip
+        if self.association in ("minimum_zone", "tangent"):
+            drawn = self._repeated.minimum_zone(displacements)
+            return self._outside(drawn) if self.association == "tangent" else drawn
+        return self._one_by_one(displacements)
+
+    def _outside(self, drawn: Drawn) -> Drawn:
+        """The side of a minimum zone that looks out of the material."""
+        if self.feature.kind == "line":
+            across = self._plane @ self.feature.normals.mean(axis=0)
+        elif self.feature.kind == "plane":
+            across = self.feature.normals.mean(axis=0)
+        else:
+            raise CmmUqError(f"a {self.feature.kind} has no tangent feature", where=f"feature {self.feature.name!r}",
+                             fix="Use maximum_inscribed or minimum_circumscribed")  # fmt: skip
+        return replace(drawn, position=drawn.position + 0.5 * drawn.form[:, None] * across / np.linalg.norm(across))
+
+    def _one_by_one(self, displacements: Floats) -> Drawn:
+        points = self._in_own_plane(self.points) + displacements
+        found = [associate(self.feature.kind, each, self.association) for each in points]  # type: ignore[arg-type]
+        directed = found[0].direction is not None
+        return Drawn(
+            np.array([one.position for one in found]),
+            np.array([one.direction for one in found]) if directed else None,
+            np.array([one.size for one in found]),
+            None,
+            np.array([one.form for one in found]),
+        )
 
     def _values(self, drawn: Drawn) -> Floats:
         values = np.zeros((len(drawn.position), VALUES))

@@ -64,12 +64,14 @@ class Common(Cause):
 
     def through(self, derivative: Floats) -> Floats:
         """See :meth:`Cause.through`."""
-        return np.asarray(self.basis.reshape(len(self.basis), -1) @ derivative.reshape(len(derivative), -1).T)
+        K, n, _ = self.basis.shape
+        return np.asarray(self.basis.reshape(K, 3 * n) @ derivative.reshape(len(derivative), 3 * n).T)
 
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
         """See :meth:`Cause.moved`."""
         part = self.basis[:, rows]
-        return np.asarray((coefficients @ part.reshape(len(part), -1)).reshape(len(coefficients), -1, 3))
+        K, m, _ = part.shape
+        return np.asarray((coefficients @ part.reshape(K, 3 * m)).reshape(len(coefficients), m, 3))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

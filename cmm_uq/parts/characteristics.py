@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.geometry.association import Association
 from cmm_uq.geometry.repeated import Repeated
 from cmm_uq.parts.associating import Features
 from cmm_uq.parts.datums import Frame
@@ -25,7 +26,6 @@ from cmm_uq.parts.plan import (
     ORIENTATIONS,
     RUNOUTS,
     SIZED,
-    Association,
     Characteristic,
     Feature,
     FeatureKind,
@@ -162,10 +162,10 @@ def _form(of: Evaluation, measured: Measured) -> Floats:
 
 
 def _distance(of: Evaluation, measured: Measured) -> Floats:
-    """Along the normal of a plane, across an axis, else between two places; of two that have one, the first's."""
+    """Along the normal of a plane, else across an axis, else between two places; of two alike, the first's."""
     one, other = (measured.features[key] for key in of.keys)
     kinds = [of.plan.feature(name).kind for name, _ in of.keys]
-    if kinds[0] not in ("plane", *_ROUND):
+    if kinds[0] != "plane" and (kinds[1] == "plane" or kinds[0] not in _ROUND):
         one, other, kinds = other, one, kinds[::-1]
     apart = other.position - one.position
     if kinds[0] == "plane":

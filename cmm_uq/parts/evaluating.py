@@ -12,11 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.parts.associating import VALUES, Associated, Features
+from cmm_uq.geometry.association import Association
+from cmm_uq.parts.associating import VALUES, Features, ProbedFeature
 from cmm_uq.parts.causes import Cause
 from cmm_uq.parts.characteristics import Evaluation, Key, Measured
 from cmm_uq.parts.datums import DatumSystem
-from cmm_uq.parts.plan import Association, Plan
+from cmm_uq.parts.plan import Plan
 from cmm_uq.points import Floats
 
 EXACT: Association = "least_squares"
@@ -58,11 +59,11 @@ class Evaluator:
 
     def _nominal(self, name: str) -> Features:
         feature = self.plan.feature(name)
-        return Features(Associated(feature, feature.points, EXACT).base[None])
+        return Features(ProbedFeature(feature, feature.points, EXACT).base[None])
 
-    def _associated(self, name: str, how: Association) -> Associated:
+    def _associated(self, name: str, how: Association) -> ProbedFeature:
         feature, rows = self.plan.feature(name), self.plan.rows[name]
-        return Associated(feature, feature.points + self.base[rows], how)
+        return ProbedFeature(feature, feature.points + self.base[rows], how)
 
     def to_first_order(self, key: Key) -> bool:
         """Whether a feature is taken to first order."""
@@ -84,19 +85,17 @@ class Evaluator:
         return np.concatenate([np.zeros((0, len(whole))), *parts])
 
     def __call__(self, coefficients: Sequence[Floats], *, exact: bool = False) -> Floats:
-        """Characteristics (N, c), mm and rad, for coefficients (N, K) of each cause.
+        """Characteristics (N, c), mm and rad, for coefficients (N, K) of each cause; one row where there is none.
 
         Parameters
         ----------
         exact : all features on their points, none to first order.
         """
-        linear = [] if exact else self.linear
+        linear, count = [] if exact else self.linear, _count(coefficients)
         features: dict[Key, Features] = {}
         if linear:
             acting = [c for c, cause in zip(coefficients, self.causes, strict=True) if cause is not None]
-            change = (
-                np.hstack(acting) @ self.transfer if acting else np.zeros((len(coefficients[0]), VALUES * len(linear)))
-            )
+            change = np.hstack([np.zeros((count, 0)), *acting]) @ self.transfer
             for i, key in enumerate(linear):
                 features[key] = self.associated[key].to_first_order(change[:, VALUES * i : VALUES * (i + 1)])
         for key in self.keys:
@@ -112,7 +111,7 @@ class Evaluator:
 
     def moved(self, coefficients: Sequence[Floats], rows: slice) -> Floats:
         """(N, m, 3) displacements of some points by all causes, beyond ``base``, mm."""
-        found = np.zeros((len(coefficients[0]), rows.stop - rows.start, 3))
+        found = np.zeros((_count(coefficients), rows.stop - rows.start, 3))
         for cause, drawn in zip(self.causes, coefficients, strict=True):
             if cause is not None:
                 found += cause.moved(drawn, rows)
@@ -122,5 +121,10 @@ class Evaluator:
     def at_nominal(self) -> Floats:
         """(c,) characteristics of the nominal points."""
         bare = self if not self.base.any() else Evaluator(self.plan, np.zeros_like(self.base), self.causes)
-        none = [np.zeros((1, len(cause.factors) if cause else 0)) for cause in self.causes] or [np.zeros((1, 0))]
+        none = [np.zeros((1, len(cause.factors) if cause else 0)) for cause in self.causes]
         return np.asarray(bare(none, exact=True)[0])
+
+
+def _count(coefficients: Sequence[Floats]) -> int:
+    """Of draws; one where nothing is drawn."""
+    return len(coefficients[0]) if coefficients else 1

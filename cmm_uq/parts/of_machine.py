@@ -7,6 +7,7 @@ import numpy as np
 from cmm_uq.parts.causes import Cause, Common, Scatter, field_along
 from cmm_uq.parts.machine import MachineState, Unmodelled
 from cmm_uq.parts.placing import Pose
+from cmm_uq.parts.qualifying import Qualified
 from cmm_uq.physics.superposition import About, Superposition
 from cmm_uq.points import Floats, Points
 
@@ -18,30 +19,31 @@ _SETTLED = 1e-9
 _ROUNDS = 12
 
 
-def mean_errors(state: MachineState, points: Points, pose: Pose) -> Floats:
+def mean_errors(state: MachineState, qualified: Qualified, pose: Pose) -> Floats:
     """(n, 3) by how much the machine displaces points without any draw, in the frame of the part, mm.
 
     Zero where it corrects what was found. Solves indicated + e(indicated) = true.
     """
-    indicated = points.xyz.copy()
     if state.corrected:
-        return np.zeros_like(indicated)
+        return np.zeros_like(qualified.part.xyz)
+    points = qualified.both
+    indicated = points.xyz.copy()
     acting = Superposition(state.effects, state.shapes)
     for _ in range(_ROUNDS):
         change = points.xyz - acting.errors(points.at(indicated), state.mean) - indicated
         indicated += change
         if np.abs(change).max(initial=0.0) < _SETTLED:
             break
-    return pose.back(indicated - points.xyz)
+    return pose.back(qualified.left((indicated - points.xyz)[:, :, None])[:, :, 0])
 
 
-def modelled(state: MachineState, points: Points, pose: Pose) -> Common:
+def modelled(state: MachineState, qualified: Qualified, pose: Pose) -> Common:
     """What the calibration modelled: differences of whole draws of its posterior from their mean, and drift since then.
 
     The columns are those of small changes about the mean (:meth:`Superposition.about`), axes leaning as they do.
     """
     acting = Superposition(state.effects, state.shapes)
-    columns = acting.derivatives(acting.about(points, state.mean))
+    columns = acting.derivatives(acting.about(qualified.both, state.mean))
     factors = tuple(effect.name for effect in state.effects for _ in effect.coefficients)
     deviations = state.draws - state.mean
 
@@ -50,29 +52,27 @@ def modelled(state: MachineState, points: Points, pose: Pose) -> Common:
         return drawn + random.standard_normal(drawn.shape) * state.drift if state.drift.any() else drawn
 
     why = dict.fromkeys(state.free, "the calibration left it to what physics allows")
-    return Common(name=MACHINE, factors=factors, draw=draw, named=why, basis=-_in_part(columns, pose))
+    return Common(name=MACHINE, factors=factors, draw=draw, named=why, basis=-_in_part(qualified.left(columns), pose))
 
 
-def not_modelled(state: MachineState, points: Points, pose: Pose) -> tuple[list[Cause], dict[str, str]]:
+def not_modelled(state: MachineState, qualified: Qualified, pose: Pose) -> tuple[list[Cause], dict[str, str]]:
     """What the calibration did not model, an independent cause each; and what cannot be drawn, with the column it lacks.
 
     Of an effect with a period, draws have one of its trial periods each, as its prior has them: evenly in their logarithm.
     """
     causes, lacking = list[Cause](), dict[str, str]()
     for one in state.unmodelled:
-        missing = [name for name in one.effect.columns if name not in points.columns]
+        missing = [name for name in one.effect.columns if name not in qualified.part.columns]
         if missing:
             lacking[one.effect.name] = missing[0]
             continue
-        cause = _unmodelled(one, points, pose)
-        if np.any(cause.basis):
-            causes.append(cause)
+        causes.append(_unmodelled(one, qualified, pose))
     return causes, lacking
 
 
-def _unmodelled(one: Unmodelled, points: Points, pose: Pose) -> Common:
+def _unmodelled(one: Unmodelled, qualified: Qualified, pose: Pose) -> Common:
     trials = list(one.effect.trials())
-    columns = np.concatenate([About(points).columns(one.effect, shape) for shape in trials], axis=2)
+    columns = np.concatenate([About(qualified.both).columns(one.effect, shape) for shape in trials], axis=2)
     k, count = len(one.sd), len(trials)
 
     def draw(random: np.random.Generator, n: int) -> Floats:
@@ -83,7 +83,8 @@ def _unmodelled(one: Unmodelled, points: Points, pose: Pose) -> Common:
     most = "its recording would not have shown" if one.bounded else "physics allows"
     name = one.effect.name
     why = {name: f"the calibration did not model it; as large as {most}"}
-    return Common(name=MACHINE, factors=(name,) * (k * count), draw=draw, named=why, basis=-_in_part(columns, pose))
+    return Common(name=MACHINE, factors=(name,) * (k * count), draw=draw, named=why,
+                  basis=-_in_part(qualified.left(columns), pose))  # fmt: skip
 
 
 def noise(state: MachineState, points: Points, pose: Pose, repeats: int = 1) -> list[Cause]:

@@ -99,22 +99,28 @@ def placed(plan: Plan, pose: Pose, machine: Machine, columns: Mapping[str, Float
     ------
     CmmUqError : an axis would have to go beyond its travel.
     """
-    normals = pose.turned(plan.normals)
     radii = 0.5 * np.array([stylus.diameter_mm for stylus in plan.styli])[plan.stylus_of]
-    n = len(normals)
-    known = {f"n{axis}": normals[:, i] for i, axis in enumerate(AXES)}
-    known |= {f"tip_{axis}_mm": plan.tips[:, i] for i, axis in enumerate(AXES)}
-    travel = -np.sign(np.where(np.abs(normals) > _SIDEWAYS, normals, 0.0))
-    known |= {f"approach_{axis}": travel[:, i] for i, axis in enumerate(AXES)}
-    if len(plan.times_s):
-        known["time_s"] = plan.times_s
-    known |= {name: np.broadcast_to(np.asarray(values, dtype=np.float64), (n,)).copy()
-              for name, values in (columns or {}).items()}  # fmt: skip
-    rows, ones = np.arange(1, n + 1), np.ones(n, dtype=np.int64)
-    xyz = pose.of(plan.points) + radii[:, None] * normals
-    points = Points(xyz, ones, rows, ones, WithStyli.of(machine), known, start_s=0.0)
+    n = len(radii)
+    further = {"time_s": plan.times_s} if len(plan.times_s) else {}
+    for name, values in (columns or {}).items():
+        further[name] = np.broadcast_to(np.asarray(values, dtype=np.float64), (n,)).copy()
+    points = probed(pose.of(plan.points), pose.turned(plan.normals), plan.tips, radii, machine, further)
     _refuse_out_of_travel(plan, points)
     return points
+
+
+def probed(
+    contacts: Floats, normals: Floats, tips: Floats, radii: Floats, machine: Machine, further: Mapping[str, Floats]
+) -> Points:
+    """The machine at points of contact (n, 3), with normals (n, 3), tips of offsets (n, 3) and radii (n,), mm."""
+    n = len(contacts)
+    known = {f"n{axis}": normals[:, i] for i, axis in enumerate(AXES)}
+    known |= {f"tip_{axis}_mm": tips[:, i] for i, axis in enumerate(AXES)}
+    travel = -np.sign(np.where(np.abs(normals) > _SIDEWAYS, normals, 0.0))
+    known |= {f"approach_{axis}": travel[:, i] for i, axis in enumerate(AXES)}
+    rows, ones = np.arange(1, n + 1), np.ones(n, dtype=np.int64)
+    centres = contacts + radii[:, None] * normals
+    return Points(centres, ones, rows, ones, WithStyli.of(machine), {**known, **further}, start_s=0.0)
 
 
 def _refuse_out_of_travel(plan: Plan, points: Points) -> None:

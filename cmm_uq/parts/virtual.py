@@ -21,6 +21,7 @@ from cmm_uq.parts.of_stylus import styli
 from cmm_uq.parts.of_temperature import Surroundings, mean_expansion, temperatures
 from cmm_uq.parts.placing import Pose, placed
 from cmm_uq.parts.plan import Plan
+from cmm_uq.parts.qualifying import Qualified
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 
@@ -69,10 +70,11 @@ class AtPose:
 
     def __init__(self, plan: Plan, given: Circumstances, pose: Pose) -> None:
         points = placed(plan, pose, given.machine.machine, given.surroundings.columns)
-        unmodelled, self.lacking = not_modelled(given.machine, points, pose)
+        qualified = Qualified.on(plan, points, given.machine.machine)
+        unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
         own, on_surface = forms(given.forms, plan)
         self.causes: list[Cause] = [
-            modelled(given.machine, points, pose),
+            modelled(given.machine, qualified, pose),
             *unmodelled,
             *noise(given.machine, points, pose, given.repeats),
             *styli(plan, pose),
@@ -80,7 +82,7 @@ class AtPose:
             *given.further,
             *own,
         ]
-        base = mean_errors(given.machine, points, pose) + mean_expansion(given.surroundings, plan, points, pose)
+        base = mean_errors(given.machine, qualified, pose) + mean_expansion(given.surroundings, plan, points, pose)
         self.measured = Evaluator(plan, base, self.causes)
         self.true: Evaluator | None = None
         if any(len(feature.surface) for feature in plan.features):
