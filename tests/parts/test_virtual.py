@@ -155,10 +155,15 @@ def test_where_the_part_lies_is_no_error_of_it(numbers: list[float]) -> None:
     np.testing.assert_allclose(off, 0, atol=1e-7)
 
 
-def test_first_order_is_the_exact_measurement_to_a_hundredth_of_u() -> None:
+@pytest.mark.parametrize("best_fit", [False, True])
+def test_first_order_is_the_exact_measurement_to_a_hundredth_of_u(best_fit: bool) -> None:
     names = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx", "rotation_x_z"]
     draws = np.random.default_rng(3).standard_normal((2000, 7)) * 5
-    plan = Plan(*block(), styli=(Stylus("stylus", np.array([0, 0, -100.0]), 4.0, 0.5, np.zeros(3), 0.8),))
+    features, characteristics = block()
+    if best_fit:
+        characteristics = tuple(replace(c, datums=()) if len(c.datums) == 3 else c for c in characteristics)
+    styli = (Stylus("stylus", np.array([0, 0, -100.0]), 4.0, 0.5, np.zeros(3), 0.8),)
+    plan = Plan(features, characteristics, styli, Alignment(best_fit=best_fit))
     virtual = Virtual(plan, Circumstances(machine(names, draws, 1.0), (POSE,)))
     assert virtual.off.max() < 0.003
     assert not virtual.exact
