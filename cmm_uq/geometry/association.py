@@ -82,7 +82,7 @@ def associate(
         of its least-squares plane.
     association : the criterion. ``"tangent"`` is of planes and of lines in a plane: outside the material, its largest distance
         from it the least, as ISO 5459 asks of datums. Its direction is that of the minimum zone.
-    outward : (d,) direction out of the material, roughly; needed for ``"tangent"``.
+    outward : (d,) direction out of the material, roughly: needed for ``"tangent"``; gives the normal of any plane its sense.
 
     Raises
     ------

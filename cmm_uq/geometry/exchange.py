@@ -54,8 +54,8 @@ def least_zones(shape: Shape, start: Floats, local: Floats, units: Floats) -> tu
     for _ in range(MOST_STEPS):
         d, J = shape.distances(state[pending], local[:, pending])
         A = np.ascontiguousarray((J / units[:, None, None]).transpose(1, 2, 0))
-        basis = _first(A) if basis is None else basis
         try:
+            basis = _first(A) if basis is None else basis
             step, half = _exchange(A, d, basis, floor)
         except np.linalg.LinAlgError:  # contact points of one draw that determine nothing
             break

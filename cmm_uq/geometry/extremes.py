@@ -29,6 +29,9 @@ PERFECT = 1e4 * ROUNDING
 SAME = 1e-9
 """mm: two ways to the same optimum agree within this."""
 
+LEANING = 1e-6
+"""Cosine between the least-squares normal and that of the narrowest zone below which they are across each other."""
+
 _BALLS = (CIRCLE, SPHERE)
 _NONE = np.zeros(0, dtype=np.int64)
 
@@ -133,7 +136,7 @@ def _least_slab(of: Placed, local: Floats) -> Extreme:
     """Straightness in a plane, flatness: the narrowest of all, by the convex hull, and its contact points."""
     points = local.reshape(len(local), -1).T
     normal, width = narrowest(points)
-    if abs(normal[-1]) < SAME:
+    if abs(normal[-1]) < LEANING:
         raise CmmUqError(
             f"{of.shape.name}: the points are as wide as they are long",
             fix=f"Measure points that spread along the {of.shape.name}",
@@ -159,7 +162,8 @@ def _least_ring(problem: _Problem, k: int) -> Extreme:
         centre, width = state[:-1], 2 * found.value * problem.scale
         A = problem.rows(found.state)[1][found.contacts]
         nearest = float(np.linalg.norm(points - centre, axis=1).min())
-        ended, better = narrower(points, width, centre, safe_radius(A, found.multipliers, nearest))
+        safe = safe_radius(A, nearest)
+        ended, better = narrower(points, width, centre, safe, problem.points(found.contacts))
         if better is None:
             gap = 0.0 if ended else np.inf
             break

@@ -36,7 +36,6 @@ class Extremum:
     value : the largest c_i.
     contacts : (p,) rows that hold it.
     multipliers : (p,) of sum 1, none negative but for rounding.
-    stationarity : length of Σ λ_i ∇c_i: zero but for rounding.
     proved : contacts, multipliers and, where the contacts alone do not hold the state, curvature prove a local minimum.
     """
 
@@ -44,7 +43,6 @@ class Extremum:
     value: float
     contacts: Ints
     multipliers: Floats
-    stationarity: float
     proved: bool
 
 
@@ -67,7 +65,7 @@ def least_largest(rows: Rows, start: Floats, rounding: float = 0.0) -> Extremum:
             found = polished
     if found is None:
         c = rows(state)[0]
-        found = Extremum(state, float(c.max()), np.array([int(c.argmax())]), np.ones(1), np.inf, False)
+        found = Extremum(state, float(c.max()), np.array([int(c.argmax())]), np.ones(1), False)
     return found
 
 
@@ -157,9 +155,8 @@ def _newton(rows: Rows, start: Floats, near: float, exact: float, redundant: boo
 
 def _judged(rows: Rows, state: Floats, contacts: Ints, multipliers: Floats, exact: float) -> Extremum:
     c, A = rows(state)
-    stationarity = float(np.linalg.norm(multipliers @ A[contacts]))
     met = (
-        stationarity < 10 * exact
+        np.linalg.norm(multipliers @ A[contacts]) < 10 * exact
         and multipliers.min() >= -exact
         and np.ptp(c[contacts]) < exact
         and c.max() - c[contacts].max() < exact
@@ -167,7 +164,7 @@ def _judged(rows: Rows, state: Floats, contacts: Ints, multipliers: Floats, exac
     if met and len(contacts) > A.shape[1] + 1:
         multipliers = _spread(A[contacts], multipliers)
     proved = bool(met and _curved_up(_curvature(rows, state, contacts, multipliers), A[contacts[multipliers > 1e-9]]))
-    return Extremum(state, float(c.max()), contacts, multipliers, stationarity, proved)
+    return Extremum(state, float(c.max()), contacts, multipliers, proved)
 
 
 def _curved_up(H: Floats, A: Floats) -> bool:

@@ -139,10 +139,10 @@ _PLACING = {
 
 
 def _scatter(points: Floats, shape: Shape) -> float | None:
-    """Uncertainty of a point to be told to the fit: none where there are more points than the feature needs."""
-    return (
-        None if len(points) > shape.least else 1e-6 * (centred(points)[2] or 1.0) if np.isfinite(points).all() else 1.0
-    )
+    """Uncertainty of a point to be told to the fit: a millionth where no more points than needed leave it to be told."""
+    if points.ndim != 2 or len(points) != shape.least or not np.isfinite(points).all():
+        return None
+    return 1e-6 * (centred(points)[2] or 1.0)
 
 
 def _about(shape: Shape, points: Floats, origin: Floats, frame: Floats, state: Floats, condition: float) -> Placed:

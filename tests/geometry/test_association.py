@@ -241,6 +241,15 @@ def test_perfect_points_give_the_feature_itself(association):
     assert found.gap < 1e-13
 
 
+def test_contacts_of_a_symmetric_ring_are_more_than_needed_and_prove_it_all_the_same():
+    turn = np.arange(8) * np.pi / 4
+    radius = 10 + np.array([0.001, -0.001] * 4)
+    found = associate("circle", radius[:, None] * np.column_stack([np.cos(turn), np.sin(turn)]), "minimum_zone")
+    assert found.form == pytest.approx(0.002, abs=1e-12)
+    assert found.size == pytest.approx(20, abs=1e-9)
+    assert found.gap == 0
+
+
 def test_as_many_points_as_the_feature_needs_leave_no_form():
     assert associate("plane", [[0, 0, 0], [10, 0, 1], [0, 10, 2]], "minimum_zone").form < 1e-14
 
@@ -257,6 +266,8 @@ FLAT = np.column_stack([np.arange(9.0) % 3, np.arange(9) // 3, np.random.default
         (lambda: associate("plane", FLAT[:2], "minimum_zone"), "2 points are too few. Measure at least 3"),
         (lambda: associate("plane", FLAT * [1, 1, np.nan], "minimum_zone"), "point 1 has a coordinate that is no finite"),
         (lambda: associate("circle", FLAT[:2, :2]), "2 points are too few"),
+        (lambda: associate("sphere", [1.0, 2.0]), r"points have the shape \(2,\)"),
+        (lambda: associate("sphere", np.zeros((0, 3))), "0 points are too few"),
         (lambda: associate("circle", np.outer(np.arange(5), [1, 2]), "minimum_zone"), "lie on one line"),
         (lambda: associate("plane", FLAT, "maximum_inscribed"), "no size to be inscribed or circumscribed"),
         (lambda: associate("circle", ARC, "tangent"), "a tangent feature is a plane, or a line in a plane"),

@@ -25,11 +25,10 @@ def test_where_a_strip_is_as_narrow_as_the_ring_the_search_does_not_end():
 
 
 def test_beside_square_contacts_a_ring_is_safe_as_far_as_its_curvature_allows():
-    # contacts outside at ±x and inside at ±y: gradients (∓1, 0, −1), (0, ±1, 1), weights of one quarter. In the directions of
-    # the centre the hull of these reaches 1/√2·1/√2 across its faces: the tetrahedron's faces are 1/√5 … away
+    # contacts outside at ±x and inside at ±y: a tetrahedron of gradients about zero, whose nearest face is κ away
     gradients = np.array([[-1.0, 0, -1], [1, 0, -1], [0, 1, 1], [0, -1, 1]])
     kappa = min(_face_distance(np.delete(gradients, i, axis=0)) for i in range(4))
-    assert safe_radius(gradients, np.full(4, 0.25), 10.0) == pytest.approx(20 * kappa / (1 + 2 * kappa))
+    assert safe_radius(gradients, 10.0) == pytest.approx(20 * kappa / (1 + 2 * kappa))
 
 
 def _face_distance(corners: np.ndarray) -> float:
@@ -38,7 +37,7 @@ def _face_distance(corners: np.ndarray) -> float:
 
 
 def test_fewer_contacts_make_nothing_safe():
-    assert safe_radius(np.eye(3)[:2], np.full(2, 0.5), 10.0) == 0
+    assert safe_radius(np.eye(3)[:2], 10.0) == 0
 
 
 def test_the_largest_empty_circle_lies_among_points_all_round():

@@ -17,10 +17,7 @@ HEXAGON = np.column_stack([np.cos(np.arange(6) * np.pi / 3), np.sin(np.arange(6)
     [
         (CUBE, 1.0),
         (TETRAHEDRON, 2.0),  # two opposite edges, not a face and a corner: 4/√3 = 2.31
-        (
-            np.vstack([TETRAHEDRON[:, :2], [[5, 0], [-5, 0]]]),
-            10 / np.sqrt(17),
-        ),  # a rhomb of halves 5 and … with square corners
+        (np.array([[5.0, 0], [0, 1], [-5, 0], [0, -1]]), 10 / np.sqrt(26)),  # a rhomb: its area over its side
         (HEXAGON, np.sqrt(3.0)),
         (np.array([[0.0, 0], [4, 0], [0, 3]]), 2.4),  # the height on the hypotenuse
     ],
