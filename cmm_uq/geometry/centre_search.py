@@ -23,8 +23,9 @@ SAMPLE = 100
 def safe_radius(gradients: Floats, nearest: float) -> float:
     """Distance from the centre within which no other has a narrower ring, mm.
 
-    Some contact's distance, linearised, rises by κ times the move at least, κ being the distance from zero to the surface of
-    the hull of the contacts' gradients; against their curvature, below 1/(nearest − δ), that suffices for δ ≤ 2κ·(nearest − δ).
+    Some contact's distance, linearised, rises by κ times the move at least, κ being the distance from zero to the surface
+    of the hull of the contacts' gradients; against their curvature, below 1/(nearest − δ), that suffices up to
+    δ = 2κ·(nearest − δ).
 
     Parameters
     ----------

@@ -108,7 +108,7 @@ def test_the_spread_of_the_draws_is_the_covariance_of_the_fit(kind):
         assert np.std(drawn.size) / 2 == pytest.approx(fit.u("r"), rel=0.045)
 
 
-@pytest.mark.parametrize("kind", [kind for kind in ALL if kind != "line"])
+@pytest.mark.parametrize("kind", ALL)
 def test_each_draw_has_the_minimum_zone_that_it_has_alone(kind):
     points = nominal(kind, 30)
     name = kind.split(" ", maxsplit=1)[0]
@@ -173,7 +173,6 @@ NARROW = 20 * np.column_stack([np.cos(np.linspace(0, 1e-3, 9)), np.sin(np.linspa
         (lambda: Repeated("circle", NARROW), r"circle: the nominal points (hardly|do not) determine it"),
         (lambda: Repeated("plane", PLANE).least_squares(np.zeros((3, 7, 3))), r"shape \(3, 7, 3\). Give them as \(N, 40, 3\)"),
         (lambda: Repeated("plane", PLANE).least_squares(np.full((3, 40, 3), np.nan)), "draw 1 has a displacement"),
-        (lambda: Repeated("line", nominal("line")).minimum_zone(np.zeros((1, 40, 3))), "not found for many draws"),
         (lambda: Repeated("sphere", nominal("sphere")).least_squares(errors(nominal("sphere"), 2, 500.0)),
          "sphere: draw . does not settle. Draw errors that are small"),
     ],
