@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -110,8 +111,13 @@ def _starts(k: int) -> Iterator[Floats]:
         yield -e
 
 
-def least_zone(of: Placed, local: Floats) -> Extreme:
-    """The minimum zone: of a line in space the narrowest cylinder."""
+def least_zone(of: Placed, local: Floats, near: Floats | None = None) -> Extreme:
+    """The minimum zone: of a line in space the narrowest cylinder.
+
+    Parameters
+    ----------
+    near : (k,) a state that is thought near it, of cylinders, cones and lines in space.
+    """
     if of.shape in (PLANE, LINE_IN_PLANE):
         return _least_slab(of, local)
     sides = (1.0,) if of.shape is LINE else (1.0, -1.0)
@@ -121,7 +127,8 @@ def least_zone(of: Placed, local: Floats) -> Extreme:
     k = len(of.state)
     if of.shape in _BALLS:
         return _least_ring(problem, k)
-    found = _solved(problem, _starts(k))
+    first = [] if near is None else [(near - of.state) * of.units() / problem.scale]
+    found = _solved(problem, chain(first, _starts(k)))
     gap = _line_gap(problem, found) if of.shape is LINE else np.inf
     return Extreme(problem.state(found.state), problem.points(found.contacts), found.multipliers, gap)
 

@@ -129,10 +129,10 @@ def _newton(rows: Rows, start: Floats, near: float, exact: float, redundant: boo
     if not redundant:
         needed = multipliers > 1e-9
         contacts, multipliers = contacts[needed], multipliers[needed]
-    last = np.inf
+    last, p = np.inf, len(contacts)
+    # steps are small against the feature, so that the curvature does not change on the way
+    H = _curvature(rows, state, contacts, multipliers)
     for _ in range(20):
-        p = len(contacts)
-        H = _curvature(rows, state, contacts, multipliers)
         residual = np.concatenate(
             [multipliers @ A[contacts], c[contacts] - c[contacts].mean(), [multipliers.sum() - 1]]
         )

@@ -126,7 +126,7 @@ class Repeated:
             if self.placed.shape is not LINE:
                 state[rows], form[rows], left = least_zones(self.placed.shape, state[rows], local, self._units)
             for i in left:
-                state[rows.start + i] = least_zone(self.placed, local[:, i]).state
+                state[rows.start + i] = least_zone(self.placed, local[:, i], state[rows.start + i]).state
                 form[rows.start + i] = self._range(state[rows.start + i], local[:, i])
         return self._drawn(state, form)
 
