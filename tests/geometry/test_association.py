@@ -252,6 +252,8 @@ def test_contacts_of_a_symmetric_ring_are_more_than_needed_and_prove_it_all_the_
 
 def test_as_many_points_as_the_feature_needs_leave_no_form():
     assert associate("plane", [[0, 0, 0], [10, 0, 1], [0, 10, 2]], "minimum_zone").form < 1e-14
+    # through the corners of a right angle: Thales
+    assert associate("circle", [[0, 0], [8, 0], [0, 6]], "minimum_zone").size == pytest.approx(10, abs=1e-12)
 
 
 ARC = 20 * np.column_stack([np.cos(np.linspace(0, 2, 30)), np.sin(np.linspace(0, 2, 30))])

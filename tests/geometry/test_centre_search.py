@@ -19,6 +19,19 @@ def test_a_ring_that_is_not_the_narrowest_is_told():
     assert np.ptp(np.linalg.norm(10 * CIRCLE - better, axis=1)) < width
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_ring_hardly_narrower_far_from_the_middle_of_the_points_is_found(seed):
+    # on two thirds of a circle the middle of the points lies 4 mm from the centre
+    turn = np.linspace(0, 4, 40)
+    radius = 10 + np.random.default_rng(seed).uniform(-0.01, 0.01, 40)
+    points = radius[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    width = 1.0001 * np.ptp(radius)
+    ended, better = narrower(points, width, np.array([30.0, 0]), 0.0)
+    assert ended
+    assert better is not None
+    assert np.ptp(np.linalg.norm(points - better, axis=1)) < width
+
+
 def test_where_a_strip_is_as_narrow_as_the_ring_the_search_does_not_end():
     points = np.array([[0.0, 0], [1, 0.1], [2, 0], [3, 0.1]])
     assert narrower(points, 0.2, np.zeros(2), 0.0) == (False, None)

@@ -147,6 +147,16 @@ def test_draws_that_the_exchange_leaves_open_are_found_one_by_one(monkeypatch):
     np.testing.assert_allclose(found.size, expected.size, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["plane", "circle in a plane", "sphere"])
+def test_the_exchange_leaves_no_plane_circle_or_sphere_open(kind):
+    points = nominal(kind, 30)
+    of = Repeated(kind.split(" ", maxsplit=1)[0], points)
+    local = of.placed.local(points + errors(points, 200))
+    start = np.tile(of.placed.state, (200, 1))
+    left = exchange.least_zones(of.placed.shape, start, local, of.placed.units())[2]
+    assert not len(left)
+
+
 def test_blocks_change_nothing(monkeypatch):
     points = nominal("sphere")
     displaced = errors(points, 7)
