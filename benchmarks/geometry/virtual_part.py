@@ -19,6 +19,7 @@ from cmm_uq.geometry.placed import FeatureKind, Placed
 
 CORES, BLOCK, SCATTER = 2, 5000, 2e-3
 MINIMUM_ZONES = 10_000
+ALONE = 100
 
 
 def part() -> dict[str, tuple[FeatureKind, np.ndarray]]:
@@ -125,14 +126,14 @@ def zones() -> None:
         drawn = of.minimum_zone(errors)
         spent = time.perf_counter() - begin
         begin = time.perf_counter()
-        single = np.array([associate(kind, points + errors[i], "minimum_zone").form for i in range(20)])
-        alone = (time.perf_counter() - begin) / 20
-        off = np.abs(single - drawn.form[:20]).max()
+        single = np.array([associate(kind, points + errors[i], "minimum_zone").form for i in range(ALONE)])
+        alone = (time.perf_counter() - begin) / ALONE
+        off = np.abs(single - drawn.form[:ALONE]).max()
         print(f"  {kind:9s} {spent:6.2f} s   one by one {1e3 * alone:6.1f} ms each, forms differ by {off:.0e} mm")
         if kind == "plane":
             begin = time.perf_counter()
-            by_lp = np.array([flatness_by_linear_programming(points + errors[i]) for i in range(20)])
-            alone = (time.perf_counter() - begin) / 20
+            by_lp = np.array([flatness_by_linear_programming(points + errors[i]) for i in range(ALONE)])
+            alone = (time.perf_counter() - begin) / ALONE
             off = np.abs(by_lp - single).max()
             print(f"            linear programming {1e3 * alone:6.1f} ms each, differ by {off:.0e} mm")
 

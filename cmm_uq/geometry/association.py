@@ -21,6 +21,9 @@ from cmm_uq.points import Floats, Ints
 Association = Literal["least_squares", "minimum_zone", "maximum_inscribed", "minimum_circumscribed", "tangent"]
 ASSOCIATIONS: tuple[Association, ...] = get_args(Association)
 
+ALONG = 0.05
+"""Cosine of the angle between a normal and ``outward`` below which the latter names no side."""
+
 _WITH_SIZE = (CIRCLE, SPHERE, CYLINDER)
 _STRAIGHT = (PLANE, LINE_IN_PLANE)
 
@@ -43,7 +46,8 @@ class Associated:
         cylinder about it that holds all points.
     deviations : (n,) signed orthogonal distances, mm: positive outside, of a plane on the side of its normal.
     contacts : (p,) points that hold the feature; none of least squares.
-    multipliers : (p,) positive, of sum 1: the proof that the contacts hold it.
+    multipliers : (p,) of sum 1, none negative: the proof that the contacts hold it.
+    condition : of the least-squares problem with columns of unit length: large where the points cover little of the feature.
     gap : no feature of this kind meets the criterion better by more than this, mm. Zero where all others were excluded;
         infinite where only a local optimum is proved, as of cylinders and cones; ``nan`` of least squares.
     """
@@ -58,6 +62,7 @@ class Associated:
     deviations: Floats
     contacts: Ints
     multipliers: Floats
+    condition: float
     gap: float
 
 
@@ -77,7 +82,7 @@ def associate(
         of its least-squares plane.
     association : the criterion. ``"tangent"`` is of planes and of lines in a plane: outside the material, its largest distance
         from it the least, as ISO 5459 asks of datums. Its direction is that of the minimum zone.
-    outward : (d,) direction out of the material, roughly; needed for ``"tangent"``.
+    outward : (d,) direction out of the material, roughly: needed for ``"tangent"``; gives the normal of any plane its sense.
 
     Raises
     ------
@@ -127,6 +132,7 @@ def _answer(
         deviations=deviations,
         contacts=found.contacts,
         multipliers=found.multipliers,
+        condition=of.condition,
         gap=found.gap,
     )
 
@@ -155,6 +161,6 @@ def _against(normal: Floats, outward: ArrayLike, feature: str) -> bool:
     if toward.shape != normal.shape or not np.isfinite(toward).all():
         raise CmmUqError(f"{feature}: outward has to be {len(normal)} finite numbers", fix="Give a direction")
     share = float(normal @ toward)
-    if abs(share) <= 1e-3 * float(np.linalg.norm(toward)) * float(np.linalg.norm(normal)):
+    if abs(share) <= ALONG * float(np.linalg.norm(toward)) * float(np.linalg.norm(normal)):
         raise CmmUqError(f"{feature}: outward lies along it", fix="Give the direction out of the material, across it")
     return share < 0

@@ -3,7 +3,8 @@
 With the centre c moved by δ, distances change by at most |δ|, so a box of half width h about c holds no ring narrower than
 that about c less 2·h·√d. Far away a ring is nearly a strip, and no narrower than the points are wide. Next to a ring that is
 held by its contact points it is their multipliers that exclude a narrower one: see :func:`safe_radius`. What is left are
-boxes between, halved until each is excluded, or holds a narrower ring.
+boxes between, halved until each is excluded, or holds a narrower ring. Whatever some of the points exclude, all of them do,
+so that of many points a sample is looked at.
 """
 
 from __future__ import annotations
@@ -13,44 +14,52 @@ from itertools import product
 import numpy as np
 
 from cmm_uq.geometry.width import narrowest
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 
 MOST_BOXES = 200_000
+SAMPLE = 100
 
 
-def safe_radius(gradients: Floats, multipliers: Floats, nearest: float) -> float:
+def safe_radius(gradients: Floats, nearest: float) -> float:
     """Distance from the centre within which no other has a narrower ring, mm.
 
-    Distances, linearised, rise somewhere by κ times the move, κ being the radius of the largest ball about zero among the
-    gradients' combinations; against their curvature, below 1/(nearest − δ), that suffices for δ ≤ 2κ·(nearest − δ).
+    Some contact's distance, linearised, rises by κ times the move at least, κ being the distance from zero to the surface
+    of the hull of the contacts' gradients; against their curvature, below 1/(nearest − δ), that suffices up to
+    δ = 2κ·(nearest − δ).
 
     Parameters
     ----------
-    gradients : (d + 2, d + 1) of the contacts with respect to centre and mean radius, signed as they hold the zone.
-    multipliers : (d + 2,).
+    gradients : (p, d + 1) of the contacts with respect to centre and mean radius, signed as they hold the zone.
     nearest : distance of the nearest point from the centre, mm.
     """
-    if len(gradients) != gradients.shape[1] + 1:
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(gradients) <= gradients.shape[1]:
         return 0.0
-    square = np.column_stack([gradients, np.ones(len(gradients))])
-    if np.linalg.cond(square) > 1e12:
+    try:
+        kappa = -float(ConvexHull(gradients).equations[:, -1].max())
+    except QhullError:
         return 0.0
-    rises = np.linalg.norm(np.linalg.inv(square)[:-1], axis=0)
-    kappa = float((multipliers / rises).min())
-    return 2 * kappa * nearest / (1 + 2 * kappa)
+    return 2 * kappa * nearest / (1 + 2 * kappa) if kappa > 0 else 0.0
 
 
-def narrower(points: Floats, width: float, centre: Floats, safe: float) -> tuple[bool, Floats | None]:
+def narrower(
+    points: Floats, width: float, centre: Floats, safe: float, contacts: Ints | None = None
+) -> tuple[bool, Floats | None]:
     """Whether the search came to an end, and a centre (d,) with a ring narrower than ``width``, mm, if there is one.
 
     Parameters
     ----------
     points : (n, d).
     centre : (d,) of the ring found, within ``safe`` of which there is no narrower one.
+    contacts : rows of the points that hold it.
     """
+    sample = points[:: len(points) // SAMPLE + 1]
+    if contacts is not None:
+        sample = np.concatenate([sample, points[contacts]])
     middle = points.mean(axis=0)
     largest = float(np.linalg.norm(points - middle, axis=1).max())
-    strip = narrowest(points)[1]
+    strip = narrowest(sample)[1]
     if strip <= width * (1 + 1e-9):
         return False, None
     reach = largest + largest**2 / (strip - width)
@@ -62,9 +71,9 @@ def narrower(points: Floats, width: float, centre: Floats, safe: float) -> tuple
         seen += len(boxes)
         if seen > MOST_BOXES:
             return False, None
-        widths = _ring_widths(points, boxes)
+        widths = _ring_widths(sample, boxes)
         best = int(np.argmin(widths))
-        if widths[best] < smaller:
+        if widths[best] < smaller and _ring_widths(points, boxes[best : best + 1])[0] < smaller:
             return True, boxes[best]
         diagonal = half * np.sqrt(d)
         open_ = (widths - 2 * diagonal < smaller) & (np.linalg.norm(boxes - centre, axis=1) + diagonal > safe)

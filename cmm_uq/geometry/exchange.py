@@ -3,8 +3,8 @@
 The zone of k parameters is held by k + 1 contact points. For any k + 1 points there is one set of signs and multipliers
 with which they prove a lower bound of the half width; the point that lies farthest outside replaces the one whose leaving
 keeps all multipliers positive, and the bound grows. Where none lies outside, the bound is the half width: the multipliers
-are the proof that no neighbouring zone is narrower (E. Stiefel, Numer. Math. 1 (1959) 1; G. A. Watson,
-*Approximation Theory and Numerical Methods*, 1980). Linearised anew at what was found, this is Newton's method on the contact points.
+are the proof that no neighbouring zone is narrower (E. Stiefel, Numer. Math. 1 (1959) 1; G. A. Watson, *Approximation
+Theory and Numerical Methods*, 1980). Linearised anew at what was found, this is Newton's method on the contact points.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def least_zones(shape: Shape, start: Floats, local: Floats, units: Floats) -> tu
     for _ in range(MOST_STEPS):
         d, J = shape.distances(state[pending], local[:, pending])
         A = np.ascontiguousarray((J / units[:, None, None]).transpose(1, 2, 0))
-        basis = _first(A) if basis is None else basis
         try:
+            basis = _first(A) if basis is None else basis
             step, half = _exchange(A, d, basis, floor)
         except np.linalg.LinAlgError:  # contact points of one draw that determine nothing
             break

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -28,6 +29,9 @@ PERFECT = 1e4 * ROUNDING
 
 SAME = 1e-9
 """mm: two ways to the same optimum agree within this."""
+
+LEANING = 1e-6
+"""Cosine between the least-squares normal and that of the narrowest zone below which they are across each other."""
 
 _BALLS = (CIRCLE, SPHERE)
 _NONE = np.zeros(0, dtype=np.int64)
@@ -107,8 +111,13 @@ def _starts(k: int) -> Iterator[Floats]:
         yield -e
 
 
-def least_zone(of: Placed, local: Floats) -> Extreme:
-    """The minimum zone: of a line in space the narrowest cylinder."""
+def least_zone(of: Placed, local: Floats, near: Floats | None = None) -> Extreme:
+    """The minimum zone: of a line in space the narrowest cylinder.
+
+    Parameters
+    ----------
+    near : (k,) a state that is thought near it, of cylinders, cones and lines in space.
+    """
     if of.shape in (PLANE, LINE_IN_PLANE):
         return _least_slab(of, local)
     sides = (1.0,) if of.shape is LINE else (1.0, -1.0)
@@ -118,7 +127,8 @@ def least_zone(of: Placed, local: Floats) -> Extreme:
     k = len(of.state)
     if of.shape in _BALLS:
         return _least_ring(problem, k)
-    found = _solved(problem, _starts(k))
+    first = [] if near is None else [(near - of.state) * of.units() / problem.scale]
+    found = _solved(problem, chain(first, _starts(k)))
     gap = _line_gap(problem, found) if of.shape is LINE else np.inf
     return Extreme(problem.state(found.state), problem.points(found.contacts), found.multipliers, gap)
 
@@ -133,7 +143,7 @@ def _least_slab(of: Placed, local: Floats) -> Extreme:
     """Straightness in a plane, flatness: the narrowest of all, by the convex hull, and its contact points."""
     points = local.reshape(len(local), -1).T
     normal, width = narrowest(points)
-    if abs(normal[-1]) < SAME:
+    if abs(normal[-1]) < LEANING:
         raise CmmUqError(
             f"{of.shape.name}: the points are as wide as they are long",
             fix=f"Measure points that spread along the {of.shape.name}",
@@ -159,7 +169,8 @@ def _least_ring(problem: _Problem, k: int) -> Extreme:
         centre, width = state[:-1], 2 * found.value * problem.scale
         A = problem.rows(found.state)[1][found.contacts]
         nearest = float(np.linalg.norm(points - centre, axis=1).min())
-        ended, better = narrower(points, width, centre, safe_radius(A, found.multipliers, nearest))
+        safe = safe_radius(A, nearest)
+        ended, better = narrower(points, width, centre, safe, problem.points(found.contacts))
         if better is None:
             gap = 0.0 if ended else np.inf
             break

@@ -1,15 +1,16 @@
 """The least of the largest of many smooth functions, with the contact points and multipliers that prove it.
 
-Every zone and every inscribed, circumscribed or tangent feature of one measurement is such a problem: min over s of the
-largest c_i(s). A descent by sequential quadratic programming comes near; Newton's method on the conditions of Karush, Kuhn and Tucker
-then holds the contact points exactly: Σ λ_i ∇c_i = 0, Σ λ_i = 1, λ_i ≥ 0, and all other c_i below those of the
-contacts.
+Every zone and every inscribed, circumscribed or tangent feature of one measurement is such a problem: the state s with the
+least of the largest c_i(s). A descent by sequential quadratic programming comes near; Newton's method on the conditions of
+Karush, Kuhn and Tucker then holds the contact points exactly: Σ λ_i ∇c_i = 0, Σ λ_i = 1, λ_i ≥ 0, and all other c_i below
+those of the contacts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -34,8 +35,7 @@ class Extremum:
     state : (k,).
     value : the largest c_i.
     contacts : (p,) rows that hold it.
-    multipliers : (p,) positive, of sum 1.
-    stationarity : length of Σ λ_i ∇c_i: zero but for rounding.
+    multipliers : (p,) of sum 1, none negative but for rounding.
     proved : contacts, multipliers and, where the contacts alone do not hold the state, curvature prove a local minimum.
     """
 
@@ -43,7 +43,6 @@ class Extremum:
     value: float
     contacts: Ints
     multipliers: Floats
-    stationarity: float
     proved: bool
 
 
@@ -66,65 +65,74 @@ def least_largest(rows: Rows, start: Floats, rounding: float = 0.0) -> Extremum:
             found = polished
     if found is None:
         c = rows(state)[0]
-        found = Extremum(state, float(c.max()), np.array([int(c.argmax())]), np.ones(1), np.inf, False)
+        found = Extremum(state, float(c.max()), np.array([int(c.argmax())]), np.ones(1), False)
     return found
 
 
 def _descended(rows: Rows, start: Floats) -> Floats:
-    """Sequential quadratic programming on the rows that are largest, until none of the others comes out above them."""
-    from scipy.optimize import minimize
-
+    """Descend on the rows that are largest, until none of the others comes out above them."""
     k, state = len(start), start
-    rise = np.eye(k + 1)[k]
     c = rows(state)[0]
     working = np.argsort(c)[::-1][: WORKING * k]
     for _ in range(12):
-        chosen = np.sort(working)
-
-        def values(z: Floats, of: Ints = chosen) -> Floats:
-            return np.asarray(z[-1] - rows(z[:-1])[0][of])
-
-        def height(z: Floats) -> float:
-            return float(z[-1])
-
-        def derivatives(z: Floats, of: Ints = chosen) -> Floats:
-            return np.column_stack([-rows(z[:-1])[1][of], np.ones(len(of))])
-
-        found = minimize(
-            height, np.append(state, rows(state)[0][chosen].max()), jac=lambda _: rise, method="SLSQP",
-            constraints=[{"type": "ineq", "fun": values, "jac": derivatives}], options={"maxiter": 200, "ftol": 1e-14},
-        )  # fmt: skip
-        if not np.isfinite(found.x).all():
-            return state
-        state = np.asarray(found.x[:-1])
+        state = _programmed(rows, state, working)
         c = rows(state)[0]
-        above = np.flatnonzero(c > c[chosen].max() + 1e-12)
+        above = np.flatnonzero(c > c[working].max() + 1e-12)
         if not len(above):
             break
-        working = np.union1d(chosen, above[np.argsort(c[above])[::-1]][: WORKING * k])
+        working = np.union1d(working, above[np.argsort(c[above])[::-1]][: WORKING * k])
     return state
 
 
+def _programmed(rows: Rows, start: Floats, of: Ints) -> Floats:
+    """Sequential quadratic programming (SLSQP) in the state and a bound z above some of the rows: the least z."""
+    from scipy.optimize import minimize
+
+    def height(z: Floats) -> float:
+        return float(z[-1])
+
+    def uphill(z: Floats) -> Floats:
+        return np.asarray(np.eye(len(z))[-1])
+
+    def below(z: Floats) -> Floats:
+        return np.asarray(z[-1] - rows(z[:-1])[0][of])
+
+    def slopes(z: Floats) -> Floats:
+        return np.column_stack([-rows(z[:-1])[1][of], np.ones(len(of))])
+
+    bounded: Any = {"type": "ineq", "fun": below, "jac": slopes}
+    first = np.append(start, rows(start)[0][of].max())
+    options: Any = {"maxiter": 200, "ftol": 1e-14}
+    found = minimize(height, first, jac=uphill, method="SLSQP", constraints=bounded, options=options)
+    return np.asarray(found.x[:-1]) if np.isfinite(found.x).all() else start
+
+
 def _polished(rows: Rows, start: Floats, exact: float) -> Extremum | None:
-    """Newton's method on the contact points that multipliers of a coarser and a finer look suggest; the best of them."""
+    """Newton's method on the contacts that a finer or a coarser look suggests: the first that is proved, or the best."""
     best: Extremum | None = None
     for near in (max(1e-8, exact), 1e-6, 1e-4, 1e-2):
-        found = _newton(rows, start, near, exact)
-        if found is not None and (best is None or (found.proved, -found.value) > (best.proved, -best.value)):
-            best = found
-        if best is not None and best.proved:
-            break
+        for redundant in (False, True):
+            found = _newton(rows, start, near, exact, redundant)
+            if found is not None and (best is None or (found.proved, -found.value) > (best.proved, -best.value)):
+                best = found
+            if best is not None and best.proved:
+                return best
     return best
 
 
-def _newton(rows: Rows, start: Floats, near: float, exact: float) -> Extremum | None:
+def _newton(rows: Rows, start: Floats, near: float, exact: float, redundant: bool) -> Extremum | None:
+    """From a start, with the rows within ``near`` of the largest that multipliers need, or with all of these rows."""
     state, k = start, len(start)
     c, A = rows(state)
-    contacts, multipliers = _multipliers(A, np.flatnonzero(c >= c.max() - near))
-    last = np.inf
+    contacts = np.flatnonzero(c >= c.max() - near)
+    multipliers = _multipliers(A[contacts])
+    if not redundant:
+        needed = multipliers > 1e-9
+        contacts, multipliers = contacts[needed], multipliers[needed]
+    last, p = np.inf, len(contacts)
+    # steps are small against the feature, so that the curvature does not change on the way
+    H = _curvature(rows, state, contacts, multipliers)
     for _ in range(20):
-        p = len(contacts)
-        H = _curvature(rows, state, contacts, multipliers)
         residual = np.concatenate(
             [multipliers @ A[contacts], c[contacts] - c[contacts].mean(), [multipliers.sum() - 1]]
         )
@@ -147,15 +155,16 @@ def _newton(rows: Rows, start: Floats, near: float, exact: float) -> Extremum | 
 
 def _judged(rows: Rows, state: Floats, contacts: Ints, multipliers: Floats, exact: float) -> Extremum:
     c, A = rows(state)
-    stationarity = float(np.linalg.norm(multipliers @ A[contacts]))
     met = (
-        stationarity < 10 * exact
+        np.linalg.norm(multipliers @ A[contacts]) < 10 * exact
         and multipliers.min() >= -exact
         and np.ptp(c[contacts]) < exact
         and c.max() - c[contacts].max() < exact
     )
-    proved = bool(met and _curved_up(_curvature(rows, state, contacts, multipliers), A[contacts]))
-    return Extremum(state, float(c.max()), contacts, multipliers, stationarity, proved)
+    if met and len(contacts) > A.shape[1] + 1:
+        multipliers = _spread(A[contacts], multipliers)
+    proved = bool(met and _curved_up(_curvature(rows, state, contacts, multipliers), A[contacts[multipliers > 1e-9]]))
+    return Extremum(state, float(c.max()), contacts, multipliers, proved)
 
 
 def _curved_up(H: Floats, A: Floats) -> bool:
@@ -166,15 +175,25 @@ def _curved_up(H: Floats, A: Floats) -> bool:
     return not len(free) or bool(np.linalg.eigvalsh(free @ H @ free.T)[0] > -1e-7)
 
 
-def _multipliers(A: Floats, near: Ints) -> tuple[Ints, Floats]:
-    """Of the rows near the largest, those with positive multipliers that bring Σ λ ∇c nearest to zero."""
+def _multipliers(A: Floats) -> Floats:
+    """(p,) not negative, of sum 1, that bring Σ λ ∇c nearest to zero: few of them positive."""
     from scipy.optimize import nnls
 
     wanted = np.zeros(A.shape[1] + 1)
     wanted[-1] = 1.0
-    found = nnls(np.vstack([A[near].T, np.ones(len(near))]), wanted)[0]
-    chosen = found > 1e-9
-    return near[chosen], found[chosen] / found[chosen].sum()
+    found = nnls(np.vstack([A.T, np.ones(len(A))]), wanted)[0]
+    return np.asarray(found / found.sum())
+
+
+def _spread(A: Floats, multipliers: Floats) -> Floats:
+    """Of more contacts than hold the state, multipliers whose smallest is the largest: all that can hold it do."""
+    from scipy.optimize import linprog
+
+    p, k = A.shape
+    stationary = np.column_stack([np.vstack([A.T, np.ones(p)]), np.zeros(k + 1)])
+    above = np.column_stack([-np.eye(p), np.ones(p)])
+    found = linprog(-np.eye(p + 1)[-1], above, np.zeros(p), stationary, np.eye(k + 1)[-1], method="highs")
+    return multipliers if found.x is None or found.x[-1] <= 0 else np.asarray(found.x[:-1])
 
 
 def _curvature(rows: Rows, state: Floats, contacts: Ints, multipliers: Floats) -> Floats:

@@ -57,7 +57,7 @@ class Placed:
         return units
 
     def position(self, state: Floats) -> Floats:
-        """(N, d) of states (N, k): centre, where the axis pierces z = 0 of the frame, of a plane the point above the origin."""
+        """(N, d) of states (N, k): centre, where the axis pierces z = 0 of the frame, of a plane the point over the origin."""
         if self.shape in (PLANE, LINE_IN_PLANE):
             return np.asarray(self.origin + state[:, :1] * self.frame[-1])
         m = 3 if self.shape is SPHERE else 2
@@ -111,38 +111,38 @@ def _plane(points: Floats) -> Placed:
 
 
 def _circle(points: Floats) -> Placed:
-    fit = fit_circle(points, u_point=_SMALL * _spread(points))
+    fit = fit_circle(points, u_point=_scatter(points, CIRCLE))
     frame = np.eye(2) if fit.normal is None else frame_about(fit.normal)[:2]
     return _about(CIRCLE, points, fit.centre, frame, np.array([0.0, 0, fit.radius]), fit.condition)
 
 
 def _sphere(points: Floats) -> Placed:
-    fit = fit_sphere(points, u_point=_SMALL * _spread(points))
+    fit = fit_sphere(points, u_point=_scatter(points, SPHERE))
     return _about(SPHERE, points, fit.centre, np.eye(3), np.array([0.0, 0, 0, fit.radius]), fit.condition)
 
 
 def _cylinder(points: Floats) -> Placed:
-    fit = fit_cylinder(points, u_point=_SMALL * _spread(points))
+    fit = fit_cylinder(points, u_point=_scatter(points, CYLINDER))
     state = np.array([0.0, 0, 0, 0, fit.radius])
     return _about(CYLINDER, points, fit.point, frame_about(fit.direction), state, fit.condition)
 
 
 def _cone(points: Floats) -> Placed:
-    fit = fit_cone(points, u_point=_SMALL * _spread(points))
+    fit = fit_cone(points, u_point=_scatter(points, CONE))
     state = np.array([0.0, 0, 0, 0, fit.radius * np.cos(fit.half_angle), fit.half_angle])
     return _about(CONE, points, fit.point, frame_about(fit.direction), state, fit.condition)
 
-
-_SMALL = 1e-6
-"""Scatter over extent with which a radius has to be determined: points on short arcs are refused by it."""
 
 _PLACING = {
     "line": _line, "plane": _plane, "circle": _circle, "sphere": _sphere, "cylinder": _cylinder, "cone": _cone,
 }  # fmt: skip
 
 
-def _spread(points: Floats) -> float:
-    return centred(points)[2] or 1.0 if points.ndim == 2 and np.isfinite(points).all() and len(points) else 1.0
+def _scatter(points: Floats, shape: Shape) -> float | None:
+    """Uncertainty of a point to be told to the fit: a millionth where no more points than needed leave it to be told."""
+    if points.ndim != 2 or len(points) != shape.least or not np.isfinite(points).all():
+        return None
+    return 1e-6 * (centred(points)[2] or 1.0)
 
 
 def _about(shape: Shape, points: Floats, origin: Floats, frame: Floats, state: Floats, condition: float) -> Placed:

@@ -102,7 +102,8 @@ class Repeated:
     def minimum_zone(self, displacements: ArrayLike) -> Drawn:
         """The minimum zone of each draw: straightness in a plane, flatness, roundness, sphericity, cylindricity, conicity.
 
-        Each ends where contact points prove a local minimum. Position and size are those of the middle of the zone.
+        Each ends where contact points prove a local minimum. Position and size are those of the middle of the zone. Of a line
+        in space it is the narrowest cylinder, found draw by draw, some hundredths of a second each.
 
         Parameters
         ----------
@@ -110,12 +111,9 @@ class Repeated:
 
         Raises
         ------
-        CmmUqError : as for least squares, and of a line in space, whose zone is round: see :func:`associate`.
+        CmmUqError : as for least squares.
         """
-        if self.placed.shape is LINE:
-            raise CmmUqError("line: the minimum zone of lines in space is not found for many draws at once",
-                             fix="Associate them one by one, or take lines in a plane")  # fmt: skip
-        if len(self.points) <= len(self.placed.state):
+        if len(self.points) <= len(self.placed.state) and self.placed.shape is not LINE:
             return self.least_squares(
                 displacements
             )  # as many points as parameters: the feature goes through all of them
@@ -123,15 +121,18 @@ class Repeated:
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
         for rows in self._blocks(len(errors), 20 * BLOCK):
             local = self._local(errors[rows], rows.start)
-            start, _ = self._descended(local, errors[rows], rows.start)
-            state[rows], form[rows], left = least_zones(self.placed.shape, start, local, self._units)
+            state[rows], _ = self._descended(local, errors[rows], rows.start)
+            left = np.arange(local.shape[1])
+            if self.placed.shape is not LINE:
+                state[rows], form[rows], left = least_zones(self.placed.shape, state[rows], local, self._units)
             for i in left:
-                state[rows.start + i] = least_zone(self.placed, local[:, i]).state
+                state[rows.start + i] = least_zone(self.placed, local[:, i], state[rows.start + i]).state
                 form[rows.start + i] = self._range(state[rows.start + i], local[:, i])
         return self._drawn(state, form)
 
     def _range(self, state: Floats, local: Floats) -> float:
-        return float(np.ptp(self.placed.shape.distances(state[None], local[:, None])[0]))
+        d = self.placed.shape.distances(state[None], local[:, None])[0]
+        return float(2 * d.max() if self.placed.shape is LINE else np.ptp(d))
 
     def _checked(self, displacements: ArrayLike) -> Floats:
         errors = np.asarray(displacements, dtype=np.float64)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.orthogonal_distance import principal
 from cmm_uq.points import Floats, Ints
 
@@ -19,6 +20,8 @@ FLAT = 1e-13
 """Share of the extent below which the points lie in the plane or on the line to rounding."""
 
 CHUNK = 256
+MOST_EDGES = 5000
+"""Of a hull: points about a plane have a few hundred."""
 
 
 def narrowest(points: Floats) -> tuple[Floats, float]:
@@ -55,6 +58,8 @@ def _in_space(points: Floats) -> Floats:
     hull = ConvexHull(points)
     faces = np.asarray(hull.equations[:, :3])
     ends, beside = _edges(np.asarray(hull.simplices, dtype=np.int64), np.asarray(hull.neighbors, dtype=np.int64))
+    if len(ends) > MOST_EDGES:
+        raise CmmUqError("plane: the points lie about no plane", fix="Measure one flat surface at a time")
     edges, one, other = points[ends[:, 1]] - points[ends[:, 0]], faces[beside[:, 0]], faces[beside[:, 1]]
     sense = np.sign(np.einsum("ij,ij->i", np.cross(one, other), edges))
     found = [faces]
