@@ -77,11 +77,14 @@ def given_recording(
 
     Parameters
     ----------
-    state : as its certificate states it, of the same effects as the model.
+    state : as its certificate states it, its effects in the model's order; the model may have others, as of its artefact.
     model : of the calibration.
     sigma_mm : standard deviation of one recorded coordinate.
     """
     which, mean, covariance = joint_posterior(model, state.unmodelled, sigma_mm)
+    own = [effect.name in {one.name for one in state.effects} for effect in model.effects for _ in effect.coefficients]
+    kept = np.flatnonzero([*own, *(True for _ in range(len(mean) - len(own)))])
+    mean, covariance = mean[kept], covariance[np.ix_(kept, kept)]
     together = tuple(state.unmodelled[i].effect for i in which)
     rest = tuple(one for i, one in enumerate(state.unmodelled) if i not in which)
     more = len(mean) - state.draws.shape[1]

@@ -119,20 +119,21 @@ class DatumSystem:
     Parameters
     ----------
     features : of the datums, in order.
-    bases : (8,) values of each without any error, which say how the frame is made.
+    nominal : (8,) values of each without any error, which say how the frame is made.
 
     Raises
     ------
-    CmmUqError : they do not fix the frame, as far as it is asked for.
+    CmmUqError : they do not fix the frame.
     """
 
-    def __init__(self, features: Sequence[Feature], nominal: Sequence[Floats], *, whole: bool = True) -> None:
+    def __init__(self, features: Sequence[Feature], nominal: Sequence[Floats]) -> None:
         self.features = tuple(features)
         self.nominal = [Features(values[None]) for values in nominal]
-        self._second: tuple[int, bool] | None = None
-        self._choose(whole)
+        self._first: int | None = None
+        self._second: tuple[int, int | None] = 0, None
+        self._choose()
         one = self._rotations(self.nominal)
-        self._steps = self._translation_steps(one[0], whole)
+        self._steps = self._translation_steps(one[0])
         self._to = self._origins(self.nominal, one)[0]
         self._turn = one[0]
 
@@ -141,61 +142,48 @@ class DatumSystem:
         turn = self._rotations(measured)
         return Frame(np.swapaxes(turn, 1, 2) @ self._turn, self._origins(measured, turn), self._to)
 
-    def _choose(self, whole: bool) -> None:
-        """Which datum fixes the first two rotations, and which the third, by its direction or its place."""
+    def _choose(self) -> None:
+        """The datum that fixes two rotations, and what fixes the third: a direction, or where one lies from one before."""
         directed = [i for i, feature in enumerate(self.features) if feature.kind in _TURNING]
+        placed = [i for i, feature in enumerate(self.features) if feature.kind != "plane"]
         if not directed:
-            self._first = None
-            self._by_points(whole)
+            if len(self.features) < 3:
+                names = ", ".join(repr(feature.name) for feature in self.features)
+                raise CmmUqError(f"the datums ({names}) do not fix how the part is turned", where="datums",
+                                 fix="Name a plane or an axis, or three points")  # fmt: skip
             return
         self._first = directed[0]
         main = self.nominal[self._first].direction[0]
         for i in range(len(self.features)):
-            if i == self._first:
-                continue
             if i in directed and np.linalg.norm(np.cross(main, self.nominal[i].direction[0])) > _ACROSS:
-                self._second = i, True
+                self._second = i, None
                 return
-            apart = self.nominal[i].position[0] - self.nominal[self._first].position[0]
-            across = apart - (apart @ main) * main
-            placed = "plane" not in (self.features[i].kind, self.features[self._first].kind)
-            if placed and np.linalg.norm(across) > _FREE:
-                self._second = i, False
-                return
-        if whole:
-            raise CmmUqError(f"the datums leave the part free to turn about {self.features[self._first].name!r}",
-                             where="datums", fix="Name another datum, with a direction across it or beside it")  # fmt: skip
-
-    def _by_points(self, whole: bool) -> None:
-        if whole and len(self.features) < 3:
-            names = ", ".join(repr(f.name) for f in self.features) or "none"
-            raise CmmUqError(f"the datums ({names}) do not fix how the part is turned", where="datums",
-                             fix="Name a plane or an axis, or three points")  # fmt: skip
+            if i in placed and i != placed[0]:
+                apart = self.nominal[i].position[0] - self.nominal[placed[0]].position[0]
+                if np.linalg.norm(np.cross(main, apart)) > _ACROSS * np.linalg.norm(apart):
+                    self._second = i, placed[0]
+                    return
+        raise CmmUqError(f"the datums leave the part free to turn about {self.features[self._first].name!r}",
+                         where="datums", fix="Name another datum, with a direction across it or beside it")  # fmt: skip
 
     def _rotations(self, given: Sequence[Features]) -> Floats:
         """(N, 3, 3) rows u, v, w of the datums' frame."""
         if self._first is None:
             return self._of_points(given)
         w = _unit(given[self._first].direction)
-        if self._second is None:
-            helper = np.eye(3)[np.argmin(np.abs(self.nominal[self._first].direction[0]))]
-            second = np.broadcast_to(helper, w.shape)
-        else:
-            i, by_direction = self._second
-            second = given[i].direction if by_direction else given[i].position - given[self._first].position
+        i, other = self._second
+        second = given[i].direction if other is None else given[i].position - given[other].position
         u = _unit(second - np.einsum("ni,ni->n", second, w)[:, None] * w)
         return np.stack([u, np.cross(w, u), w], axis=1)
 
     def _of_points(self, given: Sequence[Features]) -> Floats:
-        """By a triangle of centres; without three of them, as the coordinates have it."""
-        if len(given) < 3:
-            return np.broadcast_to(np.eye(3), (len(given[0].values) if given else 1, 3, 3)).copy()
+        """By a triangle of the first three places."""
         u = _unit(given[1].position - given[0].position)
         rest = given[2].position - given[0].position
         v = _unit(rest - np.einsum("ni,ni->n", rest, u)[:, None] * u)
         return np.stack([u, v, np.cross(u, v)], axis=1)
 
-    def _translation_steps(self, turn: Floats, whole: bool) -> list[tuple[int, Floats]]:
+    def _translation_steps(self, turn: Floats) -> list[tuple[int, Floats]]:
         """(datum, (m, 3) directions in the datums' frame) in which each fixes the translation."""
         free, steps = np.eye(3), []
         for i, feature in enumerate(self.features):
@@ -207,15 +195,12 @@ class DatumSystem:
             free = rows[count:] @ free
             if not len(free):
                 break
-        if whole and len(free):
+        if len(free):
             raise CmmUqError("the datums leave the part free to shift", where="datums", fix="Name another datum")
         return steps
 
     def _origins(self, given: Sequence[Features], turn: Floats) -> Floats:
-        """(N, 3) of a point that the datums fix; in directions that none fixes, the first datum's place."""
-        count = len(turn)
-        if not given:
-            return np.zeros((count, 3))
+        """(N, 3) of a point that the datums fix."""
         own = [np.einsum("nij,nj->ni", turn, each.position) for each in given]
         origin = own[0].copy()
         for i, directions in self._steps:

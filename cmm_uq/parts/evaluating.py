@@ -40,10 +40,8 @@ class Evaluator:
 
     def __init__(self, plan: Plan, base: Floats, causes: Sequence[Cause | None]) -> None:
         self.plan, self.base, self.causes = plan, base, causes
-        asked = {one.features[0]: () for one in plan.characteristics}
-        for one in plan.characteristics:
-            asked |= dict.fromkeys((*one.features, *one.datums, *(plan.alignment.datums if not one.datums else ())), ())
-        self.nominal = {name: self._nominal(name) for name in asked}
+        asked = [name for one in plan.characteristics for name in (*one.features, *one.datums)]
+        self.nominal = {name: self._nominal(name) for name in dict.fromkeys((*asked, *plan.alignment.datums))}
         self.evaluations = [Evaluation(one, plan, self.nominal) for one in plan.characteristics]
         self.keys = list(dict.fromkeys(key for one in self.evaluations for key in (*one.keys, *one.datums)))
         self.of_points = {one.keys[0] for one in self.evaluations if one.of_points}

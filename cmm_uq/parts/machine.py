@@ -147,6 +147,11 @@ class MachineState:
         return tuple(effect.name for effect in self.effects if self.prior_share.get(effect.name, 0.0) > FREE)
 
 
+def of_machine(effect: Effect) -> bool:
+    """Whether an effect is an error of the machine, and not of an artefact or of a probe."""
+    return effect.mechanism not in OTHERWISE and not effect.of_artefact
+
+
 def coefficients_of(effects: Iterable[Effect], reported: Mapping[str, Floats]) -> Floats:
     """Coefficients (M, k) of effects from draws (M,) of their reported parameters by ``effect.parameter``.
 
@@ -181,7 +186,7 @@ def unmodelled_errors(modelled: Iterable[str], detected: Mapping[str, float | No
     """
     known, found = set(modelled), []
     for effect in every().values():
-        if effect.name in known or effect.tier != CONTRACT or effect.mechanism in OTHERWISE:
+        if effect.name in known or effect.tier != CONTRACT or not of_machine(effect):
             continue
         if any(column.startswith(_SURROUNDINGS) for column in effect.columns):
             continue

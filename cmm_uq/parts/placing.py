@@ -15,6 +15,11 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.plan import Plan
 from cmm_uq.points import AXES, Floats, Machine, Points
 
+OWN_COLUMNS = tuple(
+    f"{begin}{axis}{end}" for begin, end in (("n", ""), ("tip_", "_mm"), ("approach_", "")) for axis in AXES
+)
+"""Columns that follow from how a point is probed."""
+
 _SIDEWAYS = 1e-6
 """Component of a normal below which an axis does not move into the surface."""
 

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.parts.placing import probed
+from cmm_uq.parts.placing import OWN_COLUMNS, probed
 from cmm_uq.parts.plan import Plan
 from cmm_uq.points import Floats, Ints, Machine, Points
 
@@ -54,15 +54,16 @@ class Qualified:
     def on(cls, plan: Plan, part: Points, machine: Machine) -> Qualified:
         """The sphere where the styli were qualified, with what is recorded of the surroundings of the part's points."""
         which = [i for i, stylus in enumerate(plan.styli) if stylus.qualified_at_mm is not None and i in plan.stylus_of]
-        toward, extra = directions(), {name: values[:1] for name, values in part.columns.items() if _common(name)}
+        toward = directions()
         q = len(toward)
         places = [np.asarray(plan.styli[i].qualified_at_mm) + 0.5 * SPHERE_MM * toward for i in which]
         tips = [np.tile(plan.styli[i].offset_mm, (q, 1)) for i in which]
         radii = np.repeat([0.5 * plan.styli[i].diameter_mm for i in which], q)
         none = np.zeros((0, 3))
-        columns = {name: np.full(q * len(which), float(values[0])) for name, values in extra.items()}
-        if "time_s" in part.columns:
-            columns["time_s"] = np.full(q * len(which), float(part.columns["time_s"].min()))
+        # before the part: at the first of its times, with what else is recorded as it is then
+        start = int(np.argmin(part.columns["time_s"])) if "time_s" in part.columns else 0
+        columns = {name: np.full(q * len(which), float(values[start])) for name, values in part.columns.items()
+                   if name not in OWN_COLUMNS}  # fmt: skip
         sphere = probed(np.concatenate([none, *places]), np.tile(toward, (len(which), 1)), np.concatenate([none, *tips]),
                         radii, machine, columns)  # fmt: skip
         return cls(part, sphere, np.array(which, dtype=np.int64), plan.stylus_of)
@@ -90,7 +91,3 @@ class Qualified:
             its = self.of == stylus
             found[its] -= sphere[None, :3] + normals[its][:, :, None] * sphere[3]
         return found
-
-
-def _common(name: str) -> bool:
-    return name.startswith("temp_")

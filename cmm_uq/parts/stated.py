@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.parts.machine import MachineState, coefficients_of, noise_of_draws, unmodelled_errors
+from cmm_uq.parts.machine import MachineState, coefficients_of, noise_of_draws, of_machine, unmodelled_errors
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats, Machine
 
@@ -50,7 +50,8 @@ def machine_stated(
     if "estimates" not in results or "identifiability" not in results:
         raise CmmUqError("states no errors of a machine", where=_WHERE, fix="Give the results of cmm-uq report")
     modelled = list(results["estimates"])
-    found = effects(modelled, where=_WHERE)
+    # faults of the artefact, and of the probe that calibrated, are not those of this measurement
+    found = tuple(effect for effect in effects(modelled, where=_WHERE) if of_machine(effect))
     shares: dict[str, float] = {}
     for name, share in results["identifiability"].get("prior_share", {}).items():
         effect = name.partition(".")[0]

@@ -31,6 +31,9 @@ CHECKED = 200
 FEWEST = 100_000
 """Virtual measurements, after which u is known to a quarter of a percent."""
 
+ROUNDING = 1e-9
+"""mm and rad: a spread below which is none."""
+
 AGREES = 0.01
 """Of u, by which first order may be off before all is taken exactly: what u is good for."""
 
@@ -107,7 +110,7 @@ class AtPose:
         drawn = self.drawn(np.random.default_rng(seed), count)
         exact = self.errors(drawn, exact=True)
         apart = self.errors(drawn) - exact
-        spread = np.maximum(exact.std(axis=0), np.finfo(np.float64).tiny)
+        spread = np.maximum(exact.std(axis=0), ROUNDING)
         return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / spread)
 
 
@@ -134,9 +137,6 @@ class Virtual:
 
     def errors(self, random: np.random.Generator, n: int) -> Floats:
         """(n, c) errors, each place as often as the others."""
-        return self._in_places(random, n)
-
-    def _in_places(self, random: np.random.Generator, n: int) -> Floats:
         counts = np.full(len(self.places), n // len(self.places))
         counts[random.permutation(len(counts))[: n - counts.sum()]] += 1
         found = [
@@ -154,7 +154,7 @@ class Virtual:
     @property
     def source(self) -> Source:
         """The errors as outputs of a Monte Carlo."""
-        return Source(self.names, lambda random, n: self.errors(random, n).T)
+        return Source(self.names, lambda random, n: np.ascontiguousarray(self.errors(random, n).T))
 
     def simulated(self, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
         """So many virtual measurements: means, covariance, intervals of the errors."""

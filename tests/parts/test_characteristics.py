@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
 from cmm_uq.parts.evaluating import Evaluator
-from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Plan
+from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan
 from cmm_uq.points import Floats
 from tests.parts_drawn import UP, block, bore, circle, plane, ring, spot
 
@@ -147,6 +147,38 @@ def test_a_datum_face_may_touch_from_outside() -> None:
     assert measured(features, one, {"face": bumped}) == pytest.approx(30 - 0.008, abs=NANOMETRE)
     squares = Characteristic("", "distance", ("face", "top"), association="least_squares")
     assert measured(features, squares, {"face": bumped}) == pytest.approx(30 - 0.008 / 9, abs=NANOMETRE)
+
+
+def edge(name: str, start: Floats, end: Floats, out: Floats) -> Feature:
+    """A line of five points on a side face."""
+    points = start + np.linspace(0, 1, 5)[:, None] * (end - start)
+    along = (end - start) / np.linalg.norm(end - start)
+    return Feature(name, "line", points, np.tile(out, (5, 1)), "stylus", Nominal(start, along))
+
+
+@pytest.mark.parametrize(("datums", "moves", "x", "y"), [
+    # a face and two bores: the first says where, and where the second lies from it, (140, 20), how the part is turned
+    (("A", "h1", "h2"), {"h1": shifted(0.14, 0.02, 0.0)}, -0.14, -0.02),
+    (("A", "h1", "h2"), {"h2": shifted(0.7, 0.1, 5.0)}, 0.0, 0.0),
+    # a second bore that moves across by a milliradian turns the point (100, 0), at (70, −40) from the first
+    (("A", "h1", "h2"), {"h2": shifted(-0.02, 0.14, 0.0)}, -1e-3 * 40, -1e-3 * 70),
+    # 3-2-1: a face, a line along x on the front, a point on the left; the point says x and nothing else
+    (("A", "front", "left"), {"left": shifted(0.01, 3.0, 2.0)}, -0.01, 0.0),
+    (("A", "front", "left"), {"front": shifted(3.0, 0.01, 2.0)}, 0.0, -0.01),
+    (("A", "front", "left"), {"front": lambda p, n: p + np.outer(p[:, 0], [0, 1e-4, 0])}, 0.0, -1e-4 * 100),
+])  # fmt: skip
+def test_frames_of_datums_in_order(datums: tuple[str, ...], moves: dict[str, Move], x: float, y: float) -> None:
+    """Where the point (100, 0, 0) of the part, which did not move, is then found; turns of a tenth of a millirad and less."""
+    origin = np.zeros(3)
+    features = (
+        *BLOCK, spot("point", [100, 0, 0]), edge("front", origin, np.array([200.0, 0, 0]), np.array([0.0, -1, 0])),
+        spot("left", [0, 0, -5], [-1, 0, 0]),
+    )  # fmt: skip
+    off = [
+        measured(features, Characteristic("", axis, ("point",), datums), moves) - at
+        for axis, at in (("x", 100), ("y", 0))
+    ]
+    assert off == pytest.approx([x, y], abs=1.5e-4 if "h2" in moves and y else 1e-6)
 
 
 def test_a_best_fit_takes_back_the_motion_of_all_points_and_shares_out_the_rest() -> None:

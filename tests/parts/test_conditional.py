@@ -116,6 +116,11 @@ def test_a_certificate_says_what_it_left_free() -> None:
     assert str(state.calibrated) == "2026-11-22"
     np.testing.assert_allclose(state.noise.usual_mm, 2e-3)
     assert {one.effect.name: one for one in state.unmodelled}["rotation_x_y"].sd == pytest.approx([4.0], rel=1e-3)
+    with_sag = {**results, "estimates": {**results["estimates"], "artefact_sag": {}}}  # type: ignore[dict-item]
+    assert [e.name for e in machine_stated(with_sag, draws, MACHINE, corrected=True).effects] == [
+        "scale_x",
+        "squareness_xy",
+    ]
     with pytest.raises(CmmUqError, match="states no errors of a machine"):
         machine_stated({"schema": "cmm-uq/budget/1"}, draws, MACHINE, corrected=True)
     with pytest.raises(CmmUqError, match=r"has no draws of scale_y.ppm"):
