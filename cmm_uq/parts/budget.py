@@ -11,7 +11,7 @@ may be negative.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +47,23 @@ class Budget:
     factors: tuple[str, ...]
     within: Floats
     u: Floats
+
+    def told(
+        self, characteristic: str, named: Mapping[str, str], least: float = 0.05
+    ) -> tuple[tuple[str, float, str], ...]:
+        """What should be told beside a result, largest first: line or factor, its share, and why.
+
+        Parameters
+        ----------
+        named : by factor, why (:attr:`Virtual.named`).
+        least : share from which on it is told.
+        """
+        column = self.characteristics.index(characteristic)
+        shares = dict(zip(self.causes, self.total[:, column].tolist(), strict=True))
+        shares |= dict(zip(self.factors, self.within[:, column].tolist(), strict=True))
+        found = [(line, share, named[line.partition(": ")[2]]) for line, share in shares.items()
+                 if share >= least and line.partition(": ")[2] in named]  # fmt: skip
+        return tuple(sorted(found, key=lambda each: -each[1]))
 
     def worst(self, characteristic: str) -> str:
         """The cause, or the factor where it is the machine's, of the largest part of a variance."""

@@ -102,7 +102,7 @@ class Scatter(Cause):
 
     def through(self, derivative: Floats) -> Floats:
         """See :meth:`Cause.through`."""
-        return np.asarray(((derivative @ self.turn.T) * self.size).reshape(len(derivative), -1).T)
+        return np.asarray(((derivative @ self.turn.T) * self.size).reshape(len(derivative), self.size.size).T)
 
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
         """See :meth:`Cause.moved`."""

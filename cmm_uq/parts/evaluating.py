@@ -75,16 +75,18 @@ class Evaluator:
         return [key for key in self.keys if self.to_first_order(key)]
 
     @cached_property
-    def transfer(self) -> Floats:
-        """(K, 8f) change of the values of ``linear`` features for one unit of each coefficient of all causes."""
+    def transfers(self) -> list[Floats | None]:
+        """(K, 8f) of each cause: change of the values of ``linear`` features for one unit of each coefficient.
+
+        Six columns more are of the motion of a best fit, where one is asked for.
+        """
         count = len(self.plan.points)
         whole = np.zeros((VALUES * len(self.linear), count, 3))
         for i, key in enumerate(self.linear):
             whole[VALUES * i : VALUES * (i + 1), self.plan.rows[key[0]]] = self.associated[key].derivative
         if self.best_fit is not None:
             whole = np.concatenate([whole, self.best_fit.derivative])
-        parts = [cause.through(whole) for cause in self.causes if cause is not None]
-        return np.concatenate([np.zeros((0, len(whole))), *parts])
+        return [None if cause is None else cause.through(whole) for cause in self.causes]
 
     def __call__(self, coefficients: Sequence[Floats], *, exact: bool = False) -> Floats:
         """Characteristics (N, c), mm and rad, for coefficients (N, K) of each cause; one row where there is none.
@@ -116,9 +118,13 @@ class Evaluator:
         return np.column_stack([one(measured) for one in self.evaluations])
 
     def _changes(self, coefficients: Sequence[Floats]) -> Floats:
-        """(N, …) first-order changes of what is taken to first order."""
-        acting = [c for c, cause in zip(coefficients, self.causes, strict=True) if cause is not None]
-        return np.asarray(np.hstack([np.zeros((_count(coefficients), 0)), *acting]) @ self.transfer)
+        """(N, …) changes of what is taken to first order."""
+        columns = VALUES * len(self.linear) + (0 if self.best_fit is None else len(self.best_fit.derivative))
+        change = np.zeros((_count(coefficients), columns))
+        for drawn, transfer in zip(coefficients, self.transfers, strict=True):
+            if transfer is not None:
+                change += drawn @ transfer
+        return change
 
     def moved(self, coefficients: Sequence[Floats], rows: slice) -> Floats:
         """(N, m, 3) displacements of some points by all causes, beyond ``base``, mm."""

@@ -32,6 +32,21 @@ def test_shares_of_a_sum_are_those_of_its_variances() -> None:
     assert found.worst("apart") == "machine: scale_x"
 
 
+def test_what_the_calibration_did_not_see_is_told_with_its_share() -> None:
+    """A bow that was not modelled beside a scale that was left free and noise of which nothing need be told."""
+    free = 50.0 * np.random.default_rng(6).standard_normal((4000, 1))
+    bow = tuple(u for u in unmodelled_errors([], {}) if u.effect.name == "straightness_x_y")
+    diagonal = Plan((spot("o", [0, 0, 0]), spot("xy", [100, 100, 0])), (Characteristic("d", "distance", ("o", "xy")),))
+    state = machine(["scale_x"], free, 5.0, prior_share={"scale_x": 0.99}, unmodelled=bow)
+    virtual = Virtual(diagonal, Circumstances(state, (POSE,)))
+    told = budget(virtual).told("d", virtual.named)
+    why = {line: words for line, _, words in told}
+    assert why.keys() == {"machine: scale_x", "machine: straightness_x_y"}
+    assert why["machine: scale_x"] == "the calibration left it to what physics allows"
+    assert why["machine: straightness_x_y"].startswith("the calibration did not model it")
+    assert told[0][1] >= told[1][1]
+
+
 def test_errors_that_cancel_have_negative_shares() -> None:
     """A diagonal of 45°: scale x and squareness of correlation −0.8 by their covariances with the sum."""
     diagonal = Plan((spot("o", [0, 0, 0]), spot("xy", [200, 200, 0])), (Characteristic("d", "distance", ("o", "xy")),))
