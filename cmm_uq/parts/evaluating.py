@@ -134,12 +134,10 @@ class Evaluator:
                 found += cause.moved(drawn, rows)
         return found
 
-    @cached_property
-    def at_nominal(self) -> Floats:
-        """(c,) characteristics of the nominal points."""
-        bare = self if not self.base.any() else Evaluator(self.plan, np.zeros_like(self.base), self.causes)
-        none = [np.zeros((1, len(cause.factors) if cause else 0)) for cause in self.causes]
-        return np.asarray(bare(none, exact=True)[0])
+
+def characteristics_of(plan: Plan, points: Floats) -> Floats:
+    """Characteristics (c,) of points (n, 3) in the frame of the part, mm."""
+    return np.asarray(Evaluator(plan, points - plan.points, [])([], exact=True)[0])
 
 
 def _count(coefficients: Sequence[Floats]) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.evaluating import characteristics_of
 from cmm_uq.parts.plan import Plan
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated
@@ -58,7 +58,7 @@ def evaluated(plan: Plan, points: Floats) -> Floats:
     if points.shape != plan.points.shape:
         raise CmmUqError(f"{len(points)} points were measured, the plan has {len(plan.points)}", where="the recording",
                          fix="Measure each point of the plan once")  # fmt: skip
-    return np.asarray(Evaluator(plan, points - plan.points, [])([], exact=True)[0])
+    return characteristics_of(plan, points)
 
 
 def conforming(plan: Plan, errors: Floats, measured: Floats) -> tuple[Floats, float]:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.parts.causes import Cause
-from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.evaluating import Evaluator, characteristics_of
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.of_form import Form, forms, whole_surfaces
 from cmm_uq.parts.of_machine import mean_errors, modelled, noise, not_modelled
@@ -50,6 +50,9 @@ class Circumstances:
     forms : what is known of the form of its features.
     repeats : of each point, of whose readings the mean is taken.
     further : causes of another kind, of the plan's points.
+    measured : (n, 3) points of the part as they were measured, in its frame, mm, about which errors are then drawn: a position
+        that is off errs as a distance does, one of zero only to one side. The nominal points without them, and of a part whose
+        whole surfaces are drawn.
     """
 
     machine: MachineState
@@ -58,6 +61,7 @@ class Circumstances:
     forms: tuple[Form, ...] = ()
     repeats: int = 1
     further: tuple[Cause, ...] = ()
+    measured: Floats | None = None
 
 
 class AtPose:
@@ -89,9 +93,12 @@ class AtPose:
             *own,
         ]
         base = mean_errors(given.machine, qualified, pose) + mean_expansion(given.surroundings, plan, points, pose)
-        self.measured = Evaluator(plan, base, self.causes)
+        drawn = any(len(feature.surface) for feature in plan.features)
+        part = plan.points if drawn or given.measured is None else given.measured
+        self.measured = Evaluator(plan, base + part - plan.points, self.causes)
+        self.still = characteristics_of(plan, part)
         self.true: Evaluator | None = None
-        if any(len(feature.surface) for feature in plan.features):
+        if drawn:
             true = whole_surfaces(plan)
             still: list[Cause | None] = [None] * (len(self.causes) - len(own))
             self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface])
@@ -102,7 +109,7 @@ class AtPose:
 
     def errors(self, coefficients: Sequence[Floats], *, exact: bool = False) -> Floats:
         """(n, c) errors of the characteristics."""
-        true = self.measured.at_nominal if self.true is None else self.true(coefficients, exact=exact)
+        true = self.still if self.true is None else self.true(coefficients, exact=exact)
         return np.asarray(self.measured(coefficients, exact=exact) - true)
 
     def off(self, seed: int = 0, count: int = CHECKED) -> Floats:

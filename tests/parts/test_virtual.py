@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.evaluating import Evaluator, characteristics_of
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, placed
 from cmm_uq.parts.plan import Alignment, Characteristic, Plan, Stylus
@@ -149,10 +149,9 @@ def test_where_the_part_lies_is_no_error_of_it(numbers: list[float]) -> None:
     """A part moved and turned a little, as a whole, has the characteristics that it had; within 0.1 nm."""
     features, characteristics = block()
     plan = Plan(features, characteristics, alignment=Alignment(("A", "B", "C")))
-    still = Evaluator(plan, np.zeros_like(plan.points), [])
     turn = Rotation.from_rotvec(1e-3 * np.array(numbers[:3])).as_matrix()
     moved = Evaluator(plan, plan.points @ turn.T + np.array(numbers[3:]) - plan.points, [])
-    off = moved([], exact=True) - still.at_nominal
+    off = moved([], exact=True) - characteristics_of(plan, plan.points)
     np.testing.assert_allclose(off, 0, atol=1e-7)
 
 
@@ -288,5 +287,22 @@ def test_form_alone_needs_no_first_order() -> None:
     virtual = Virtual(Plan((face,), both), Circumstances(machine(noise_um=1.0), (POSE,)))
     squares, zone = virtual.errors(np.random.default_rng(0), 300).T
     assert (zone <= squares + 1e-9).all()
-    # range of 97 independent normal numbers, 5.01 σ (David and Nagaraja 2003, table of expected ranges: 5.015 for 100)
-    assert squares.mean() == pytest.approx(5.0e-3, rel=0.02)
+    # the range of 100 independent normal numbers is 5.015 σ on average (David and Nagaraja 2003); the plane takes 3 of 100
+    assert squares.mean() == pytest.approx(5.015e-3 * np.sqrt(0.97), rel=0.02)
+
+
+def test_a_position_that_is_off_errs_to_both_sides() -> None:
+    """Two independent errors of 1 µm: off by 0.1 mm it has twice the one along, of 2 µm; at zero a Rayleigh distribution."""
+    hole = circle("hole", [50, 50, 0], 5.0, 4)
+    ends = (spot("o", [0, 0, 0]), spot("along", [100, 0, 0]), spot("up", [0, 100, 0]))
+    tip = Stylus("tip", u_offset_um=np.array([1.0, 1.0, 0.0]))
+    probed = replace(hole, stylus="tip")
+    plan = Plan(
+        (probed, *ends), (Characteristic("p", "position", ("hole",), ("o", "along", "up")),), (Stylus("stylus"), tip)
+    )
+    off = plan.points + np.where(plan.stylus_of[:, None] == 1, [0.05, 0.0, 0.0], 0.0)
+    for measured, u, mean in ((None, 2e-3 * np.sqrt(2 - np.pi / 2), 2e-3 * np.sqrt(np.pi / 2)), (off, 2e-3, 0.0)):
+        given = Circumstances(machine(), (POSE,), measured=measured)
+        found = Virtual(plan, given).errors(np.random.default_rng(0), 50_000)[:, 0]
+        assert found.std() == pytest.approx(u, rel=0.02)
+        assert found.mean() == pytest.approx(mean, abs=5e-5)
