@@ -5,7 +5,9 @@ models six of them; the machine corrects its estimates. Errors of a plate's char
 included, are compared with intervals from (a) what the calibration modelled alone, (b) that and what it did not model, each on
 its own, (c) everything together given the calibration's recording.
 
-Run: ``python -m benchmarks.parts.coverage [MACHINES]``
+With ``free`` the bar is not certified, so that one scale common to all axes is left free.
+
+Run: ``python -m benchmarks.parts.coverage [MACHINES] [free]``
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ SIGMA, DRAWS = 2e-3, 1000
 PLACES = np.array([[150.0, 100, -400], [400, 300, -200], [650, 150, -300]])
 
 
-def main(machines: int) -> None:
+def main(machines: int, *, free: bool = False) -> None:
     job = cmm_uq.read(ROOT / "examples" / "iota-1102-20C")
     bars = job.points.select(job.points.measurement != 18)
     named = effects(MODELLED)
@@ -42,7 +44,10 @@ def main(machines: int) -> None:
     )
     every = (*named, *(u.effect for u in unmodelled))
     sd = np.array([c.prior_sd for effect in every for c in effect.coefficients])
-    designed = MeasurementModel(Ballbar(job.facts.artefact, bars), tuple(e for e in every if not e.columns))
+    facts = job.facts.artefact
+    if free:
+        facts = facts.model_copy(update={"length_mm": None, "u_um": None})
+    designed = MeasurementModel(Ballbar(facts, bars), tuple(e for e in every if not e.columns))
     used = np.array([not effect.columns for effect in every for _ in effect.coefficients])
     features, characteristics = block()
     tip = Stylus("stylus", np.array([0.0, 0, -80.0]), 4.0, qualified_at_mm=np.array([100.0, 100, -400]))
@@ -51,9 +56,9 @@ def main(machines: int) -> None:
     for _ in range(machines):
         truth = sd * random.standard_normal(len(sd))
         length = designed.artefact.sizes[0]
-        size = length.nominal + length.sd * random.standard_normal()
+        size = length.nominal + (0.0 if free else length.sd * random.standard_normal())
         xyz = designed.simulate(truth[used], np.array([size]), Noise(coordinate=SIGMA), random)
-        model = MeasurementModel(Ballbar(job.facts.artefact, bars.at(xyz)), named)
+        model = MeasurementModel(Ballbar(facts, bars.at(xyz)), named)
         _, mean, covariance = joint_posterior(model, (), SIGMA)
         noise = StatedNoise(np.full(3, SIGMA))
         stated = MachineState(
@@ -84,4 +89,4 @@ def main(machines: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 400)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 400, free="free" in sys.argv[2:])
