@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cmm_uq.messages import Text
 from cmm_uq.parts.causes import Cause
 from cmm_uq.parts.virtual import AtPose, Virtual
 from cmm_uq.points import Floats
@@ -49,8 +50,8 @@ class Budget:
     u: Floats
 
     def told(
-        self, characteristic: str, named: Mapping[str, str], least: float = 0.05
-    ) -> tuple[tuple[str, float, str], ...]:
+        self, characteristic: str, named: Mapping[str, Text], least: float = 0.05
+    ) -> tuple[tuple[str, float, Text], ...]:
         """What should be told beside a result, largest first: line or factor, its share, and why.
 
         Parameters

@@ -1,8 +1,8 @@
 """The other way to an uncertainty: a calibrated part, like those that are measured, measured again and again.
 
 The method of ISO 15530-3:2011 by its published descriptions; its text was not at hand, so that nothing here says that a test
-is complete by it. What the repeats vary (set-ups, operators, time of day, qualifications) is seen; what they keep (the place on
-the table, this part's form) is seen only as it is there.
+is complete by it. What the repeats vary (set-ups, operators, time of day, qualifications) is seen; what they keep (the place
+on the table, this part's form) is seen only as it is there.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cmm_uq.messages import Text
 from cmm_uq.points import Floats
 
 Draw = Callable[[np.random.Generator, int], Floats]
@@ -40,7 +41,7 @@ class Cause(ABC):
     name: str
     factors: tuple[str, ...]
     draw: Draw
-    named: Mapping[str, str] = field(default_factory=dict)
+    named: Mapping[str, Text] = field(default_factory=dict)
 
     @abstractmethod
     def through(self, derivative: Floats) -> Floats:

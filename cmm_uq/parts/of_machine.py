@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.messages import say
 from cmm_uq.parts.causes import Cause, Common, Scatter, field_along
 from cmm_uq.parts.machine import MachineState, Unmodelled
 from cmm_uq.parts.placing import Pose
@@ -52,7 +53,7 @@ def modelled(state: MachineState, qualified: Qualified, pose: Pose) -> Common:
         drawn = deviations[random.integers(len(deviations), size=n)]
         return drawn + random.standard_normal(drawn.shape) * state.drift if state.drift.any() else drawn
 
-    why = dict.fromkeys(state.free, "the calibration left it to what physics allows")
+    why = dict.fromkeys(state.free, say("the calibration left it to what physics allows"))
     return Common(name=MACHINE, factors=factors, draw=draw, named=why, basis=-_in_part(qualified.left(columns), pose))
 
 
@@ -81,9 +82,12 @@ def _unmodelled(one: Unmodelled, qualified: Qualified, pose: Pose) -> Common:
         found[np.arange(n), random.integers(count, size=n)] = random.standard_normal((n, k)) * one.sd
         return found.reshape(n, -1)
 
-    most = "its recording would not have shown" if one.bounded else "physics allows"
     name = one.effect.name
-    why = {name: f"the calibration did not model it; as large as {most}"}
+    why = {
+        name: say("the calibration did not model it; as large as its recording would not have shown")
+        if one.bounded
+        else say("the calibration did not model it; as large as physics allows")
+    }
     return Common(name=MACHINE, factors=(name,) * (k * count), draw=draw, named=why,
                   basis=-_in_part(qualified.left(columns), pose))  # fmt: skip
 

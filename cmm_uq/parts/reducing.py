@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Text, say
 from cmm_uq.parts.of_machine import NOISE
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Plan
@@ -31,7 +32,7 @@ class Way:
     u : (c,) standard uncertainties, mm and rad.
     """
 
-    name: str
+    name: Text
     u: Floats
 
 
@@ -61,18 +62,19 @@ def ways(plan: Plan, given: Circumstances, draws: int = DRAWS, seed: int = 0) ->
 
     Ways that the travel of the machine does not allow are left out.
     """
-    found = [Way("as planned", spread(Virtual(plan, given), draws, seed))]
+    planned = Virtual(plan, given)
+    found = [Way(say("as planned"), spread(planned, draws, seed))]
     styli = tuple(replace(s, u_diameter_um=0.5 * s.u_diameter_um, u_offset_um=0.5 * s.u_offset_um,
                           lobing_um=0.5 * s.lobing_um) for s in plan.styli)  # fmt: skip
     part = given.surroundings.part
     steadier = replace(part, u_temperature_k=0.5 * part.u_temperature_k)
     turned = tuple(_turned(pose, _QUARTER_TURN, plan) for pose in given.poses)
-    changed: Mapping[str, tuple[Plan, Circumstances]] = {
-        "each point four times": (plan, replace(given, repeats=4 * given.repeats)),
-        "styli qualified twice as well": (replace(plan, styli=styli), given),
-        "temperature of the part known twice as well":
+    changed: Mapping[Text, tuple[Plan, Circumstances]] = {
+        say("each point four times"): (plan, replace(given, repeats=4 * given.repeats)),
+        say("styli qualified twice as well"): (replace(plan, styli=styli), given),
+        say("temperature of the part known twice as well"):
             (plan, replace(given, surroundings=replace(given.surroundings, part=steadier))),
-        "part turned by 90° about Z": (plan, replace(given, poses=turned)),
+        say("part turned by 90° about Z"): (plan, replace(given, poses=turned)),
     }  # fmt: skip
     for name, (other, circumstances) in changed.items():
         try:
@@ -82,8 +84,10 @@ def ways(plan: Plan, given: Circumstances, draws: int = DRAWS, seed: int = 0) ->
     try:
         pose = given.poses[0]
         places = [AtPose(plan, given, pose), AtPose(plan, given, _turned(pose, _HALF_TURN, plan))]
-        errors = mean_of_places(places, np.random.default_rng(seed), draws)
-        found.append(Way("mean of two measurements, the part turned by 180° about Z between them", errors.std(axis=0)))
+        errors = mean_of_places(places, np.random.default_rng(seed), draws, exact=planned.exact)
+        found.append(
+            Way(say("mean of two measurements, the part turned by 180° about Z between them"), errors.std(axis=0))
+        )
     except CmmUqError:
         pass
     return found

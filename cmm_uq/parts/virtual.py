@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cmm_uq.messages import Text
 from cmm_uq.parts.causes import Cause
 from cmm_uq.parts.evaluating import Evaluator, characteristics_of
 from cmm_uq.parts.machine import MachineState
@@ -154,7 +155,7 @@ class Virtual:
         return np.concatenate(found)
 
     @cached_property
-    def named(self) -> Mapping[str, str]:
+    def named(self) -> Mapping[str, Text]:
         """By factor, why it should be told beside the result."""
         return {name: why for cause in self.places[0].causes for name, why in cause.named.items()}
 

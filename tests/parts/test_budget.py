@@ -113,7 +113,7 @@ def test_a_part_turned_round_loses_what_the_turn_reverses() -> None:
 
 def test_ways_say_what_they_change() -> None:
     """Noise alone: four readings halve u, and so nearly does nothing else but the mean of two measurements."""
-    found = {way.name: way.u[0] for way in ways(PAIR, Circumstances(machine(noise_um=2.0), (POSE,)))}
+    found = {str(way.name): way.u[0] for way in ways(PAIR, Circumstances(machine(noise_um=2.0), (POSE,)))}
     planned = found["as planned"]
     assert planned == pytest.approx(2e-3 * np.sqrt(2), rel=0.02)
     assert found["each point four times"] == pytest.approx(planned / 2, rel=0.02)
