@@ -20,6 +20,9 @@ from cmm_uq.parts.datums import BEST_FIT, BestFit, DatumSystem
 from cmm_uq.parts.plan import Plan
 from cmm_uq.points import Floats
 
+Known = dict[tuple[str, Association, bytes], ProbedFeature]
+"""Features by name, association and points."""
+
 EXACT: Association = "least_squares"
 """The association whose values have a derivative everywhere."""
 
@@ -32,14 +35,18 @@ class Evaluator:
     plan : with nominal points.
     base : (n, 3) displacements without any draw, mm.
     causes : that move the points besides; ``None`` for one that does not.
+    known : features that were looked at before, to be looked up and added to: they are the same wherever the part lies.
 
     Raises
     ------
     CmmUqError : points that do not determine a feature, datums that do not fix the frame, characteristics that do not exist.
     """
 
-    def __init__(self, plan: Plan, base: Floats, causes: Sequence[Cause | None]) -> None:
+    def __init__(
+        self, plan: Plan, base: Floats, causes: Sequence[Cause | None], known: Known | None = None
+    ) -> None:  # fmt: skip
         self.plan, self.base, self.causes = plan, base, causes
+        self._known: Known = {} if known is None else known
         asked = [name for one in plan.characteristics for name in (*one.features, *one.datums)]
         self.nominal = {name: self._nominal(name) for name in dict.fromkeys((*asked, *plan.alignment.datums))}
         self.evaluations = [Evaluation(one, plan, self.nominal) for one in plan.characteristics]
@@ -58,12 +65,16 @@ class Evaluator:
         self.best_fit = BestFit(plan.points, plan.normals) if fitted else None
 
     def _nominal(self, name: str) -> Features:
-        feature = self.plan.feature(name)
-        return Features(ProbedFeature(feature, feature.points, EXACT).base[None])
+        return Features(self._probed(name, EXACT, self.plan.feature(name).points).base[None])
 
     def _associated(self, name: str, how: Association) -> ProbedFeature:
-        feature, rows = self.plan.feature(name), self.plan.rows[name]
-        return ProbedFeature(feature, feature.points + self.base[rows], how)
+        return self._probed(name, how, self.plan.feature(name).points + self.base[self.plan.rows[name]])
+
+    def _probed(self, name: str, how: Association, points: Floats) -> ProbedFeature:
+        key = name, how, points.tobytes()
+        if key not in self._known:
+            self._known[key] = ProbedFeature(self.plan.feature(name), points, how)
+        return self._known[key]
 
     def to_first_order(self, key: Key) -> bool:
         """Whether a feature is taken to first order."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from cmm_uq.messages import Text
 from cmm_uq.parts.causes import Cause
-from cmm_uq.parts.evaluating import Evaluator, characteristics_of
+from cmm_uq.parts.evaluating import Evaluator, Known, characteristics_of
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.of_form import Form, forms, whole_surfaces
 from cmm_uq.parts.of_machine import mean_errors, modelled, noise, not_modelled
@@ -73,13 +73,14 @@ class AtPose:
     plan : of the measurement.
     given : its circumstances.
     pose : the place.
+    known : features that were looked at in another place (:class:`Evaluator`).
 
     Raises
     ------
     CmmUqError : see :class:`Evaluator`, and an axis beyond its travel.
     """
 
-    def __init__(self, plan: Plan, given: Circumstances, pose: Pose) -> None:
+    def __init__(self, plan: Plan, given: Circumstances, pose: Pose, known: Known | None = None) -> None:
         points = placed(plan, pose, given.machine.machine, given.surroundings.columns)
         qualified = Qualified.on(plan, points, given.machine.machine)
         unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
@@ -96,7 +97,7 @@ class AtPose:
         base = mean_errors(given.machine, qualified, pose) + mean_expansion(given.surroundings, plan, points, pose)
         drawn = any(len(feature.surface) for feature in plan.features)
         part = plan.points if drawn or given.measured is None else given.measured
-        self.measured = Evaluator(plan, base + part - plan.points, self.causes)
+        self.measured = Evaluator(plan, base + part - plan.points, self.causes, known)
         self.still = characteristics_of(plan, part)
         self.true: Evaluator | None = None
         if drawn:
@@ -134,7 +135,8 @@ class Virtual:
 
     def __init__(self, plan: Plan, given: Circumstances) -> None:
         self.plan = plan
-        self.places = [AtPose(plan, given, pose) for pose in given.poses]
+        known: Known = {}
+        self.places = [AtPose(plan, given, pose, known) for pose in given.poses]
         self.off = self.places[0].off()
         self.exact = bool(np.any(self.off > AGREES))
 
