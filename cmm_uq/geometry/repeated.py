@@ -114,9 +114,8 @@ class Repeated:
         CmmUqError : as for least squares.
         """
         if len(self.points) <= len(self.placed.state) and self.placed.shape is not LINE:
-            return self.least_squares(
-                displacements
-            )  # as many points as parameters: the feature goes through all of them
+            # the feature goes through as many points as it has parameters
+            return self.least_squares(displacements)
         errors = self._checked(displacements)
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
         for rows in self._blocks(len(errors), 20 * BLOCK):
