@@ -267,7 +267,7 @@ def _refuse(one: Characteristic, plan: Plan) -> None:
     if one.what in ORIENTATIONS:
         allowed = ("line", "plane", "cylinder", "cone")
     if one.what in RUNOUTS:
-        allowed = ("plane", "circle", "cylinder")
+        allowed = ("plane", "circle" if one.what == "circular_runout" else "cylinder")
     for kind in kinds:
         if allowed and kind not in allowed:
             raise CmmUqError(f"a {kind} has no {one.what}", where=where, fix=f"It is of {', '.join(allowed)}")

@@ -210,6 +210,7 @@ def test_a_best_fit_of_one_face_is_refused() -> None:
     (Characteristic("c", "parallelism", ("A",)), "needs a datum"),
     (Characteristic("c", "coaxiality", ("h1",), ("A",)), "the datum of coaxiality is a plane"),
     (Characteristic("c", "position", ("h1",)), "position needs datums"),
+    (Characteristic("c", "circular_runout", ("h1",), ("h2",)), "a cylinder has no circular_runout"),
 ])  # fmt: skip
 def test_what_a_feature_does_not_have_is_refused(one: Characteristic, words: str) -> None:
     with pytest.raises(CmmUqError, match=words):
