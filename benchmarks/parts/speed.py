@@ -3,7 +3,7 @@
 Beside a plain NumPy loop over least squares (Gauss–Newton by ``numpy.linalg.lstsq``, one draw at a time) and the same with
 ``scipy.optimize.least_squares``, on as many draws as fit into a few seconds; both are given the displaced points for nothing.
 
-Run: ``OPENBLAS_NUM_THREADS=2 python -m benchmarks.parts.speed``
+Run: ``OPENBLAS_NUM_THREADS=1 python -m benchmarks.parts.speed``
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ part with the form that was drawn. A characteristic that was measured as y is th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -34,6 +35,9 @@ FEWEST = 100_000
 
 ROUNDING = 1e-9
 """mm and rad: a spread below which is none."""
+
+THREADED = 2_000
+"""Draws of a block that are worth a thread."""
 
 AGREES = 0.01
 """Of u, by which first order may be off before all is taken exactly: what u is good for."""
@@ -147,6 +151,13 @@ class Virtual:
 
     def errors(self, random: np.random.Generator, n: int) -> Floats:
         """(n, c) errors, each place as often as the others."""
+        if n < 2 * THREADED:
+            return self._drawn(random, n)
+        halves = n // 2, n - n // 2  # of streams of their own: the same numbers on any number of cores
+        with ThreadPoolExecutor(len(halves)) as threads:
+            return np.concatenate(list(threads.map(self._drawn, random.spawn(len(halves)), halves)))
+
+    def _drawn(self, random: np.random.Generator, n: int) -> Floats:
         counts = np.full(len(self.places), n // len(self.places))
         counts[random.permutation(len(counts))[: n - counts.sum()]] += 1
         found = [

@@ -306,3 +306,11 @@ def test_a_position_that_is_off_errs_to_both_sides() -> None:
         found = Virtual(plan, given).errors(np.random.default_rng(0), 50_000)[:, 0]
         assert found.std() == pytest.approx(u, rel=0.02)
         assert found.mean() == pytest.approx(mean, abs=5e-5)
+
+
+def test_a_seed_gives_the_same_bytes() -> None:
+    """In blocks that are drawn by two threads too."""
+    plan, given = Plan(*block()), Circumstances(machine(noise_um=1.0), (POSE,))
+    one, other = (Virtual(plan, given).errors(np.random.default_rng(7), 5000) for _ in range(2))
+    assert one.tobytes() == other.tobytes()
+    assert len(np.unique(one[:, 0])) == 5000
