@@ -184,7 +184,7 @@ def _representative(sizes: Sizes, prior: Floats, share: Floats) -> tuple[list[in
     whether there is any is what the evidence of an effect depends on most.
     """
     table = np.column_stack(
-        [np.where(sizes.slow > 0, sizes.rate, 0), sizes.slow, sizes.placing, sizes.growth, sizes.reading]
+        [np.where(sizes.slow > 0, sizes.rate, -1), sizes.slow, sizes.placing, sizes.growth, sizes.reading]
     )
     _, first, index = np.unique(np.round(table, 9), axis=0, return_index=True, return_inverse=True)
     before, part = (np.bincount(index.ravel(), each, len(first)) for each in (prior, share))

@@ -142,19 +142,32 @@ class Marginal:
         others = np.hstack([self._freedoms.dense(), self._turned[:, c:]])
         return SlowFirst(self._turned[:, :c], others, self.noise.classes[0], len(self._counts))
 
-    def _without_slow_noise(self, slow: SlowFirst, v: Floats, variances: Floats) -> tuple[Floats, Floats]:
-        """As :meth:`_factors`, slow noise with variances (w, c) eliminated ahead of the placings."""
-        c, free = variances.shape[1], self._freedoms.count
-        least = np.maximum(variances, (1e-6 * self._scale) ** 2)
+    def _without_slow_noise(self, slow: SlowFirst, v: Floats, sizes: Sizes) -> tuple[Floats, Floats]:
+        """As :meth:`_factors`, slow noise eliminated ahead of the placings."""
+        precision, log = self._of_slow(sizes)
+        c, free = precision.shape[1], self._freedoms.count
         P = len(self._length)
         prior = np.zeros((free + P - c, free + P - c))
         prior[free:, free:] = self._prior[c:, c:]
         at = np.arange(free)
         prior[at, at] = self._absent.ravel()
-        left, logs = slow.precision(v, prior.ravel(), 1 / (least * self._length[:c] ** 2))
+        left, logs = slow.precision(v, prior.ravel(), precision)
         diagonal = np.arange(left.shape[1])
         left[:, diagonal, diagonal] *= 1 + _JITTER
-        return _cholesky(left), -0.5 * np.log(v) @ self._counts - 0.5 * np.log(least).sum(axis=1) - logs
+        return _cholesky(left), log - 0.5 * np.log(v) @ self._counts - logs
+
+    def _of_slow(self, sizes: Sizes) -> tuple[Floats, Floats]:
+        """Precision (w, c, c) beforehand of slow noise' coefficients, and half the logarithm of its determinant (w,)."""
+        variances = np.maximum(self.noise.variances(sizes)[1], (1e-6 * self._scale) ** 2)
+        c, at = variances.shape[1], np.arange(variances.shape[1])
+        own = self._length[:c]
+        precision = np.zeros((len(variances), c, c))
+        precision[:, at, at] = 1 / (variances * own**2)
+        walks = sizes.rate == 0
+        if np.any(walks):
+            constant = int(np.flatnonzero(self.noise.frequency == 0)[0])  # all have one variance
+            precision[walks] += self.noise.tied / own / own[:, None] / variances[walks, constant, None, None]
+        return precision, -0.5 * np.log(variances).sum(axis=1)
 
     def _factors(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them.
@@ -162,24 +175,22 @@ class Marginal:
         What each placing leaves free is eliminated first, by itself; slow noise has no rows and columns where it is absent in
         all of the sizes, and comes first where there are few placings.
         """
-        variances, slow = self.noise.variances(sizes)
-        v = variances @ self.noise.classes[1].T
+        v = self.noise.variances(sizes)[0] @ self.noise.classes[1].T
         absent = not np.any(sizes.slow)
         if not absent and self._slow_first is not None:
-            return self._without_slow_noise(self._slow_first, v, slow)
+            return self._without_slow_noise(self._slow_first, v, sizes)
         products, prior, blocks = self._without_slow if absent else (self._products, self._prior.ravel(), self._blocks)
-        P = len(self._length) - absent * slow.shape[1]
+        c = self.noise.slow.shape[1]
+        P = len(self._length) - absent * c
         whole = ((1 / v) @ products).reshape(-1, P, P)
         whole += prior.reshape(P, P)
         log = -0.5 * np.log(v) @ self._counts
-        c = slow.shape[1]
         if absent:  # what is left of slow noise whose variance goes to zero
             log += np.log(self._length[:c]).sum()
         else:
-            at = np.arange(c)
-            least = np.maximum(slow, (1e-6 * self._scale) ** 2)
-            whole[:, at, at] += 1 / (least * self._length[at] ** 2)
-            log -= 0.5 * np.log(least).sum(axis=1)
+            precision, own = self._of_slow(sizes)
+            whole[:, :c, :c] += precision
+            log += own
         whole.reshape(len(whole), -1)[:, :: P + 1] *= 1 + _JITTER
         if self._freedoms.count:
             lost, own = self._eliminated(v, blocks)

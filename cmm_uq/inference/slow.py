@@ -72,7 +72,7 @@ class SlowFirst:
         ----------
         v : (w, classes) variance of the observations of each class.
         prior : (R²,) precision of the other columns beforehand.
-        of_cosines : (w, c) precision of the cosines beforehand.
+        of_cosines : (w, c, c) precision of the cosines beforehand, that of each axis by itself.
         """
         w, R = len(v), self.others.shape[1]
         left = ((1 / v) @ self._others + prior).reshape(w, R, R)
@@ -85,7 +85,7 @@ class SlowFirst:
             bordered[:, :c] = now
             bordered[:, c:, :c] = now[:, :, c:].transpose(0, 2, 1)
             at, beyond = np.arange(c), np.arange(c, c + R)
-            bordered[:, at, at] += of_cosines[:, columns]
+            bordered[:, :c, :c] += of_cosines[:, columns[:, None], columns]
             bordered[:, beyond, beyond] = most[:, None]
             factor = np.linalg.cholesky(bordered)
             rows = factor[:, c:, :c]

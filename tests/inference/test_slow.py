@@ -39,8 +39,8 @@ def linear() -> LinearModel:
 
 
 SIZES = Sizes(
-    np.array([[1.0, 2.0, 0.5], [0.3, 0.4, 0.5], [1.0, 1.0, 1.0]]), np.zeros(3), np.zeros(3), np.array([1.2, 3.0, 0.2]),
-    np.array([4.0, 30.0, 1.0]),
+    np.array([[1.0, 2.0, 0.5], [0.3, 0.4, 0.5], [1.0, 1.0, 1.0], [1.0, 2.0, 0.5]]), np.zeros(4), np.zeros(4),
+    np.array([1.2, 3.0, 0.2, 1.2]), np.array([4.0, 30.0, 1.0, 0.0]),
 )  # fmt: skip
 
 
@@ -62,10 +62,14 @@ def test_what_is_left_is_the_schur_complement() -> None:
     """Of the precision of cosines and other columns together, by dense algebra."""
     random, noise = np.random.default_rng(4), three_axes()
     others, classes = random.standard_normal((M, 4)), AXIS.astype(np.int64)
-    v, prior, own = np.array([[1.0, 4.0, 0.25]]), np.diag([0.0, 0.1, 0.2, 0.3]), random.uniform(0.5, 2.0, (1, 15))
-    left, logs = SlowFirst(noise.slow, others, classes, 3).precision(v, prior.ravel(), own)
+    v, prior, own = (
+        np.array([[1.0, 4.0, 0.25]]),
+        np.diag([0.0, 0.1, 0.2, 0.3]),
+        np.diag(random.uniform(0.5, 2.0, 15)) + noise.tied,
+    )
+    left, logs = SlowFirst(noise.slow, others, classes, 3).precision(v, prior.ravel(), own[None])
     weight = np.diag(1 / v[0, classes])
-    S = noise.slow.T @ weight @ noise.slow + np.diag(own[0])
+    S = noise.slow.T @ weight @ noise.slow + own
     across = noise.slow.T @ weight @ others
     wanted = others.T @ weight @ others + prior - across.T @ np.linalg.solve(S, across)
     assert left[0] == pytest.approx(wanted, rel=1e-10, abs=1e-10)
@@ -77,7 +81,7 @@ def test_density_and_draws_do_not_depend_on_what_is_eliminated_first(monkeypatch
     first = Marginal(model, noise, solve(model))
     monkeypatch.setattr(module, "_MOST_FREE", -1)
     last = Marginal(model, noise, solve(model))
-    assert first.log_likelihood(SIZES)[0] - last.log_likelihood(SIZES)[0] == pytest.approx(np.zeros(3), abs=1e-7)
+    assert first.log_likelihood(SIZES)[0] - last.log_likelihood(SIZES)[0] == pytest.approx(np.zeros(4), abs=1e-7)
     assert first.log_likelihood(SIZES)[1] == pytest.approx(last.log_likelihood(SIZES)[1], rel=1e-8)
     draws = [each.draw(SIZES, np.random.default_rng(5)) for each in (first, last)]
     assert draws[0] == pytest.approx(draws[1], rel=1e-7)
@@ -90,15 +94,19 @@ def kernel(rate: float, sd: float) -> Floats:
 def test_the_covariance_in_full_is_that_of_an_ornstein_uhlenbeck_process_along_each_axis() -> None:
     columns = three_axes().exact(SIZES.at([1]))
     assert columns @ columns.T == pytest.approx(kernel(30.0, 3.0), abs=1e-9)
+    columns = three_axes().exact(SIZES.at([3]))
+    walked = 2 * 1.2**2 * np.minimum(PART[:, None], PART) * (AXIS[:, None] == AXIS)
+    assert columns @ columns.T == pytest.approx(walked, abs=1e-9)
 
 
 def test_cosines_leave_out_as_much_as_they_say() -> None:
     """Variance of the process less that of the cosines, as a part of what no other reading shares."""
     noise = three_axes()
     _, slow = noise.variances(SIZES)
-    left = SIZES.slow**2 - slow[:, :5].sum(axis=1)
+    walked = SIZES.slow**2 * np.where(SIZES.rate > 0, 1, 1 / 3)  # a walk's cosines without the constant
+    left = walked - np.where(SIZES.rate > 0, slow[:, 0], 0) - slow[:, 1:5].sum(axis=1)
     assert noise.quick(SIZES) == pytest.approx(left / (left + SIZES.coordinate**2), rel=1e-12)
-    assert noise.quick(replace(SIZES, slow=np.zeros(3))) == pytest.approx(np.zeros(3))
+    assert noise.quick(replace(SIZES, slow=np.zeros(4))) == pytest.approx(np.zeros(4))
 
 
 def test_the_slowest_cosines_are_those_of_every_axis() -> None:
