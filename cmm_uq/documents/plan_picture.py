@@ -80,7 +80,14 @@ def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
             ax.axis("off")
             left = i / A_ROW + 0.008
             figure.text(left, 1 - 4.5 / height, f"{first + i}", fontsize=10, color=ACCENT, fontweight="bold")
-            figure.text(left + 0.035, 1 - 4.5 / height, placing.title, fontsize=7.5, color=INK, fontweight="bold")
+            figure.text(
+                left + 0.035,
+                1 - 4.5 / height,
+                placing.title,
+                fontsize=_size(placing.title),
+                color=INK,
+                fontweight="bold",
+            )
             figure.text(left, 1 - 9.5 / height, placing.ends, fontsize=TINY, color=MUTED)
         last = first + len(placings) - 1
         numbers = (
@@ -199,6 +206,12 @@ def gain_plot(
         )
         both = say("{quantity} with {one} and with {other}.", quantity=quantity, one=names[0], other=names[1])
         return drawn(figure, both, told)
+
+
+def _size(title: Text) -> float:
+    """Of the letters of a placing's title, smaller where it is longer than its picture is wide."""
+    said, room = lettered(title), WIDTH_MM * (1 / A_ROW - 0.05)
+    return SMALL if said is title else SMALL * min(1.0, room / width_mm(said, SMALL, "bold"))
 
 
 def _edge(last: Text) -> float:
