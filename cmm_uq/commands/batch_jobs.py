@@ -130,7 +130,7 @@ class Wanted:
             data is not None
             and data.get("software", {}).get("version") == __version__
             and data.get("job", {}).get("inputs_sha256") == sha256(job.inputs)
-            and data["job"].get("language", ENGLISH) == job.facts.job.language
+            and data.get("job", {}).get("language", ENGLISH) == job.facts.job.language
             and data.get("sampling", {}).get("seed", self.seed) == self.seed
         )
         return data if same else None

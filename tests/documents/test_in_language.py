@@ -23,6 +23,8 @@ from cmm_uq.documents.html import render_html
 from cmm_uq.documents.in_language import said
 from cmm_uq.documents.lettering import lettered_in
 from cmm_uq.documents.pdf import render_pdf
+from cmm_uq.documents.plan_picture import _edge, _size
+from cmm_uq.documents.plot_style import SMALL
 from cmm_uq.documents.plots import budget_bars
 from cmm_uq.documents.results_file import head
 from cmm_uq.errors import CmmUqError
@@ -150,6 +152,16 @@ def test_a_long_name_beside_a_bar_is_cut_to_its_room() -> None:
     [cut] = {text for text in plot.lettering if text.endswith("…")}
     assert said_in(name, "de").startswith(cut[:-1])
     assert len(cut) > 25
+
+
+def test_a_long_title_of_a_placing_is_set_smaller_and_a_long_tick_has_room() -> None:
+    """English letters keep their size, and the axis its end."""
+    title, never = say("along {direction}", direction=Verbatim("+X" * 20)), say("not at all")
+    with lettered_in("de"):
+        twice = say("along {direction}", direction=Verbatim("+X" * 40))
+        assert _size(twice) < _size(title) < SMALL
+        assert _edge(never) > 1.38
+    assert (_size(title), _edge(never)) == (SMALL, 1.38)
 
 
 def test_a_japanese_pdf_has_every_character_and_breaks_no_line_before_a_full_stop() -> None:
