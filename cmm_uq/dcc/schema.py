@@ -35,13 +35,15 @@ def checked_by_schema(data: bytes, folder: Path, where: str) -> None:
     """
     version = parsed(data, where).attributes.get("schemaVersion", "")
     schema = _schema(folder, version, where)
-    import defusedxml.ElementTree  # type: ignore[import-untyped]
+    import defusedxml.ElementTree
 
     root = defusedxml.ElementTree.fromstring(data)
     errors = [error for error, _ in zip(schema.iter_errors(root), range(_MOST), strict=False)]
     if errors:
         found = [
-            CmmUqError(str(error.reason), where=f"{where}, {error.path}", fix=f"The schema of DCC {version} asks for it")
+            CmmUqError(
+                str(error.reason), where=f"{where}, {error.path}", fix=f"The schema of DCC {version} asks for it"
+            )
             for error in errors
         ]
         found[0].also = tuple(found[1:])
@@ -54,7 +56,9 @@ def _schema(folder: Path, version: str, where: str) -> Any:
         import xmlschema
     except ImportError:
         raise CmmUqError(
-            "the package xmlschema is not installed", where="--schema", fix="pip install xmlschema, or leave --schema out"
+            "the package xmlschema is not installed",
+            where="--schema",
+            fix="pip install xmlschema, or leave --schema out",
         ) from None
     file = folder / f"dcc-{version}.xsd"
     if not re.fullmatch(r"3\.\d+\.\d+", version) or not file.is_file():
@@ -66,7 +70,9 @@ def _schema(folder: Path, version: str, where: str) -> Any:
     for space, location in _IMPORT.findall(text):
         wanted = _of_version(folder, space, location) or places.get(space)
         if wanted is None:
-            raise CmmUqError(f"imports {location}, which is not beside it", where=str(file), fix="Put it into the same folder")
+            raise CmmUqError(
+                f"imports {location}, which is not beside it", where=str(file), fix="Put it into the same folder"
+            )
         text = text.replace(f'"{location}"', f'"{Path(wanted).as_uri()}"')
     return xmlschema.XMLSchema(text, base_url=str(folder), allow="local", defuse="always")
 

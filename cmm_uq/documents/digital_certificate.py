@@ -6,7 +6,7 @@ choice.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import sqrt
 from types import MappingProxyType
 from typing import Any
@@ -14,7 +14,7 @@ from typing import Any
 from scipy import special
 
 from cmm_uq.dcc.certificate import Administrative, Certificate
-from cmm_uq.dcc.quantities import Column, Covariance, Ellipsoid, ExpandedList, Real, RealList
+from cmm_uq.dcc.quantities import Column, Covariance, Ellipsoid, ExpandedList, RealList
 from cmm_uq.dcc.results import Data, Measurement, Quantity, Result
 from cmm_uq.dcc.texts import Attached
 from cmm_uq.documents.clauses import certifies
@@ -112,7 +112,11 @@ def digital_certificate(
 def _title(job: Job) -> Text:
     mark = mark_of(job)
     named = say("Calibration of {machine}", machine=Verbatim(job.facts.machine.name))
-    return named if mark is None else say("{banner}: {machine}", banner=mark.banner, machine=Verbatim(job.facts.machine.name))
+    return (
+        named
+        if mark is None
+        else say("{banner}: {machine}", banner=mark.banner, machine=Verbatim(job.facts.machine.name))
+    )
 
 
 def free(results: Mapping[str, Any]) -> frozenset[str]:
@@ -169,14 +173,18 @@ def _together(results: Mapping[str, Any], say_in: SayIn, figures: Figures) -> Re
         region=region,
     )  # fmt: skip
     title = say("Estimates together, with their covariance")
-    quantity = Quantity(id=figures.id_of(("covariance",)), name=words_of(title, say_in), value=stated, ref_type=("cmm_covariance",))
+    quantity = Quantity(
+        id=figures.id_of(("covariance",)), name=words_of(title, say_in), value=stated, ref_type=("cmm_covariance",)
+    )
     return Result(name=words_of(title, say_in), data=Data(parts=(quantity,)), ref_type=("cmm_covariance",))
 
 
 def _of(results: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
     """An estimate, or a size of the artefact, by its name in the covariance."""
     owner, _, parameter = name.partition(".")
-    place: Mapping[str, Any] = results["estimates"].get(owner, {}) if owner != "artefact" else results.get("artefact", {})
+    place: Mapping[str, Any] = (
+        results["estimates"].get(owner, {}) if owner != "artefact" else results.get("artefact", {})
+    )
     found = place.get(parameter)
     return found if isinstance(found, Mapping) and "u" in found else None
 

@@ -69,7 +69,10 @@ def core_data(job: Job, languages: Sequence[str], say_in: SayIn) -> CoreData:
     """Identifier, languages and dates."""
     facts = job.facts.job
     number, mark = one_line(facts.number or facts.id), mark_of(job)
-    known = [("calibrationLaboratory", facts.id, say("Job"), "cmm_job"), ("customer", facts.order, say("Order"), "basic_orderNumber")]
+    known = [
+        ("calibrationLaboratory", facts.id, say("Job"), "cmm_job"),
+        ("customer", facts.order, say("Order"), "basic_orderNumber"),
+    ]
     return CoreData(
         country=job.facts.laboratory.country or UNKNOWN_COUNTRY,
         languages=tuple(languages),
@@ -117,9 +120,13 @@ def _travel(job: Job, say_in: SayIn) -> list[PrimitiveQuantity]:
         if travel:
             name = words_of(say("Measuring range of {axis}", axis=Verbatim(axis.upper())), say_in)
             ends = RealList(
-                labels=("lowest", "highest"), values=tuple(Decimal(repr(float(end))) for end in travel), units=(UNITS["mm"].dsi,)
+                labels=("lowest", "highest"),
+                values=tuple(Decimal(repr(float(end))) for end in travel),
+                units=(UNITS["mm"].dsi,),
             )
-            found.append(PrimitiveQuantity(id=f"travel_{axis}", name=name, value=ends, ref_type=("cmm_measuringRange",)))
+            found.append(
+                PrimitiveQuantity(id=f"travel_{axis}", name=name, value=ends, ref_type=("cmm_measuringRange",))
+            )
     return found
 
 
@@ -173,7 +180,9 @@ def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
     if facts.replaces is not None:
         told = (replaced_certificate(facts.replaces), Verbatim(facts.replaces.reason), Verbatim(facts.replaces.changed))
         found.append(
-            Statement(name=words_of(say("Replaces"), say_in), declaration=rich_of(told, say_in), ref_type=("basic_revision",))
+            Statement(
+                name=words_of(say("Replaces"), say_in), declaration=rich_of(told, say_in), ref_type=("basic_revision",)
+            )
         )
     if facts.recalibration_agreed:
         name = words_of(say("Next calibration, as agreed with the customer"), say_in)

@@ -42,7 +42,9 @@ _P_TWICE = Decimal("0.9545")
 """Probability of a normal distribution within two standard deviations."""
 
 
-def statements(decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: Figures, *, certifies: bool) -> tuple[Statement, ...]:
+def statements(
+    decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: Figures, *, certifies: bool
+) -> tuple[Statement, ...]:
     """A statement for each decision of results.json.
 
     Parameters
@@ -56,7 +58,11 @@ def statements(decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: Fig
 
 def _statement(i: int, one: Mapping[str, Any], say_in: SayIn, figures: Figures, *, certifies: bool) -> Statement:
     decision = one["decision"]
-    named = say("{standard}, {characteristic}", standard=Verbatim(one["standard"]), characteristic=Verbatim(one["characteristic"]))
+    named = say(
+        "{standard}, {characteristic}",
+        standard=Verbatim(one["standard"]),
+        characteristic=Verbatim(one["characteristic"]),
+    )
     return Statement(
         id=figures.id_of(("conformity", str(i))),
         name=words_of(named, say_in),
@@ -122,7 +128,9 @@ def _permissible(path: tuple[str, ...], mpe: Mapping[str, Any], say_in: SayIn, f
             )  # fmt: skip
 
 
-def evidence(decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: Figures, *, certifies: bool) -> tuple[Result, ...]:
+def evidence(
+    decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: Figures, *, certifies: bool
+) -> tuple[Result, ...]:
     """Every value that was decided, and the budget of the one that is named."""
     found = []
     for i, one in enumerate(decided):

@@ -123,7 +123,9 @@ class Figures:
         yield self._quantity(path, Real(value=value, unit=unit.dsi, uncertainty=stated))
         if interval is not None and interval is not stated and not _symmetric(data):
             named = say("{what}, 95 % coverage interval", what=self.title(path))
-            yield self._quantity((*path, "interval95"), Real(value=value, unit=unit.dsi, uncertainty=interval), name=named)
+            yield self._quantity(
+                (*path, "interval95"), Real(value=value, unit=unit.dsi, uncertainty=interval), name=named
+            )
         for key, further in data.items():
             if key not in ("value", "u", "U", "k", "interval95"):
                 yield from self.parts((*path, key), further, unit)
@@ -164,9 +166,13 @@ class Figures:
         elif all(isinstance(value, Mapping) for value in values):
             yield from self._rows(path, values)
         else:
-            inner = [part for i, value in enumerate(values) for part in self.parts((*path, str(i)), value, unit or above)]
+            inner = [
+                part for i, value in enumerate(values) for part in self.parts((*path, str(i)), value, unit or above)
+            ]
             if inner:
-                yield QuantityList(name=words_of(self.title(path), self.say_in), parts=tuple(inner), id=self.id_of(path))
+                yield QuantityList(
+                    name=words_of(self.title(path), self.say_in), parts=tuple(inner), id=self.id_of(path)
+                )
 
     def _rows(self, path: Path, rows: Sequence[Mapping[str, Any]]) -> Iterator[Part]:
         """A table by its columns; row by row where a cell holds more than a figure, a text or a point."""
@@ -219,7 +225,10 @@ class Figures:
             "value": inputs, "u": inputs, "sensitivity": tuple(ratio(unit, one) for one in inputs),
             "contribution": (unit,) * len(lines), "share": (ONE.dsi,) * len(lines), "dof": (ONE.dsi,) * len(lines),
         }  # fmt: skip
-        inner = [self._quantity((*below, key), _texts([line[key] for line in lines])) for key in ("input", "distribution", "source")]
+        inner = [
+            self._quantity((*below, key), _texts([line[key] for line in lines]))
+            for key in ("input", "distribution", "source")
+        ]
         for key, units in columns.items():
             held = [i for i, line in enumerate(lines) if line[key] is not None]
             if held:
@@ -228,7 +237,9 @@ class Figures:
                     labels=labels, values=_decimals([lines[i][key] for i in held]), units=tuple(units[i] for i in held)
                 )
                 inner.append(self._quantity((*below, key), found))
-        yield QuantityList(name=words_of(say("Uncertainty budget"), self.say_in), parts=tuple(inner), id=self.id_of(below))
+        yield QuantityList(
+            name=words_of(say("Uncertainty budget"), self.say_in), parts=tuple(inner), id=self.id_of(below)
+        )
 
 
 def _decimals(values: Sequence[float]) -> tuple[Decimal, ...]:
@@ -290,7 +301,10 @@ def _quantities(values: Sequence[Mapping[str, Any]], labels: tuple[str, ...], un
             probabilities=tuple(one.probability for one in found),
         )  # fmt: skip
     return RealList(
-        labels=labels, values=_decimals([value["value"] for value in values]), units=(unit.dsi,), uncertainty=uncertainty
+        labels=labels,
+        values=_decimals([value["value"] for value in values]),
+        units=(unit.dsi,),
+        uncertainty=uncertainty,
     )
 
 

@@ -62,7 +62,9 @@ def equipment(job: Job, say_in: SayIn) -> Equipments:
         )
     ]  # fmt: skip
     if gauge is not None:
-        quantities = _certified("short_gauge", say("Certified length"), gauge.length_mm, gauge.u_um, gauge.cte_per_k, say_in)
+        quantities = _certified(
+            "short_gauge", say("Certified length"), gauge.length_mm, gauge.u_um, gauge.cte_per_k, say_in
+        )
         named = gauge.name or str.__str__(say("Short gauge"))
         found.append(_reference(job, named, gauge.serial, gauge.certificate, say_in, tuple(quantities)))
     taken = [] if job.acquired is None else job.acquired.said.instruments
@@ -79,7 +81,12 @@ def equipment(job: Job, say_in: SayIn) -> Equipments:
 
 
 def _reference(
-    job: Job, name: str, serial: str, chain: Traceability | None, say_in: SayIn, quantities: tuple[PrimitiveQuantity, ...]
+    job: Job,
+    name: str,
+    serial: str,
+    chain: Traceability | None,
+    say_in: SayIn,
+    quantities: tuple[PrimitiveQuantity, ...],
 ) -> Equipment:
     """A measurement standard, with its certificate."""
     return Equipment(
@@ -115,7 +122,10 @@ def _certificate(job: Job, chain: Traceability | None, say_in: SayIn) -> Hash | 
 
 def _paper(number: str, say_in: SayIn) -> Hash:
     return Hash(
-        referral=words_of(say("Calibration certificate"), say_in), referral_id=one_line(number), procedure=NO_HASH, value=NO_HASH
+        referral=words_of(say("Calibration certificate"), say_in),
+        referral_id=one_line(number),
+        procedure=NO_HASH,
+        value=NO_HASH,
     )
 
 
@@ -125,7 +135,9 @@ def _certified(
     """Length and expansion as the job states them."""
     if length is not None:
         u = Decimal(repr(float(u_um or 0.0))).scaleb(-3)
-        stated = Expanded(uncertainty=u, factor=Decimal(1), probability=P_STANDARD, distribution="normal") if u else None
+        stated = (
+            Expanded(uncertainty=u, factor=Decimal(1), probability=P_STANDARD, distribution="normal") if u else None
+        )
         yield _primitive(f"{owner}_length", name, length, UNITS["mm"], say_in, stated)
     if cte:
         yield _primitive(f"{owner}_cte", say("Coefficient of thermal expansion"), cte, UNITS["1/K"], say_in)
@@ -143,13 +155,19 @@ def conditions(job: Job, say_in: SayIn) -> tuple[Condition, ...]:
     found = []
     if job.facts.job.conditions:
         told = rich_of((Verbatim(job.facts.job.conditions),), say_in)
-        found.append(Condition(name=words_of(say("Conditions"), say_in), data=Data(parts=(told,)), ref_type=("cmm_conditions",)))
+        found.append(
+            Condition(name=words_of(say("Conditions"), say_in), data=Data(parts=(told,)), ref_type=("cmm_conditions",))
+        )
     for column, what in TEMPERATURES.items():
         if column in job.points.columns:
             values = job.points.columns[column]
             ends = (
-                _temperature(f"{column}.min", say("Lowest temperature"), float(values.min()), "basic_temperatureMin", say_in),
-                _temperature(f"{column}.max", say("Highest temperature"), float(values.max()), "basic_temperatureMax", say_in),
+                _temperature(
+                    f"{column}.min", say("Lowest temperature"), float(values.min()), "basic_temperatureMin", say_in
+                ),
+                _temperature(
+                    f"{column}.max", say("Highest temperature"), float(values.max()), "basic_temperatureMax", say_in
+                ),
             )
             name = words_of(say("Temperature: {what}", what=what), say_in)
             found.append(Condition(name=name, data=Data(parts=ends), ref_type=("basic_temperature",)))
