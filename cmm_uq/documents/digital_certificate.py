@@ -45,7 +45,8 @@ _TITLES: Mapping[str, Text] = MappingProxyType({
     "differences": say("Differences that are determined"), "artefact": say("Sizes of the artefact after the fit"),
     "certified": say("Certified sizes of the artefact"), "tolerances": say("Parameters and tolerances"),
     "noise": say("Noise of a reading"), "least_squares": say("Least squares, for comparison"),
-    "as_found": say("The machine as it was found, before it was adjusted"), "cmc": say("Calibration and measurement capability"),
+    "as_found": say("The machine as it was found, before it was adjusted"),
+    "cmc": say("Calibration and measurement capability"),
 })  # fmt: skip
 """Of parts of results.json that every kind has, in the order of the certificate; those of a kind have their key as title."""
 
@@ -150,8 +151,8 @@ def _together(results: Mapping[str, Any], say_in: SayIn, figures: Figures) -> Re
         return None
     names = data["parameters"]
     chosen = [i for i, name in enumerate(names) if name not in figures.free]
-    found = [_of(results, names[i]) for i in chosen]
-    if not 1 < len(chosen) <= _MOST or not all(one and one["u"] and one["k"] and one["k"] >= 1 for one in found):
+    found = [one for i in chosen if (one := _of(results, names[i])) and one["u"] and one["k"] and one["k"] >= 1]
+    if not 1 < len(chosen) <= _MOST or len(found) < len(chosen):
         return None
     units = [dsi_of(data["units"][i]) for i in chosen]
     region = Ellipsoid(

@@ -96,9 +96,11 @@ def items(job: Job, say_in: SayIn) -> Items:
     """The machine."""
     machine = job.facts.machine
     serial = Identification(
-        issuer="manufacturer", value=one_line(machine.serial) or str.__str__(NOT_STATED), name=words_of(say("Serial number"), say_in),
+        issuer="manufacturer",
+        value=one_line(machine.serial) or str.__str__(NOT_STATED),
+        name=words_of(say("Serial number"), say_in),
         ref_type=("basic_serialNumber",),
-    )  # fmt: skip
+    )
     item = Item(
         id="machine",
         name=words_of(Verbatim(machine.name), say_in),
@@ -187,15 +189,15 @@ def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
     if facts.recalibration_agreed:
         name = words_of(say("Next calibration, as agreed with the customer"), say_in)
         found.append(Statement(name=name, date=facts.recalibration_agreed, ref_type=("basic_recalibration",)))
-    told = [
+    further = [
         (say("Place"), facts.place), (say("Deviations from the method"), facts.deviations),
         (say("Results of external providers"), facts.external), (say("Data of the customer"), facts.from_customer),
         (say("Remarks"), facts.remarks),
     ]  # fmt: skip
-    for name, text in told:
+    for what, text in further:
         if text:
             paragraphs = (Verbatim(text), *((NOT_OURS,) if text is facts.from_customer else ()))
-            found.append(Statement(name=words_of(name, say_in), declaration=rich_of(paragraphs, say_in)))
+            found.append(Statement(name=words_of(what, say_in), declaration=rich_of(paragraphs, say_in)))
     return tuple(found)
 
 

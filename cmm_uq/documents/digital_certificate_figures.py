@@ -34,6 +34,12 @@ POSTERIOR = "posterior"
 """In place of a named distribution: that of the draws in posterior.npz."""
 
 NOT_DETERMINED = say("not determined by this recording")
+_ESTIMATED = ("estimates", "artefact")
+"""Keys of what is estimated with the priors that physics allows."""
+
+_NO_RESULT = ("noise", "least_squares")
+"""Keys of what is there for comparison, which nobody who looks for measured values should find."""
+
 _SHORT = 4
 """Numbers of a list that stand in columns of their own: a point, a direction."""
 
@@ -115,7 +121,7 @@ class Figures:
 
     def _with_uncertainty(self, path: Path, data: Mapping[str, Any], unit: Unit) -> Iterator[Part]:
         """A value with u, U, k and interval, and what else is said of it."""
-        if ".".join(path[-2:]) in self.free or data["value"] is None:
+        if data["value"] is None or (path[0] in _ESTIMATED and ".".join(path[-2:]) in self.free):
             yield self._quantity(path, rich_of((NOT_DETERMINED,), self.say_in))
             return
         value, interval = decimal(data["value"]), _interval(data)
@@ -287,7 +293,7 @@ def _symmetric(data: Mapping[str, Any]) -> bool:
     """Whether both sides of the interval are the same to the two digits that are printed of U."""
     value, (low, high), U = data["value"], data["interval95"], data["U"]
     step = 10.0 ** (math.floor(math.log10(U)) - 1)
-    return round((high - value) / step) == round((value - low) / step)
+    return bool(round((high - value) / step) == round((value - low) / step))
 
 
 def _quantities(values: Sequence[Mapping[str, Any]], labels: tuple[str, ...], unit: Unit) -> RealList:
@@ -310,7 +316,9 @@ def _quantities(values: Sequence[Mapping[str, Any]], labels: tuple[str, ...], un
 
 def _ref_type(path: Path, value: Any) -> tuple[str, ...]:
     """What the good practice of the DCC calls it."""
-    if not isinstance(value, Real | RealList):
+    if path[-1] == "interval95":
+        return ("cmm_coverageInterval",)
+    if not isinstance(value, Real | RealList) or path[0] in _NO_RESULT:
         return ()
     if path[0] in ("certified", "tolerances") or path[-1].startswith("reference"):
         return ("basic_referenceValue",) if path[0] != "tolerances" else ("cmm_toleranceLimit",)

@@ -1,4 +1,4 @@
-"""How it was measured, in a digital certificate: methods, software, the artefact with its certificate, conditions, metadata."""
+"""How it was measured, in a digital certificate: methods, software, the artefact, conditions, metadata."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def _certificate(job: Job, chain: Traceability | None, say_in: SayIn) -> Hash | 
     told: list[Text] = [Verbatim(chain.laboratory)] if chain.laboratory else []
     told += [say("of {date}", date=day(chain.date))] if chain.date else []
     told += [say("due {date}", date=day(chain.due))] if chain.due else []
-    digest = sha256(job.inputs)[file] if file in job.inputs else None
+    digest = sha256(job.inputs)[file] if file is not None and file in job.inputs else None
     return Hash(
         referral=words_of(say("Calibration certificate"), say_in), referral_id=number,
         procedure="SHA-256" if digest else NO_HASH, value=digest or NO_HASH,
