@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -53,7 +54,17 @@ def product(one: str, other: str) -> str:
 
 
 def ratio(one: str, other: str) -> str:
-    """Unit of a sensitivity; D-SI takes one fraction."""
-    if one == other:
-        return ONE.dsi
-    return one if other == ONE.dsi else rf"{one}\per{other}"
+    """Unit of a sensitivity."""
+    return ONE.dsi if one == other else product(one, _inverse(other))
+
+
+_FACTOR = re.compile(r"((?:\\(?:nano|micro|milli|centi|kilo))?\\[a-z]+)(?:\\tothe\{(-?\d+)\})?")
+"""A unit with its prefix, and the power of both; those of the table."""
+
+
+def _inverse(unit: str) -> str:
+    """One over a unit: every power with the other sign."""
+    if unit == ONE.dsi or unit.startswith("|"):
+        return unit if unit == ONE.dsi else f"|1/({unit[1:]})"
+    factors = ((name, -int(power or 1)) for name, power in _FACTOR.findall(unit))
+    return "".join(name if power == 1 else rf"{name}\tothe{{{power}}}" for name, power in factors)
