@@ -10,12 +10,13 @@ from cmm_uq.commands.written import Form, Stage, Told, Written, silent
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.documents.diagnosis_next import TO_FILL_IN
 from cmm_uq.documents.outcome import Outcome
+from cmm_uq.documents.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job
 from cmm_uq.plugins import naming_package
 from cmm_uq.records.place import NONE
 
 CERTIFICATE, DIAGNOSIS = ("certificate.html", "certificate.pdf"), ("diagnosis.html", "diagnosis.pdf")
-REPORT = Form("report", CERTIFICATE, recorded=True)
+REPORT = Form("report", CERTIFICATE, further=(PROVENANCE,), recorded=True)
 DIAGNOSE = Form("diagnose", DIAGNOSIS, "diagnosis", (TO_FILL_IN,), recorded=True)
 
 
@@ -48,7 +49,7 @@ def write_report(
     job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
     told: Told | None = None, records: str | Path | None = NONE,
 ) -> Written:  # fmt: skip
-    """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
+    """Analyse a job and write its certificate (HTML and PDF), ``results.json`` and ``provenance.json``, all or none.
 
     A kind may add files of its own. Documents of a recording that was not measured carry its origin in their names.
 

@@ -136,22 +136,24 @@ class Form:
         from cmm_uq.documents.html import render_html
         from cmm_uq.documents.origin import marked
         from cmm_uq.documents.pdf import render_pdf
+        from cmm_uq.documents.provenance import FILE, provenance
 
         job, data = outcome.found.job, as_json(outcome.results)
         document = marked(outcome.document, job)
-        for name in outcome.files.keys() & job.inputs.keys():
+        for name in {*outcome.files, *self.further} & job.inputs.keys():
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
-        rendered = {}
+        rendered: dict[str, bytes] = {}
+        further = {RESULTS: data, **outcome.files}
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
-            pdf = name.endswith(".pdf")
-            rendered[name] = (
-                render_pdf(document, {**job.inputs, RESULTS: data, **outcome.files})
-                if pdf
-                else render_html(document).encode()
-            )
-        return {**rendered, RESULTS: data, **outcome.files}
+            if name.endswith(".pdf"):
+                if FILE in self.further:
+                    further[FILE] = provenance(job, outcome.results, {**rendered, **further})
+                rendered[name] = render_pdf(document, {**job.inputs, **further})
+            else:
+                rendered[name] = render_html(document).encode()
+        return {**rendered, **further}
 
     def names(self, job: Job) -> list[str]:
         """Of the documents of a job."""

@@ -17,7 +17,7 @@ import pytest
 from tests.cli.process import COMMAND, run, run_apart
 from tests.cli.terminal import everything, on_terminal, until
 
-FILES = ["certificate.html", "certificate.pdf", "manifest.json", "posterior.npz", "results.json"]
+FILES = ["certificate.html", "certificate.pdf", "manifest.json", "posterior.npz", "provenance.json", "results.json"]
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +54,7 @@ def test_the_pdf_carries_the_job_and_the_results(
         attached = {name: pdf.attachments[name].get_file().read_bytes() for name in pdf.attachments}
     assert attached["results.json"] == (report / "results.json").read_bytes()
     assert attached["posterior.npz"] == (report / "posterior.npz").read_bytes()
+    assert attached["provenance.json"] == (report / "provenance.json").read_bytes()
     assert attached["job.toml"] == (iota / "job.toml").read_bytes()
     assert attached["ballbar.csv"] == (iota / "ballbar.csv").read_bytes()
 
