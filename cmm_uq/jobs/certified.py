@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
@@ -141,7 +141,7 @@ def _found(wanted: CertifiedValue, certificate: Certificate, given: Mapping[str,
     if isinstance(named, str):
         chosen = [one for one in every if named in (one.name, heading(one), one.id, one.shown)]
     else:
-        chosen = [one for one in every if len(one.values) == wanted.count and _called(one, wanted.words)]
+        chosen = [one for one in every if len(one.values) == wanted.count and _called(one, wanted)]
     if len(chosen) == 1 and len(chosen[0].values) == wanted.count:
         return chosen[0]
     if not chosen and not wanted.needed:
@@ -154,9 +154,11 @@ def _found(wanted: CertifiedValue, certificate: Certificate, given: Mapping[str,
     )  # fmt: skip
 
 
-def _called(one: Figures, words: Sequence[str]) -> bool:
+def _called(one: Figures, wanted: CertifiedValue) -> bool:
+    """Whether it goes by a name of what is wanted; a deviation is a certified value of a form only."""
     name = " ".join((*one.place[2:], one.name, *one.ref_types)).casefold()
-    return any(word in name for word in words) and not any(word in name for word in _NO_RESULT)
+    other = () if wanted.micrometres else _NO_RESULT
+    return any(word in name for word in wanted.words) and not any(word in name for word in other)
 
 
 def _valued(wanted: CertifiedValue, one: Figures, given: Mapping[str, Any], where: str) -> dict[str, Any]:

@@ -33,7 +33,16 @@ class CertifiedValue:
 
 LENGTH_WORDS = ("length", "distance", "länge", "abstand", "longueur", "長さ", "距離")
 DIAMETER_WORDS = ("diameter", "durchmesser", "diamètre", "直径")
-FORM_WORDS = ("form", "roundness", "sphericity", "rundheit", "circularité", "真球度")
+FORM_WORDS = (
+    "form dev",
+    "form error",
+    "formabweichung",
+    "roundness",
+    "sphericity",
+    "rundheit",
+    "circularité",
+    "真球度",
+)
 """In English, German, French and Japanese."""
 
 LENGTH = CertifiedValue("length_mm", "u_um", LENGTH_WORDS)
