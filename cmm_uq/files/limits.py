@@ -31,7 +31,9 @@ MODEL_BYTES = Limit(4_000_000, "bytes", "model file of a budget", "holds 250 000
 TABLE_BYTES = Limit(64_000_000, "bytes", "recording, temperature log", "100 000 rows of 30 columns take half of it")
 UNPACKED = Limit(400_000_000, "bytes", "workbook once it is unpacked", "200 000 rows of 30 columns take half of it")
 MAP_BYTES = Limit(4_000_000, "bytes", "error map", "30 000 positions")
-DCC_BYTES = Limit(64_000_000, "bytes", "digital certificate", "attached files and its human-readable copy take a few of them")
+DCC_BYTES = Limit(
+    64_000_000, "bytes", "digital certificate", "attached files and its human-readable copy take a few of them"
+)
 SECRET_BYTES = Limit(4_096, "bytes", "file with a secret", "a password is one line")
 
 ROWS = Limit(200_000, "rows", "CSV file", "a scanned surface; larger ones are point clouds")
@@ -69,8 +71,8 @@ DRAWS = Limit(250_000, "entries", "samples of an input", "draws of an earlier Mo
 INPUTS = Limit(500, "entries", "inputs, outputs or correlations of a budget", "its matrix of correlations is square")
 
 LIMITS = (
-    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, DCC_BYTES, SECRET_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS,
-    FREEDOMS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY,
+    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, DCC_BYTES, SECRET_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS,
+    OBSERVATIONS, FREEDOMS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY,
     LISTED, DRAWS, INPUTS, XML_ELEMENTS, XML_DEPTH, XML_ATTRIBUTES,
 )  # fmt: skip
 """All of them, in the order of docs/limits.md."""
