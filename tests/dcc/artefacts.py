@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Sequence
-from dataclasses import replace
 from decimal import Decimal
 
 from cmm_uq.dcc import Certificate, written
+from cmm_uq.dcc.administrative import Contact, Person
 from cmm_uq.dcc.quantities import Column, Covariance, Ellipsoid, Expanded, ExpandedList, Real, RealList
 from cmm_uq.dcc.results import Data, Measurement, Quantity, QuantityList, Result, Statement
 from cmm_uq.dcc.texts import words
@@ -53,13 +53,14 @@ def issued(
     held = (QuantityList(parts=parts),) if table else parts
     made = certificate()
     (old,) = made.administrative.items.items
-    items = replace(made.administrative.items, items=(replace(old, name=words(item)),))
-    core = replace(made.administrative.core, identifier="D-K-4711", issued=dt.date(2026, 3, 5))
+    items = made.administrative.items.with_changes(items=(old.with_changes(name=words(item)),))
+    core = made.administrative.core.with_changes(identifier="D-K-4711", issued=dt.date(2026, 3, 5))
     found = Result(name=words(result), data=Data(parts=held))
-    return replace(
-        made, administrative=replace(made.administrative, items=items, core=core, statements=(DUE,)),
-        measurements=(Measurement(name=words("Calibration"), results=(found,)),), document=None,
+    administrative = made.administrative.with_changes(
+        items=items, core=core, statements=(DUE,), persons=(Person(person=Contact(name=words("A. Huber"))),)
     )  # fmt: skip
+    measurement = Measurement(name=words("Calibration"), results=(found,))
+    return made.with_changes(administrative=administrative, measurements=(measurement,), document=None)
 
 
 def _decimals(text: str) -> tuple[Decimal, ...]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime as dt
 import math
 import tomllib
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -212,6 +211,6 @@ def test_a_standard_that_needs_the_uncertainty_has_it_from_the_certificate() -> 
 
 def test_an_item_of_several_is_not_named_for_the_job() -> None:
     made = BALL_BAR.administrative
-    two = replace(made.items, items=made.items.items * 2)
-    artefact = job("ballbar", replace(BALL_BAR, administrative=replace(made, items=two))).facts.artefact
+    two = made.with_changes(items=made.items.with_changes(items=made.items.items * 2))
+    artefact = job("ballbar", BALL_BAR.with_changes(administrative=two)).facts.artefact
     assert (artefact.name, artefact.serial) == ("", "")
