@@ -39,7 +39,7 @@ def test_as_data_it_has_every_quantity_with_its_digits() -> None:
     (b"point,x\n1,2\n", "is no XML"),
     (b'<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>', "has a document type"),
     (SAMPLE.read_bytes().replace(b'schemaVersion="3.2.1"', b'schemaVersion="2.4.0"'), "is not version 3 of the schema"),
-    (SAMPLE.read_bytes().replace(b"83.00051", b"83,00051"), "si:valueXMLList '0 0 83.00034 83,00051' is not a list of numbers"),
+    (SAMPLE.read_bytes().replace(b"83.00051", b"83,00051"), "'0 0 83.00034 83,00051' is not a list of numbers"),
     (None, "no such file"),
 ])  # fmt: skip
 def test_what_is_no_certificate_is_refused_in_one_line(content: bytes | None, told: str, tmp_path: Path) -> None:
