@@ -23,7 +23,6 @@ from cmm_uq.jobs.artefact import ArtefactFacts, CertificateFile
 from cmm_uq.jobs.certified_value import CertifiedValue
 from cmm_uq.jobs.expanded import with_standard_uncertainty
 from cmm_uq.jobs.importing.dcc import Dcc, heading
-from cmm_uq.jobs.importing.format import HEAD
 from cmm_uq.jobs.importing.imported import imported_references
 from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.importing.recognised import Recognised
@@ -56,10 +55,12 @@ class Read:
     table: Mapping[str, Any]
     recognised: Recognised | None = None
 
-
-def is_digital(content: bytes) -> bool:
-    """Whether a file is a DCC."""
-    return Dcc().recognises(content[:HEAD])
+    def beside(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """``[artefact]`` as job.toml has it, with what the certificate says."""
+        return {**given, **{
+            key: {**_table(given, key), **value} if isinstance(value, Mapping) else value
+            for key, value in self.table.items()
+        }}  # fmt: skip
 
 
 def certified(content: bytes, where: str, given: Mapping[str, Any], facts: type[ArtefactFacts]) -> Read:
@@ -97,13 +98,6 @@ def certified(content: bytes, where: str, given: Mapping[str, Any], facts: type[
     return Read(
         table, Recognised(name, Dcc.name, Dcc.title, facts_told, sources, sum(len(one.values) for _, one in found))
     )
-
-
-def stated(given: Mapping[str, Any], read_: Mapping[str, Any]) -> dict[str, Any]:
-    """``[artefact]`` with what its certificate says beside."""
-    return {**given, **{
-        key: {**_table(given, key), **value} if isinstance(value, Mapping) else value for key, value in read_.items()
-    }}  # fmt: skip
 
 
 def _chain(certificate: Certificate, given: Mapping[str, Any], where: str) -> dict[str, Any]:

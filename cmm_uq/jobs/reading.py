@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import create_model
@@ -16,12 +16,14 @@ from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.as_found import as_found_of
-from cmm_uq.jobs.certified import Read, certified, is_digital, stated
 from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.digitizer_calibration import calibration_file
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.earlier_noise import noise_file
 from cmm_uq.jobs.file_names import check_distinct
+from cmm_uq.jobs.importing.dcc import ROOT as DCC
+from cmm_uq.jobs.importing.format import HEAD
+from cmm_uq.jobs.importing.xml_files import begins_with
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
@@ -36,6 +38,9 @@ from cmm_uq.jobs.source import InFolder, InMemory, Source
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
 from cmm_uq.writing import finish_interrupted
+
+if TYPE_CHECKING:
+    from cmm_uq.jobs.certified import Read
 
 
 @dataclass(frozen=True)
@@ -206,7 +211,7 @@ def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile, Read | N
         if found is None:
             return data
         says.append(found)
-        return {**data, "artefact": stated(data["artefact"], found.table)}
+        return {**data, "artefact": found.beside(data["artefact"])}
 
     facts = checked(
         content, source.toml, lambda data: _model_for(data, nameable), nameable.standards, beside=beside
@@ -224,7 +229,9 @@ def _certified(data: dict[str, Any], source: Source, nameable: Nameable) -> Read
     if not isinstance(name, str) or table is None:
         return None
     content = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {source.toml}")
-    if is_digital(content):
+    if begins_with(content[:HEAD], DCC):
+        from cmm_uq.jobs.certified import certified  # the model of a certificate is made for who has one
+
         return certified(content, str(source.toml.parent / name), artefact, table)
     if table.with_references:
         return None

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
+from typing import TYPE_CHECKING
 
-from cmm_uq.dcc import read
-from cmm_uq.dcc.figures import Figures, figures
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import ROWS
 from cmm_uq.jobs.importing.format import Format
@@ -16,7 +15,13 @@ from cmm_uq.jobs.importing.xml_files import begins_with
 from cmm_uq.messages import say
 from cmm_uq.units import UNITS
 
+if TYPE_CHECKING:
+    from cmm_uq.dcc.figures import Figures
+
 _BY_DSI = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
+
+
+ROOT = "digitalCalibrationCertificate"
 
 
 class Dcc(Format):
@@ -27,10 +32,13 @@ class Dcc(Format):
 
     def recognises(self, head: bytes) -> bool:
         """See :meth:`Format.recognises`."""
-        return begins_with(head, "digitalCalibrationCertificate")
+        return begins_with(head, ROOT)
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         """See :meth:`Format.read`: a sheet for each result that has more than one value of something."""
+        from cmm_uq.dcc import read  # the model of a certificate is made for who has one
+        from cmm_uq.dcc.figures import figures
+
         sheets = []
         for place, of_result in groupby(figures(read(content, where)), key=lambda one: one.place[:2]):
             columns = [_column(one, where) for one in of_result]
