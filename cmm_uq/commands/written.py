@@ -141,23 +141,28 @@ class Form:
         from cmm_uq.documents.in_language import said
         from cmm_uq.documents.origin import marked
         from cmm_uq.documents.pdf import render_pdf
+        from cmm_uq.documents.provenance import FILE, provenance
 
         job, data = outcome.found.job, as_json(outcome.results)
         document = said(marked(outcome.document, job), job.facts.job.language)
-        for name in outcome.files.keys() & job.inputs.keys():
+        for name in {*outcome.files, *self.further} & job.inputs.keys():
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
         rendered: dict[str, bytes] = {}
+        further = {RESULTS: data, **outcome.files}
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
             if name.endswith(".html"):
-                rendered[name] = render_html(document).encode()
+                made = render_html(document).encode()
             elif name.endswith(".xml"):
-                rendered[name] = _digital(job, data, rendered)
+                made = _digital(job, data, rendered)
             else:
+                if FILE in self.further:
+                    further[FILE] = provenance(job, outcome.results, {**rendered, **further})
                 digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
-                rendered[name] = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **outcome.files})
-        return {**rendered, RESULTS: data, **outcome.files}
+                made = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **further}, job.facts.job.language)
+            rendered[name] = made
+        return {**rendered, **further}
 
     def names(self, job: Job) -> list[str]:
         """Of the documents of a job."""
