@@ -32,7 +32,9 @@ TABLE_BYTES = Limit(64_000_000, "bytes", "recording, temperature log", "100 000 
 UNPACKED = Limit(400_000_000, "bytes", "workbook once it is unpacked", "200 000 rows of 30 columns take half of it")
 MAP_BYTES = Limit(4_000_000, "bytes", "error map", "30 000 positions")
 SECRET_BYTES = Limit(4_096, "bytes", "file with a secret", "a password is one line")
-KEY_BYTES = Limit(1_000_000, "bytes", "file with a key, certificates or revocations", "a key with its chain takes ten thousand")
+KEY_BYTES = Limit(
+    1_000_000, "bytes", "file with a key, certificates or revocations", "a key with its chain takes ten thousand"
+)
 SIGNED_BYTES = Limit(64_000_000, "bytes", "signed PDF or XML", "a certificate with its inputs takes a few million")
 
 ROWS = Limit(200_000, "rows", "CSV file", "a scanned surface; larger ones are point clouds")

@@ -34,6 +34,9 @@ class Trust:
     revocations: tuple[bytes, ...] = ()
 
 
+NOBODY = Trust()
+
+
 @dataclass(frozen=True)
 class Signature:
     """One signature, and what holds of it.

@@ -10,10 +10,11 @@ import datetime as dt
 import hashlib
 import io
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.signing.extra import installed
+from cmm_uq.signing.found import NOBODY, Trust
 from cmm_uq.signing.signer import ONE_DIGEST, Signer
 
 if TYPE_CHECKING:
@@ -31,16 +32,41 @@ class Seal:
     Parameters
     ----------
     picture : a PDF of one page, shown in the seal's place.
-    box : left, bottom, right and top of the place, in points from the page's lower left corner.
+    places : left, bottom, right and top of the place of the first signature and of those after it, in points from the
+        page's lower left corner; a signature for which no place is left is not seen.
     says : the picture in words, for those who cannot see it.
     """
 
     picture: bytes
-    box: tuple[float, float, float, float]
+    places: tuple[tuple[float, float, float, float], ...]
     says: str
 
 
-def sign_pdf(pdf: bytes, signer: Signer, *, seal: Seal | None, at: dt.datetime, reason: str = "") -> bytes:
+Level = Literal["B-B", "B-T", "B-LT", "B-LTA"]
+"""Of ETSI EN 319 142-1: signed; and stamped by a server; with what proves the certificates; and that stamped, too."""
+
+LEVELS: tuple[Level, ...] = get_args(Level)
+
+
+@dataclass(frozen=True)
+class Stamping:
+    """What a level above B-B needs.
+
+    Parameters
+    ----------
+    server : address of a time stamp server.
+    level : B-T, B-LT or B-LTA.
+    trust : whom the chains of signer and server must lead to, for B-LT and B-LTA.
+    """
+
+    server: str
+    level: Level = "B-T"
+    trust: Trust = NOBODY
+
+
+def sign_pdf(
+    pdf: bytes, signer: Signer, *, seal: Seal | None, at: dt.datetime, stamping: Stamping | None = None, reason: str = ""
+) -> bytes:  # fmt: skip
     """A PDF with a signature.
 
     Parameters
@@ -49,11 +75,12 @@ def sign_pdf(pdf: bytes, signer: Signer, *, seal: Seal | None, at: dt.datetime, 
     signer : who signs.
     seal : what is seen of it; ``None`` for nothing.
     at : time of signing, with its zone.
+    stamping : level above B-B; ``None`` for B-B.
     reason : why it is signed.
 
     Raises
     ------
-    CmmUqError : it cannot be read as a PDF, or the key must not sign at this time.
+    CmmUqError : it cannot be read as a PDF, the key must not sign at this time, or a server does not answer as it should.
     """
     signer.check(at)
     with installed():
@@ -63,11 +90,13 @@ def sign_pdf(pdf: bytes, signer: Signer, *, seal: Seal | None, at: dt.datetime, 
         from cmm_uq.signing.adapter import Adapted
         from cmm_uq.signing.tagging import show, tag
     writer = appending(pdf)
-    name = _field(writer)
+    name, count = _field(writer)
+    if seal is not None and count >= len(seal.places):
+        seal = None
     said = seal.says if seal else signer.name
     fields.append_signature_field(
         writer,
-        fields.SigFieldSpec(name, box=seal.box if seal else None, readable_field_name=said),
+        fields.SigFieldSpec(name, box=seal.places[count] if seal else None, readable_field_name=said),
     )
     field = next(reference for _, _, reference in fields.enumerate_sig_fields(writer, with_name=name))
     if seal is not None:
@@ -77,7 +106,14 @@ def sign_pdf(pdf: bytes, signer: Signer, *, seal: Seal | None, at: dt.datetime, 
         field_name=name, md_algorithm=ONE_DIGEST, subfilter=fields.SigSeedSubFilter.PADES, name=signer.name,
         reason=reason or None,
     )  # fmt: skip
-    return asyncio.run(_signed(signers.PdfSigner(metadata, Adapted(signer), stamp_style=NoOpStampStyle()), writer, at))
+    adapted, style = Adapted(signer), NoOpStampStyle()
+    if stamping is None or stamping.level == "B-B":
+        return asyncio.run(_signed(signers.PdfSigner(metadata, adapted, stamp_style=style), writer, at))
+    from cmm_uq.signing.time_server import Server
+
+    server = Server(stamping.server)
+    pdf_signer = signers.PdfSigner(metadata, adapted, timestamper=server, stamp_style=style)
+    return asyncio.run(_stamped(pdf_signer, writer, signer, stamping, at))
 
 
 def appending(pdf: bytes) -> IncrementalPdfFileWriter:
@@ -107,12 +143,12 @@ def appending(pdf: bytes) -> IncrementalPdfFileWriter:
         raise CmmUqError(f"cannot be read as a PDF: {error}", fix="Name a PDF that is whole") from None
 
 
-def _field(writer: IncrementalPdfFileWriter) -> str:
-    """A name that no field has."""
+def _field(writer: IncrementalPdfFileWriter) -> tuple[str, int]:
+    """A name that no field has, and how many there are."""
     from pyhanko.sign.fields import enumerate_sig_fields
 
     taken = {name for name, _, _ in enumerate_sig_fields(writer)}
-    return next(name for name in (f"{FIELD}{i}" for i in range(1, len(taken) + 2)) if name not in taken)
+    return next(name for name in (f"{FIELD}{i}" for i in range(1, len(taken) + 2)) if name not in taken), len(taken)
 
 
 async def _signed(pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, at: dt.datetime) -> bytes:
@@ -127,3 +163,22 @@ async def _signed(pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, at: d
     await document.perform_signature(digest.document_digest, PdfCMSSignedAttributes(signing_time=at))
     output.seek(0)
     return bytes(output.read())
+
+
+async def _stamped(
+    pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, signer: Signer, stamping: Stamping, at: dt.datetime
+) -> bytes:  # fmt: skip
+    """Signed with a time stamp, and what else the level asks for."""
+    server = pdf_signer.default_timestamper
+    if stamping.level == "B-T":
+        return await _signed(pdf_signer, writer, at)
+    from cmm_uq.signing.long_term import Proof, stamped
+
+    proof = Proof(signer, server, stamping.trust, at)
+    await proof.gather()
+    kept = proof.kept(await _signed(pdf_signer, writer, at))
+    if stamping.level == "B-LTA":
+        return await stamped(kept, server)
+    output = io.BytesIO()
+    kept.write(output)
+    return output.getvalue()

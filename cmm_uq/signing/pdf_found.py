@@ -27,6 +27,7 @@ PADES = "/ETSI.CAdES.detached"
 WEAK = say("the signature is made with an algorithm that is weak or unknown")
 BROKEN = say("the signature does not fit the file: one of them was changed")
 UNREADABLE = say("the signature cannot be read")
+STAMP_BROKEN = say("the time stamp does not fit the signature")
 NO_PADES = say("the signature is no PAdES signature")
 
 _TOLD = 6
@@ -90,8 +91,10 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> Signature:
         (*file.evidence.certificates, *embedded.other_embedded_certs), file.evidence.revocations, file.evidence.answers
     )
     stamped, proven = _stamped(embedded, evidence, file.trust)
-    at = stamped or _claimed(embedded)
+    at = stamped if proven else _claimed(embedded)
     intact, problems = _intact(file, embedded)
+    if stamped is None and _token(embedded) is not None:
+        problems.append(STAMP_BROKEN)
     whole, appended = _whole(file, embedded)
     if embedded.sig_object.get("/SubFilter") != PADES:
         problems.append(NO_PADES)
@@ -168,7 +171,9 @@ def _whole(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text
     """Whether only time stamps, evidence and further signatures were appended, and else what."""
     from pyhanko.sign.diff_analysis import DiffResult, ModificationLevel
 
-    embedded.compute_integrity_info()
+    from cmm_uq.signing.appended import POLICY
+
+    embedded.compute_integrity_info(diff_policy=POLICY)
     result = embedded.diff_result
     most = ModificationLevel.FORM_FILLING if file.later(embedded) else ModificationLevel.LTA_UPDATES
     if isinstance(result, DiffResult) and result.modification_level <= most:
@@ -193,20 +198,26 @@ def _changed(reader: PdfFileReader, signed: int) -> list[str]:
     return [*names[:_TOLD], *(["…"] if len(names) > _TOLD else [])]
 
 
+def _token(embedded: EmbeddedPdfSignature) -> Any:
+    """The time stamp of a signature; ``None`` where it has none."""
+    from pyhanko.sign.validation.generic_cms import extract_tst_data_iter
+
+    try:
+        return next(extract_tst_data_iter(embedded.signer_info, signed=False), None)
+    except KeyError:
+        return None
+
+
 def _stamped(embedded: EmbeddedPdfSignature, evidence: Evidence, trust: Trust) -> tuple[dt.datetime | None, bool]:
     """Time of the signature's time stamp, and whether somebody trusted made it."""
     from pyhanko.sign.validation.generic_cms import (
-        extract_tst_data_iter,
         message_imprint_checker,
         validate_tst_signed_data,
     )
 
     from cmm_uq.signing.chain import context
 
-    try:
-        token = next(extract_tst_data_iter(embedded.signer_info, signed=False), None)
-    except KeyError:
-        return None, False
+    token = _token(embedded)
     if token is None:
         return None, False
     at = token["encap_content_info"]["content"].parsed["gen_time"].native
@@ -220,6 +231,7 @@ def _stamped(embedded: EmbeddedPdfSignature, evidence: Evidence, trust: Trust) -
 
 def _evidence(reader: PdfFileReader) -> Evidence:
     """What the store of the document holds (ISO 32000-2, 12.8.4.3)."""
+    from asn1crypto import crl, ocsp
     from pyhanko.sign.validation.dss import DocumentSecurityStore
     from pyhanko.sign.validation.errors import NoDSSFoundError
 
@@ -229,7 +241,11 @@ def _evidence(reader: PdfFileReader) -> Evidence:
         store = DocumentSecurityStore.read_dss(reader)
     except NoDSSFoundError:
         return Evidence()
-    return Evidence(tuple(store.load_certs()), tuple(store.crls), tuple(store.ocsps))
+    lists, answers = ([one.get_object().data for one in kept] for kept in (store.crls, store.ocsps))
+    return Evidence(
+        tuple(store.load_certs()), tuple(crl.CertificateList.load(one) for one in lists),
+        tuple(ocsp.OCSPResponse.load(one) for one in answers),
+    )  # fmt: skip
 
 
 def _level(file: _File, embedded: EmbeddedPdfSignature, stamped: dt.datetime | None) -> str:

@@ -97,6 +97,16 @@ def test_pyhanko_confirms_it(signed: bytes, anchor: Held) -> None:
     assert status.coverage.name == "ENTIRE_FILE"
 
 
+def test_a_second_person_signs_the_same_document(signed: bytes, curve_held: Held, trust: Trust) -> None:
+    later = SIGNED + dt.timedelta(hours=1)
+    twice = sign_pdf(signed, curve_held.signer, seal=None, at=later)
+    first, second = signatures_of_pdf(twice, trust)
+    assert (first.name, second.name, second.time) == ("A. Huber", "B. Maier", later)
+    assert first.good
+    assert second.good
+    assert first.content == signed
+
+
 @given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_one_altered_bit_is_found(signed: bytes, trust: Trust, place: float, bit: int) -> None:
     altered = bytearray(signed)
