@@ -12,11 +12,12 @@ from cmm_uq.cli.importing import show_imported
 from cmm_uq.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
+from cmm_uq.cli.signing_options import Level, Sign, TimeServer, Trusted, asked_signing, said_of
 from cmm_uq.errors import CmmUqError
 
 EXAMPLES = examples(
     "report examples/iota-1102-20C", "report JOB --out DIR --seed 3", "report JOB --json --strict > results.json",
-    "report --scheduled jobs --dry-run",
+    "report JOB --sign laboratory.p12", "report --scheduled jobs --dry-run",
 )  # fmt: skip
 
 
@@ -37,6 +38,10 @@ def command(
     verbose: Verbose = False,
     json: Json = False,
     records: Records = None,
+    sign: Sign = None,
+    time_server: TimeServer = None,
+    level: Level = None,
+    trust: Trusted = None,
     scheduled: Annotated[
         bool,
         typer.Option(
@@ -63,19 +68,25 @@ def command(
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
     _check(job, {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run} if not scheduled else
-           {"--force": force, "--strict": strict, "--verbose": verbose}, scheduled=scheduled)  # fmt: skip
+           {"--force": force, "--strict": strict, "--verbose": verbose, "--sign": sign}, scheduled=scheduled)  # fmt: skip
     if scheduled:
         from cmm_uq.cli.scheduled import STANDARD_OUTPUT, run
         from cmm_uq.commands.scheduled import Asked
 
         asked = Asked(tuple(job), out, schedule, records, seed or None, dry_run)
         raise typer.Exit(run(asked, None if quiet and lines is None else lines or STANDARD_OUTPUT))
+    signing = None if sign is None else asked_signing(sign, time_server, level, trust)
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.report import write_report
 
         told = None if quiet or json else show_imported
-        report = write_report(job[0], out, seed=seed, force=force, stage=stage, told=told, records=records)
-    conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)
+        report = write_report(job[0], out, seed=seed, force=force, stage=stage, told=told, records=records,
+                              signing=signing)  # fmt: skip
+    try:
+        conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)
+    finally:
+        if signing is not None and not (quiet or json):
+            said_of(signing, [path for path in report.files.values() if path.suffix in (".pdf", ".xml")])
 
 
 def _check(jobs: list[Path], others: dict[str, object], *, scheduled: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cmm_uq.commands import analysis, diagnosing
 from cmm_uq.commands.reading import compared_with, read_job
@@ -13,6 +14,9 @@ from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
 from cmm_uq.plugins import naming_package
 from cmm_uq.records.place import NONE
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.signing import Signing
 
 CERTIFICATE, DIAGNOSIS = ("certificate.html", "certificate.pdf"), ("diagnosis.html", "diagnosis.pdf")
 REPORT = Form("report", CERTIFICATE, recorded=True)
@@ -46,7 +50,7 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: 
 
 def write_report(
     job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
-    told: Told | None = None, records: str | Path | None = NONE,
+    told: Told | None = None, records: str | Path | None = NONE, signing: Signing | None = None,
 ) -> Written:  # fmt: skip
     """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
 
@@ -61,10 +65,12 @@ def write_report(
     stage : told of progress.
     told : of the job, before anything is computed.
     records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
+    signing : who signs the certificate; ``None`` for nobody.
 
     Raises
     ------
-    CmmUqError : the job cannot be analysed, or something in the folder that this command did not write for this job.
+    CmmUqError : the job cannot be analysed, the certificate cannot be signed, or something in the folder that this command did
+        not write for this job.
     OutputError : the folder cannot be written to.
     """
     tell = stage or silent
@@ -74,7 +80,7 @@ def write_report(
     if told is not None:
         told(read)
     return REPORT.write(read, lambda: report_outcome(read, seed=seed, stage=tell), out, force=force, stage=tell,
-                        records=records)  # fmt: skip
+                        records=records, signing=signing)  # fmt: skip
 
 
 @naming_package()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cmm_uq.commands.recording import ledger_of, opened
 from cmm_uq.documents.in_short import Summary
@@ -13,6 +14,9 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.records.place import NONE
 from cmm_uq.writing import Owner, staged
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.signing import Signing
 
 Stage = Callable[[str, float], None]
 """Told what is being done, after a colon what of it is counted, and the part of the whole that is done."""
@@ -88,6 +92,7 @@ class Form:
         force: bool = False,
         stage: Stage = silent,
         records: str | Path | None = NONE,
+        signing: Signing | None = None,
     ) -> Written:
         """Make sure of the folder, then compute, render and write, all or none, and record it with that.
 
@@ -99,10 +104,12 @@ class Form:
         force : keep what stands in the way as ``NAME.previous`` instead of refusing.
         stage : told of progress.
         records : file or URL of the records; ``none`` for none, ``None`` for those of the environment, else beside the folder.
+        signing : who signs the documents; ``None`` for nobody.
 
         Raises
         ------
-        CmmUqError : as computing does, or something in the folder that this command did not write for this job.
+        CmmUqError : as computing does, the documents cannot be signed, or something in the folder that this command did not
+            write for this job.
         OutputError : the folder, or the records, cannot be written to.
         """
         owner = self.owner(job)
@@ -113,7 +120,7 @@ class Form:
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
             found = outcome()
-            contents = self.contents(found, stage)
+            contents = self.contents(found, stage, signing=signing)
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
             files = place.write(contents, ledger=ledger)
@@ -126,7 +133,7 @@ class Form:
         return Owner(self.command, job.facts.job.id, job.origin)
 
     def contents(
-        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False
+        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, signing: Signing | None = None
     ) -> dict[str, bytes]:  # fmt: skip
         """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
         from cmm_uq.documents.results_file import as_json
@@ -151,6 +158,10 @@ class Form:
                 if pdf
                 else render_html(document).encode()
             )
+        if signing is not None:
+            stage("Signing", 0.9)
+            laboratory = job.facts.laboratory.model_dump()
+            rendered = {name: signing.signed(name, content, laboratory) for name, content in rendered.items()}
         return {**rendered, RESULTS: data, **outcome.files}
 
     def names(self, job: Job) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.errors import CmmUqError
@@ -49,8 +50,24 @@ def signer_of_file(path: Path, passphrase: str) -> Signer:
     return Signer(certificate, tuple(chain), *signing(key, where), where=where)
 
 
-def test_key(name: str, passphrase: str, at: dt.datetime) -> bytes:
-    """A new key for trying, with a certificate that it signs itself and that says so, as a PKCS#12 file.
+@dataclass(frozen=True)
+class TrialKey:
+    """A key for trying.
+
+    Parameters
+    ----------
+    key : with its certificate, as a PKCS#12 file.
+    certificate : alone, PEM.
+    until : last day that it is valid.
+    """
+
+    key: bytes
+    certificate: bytes
+    until: dt.date
+
+
+def trial_key(name: str, passphrase: str, at: dt.datetime) -> TrialKey:
+    """A new key for trying, with a certificate that it signs itself and that says so.
 
     Parameters
     ----------
@@ -94,9 +111,11 @@ def test_key(name: str, passphrase: str, at: dt.datetime) -> bytes:
         .add_extension(x509.UnrecognizedExtension(ObjectIdentifier(TEST_OID), _utf8(str(TEST_NOTE).encode())), critical=False)
     )  # fmt: skip
     certificate = builder.sign(key, hashes.SHA256())
-    return pkcs12.serialize_key_and_certificates(
+    key_file = pkcs12.serialize_key_and_certificates(
         name.strip().encode(), key, certificate, None, serialization.BestAvailableEncryption(passphrase.encode())
     )
+    pem = certificate.public_bytes(serialization.Encoding.PEM)
+    return TrialKey(key_file, pem, certificate.not_valid_after_utc.date())
 
 
 def _utf8(text: bytes) -> bytes:
