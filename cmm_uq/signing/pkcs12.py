@@ -12,8 +12,8 @@ from cmm_uq.files.limits import KEY_BYTES
 from cmm_uq.signing.extra import installed
 from cmm_uq.signing.signer import TEST_NOTE, TEST_OID, TEST_WORDS, Signer, signing
 
-TEST_DAYS, TEST_BITS = 365, 3072
-"""How long a test key is valid, and its size."""
+TEST_DAYS = 365
+"""How long a test key is valid."""
 
 LONGEST_NAME = 64 - len(f"{TEST_WORDS} – ")
 """Characters of a name (X.520, ub-common-name)."""
@@ -88,10 +88,10 @@ def trial_key(name: str, passphrase: str, at: dt.datetime) -> TrialKey:
     with installed():
         from cryptography import x509
         from cryptography.hazmat.primitives import hashes, serialization
-        from cryptography.hazmat.primitives.asymmetric import rsa
+        from cryptography.hazmat.primitives.asymmetric import ec
         from cryptography.hazmat.primitives.serialization import pkcs12
         from cryptography.x509.oid import NameOID, ObjectIdentifier
-    key = rsa.generate_private_key(public_exponent=65537, key_size=TEST_BITS)
+    key = ec.generate_private_key(ec.SECP256R1())  # small, and opened at once
     subject = x509.Name([
         x509.NameAttribute(NameOID.COMMON_NAME, f"{TEST_WORDS} – {name.strip()}"),
         x509.NameAttribute(NameOID.ORGANIZATIONAL_UNIT_NAME, f"{TEST_WORDS}, proves nothing"),

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, unquote
 
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.signing.extra import installed
 from cmm_uq.signing.signer import Signer
+
+if TYPE_CHECKING:
+    from cryptography.x509 import Certificate
 
 SCHEME = "pkcs11:"
 KNOWN = ("token", "object", "module-path")
@@ -72,52 +77,94 @@ def signer_of_token(uri: str, pin: str) -> Signer:
     CmmUqError : there is no such module, token, key or certificate, or the PIN is another.
     """
     with installed():
-        import pkcs11
         from cryptography.x509 import load_der_x509_certificate
-        from pkcs11 import Attribute, ObjectClass, exceptions
-    place = place_of(uri)
-    try:
-        session = pkcs11.lib(place.module).get_token(token_label=place.token).open(user_pin=pin)
-        key = session.get_key(object_class=ObjectClass.PRIVATE_KEY, label=place.key)
-        found = list(session.get_objects({Attribute.CLASS: ObjectClass.CERTIFICATE, Attribute.LABEL: place.key}))
-        certificate = load_der_x509_certificate(found[0][Attribute.VALUE]) if found else None
-    except exceptions.PinIncorrect:
-        raise CmmUqError("the PIN does not open the token", where=uri, fix="Mind how often it may be wrong") from None
-    except (exceptions.NoSuchToken, exceptions.TokenNotPresent):
-        raise CmmUqError(f"no token {place.token!r} is there", where=uri, fix="Put it in") from None
-    except exceptions.NoSuchKey:
-        raise CmmUqError(f"the token has no key {place.key!r}", where=uri, fix="Name the label of its key") from None
-    except (exceptions.PKCS11Error, OSError, RuntimeError, ValueError) as error:
-        why = str(error) or type(error).__name__
-        raise CmmUqError(f"the token cannot be used: {why}", where=uri, fix="Check module and token") from None
+        from pkcs11 import Attribute, KeyType, ObjectClass
+    token = _Token(place_of(uri), pin, uri)
+    with token.opened() as session:
+        sort = token.key(session).key_type
+        kept = [(str(one[Attribute.LABEL]), load_der_x509_certificate(bytes(one[Attribute.VALUE])))
+                for one in session.get_objects({Attribute.CLASS: ObjectClass.CERTIFICATE})]  # fmt: skip
+    certificate = next((one for label, one in kept if label == token.place.key), None)
     if certificate is None:
-        raise CmmUqError(f"the token has no certificate {place.key!r}", where=uri,
+        raise CmmUqError(f"the token has no certificate {token.place.key!r}", where=uri,
                          fix="Put the certificate of the key beside it, under the same label")  # fmt: skip
-    algorithm, signed = _signing(key, uri)
-    return Signer(certificate, (), algorithm, signed, where=uri)
-
-
-def _signing(key: Any, uri: str) -> tuple[Literal["rsa", "ecdsa"], Callable[[bytes], bytes]]:
-    """How a key of a token signs; an ECDSA key draws a number for every signature."""
-    from hashlib import sha256
-
-    from pkcs11 import KeyType, Mechanism, exceptions
-    from pkcs11.util.ec import encode_ecdsa_signature
-
-    def asked(sign: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:
-        def signed(data: bytes) -> bytes:
-            try:
-                return sign(data)
-            except exceptions.PKCS11Error as error:
-                why = str(error) or type(error).__name__
-                raise CmmUqError(f"the token does not sign: {why}", where=uri, fix="Check the key's use") from None
-
-        return signed
-
-    if key.key_type == KeyType.RSA:
-        return "rsa", asked(lambda data: bytes(key.sign(data, mechanism=Mechanism.SHA256_RSA_PKCS)))
-    if key.key_type == KeyType.EC:
-        return "ecdsa", asked(
-            lambda data: bytes(encode_ecdsa_signature(key.sign(sha256(data).digest(), mechanism=Mechanism.ECDSA)))
-        )
+    chain = _above(certificate, [one for _, one in kept])
+    if sort == KeyType.RSA:
+        return Signer(certificate, chain, "rsa", token.by_rsa, where=uri)
+    if sort == KeyType.EC:
+        return Signer(certificate, chain, "ecdsa", token.by_ecdsa, where=uri)
     raise CmmUqError("the key is neither RSA nor ECDSA", where=uri, fix="Sign with an RSA or ECDSA key")
+
+
+def _above(certificate: Certificate, others: Sequence[Certificate]) -> tuple[Certificate, ...]:
+    """Certificates above another, nearest first."""
+    found = [certificate]
+    while len(found) <= len(others):
+        issuer = next((one for one in others if one.subject == found[-1].issuer and one not in found), None)
+        if issuer is None:
+            break
+        found.append(issuer)
+    return tuple(found[1:])
+
+
+class _Token:
+    """A token that is opened for every use, so that nobody finds it open."""
+
+    def __init__(self, place: Place, pin: str, uri: str) -> None:
+        self.place, self._pin, self._uri = place, pin, uri
+
+    @contextlib.contextmanager
+    def opened(self) -> Iterator[Any]:
+        """A session; whatever goes wrong in it in one line.
+
+        Raises
+        ------
+        CmmUqError : there is no such module, token or key, or the PIN is another.
+        """
+        import pkcs11
+        from pkcs11 import exceptions
+
+        try:
+            with (
+                pkcs11.lib(self.place.module)
+                .get_token(token_label=self.place.token)
+                .open(user_pin=self._pin) as session
+            ):
+                yield session
+        except exceptions.PinIncorrect:
+            raise self._refused("the PIN does not open the token", "Mind how often it may be wrong") from None
+        except (exceptions.NoSuchToken, exceptions.TokenNotPresent):
+            raise self._refused(f"no token {self.place.token!r} is there", "Put it in") from None
+        except exceptions.NoSuchKey:
+            raise self._refused(f"the token has no key {self.place.key!r}", "Name the label of its key") from None
+        except (exceptions.PKCS11Error, OSError, RuntimeError, ValueError) as error:
+            why = str(error) or type(error).__name__
+            raise self._refused(
+                f"the token cannot be used: {why}", "Check module, token and the use of its key"
+            ) from None
+
+    def _refused(self, problem: str, fix: str) -> CmmUqError:
+        return CmmUqError(problem, where=self._uri, fix=fix)
+
+    def key(self, session: Any) -> Any:
+        """The private key, which stays where it is."""
+        from pkcs11 import ObjectClass
+
+        return session.get_key(object_class=ObjectClass.PRIVATE_KEY, label=self.place.key)
+
+    def by_rsa(self, data: bytes) -> bytes:
+        """Signature of an RSA key."""
+        from pkcs11 import Mechanism
+
+        with self.opened() as session:
+            return bytes(self.key(session).sign(data, mechanism=Mechanism.SHA256_RSA_PKCS))
+
+    def by_ecdsa(self, data: bytes) -> bytes:
+        """Signature of an ECDSA key, which draws a number for each."""
+        from pkcs11 import Mechanism
+        from pkcs11.util.ec import encode_ecdsa_signature
+
+        with self.opened() as session:
+            return bytes(
+                encode_ecdsa_signature(self.key(session).sign(sha256(data).digest(), mechanism=Mechanism.ECDSA))
+            )

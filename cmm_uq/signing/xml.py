@@ -78,12 +78,11 @@ def outside(root: _Element) -> list[Text]:
     """What a signature over the root does not cover, though a reader could take it for a part of the file."""
     with installed():
         from lxml import etree
-    tree = root.getroottree()
+    beside = [*root.itersiblings(preceding=True), *root.itersiblings()]
     found: list[Text] = []
-    if next(tree.iter(etree.Comment), None) is not None:
-        found.append(COMMENT)
-    if next(tree.iter(etree.ProcessingInstruction), None) is not None:
-        found.append(INSTRUCTION)
+    for sort, said in ((etree.Comment, COMMENT), (etree.ProcessingInstruction, INSTRUCTION)):
+        if next(root.iter(sort), None) is not None or any(one.tag is sort for one in beside):
+            found.append(said)
     return found
 
 
