@@ -21,6 +21,7 @@ from cmm_uq.cli import (
     history,
     importing,
     instruments,
+    keys,
     new,
     plan,
     prove,
@@ -33,6 +34,7 @@ from cmm_uq.cli import (
     schema,
     selftest,
     serve,
+    sign,
     simulate,
 )
 from cmm_uq.cli.options import examples
@@ -68,6 +70,7 @@ for module, short in {
     release: "A certificate released, withdrawn or replaced.",
     qif: "The results of a report as QIF 3.0.",
     read: "A digital calibration certificate (DCC), printed.",
+    sign: "A certificate signed electronically: PDF and XML.",
     affected: "Which certificates a correction of the package touches.",
     serve: "The records to look at, in a browser.",
     schema: "JSON Schema of a file, for editors that complete and explain.",
@@ -80,6 +83,7 @@ app.add_typer(instruments.app, name="instruments", short_help="Instruments: read
 app.add_typer(
     schedule.app, name="schedule", short_help="Scheduled runs: what they go by, whom they tell, what starts them."
 )
+app.add_typer(keys.app, name="keys", short_help="Keys for electronic signatures: a new one for trying.")
 app.add_typer(records.app, name="records", short_help="The history: verified, imported, backed up, brought up to date.")
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),

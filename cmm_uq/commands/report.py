@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cmm_uq.commands import analysis, diagnosing
 from cmm_uq.commands.reading import compared_with, in_language, read_job
@@ -16,6 +17,9 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.languages.language import Code
 from cmm_uq.plugins import naming_package
 from cmm_uq.records.place import NONE
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.signing import Signing
 
 CERTIFICATE = ("certificate.html", DIGITAL, "certificate.pdf")
 DIAGNOSIS = ("diagnosis.html", "diagnosis.pdf")
@@ -51,6 +55,7 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: 
 def write_report(
     job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
     told: Told | None = None, records: str | Path | None = NONE, language: Code | None = None,
+    signing: Signing | None = None,
 ) -> Written:  # fmt: skip
     """Analyse a job and write its certificate (HTML, PDF, DCC), ``results.json`` and ``provenance.json``, all or none.
 
@@ -66,10 +71,12 @@ def write_report(
     told : of the job, before anything is computed.
     records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
     language : of the documents, instead of the job's.
+    signing : who signs the certificate; ``None`` for nobody.
 
     Raises
     ------
-    CmmUqError : the job cannot be analysed, or something in the folder that this command did not write for this job.
+    CmmUqError : the job cannot be analysed, the certificate cannot be signed, or something in the folder that this command did
+        not write for this job.
     OutputError : the folder cannot be written to.
     """
     tell = stage or silent
@@ -79,7 +86,7 @@ def write_report(
     if told is not None:
         told(read)
     return REPORT.write(read, lambda: report_outcome(read, seed=seed, stage=tell), out, force=force, stage=tell,
-                        records=records)  # fmt: skip
+                        records=records, signing=signing)  # fmt: skip
 
 
 @naming_package()

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cmm_uq.commands.recording import ledger_of, opened
 from cmm_uq.documents.fonts import fonts_of
@@ -15,6 +16,9 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.records.place import NONE
 from cmm_uq.writing import Owner, staged
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.signing import Signing
 
 Stage = Callable[[str, float], None]
 """Told what is being done, after a colon what of it is counted, and the part of the whole that is done."""
@@ -91,6 +95,7 @@ class Form:
         force: bool = False,
         stage: Stage = silent,
         records: str | Path | None = NONE,
+        signing: Signing | None = None,
     ) -> Written:
         """Make sure of the folder, then compute, render and write, all or none, and record it with that.
 
@@ -102,10 +107,12 @@ class Form:
         force : keep what stands in the way as ``NAME.previous`` instead of refusing.
         stage : told of progress.
         records : file or URL of the records; ``none`` for none, ``None`` for those of the environment, else beside the folder.
+        signing : who signs the documents; ``None`` for nobody.
 
         Raises
         ------
-        CmmUqError : as computing does, or something in the folder that this command did not write for this job.
+        CmmUqError : as computing does, the documents cannot be signed, or something in the folder that this command did not
+            write for this job.
         OutputError : the folder, or the records, cannot be written to.
         """
         fonts_of(job.facts.job.language)  # refused before anything is computed
@@ -117,7 +124,7 @@ class Form:
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
             found = outcome()
-            contents = self.contents(found, stage)
+            contents = self.contents(found, stage, signing=signing)
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
             files = place.write(contents, ledger=ledger)
@@ -130,7 +137,7 @@ class Form:
         return Owner(self.command, job.facts.job.id, job.origin)
 
     def contents(
-        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False
+        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, signing: Signing | None = None
     ) -> dict[str, bytes]:  # fmt: skip
         """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
         from cmm_uq.documents.results_file import as_json
@@ -150,6 +157,7 @@ class Form:
                              fix="Rename it, in job.toml too")  # fmt: skip
         rendered: dict[str, bytes] = {}
         further = {RESULTS: data, **outcome.files}
+        laboratory = job.facts.laboratory.model_dump()
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
             if name.endswith(".html"):
@@ -160,7 +168,10 @@ class Form:
                 if FILE in self.further:
                     further[FILE] = provenance(job, outcome.results, {**rendered, **further})
                 digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
-                made = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **further}, job.facts.job.language)
+                made = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **further})
+            if signing is not None:
+                stage(f"Signing: {name}", 0.9)
+                made = signing.signed(name, made, laboratory)
             rendered[name] = made
         return {**rendered, **further}
 

@@ -66,6 +66,33 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     return _with_fallback(content, [str(file.parent) for file in fonts_of(language)])
 
 
+def picture(template: str, content: Mapping[str, Any]) -> bytes:
+    """A template alone as a PDF page without tags, to be shown inside another.
+
+    Parameters
+    ----------
+    template : its file name.
+    content : what it shows.
+    """
+    import typst
+
+    def made(*, system_fonts: bool) -> bytes:
+        return typst.compile(
+            (template_folder() / template).read_bytes(),
+            font_paths=typst.Fonts(include_system_fonts=system_fonts),
+            ignore_system_fonts=not system_fonts,
+            sys_inputs={"input": json.dumps(content)},
+            pdf_standards=["a-3b"],
+            pdf_tags=False,
+            timestamp=0,
+        )
+
+    try:
+        return made(system_fonts=False)
+    except typst.TypstError:
+        return made(system_fonts=True)
+
+
 def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
     suffix = PurePosixPath(name).suffix.lower()
     outcome = suffix in {".json", ".npz", ".xml"}

@@ -35,6 +35,10 @@ DCC_BYTES = Limit(
     64_000_000, "bytes", "digital certificate", "attached files and its human-readable copy take a few of them"
 )
 SECRET_BYTES = Limit(4_096, "bytes", "file with a secret", "a password is one line")
+KEY_BYTES = Limit(
+    1_000_000, "bytes", "file with a key, certificates or revocations", "a key with its chain takes ten thousand"
+)
+SIGNED_BYTES = Limit(64_000_000, "bytes", "signed PDF or XML", "a certificate with its inputs takes a few million")
 
 ROWS = Limit(200_000, "rows", "CSV file", "a scanned surface; larger ones are point clouds")
 MAP_ROWS = Limit(30_000, "rows", "error map", "10 m of each axis by the millimetre")
@@ -71,8 +75,8 @@ DRAWS = Limit(250_000, "entries", "samples of an input", "draws of an earlier Mo
 INPUTS = Limit(500, "entries", "inputs, outputs or correlations of a budget", "its matrix of correlations is square")
 
 LIMITS = (
-    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, DCC_BYTES, SECRET_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS,
-    OBSERVATIONS, FREEDOMS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS,
-    CONFORMITY, LISTED, DRAWS, INPUTS, XML_ELEMENTS, XML_DEPTH, XML_ATTRIBUTES,
+    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, DCC_BYTES, SECRET_BYTES, KEY_BYTES, SIGNED_BYTES, ROWS,
+    MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS, FREEDOMS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD,
+    FILE_NAME, EFFECTS, MAPS, CONFORMITY, LISTED, DRAWS, INPUTS, XML_ELEMENTS, XML_DEPTH, XML_ATTRIBUTES,
 )  # fmt: skip
 """All of them, in the order of docs/limits.md."""
