@@ -28,8 +28,12 @@ def formal_warnings(job: Job) -> tuple[Text, ...]:
 
 def contradictions(job: Job) -> tuple[Text, ...]:
     """Dates out of their order, and an artefact that was certified on the machine which it tests."""
-    found = None if job.as_found is None else job.as_found.job.date
-    return (*_circular(job.facts), *_dates(job.facts, found))
+    return (*_circular(job.facts), *dates_out_of_order(job))
+
+
+def dates_out_of_order(job: Job) -> tuple[Text, ...]:
+    """Dates of which one must not be earlier than the other and is, among them an artefact that was due on the day."""
+    return tuple(_dates(job.facts, None if job.as_found is None else job.as_found.job.date))
 
 
 def unstated(facts: JobFile) -> list[tuple[Text, str]]:
