@@ -42,7 +42,8 @@ app = typer.Typer(
     name="cmm-uq",
     help="Uncertainty of coordinate measuring machines, and the certificates that state it.",
     epilog="Exit codes: 0 done; 2 bad input; 3 output impossible; 4 with --strict: done, not conforming or inconsistent; "
-    "130, 143 interrupted; 1 with report --scheduled: done, and something needs a person; of verify: 1 not verified, 3 not wholly checked.\n\n"
+    "130, 143 interrupted; 1 with report --scheduled: done, and something needs a person; of verify: 1 not verified, "
+    "3 not wholly checked.\n\n"
     + examples("report examples/iota-1102-20C", "report --help", "--install-completion"),
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # brackets of TOML stay as they are, and help is there at once

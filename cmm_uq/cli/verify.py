@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cmm_uq.cli import NOT_VERIFIED, NOT_WHOLLY_CHECKED
+from cmm_uq.cli.deferred import defer_scipy
 from cmm_uq.cli.options import Json, Quiet, Verbose, examples
 from cmm_uq.cli.printing import put_data, say
 from cmm_uq.cli.progress import shown
@@ -41,14 +42,14 @@ def command(
 ) -> None:
     """Compare the forms of a certificate with each other, its figures, decisions and inputs, and compute it again.
 
-    Exit code 0 where it is verified, 1 where something is wrong, 3 where nothing is but not all could be checked, 2 where a file
-    cannot be read.
+    Exit code 0 where it is verified, 1 where something is wrong, 3 where nothing is but not all could be checked, 2 where a
+    file cannot be read.
     """
+    defer_scipy()
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.verify import verify
-        from cmm_uq.commands.written import silent
 
-        found = verify(files, rerun=rerun, stage=stage or silent)
+        found = verify(files, rerun=rerun, stage=stage or (lambda what, part: None))
     inquiry = found.inquiry
     if json:
         put_data({"schema": "cmm-uq/verification/1", "subject": found.subject, **inquiry.as_data()})

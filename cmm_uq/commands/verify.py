@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
-from cmm_uq.commands.written import Stage, silent
 from cmm_uq.errors import CmmUqError
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.given import RESULTS, RESULTS_SCHEMA, Given, check_files, read_given
 
 if TYPE_CHECKING:
+    from cmm_uq.commands.written import Stage
     from cmm_uq.jobs.job import Job
     from cmm_uq.verification.again import Again
 
@@ -45,7 +45,7 @@ class Verification:
         return str(self.given.results[1]["job"]["id"]) if self.given.results is not None else ""
 
 
-def verify(paths: Iterable[Path], *, rerun: bool = True, stage: Stage = silent) -> Verification:
+def verify(paths: Iterable[Path], *, rerun: bool = True, stage: Stage = lambda what, part: None) -> Verification:
     """Verify the files of one certificate.
 
     Parameters
@@ -65,10 +65,15 @@ def verify(paths: Iterable[Path], *, rerun: bool = True, stage: Stage = silent) 
     stage("Comparing the forms", 0.1)
     job = _compare(inquiry, given)
     _say_unsigned(inquiry, given)
+    alike = False
     if not rerun:
         inquiry.left("computing again", "not asked for (--no-rerun)")
     elif job is not None:
-        _compute_again(inquiry, given, job, stage)
+        alike = _compute_again(inquiry, given, job, stage)
+    if given.pdf is not None and given.html is not None and not alike:
+        from cmm_uq.verification.views_agree import compare_views
+
+        compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
     stage("Done", 1.0)
     return Verification(given, inquiry)
 
@@ -97,10 +102,6 @@ def _check_schema(inquiry: Inquiry, given: Given) -> None:
 
 def _compare(inquiry: Inquiry, given: Given) -> Job | None:
     """The forms with each other, and figures, decisions, inputs and dates; the job, where its inputs are sound."""
-    from cmm_uq.verification.views_agree import compare_views
-
-    if given.pdf is not None and given.html is not None:
-        compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
     if given.results is None:
         return None
     from cmm_uq.verification.consistent import check_figures
@@ -148,31 +149,34 @@ def _say_unsigned(inquiry: Inquiry, given: Given) -> None:
     if given.pdf is not None:
         name, pdf = given.pdf
         if len(pdf.ends) > 1:
-            inquiry.wrong("files", name, f"byte {pdf.ends[0]}", "was changed after it was made: a further revision follows")
+            inquiry.wrong(
+                "files", name, f"byte {pdf.ends[0]}", "was changed after it was made: a further revision follows"
+            )
         elif not pdf.signatures:
             inquiry.notes.append(f"{name} carries no electronic signature: who issued it is not shown.")
 
 
-def _compute_again(inquiry: Inquiry, given: Given, job: Job, stage: Stage) -> None:
-    """Everything from the inputs, by this version."""
+def _compute_again(inquiry: Inquiry, given: Given, job: Job, stage: Stage) -> bool:
+    """Everything from the inputs, by this version; whether the documents are the same to the byte."""
     if given.results is None:
-        return
+        return False
     data = given.results[1]
     made, here = str(data["software"]["version"]), __version__
     if _plugins_missing(inquiry, data):
-        return
+        return False
     if made != here:
         _by_another_version(inquiry, given, job, made)
-        return
+        return False
     from cmm_uq.verification.again import compare_again
 
     try:
-        compare_again(inquiry, given, again(given, job, stage))
+        return compare_again(inquiry, given, again(given, job, stage))
     except CmmUqError as error:
         inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
+        return False
 
 
-def again(given: Given, job: Job, stage: Stage = silent) -> Again:
+def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Again:
     """What the inputs of a certificate give.
 
     Raises

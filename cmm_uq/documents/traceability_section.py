@@ -6,6 +6,7 @@ from cmm_uq.documents.document import Block, Facts, Paragraph, Section
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
 from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.chain import certified_on_this_machine
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.short_gauge import ShortGaugeFacts
@@ -81,13 +82,6 @@ def certificate_rows(chain: Traceability | None) -> list[tuple[Text, Text]]:
         (say("Its certificate"), sentences((*names(filter(None, (chain.number,))), *issued))),
         (say("Issued by"), Verbatim(chain.laboratory)),
     ]
-
-
-def certified_on_this_machine(facts: JobFile) -> bool:
-    """Whether the artefact's certificate comes from the machine that the artefact now tests."""
-    chain, machine = facts.artefact.certificate, facts.machine
-    own = {name.strip().casefold() for name in (machine.name, machine.serial) if name.strip()}
-    return chain is not None and chain.machine.strip().casefold() in own
 
 
 def statement_of_traceability(facts: JobFile) -> Text:

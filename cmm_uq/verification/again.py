@@ -48,8 +48,8 @@ Difference = tuple[str, Any, Any]
 """JSON path, what stands there, and what it should be."""
 
 
-def compare_again(inquiry: Inquiry, given: Given, again: Again) -> None:
-    """Keep every difference of a certificate by this version of the package.
+def compare_again(inquiry: Inquiry, given: Given, again: Again) -> bool:
+    """Keep every difference of a certificate by this version of the package; whether its documents are the same to the byte.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def compare_again(inquiry: Inquiry, given: Given, again: Again) -> None:
     again : made of its inputs.
     """
     if given.results is None:
-        return
+        return False
     name, data, content = given.results
     new = strict_json(again.files[RESULTS], RESULTS)
     inquiry.looked("again", sum(1 for _ in leaves(data)))
@@ -65,16 +65,15 @@ def compare_again(inquiry: Inquiry, given: Given, again: Again) -> None:
     kernels = not same and by_other_kernels(data, new)
     if kernels:
         inquiry.notes.append(
-            "Figures differ in their last digits from those computed here, as by another processor or library: compared within "
-            "printed digits and Monte Carlo error."
+            "Figures differ in their last digits from those computed here, as by another processor or library: compared "
+            "within printed digits and Monte Carlo error."
         )
     found = differences(data, new)
     for path, stands, should in found if not kernels else beyond_sampling(data, new, found):
         inquiry.wrong("again", name, path, "is not what its inputs give", stands, should)
-    _compare_html(inquiry, given, again, kernels=kernels)
+    alike = _compare_html(inquiry, given, again, kernels=kernels)
     _compare_attached(inquiry, given, again, kernels=kernels)
-    if same:
-        _compare_pdf(inquiry, given, again)
+    return same and _compare_pdf(inquiry, given, again) and alike
 
 
 def leaves(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -158,29 +157,32 @@ def _words_alike(stands: str, should: str, part: float) -> bool:
     if _NUMBER.sub("#", stands) != _NUMBER.sub("#", should):
         return False
     pairs = zip(_NUMBER.findall(stands), _NUMBER.findall(should), strict=True)
-    numbers = [(float(a.replace("−", "-").replace(",", ".")), float(b.replace("−", "-").replace(",", "."))) for a, b in pairs]
+    numbers = [
+        (float(a.replace("−", "-").replace(",", ".")), float(b.replace("−", "-").replace(",", "."))) for a, b in pairs
+    ]
     return all(abs(a - b) <= 4 * part * max(abs(a), abs(b), 1.0) for a, b in numbers)
 
 
-def _compare_html(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool) -> None:
+def _compare_html(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool) -> bool:
     if given.html is None:
-        return
+        return True
     name, page, content = given.html
     should = next((data for file, data in again.files.items() if file.endswith(".html")), None)
     if should is None:
         inquiry.left(name, "none is written of these inputs")
-        return
+        return False
     inquiry.looked("again")
     if content == should:
-        return
+        return True
     if kernels:
         from cmm_uq.verification.html_page import read_html
 
         if _masked(page.text) == _masked(read_html(should, name).text):
             inquiry.left("pictures", "the figures differ in their last digits, and with them the pictures")
-            return
+            return False
     line, stands, wanted = _first_line(content, should)
     inquiry.wrong("again", name, f"line {line}", "is not what its inputs give", stands, wanted)
+    return False
 
 
 def _masked(text: str) -> str:
@@ -199,7 +201,9 @@ def _first_line(stands: bytes, should: bytes) -> tuple[int, str, str]:
 
 def _compare_attached(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool) -> None:
     """Files inside the PDF, or beside it, that the command writes: none missing, none more, none other."""
-    written = {name: data for name, data in again.files.items() if name != RESULTS and not name.endswith((".html", ".xml"))}
+    written = {
+        name: data for name, data in again.files.items() if name != RESULTS and not name.endswith((".html", ".xml"))
+    }
     inputs = given.results[1]["job"]["inputs_sha256"] if given.results else {}
     for name, data in written.items():
         stands = given.files.get(name)
@@ -218,22 +222,23 @@ def _compare_attached(inquiry: Inquiry, given: Given, again: Again, *, kernels: 
             inquiry.wrong("again", given.pdf[0], f"attachment {name}", "is missing")
 
 
-def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> None:
+def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> bool:
     """The first revision of the PDF to the byte; signatures come behind it."""
     if given.pdf is None:
-        return
+        return True
     name, pdf = given.pdf
     if again.pdf is None:
         inquiry.left("drawings and letters of the PDF's pages", again.why_no_pdf)
-        return
-    inquiry.looked("again", len(pdf.pages))
-    if pdf.content == again.pdf:
-        return
-    if pdf.content.startswith(again.pdf):
-        inquiry.wrong("files", name, f"byte {len(again.pdf)}", "goes on behind the end of what its inputs give")
-        return
+        return False
+    inquiry.looked("again")
+    if pdf.content[: pdf.ends[0]] == again.pdf:
+        return True
     stands, should = pdf.content, again.pdf
-    at = next((i for i, (a, b) in enumerate(zip(stands, should, strict=False)) if a != b), min(len(stands), len(should)))
+    at = next(
+        (i for i, (a, b) in enumerate(zip(stands, should, strict=False)) if a != b), min(len(stands), len(should))
+    )
     objects = re.findall(rb"(?:^|[\r\n])(\d+) \d+ obj\b", stands[:at])
     where = f"object {objects[-1].decode()}, byte {at}" if objects else f"byte {at}"
-    inquiry.wrong("again", name, where, "is not what its inputs give", stands[at : at + 24].hex(" "), should[at : at + 24].hex(" "))
+    here, there = (content[at : at + 24].hex(" ") for content in (stands, should))
+    inquiry.wrong("again", name, where, "is not what its inputs give", here, there)
+    return False

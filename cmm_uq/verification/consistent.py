@@ -96,7 +96,9 @@ def _check_covariance(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> N
                               matrix[i][i], f"{u**2:.10g}")  # fmt: skip
         for j in range(i):
             if matrix[i][j] != matrix[j][i]:
-                inquiry.wrong("figures", file, f"covariance.matrix[{i}][{j}]", "is not symmetric", matrix[i][j], matrix[j][i])
+                inquiry.wrong(
+                    "figures", file, f"covariance.matrix[{i}][{j}]", "is not symmetric", matrix[i][j], matrix[j][i]
+                )
             if abs(matrix[i][j]) > math.sqrt(max(matrix[i][i] * matrix[j][j], 0.0)) * (1 + _ROOT):
                 inquiry.wrong("figures", file, f"covariance.matrix[{i}][{j}]", "is larger than a covariance can be",
                               matrix[i][j])  # fmt: skip
@@ -106,7 +108,8 @@ def _check_accuracy(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> Non
     """The figures of performance stand in two places."""
     plain, uncertain = data.get("accuracy") or {}, data.get("accuracy_uncertainty") or {}
     if list(plain) != list(uncertain):
-        inquiry.wrong("figures", file, "accuracy", "names other figures than accuracy_uncertainty", list(plain), list(uncertain))
+        inquiry.wrong("figures", file, "accuracy", "names other figures than accuracy_uncertainty", list(plain),
+                      list(uncertain))  # fmt: skip
     for name, value in plain.items():
         inquiry.looked("figures")
         if name in uncertain and uncertain[name]["value"] != value:

@@ -51,7 +51,8 @@ def check_decisions(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> Non
             continue
         inquiry.looked("decisions", 1 + len(entry["errors"]))
         if found and entry["standard"] not in BUILT_IN:
-            inquiry.left(f"decision by {entry['standard']}", "the standard comes from another package, which decides otherwise")
+            why = "the standard comes from another package, which decides otherwise"
+            inquiry.left(f"decision by {entry['standard']}", why)
             continue
         for place, problem, stands, should in found:
             inquiry.wrong("decisions", file, f"{path}{place}", problem, stands, should)

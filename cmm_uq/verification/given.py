@@ -65,7 +65,8 @@ def read_given(paths: Iterable[Path]) -> Given:
     for path in _files(paths):
         name = path.name
         if name in given.contents:
-            raise CmmUqError(f"there are two files {name!r}, and one certificate is verified at a time", where=str(path), fix=_FIX)
+            raise CmmUqError(f"there are two files {name!r}, and one certificate is verified at a time", where=str(path),
+                             fix=_FIX)  # fmt: skip
         given.contents[name] = content_of(path, PDF_BYTES, _FIX)
         _sort(given, name, given.contents[name], str(path))
     if given.results is None and given.pdf is not None and RESULTS in given.pdf[1].files:
@@ -86,14 +87,19 @@ def _files(paths: Iterable[Path]) -> list[Path]:
         if not path.is_dir():
             found.append(path)
             continue
-        inside = sorted(Path(one.path) for one in os.scandir(path) if not one.name.startswith(".") and not _is_folder(one))
+        inside = sorted(
+            Path(one.path) for one in os.scandir(path) if not one.name.startswith(".") and not _is_folder(one)
+        )
         if not inside:
             raise CmmUqError("holds no files", where=str(path), fix=_FIX)
         if linked := next((one for one in inside if one.is_symlink()), None):
-            raise CmmUqError("is a link, which may lead to anything", where=str(linked), fix="Put the file itself there")
+            raise CmmUqError(
+                "is a link, which may lead to anything", where=str(linked), fix="Put the file itself there"
+            )
         found += inside
     if len(found) > GIVEN.most:
-        raise CmmUqError(f"{len(found)} files are given, and {GIVEN.most} are read at once", where=str(found[0].parent), fix=_FIX)
+        raise CmmUqError(f"{len(found)} files are given, and {GIVEN.most} are read at once", where=str(found[0].parent),
+                         fix=_FIX)  # fmt: skip
     return found
 
 

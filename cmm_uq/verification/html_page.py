@@ -1,4 +1,4 @@
-"""A certificate's HTML read as what it shows: text in order, tables, words of pictures; and nothing that does not belong there.
+"""A certificate's HTML read as what it shows: text in order, tables, words of pictures; and nothing that does not belong.
 
 The page is one file without scripts, forms or references to anything outside it, with the tags and attributes of the
 template and no others. Whatever else is in a page is named, since it may show something else than what is read here.

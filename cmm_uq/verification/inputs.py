@@ -1,4 +1,4 @@
-"""Whether the inputs are those that ``results.json`` names, by their hashes, and ``results.json`` is of the job that they are."""
+"""Whether the inputs are those that ``results.json`` names, by their hashes, and it speaks of the job that they are."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from hashlib import sha256
 from typing import Any
 
 from cmm_uq.conformity.decision import rule_name
-from cmm_uq.documents.completeness import dates_out_of_order
-from cmm_uq.documents.traceability_section import certified_on_this_machine
+from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.job import Job
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.given import JOB, RESULTS, Given
@@ -44,15 +43,21 @@ def inputs_of(inquiry: Inquiry, given: Given) -> dict[str, bytes] | None:
         if input_ not in files:
             sound = False
             if given.pdf is not None:
-                inquiry.wrong("inputs", given.pdf[0], f"attachment {input_}", f"is missing, and {name} names it as an input")
+                inquiry.wrong(
+                    "inputs", given.pdf[0], f"attachment {input_}", f"is missing, and {name} names it as an input"
+                )
             continue
         found[input_] = files[input_]
         stands = sha256(files[input_]).hexdigest()
         if stands != digest:
             sound = False
-            inquiry.wrong("inputs", _file_of(given, input_), "", f"is not the file whose hash {name} has", stands, digest)
+            inquiry.wrong(
+                "inputs", _file_of(given, input_), "", f"is not the file whose hash {name} has", stands, digest
+            )
         if input_ in given.others and files[input_] != given.others[input_]:
-            inquiry.wrong("inputs", input_, "", f"is another file than the one of that name in {given.pdf and given.pdf[0]}")
+            inquiry.wrong(
+                "inputs", input_, "", f"is another file than the one of that name in {given.pdf and given.pdf[0]}"
+            )
     if given.pdf is None and not sound and not (wanted.keys() & files.keys()):
         inquiry.left("inputs", "neither a PDF that has them inside nor the files themselves are given")
     elif given.pdf is None and not sound:
@@ -78,7 +83,8 @@ def _check_posterior(inquiry: Inquiry, given: Given, data: Mapping[str, Any], fi
     inquiry.looked("inputs")
     stands = sha256(files[name]).hexdigest()
     if stands != entry["sha256"]:
-        inquiry.wrong("inputs", _file_of(given, name), "", "is not the file whose hash results.json has", stands, entry["sha256"])
+        inquiry.wrong("inputs", _file_of(given, name), "", "is not the file whose hash results.json has", stands,
+                      entry["sha256"])  # fmt: skip
     if name in given.others and given.others[name] != files[name]:
         inquiry.wrong("inputs", name, "", "is another file than the one of that name in the PDF")
 

@@ -12,7 +12,9 @@ import logging
 import re
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -63,7 +65,6 @@ class PdfFile:
     Attributes
     ----------
     content : the file's bytes.
-    pages : text of each.
     attachments : in the order of their names in the file.
     information : title, dates and the like, as the file says.
     xmp : the same as its metadata stream says.
@@ -71,10 +72,10 @@ class PdfFile:
     ends : bytes up to the end of each revision.
     signatures : signature fields.
     problems : what does not belong there, each with its place.
+    reader : of its pages.
     """
 
     content: bytes
-    pages: list[str] = field(default_factory=list)
     attachments: list[Attachment] = field(default_factory=list)
     information: dict[str, str] = field(default_factory=dict)
     xmp: str = ""
@@ -82,6 +83,19 @@ class PdfFile:
     ends: list[int] = field(default_factory=list)
     signatures: int = 0
     problems: list[tuple[str, str]] = field(default_factory=list)
+    reader: PdfReader | None = None
+    where: str = ""
+
+    @cached_property
+    def pages(self) -> list[str]:
+        """Text of each page, as a reader copies it; looked for when it is first asked for.
+
+        Raises
+        ------
+        CmmUqError : they are damaged, or beyond the limits.
+        """
+        with _reading(self.where):
+            return list(_texts(self))
 
     @property
     def files(self) -> Mapping[str, bytes]:
@@ -101,7 +115,7 @@ def read_pdf(content: bytes, where: str) -> PdfFile:
     """
     if len(content) > PDF_BYTES.most:
         raise CmmUqError(f"is larger than {PDF_BYTES.most} bytes", where=where, fix=_FIX)
-    found = PdfFile(content)
+    found = PdfFile(content, where=where)
     found.ends = [match.end() for match in re.finditer(rb"%%EOF(?:\r\n|\n|\r)?", content)]
     if not content.startswith(b"%PDF-") or not found.ends:
         raise CmmUqError("is no whole PDF: its beginning or its end is missing", where=where, fix=_FIX)
@@ -111,12 +125,20 @@ def read_pdf(content: bytes, where: str) -> PdfFile:
         if not content.startswith(b"xref", int(match[1])):
             raise CmmUqError("has no table of its objects where it says: it is damaged, or no PDF of cmm-uq",
                              where=f"{where}: byte {match.start()}", fix=_FIX)  # fmt: skip
+    with _reading(where):
+        _read(found, where)
+    return found
+
+
+@contextmanager
+def _reading(where: str) -> Iterator[None]:
+    """Whatever a damaged file makes of the library that reads it, said in one sentence."""
     from pypdf.errors import PyPdfError
 
     quiet, level = logging.getLogger("pypdf"), logging.getLogger("pypdf").level
     quiet.setLevel(logging.CRITICAL)
     try:
-        _read(found, where)
+        yield
     except CmmUqError:
         raise
     except (PyPdfError, ValueError, KeyError, TypeError, AttributeError, IndexError, AssertionError, ArithmeticError,
@@ -125,7 +147,6 @@ def read_pdf(content: bytes, where: str) -> PdfFile:
         raise CmmUqError(f"is a damaged PDF ({what})", where=where, fix=_FIX) from error
     finally:
         quiet.setLevel(level)
-    return found
 
 
 def _read(found: PdfFile, where: str) -> None:
@@ -135,7 +156,7 @@ def _read(found: PdfFile, where: str) -> None:
     if reader.is_encrypted or "/Encrypt" in reader.trailer:
         raise CmmUqError("is encrypted, which no PDF of cmm-uq is", where=where, fix=_FIX)
     _Walk(found, where).all(reader.trailer)
-    root = reader.trailer["/Root"]
+    root: Any = reader.trailer["/Root"]
     found.language = str(root.get("/Lang", ""))
     found.information = {str(key): str(value) for key, value in (reader.metadata or {}).items()}
     if "/Metadata" in root:
@@ -143,7 +164,7 @@ def _read(found: PdfFile, where: str) -> None:
     found.attachments = list(_attachments(found, root))
     if len(reader.pages) > PDF_PAGES.most:
         raise CmmUqError(f"has more than {PDF_PAGES.most} pages", where=where, fix=_FIX)
-    found.pages = list(_texts(found, reader, where))
+    found.reader = reader
 
 
 class _Walk:
@@ -193,7 +214,9 @@ class _Walk:
     def _unpack(self, place: str, one: Any) -> None:
         """A stream whole, up to the limit, with its checksum."""
         packing = one.get("/Filter")
-        packing = [str(name) for name in packing] if isinstance(packing, list) else [] if packing is None else [str(packing)]
+        packing = (
+            [str(name) for name in packing] if isinstance(packing, list) else [] if packing is None else [str(packing)]
+        )
         raw = one._data if isinstance(one._data, bytes) else bytes(one._data)
         if packing not in ([], ["/FlateDecode"]) or one.get("/DecodeParms") is not None:
             raise CmmUqError(f"packs a stream by {' '.join(packing)}, which no PDF of cmm-uq does",
@@ -242,22 +265,25 @@ def _attachments(found: PdfFile, root: Any) -> Iterator[Attachment]:
         if "/UF" in files and files["/UF"].get_object() is not stream:
             found.problems.append((f"attachment {name}", "has two contents, one for each form of its name"))
         content = stream.get_data()
-        told = stream["/Params"] if "/Params" in stream else {}
+        told = _inner(stream, "/Params")
         if "/Size" in told and int(told["/Size"]) != len(content):
             found.problems.append((f"attachment {name}", f"has {len(content)} bytes, and {told['/Size']} are told"))
-        if "/CheckSum" in told and bytes(told["/CheckSum"].original_bytes) != hashlib.md5(
-            content, usedforsecurity=False
-        ).digest():
+        if (
+            "/CheckSum" in told
+            and bytes(told["/CheckSum"].original_bytes) != hashlib.md5(content, usedforsecurity=False).digest()
+        ):
             found.problems.append((f"attachment {name}", "has another checksum than the PDF tells"))
         yield Attachment(name, content, str(spec.get("/AFRelationship", "")).lstrip("/"))
 
 
-def _texts(found: PdfFile, reader: PdfReader, where: str) -> Iterator[str]:
+def _texts(found: PdfFile) -> Iterator[str]:
     """Text of each page, as a reader copies it."""
-    until = monotonic() + SECONDS
-    for number, page in enumerate(reader.pages, 1):
+    until, where = monotonic() + SECONDS, found.where
+    for number, page in enumerate(found.reader.pages if found.reader else (), 1):
         if _drawn(page, {}, ()) > PDF_DRAWN.most:
-            raise CmmUqError(f"draws more than {PDF_DRAWN.most} bytes on a page", where=f"{where}: page {number}", fix=_FIX)
+            raise CmmUqError(
+                f"draws more than {PDF_DRAWN.most} bytes on a page", where=f"{where}: page {number}", fix=_FIX
+            )
         contents = page.get_contents()
         if contents is not None and _INVISIBLE.search(contents.get_data()):
             found.problems.append((f"page {number}", "has text that is not painted as text"))
@@ -266,10 +292,14 @@ def _texts(found: PdfFile, reader: PdfReader, where: str) -> Iterator[str]:
             raise CmmUqError(f"takes longer than {SECONDS:.0f} s to read", where=f"{where}: page {number}", fix=_FIX)
 
 
+def _inner(one: Any, key: str) -> Any:
+    """A part of a dictionary, whatever refers to it; an empty one where there is none."""
+    return one[key] if key in one else {}  # noqa: SIM401 - get() of pypdf does not follow references
+
+
 def _drawn(page: Any, known: dict[int, int], above: tuple[int, ...]) -> int:
     """Bytes of instructions that drawing takes, with forms within forms as often as they are drawn."""
-    resources = page["/Resources"] if "/Resources" in page else {}
-    forms = resources["/XObject"] if "/XObject" in resources else {}
+    forms = _inner(_inner(page, "/Resources"), "/XObject")
     content = page.get_data() if hasattr(page, "get_data") else b""
     if not content and "/Contents" in page:
         content = page.get_contents().get_data()

@@ -37,7 +37,7 @@ def strict_json(content: bytes, where: str) -> dict[str, Any]:
             raise CmmUqError(f"has the key {twice!r} twice", where=where, fix=_FIX)
         return found
 
-    def numeral(of: type[int] | type[float], text: str) -> Any:
+    def numeral(of: type[int | float], text: str) -> Any:
         number = None if len(text) > NUMERAL.most else of(text)
         if number is None or not math.isfinite(number):
             raise CmmUqError(f"has a number that is none: {text}", where=where, fix=_FIX)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.html_page import HtmlPage
@@ -48,9 +48,10 @@ def compare_views(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, *, files: tupl
         if not shown.startswith(banner):
             inquiry.wrong("forms", name, f"page {number}", "does not begin with the banner", shown[:60], page.banner)
         shown = shown.removeprefix(banner)
-        for stands, should, at in _differences(shown, whole, at, heads, replaced=replaced):
+        found, at = _differences(shown, whole, at, heads, replaced=replaced)
+        for stands, should in found:
             count += 1
-            if count <= _MOST_SHOWN and (stands or should):
+            if count <= _MOST_SHOWN:
                 inquiry.wrong("forms", name, f"page {number}", f"says something else than {beside}", stands, should)
     if at < len(whole):
         inquiry.wrong("forms", name, f"page {len(pdf.pages)}", f"ends before {beside} does", "", whole[at:])
@@ -74,9 +75,9 @@ def without_foot(text: str, title: str, number: int, pages: int) -> tuple[str, b
 
 def _differences(
     text: str, whole: str, at: int, heads: Sequence[str], *, replaced: bool
-) -> Iterator[tuple[str, str, int]]:  # fmt: skip
-    """What stands on a page and what should, with the place in the whole up to which they are compared; the last is the end."""
-    here = 0
+) -> tuple[list[tuple[str, str]], int]:  # fmt: skip
+    """What stands on a page and what should, and the place in the whole up to which they were compared."""
+    here, found = 0, list[tuple[str, str]]()
     while here < len(text):
         length = _alike(text, here, whole, at, replaced=replaced)
         here, at = here + length, at + length
@@ -85,12 +86,11 @@ def _differences(
         if head := next((one for one in heads if text.startswith(one, here) and here == 0), ""):
             here += len(head)
             continue
-        skipped, found = _together(text, here, whole, at)
-        stands, should = text[here : here + skipped], whole[at:found]
+        skipped, on = _together(text, here, whole, at)
         before = text[max(0, here - _CONTEXT) : here]
-        here, at = here + skipped, found
-        yield before + stands, before + should, at
-    yield "", "", at
+        found.append((before + text[here : here + skipped], before + whole[at:on]))
+        here, at = here + skipped, on
+    return found, at
 
 
 def _alike(text: str, here: int, whole: str, at: int, *, replaced: bool) -> int:
@@ -98,7 +98,10 @@ def _alike(text: str, here: int, whole: str, at: int, *, replaced: bool) -> int:
     length, most = 0, min(len(text) - here, len(whole) - at)
     step = most
     while step:
-        if length + step <= most and text[here + length : here + length + step] == whole[at + length : at + length + step]:
+        if (
+            length + step <= most
+            and text[here + length : here + length + step] == whole[at + length : at + length + step]
+        ):
             length += step
         elif replaced and length < most and text[here + length] == MISSING:
             length += 1
