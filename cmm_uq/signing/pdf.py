@@ -1,0 +1,129 @@
+"""PDF signed by PAdES: a revision appended, that leaves every byte before it as it is, tagged and fit for the archive.
+
+The date of the metadata stays that of the document. The same document, key and time give the same bytes at level B-B.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import datetime as dt
+import hashlib
+import io
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.signing.extra import installed
+from cmm_uq.signing.signer import ONE_DIGEST, Signer
+
+if TYPE_CHECKING:
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+    from pyhanko.sign.signers import PdfSigner
+
+FIELD = "Signature"
+"""Names of the fields: Signature1, Signature2, …"""
+
+
+@dataclass(frozen=True)
+class Seal:
+    """What is seen of a signature on the first page.
+
+    Parameters
+    ----------
+    picture : a PDF of one page, shown in the seal's place.
+    box : left, bottom, right and top of the place, in points from the page's lower left corner.
+    says : the picture in words, for those who cannot see it.
+    """
+
+    picture: bytes
+    box: tuple[float, float, float, float]
+    says: str
+
+
+def sign_pdf(pdf: bytes, signer: Signer, *, seal: Seal | None, at: dt.datetime, reason: str = "") -> bytes:
+    """A PDF with a signature.
+
+    Parameters
+    ----------
+    pdf : the document; signatures that it has stay valid.
+    signer : who signs.
+    seal : what is seen of it; ``None`` for nothing.
+    at : time of signing, with its zone.
+    reason : why it is signed.
+
+    Raises
+    ------
+    CmmUqError : it cannot be read as a PDF, or the key must not sign at this time.
+    """
+    signer.check(at)
+    with installed():
+        from pyhanko.sign import fields, signers
+        from pyhanko.stamp.noop import NoOpStampStyle
+
+        from cmm_uq.signing.adapter import Adapted
+        from cmm_uq.signing.tagging import show, tag
+    writer = appending(pdf)
+    name = _field(writer)
+    said = seal.says if seal else signer.name
+    fields.append_signature_field(
+        writer,
+        fields.SigFieldSpec(name, box=seal.box if seal else None, readable_field_name=said),
+    )
+    field = next(reference for _, _, reference in fields.enumerate_sig_fields(writer, with_name=name))
+    if seal is not None:
+        show(writer, field.get_object(), seal.picture)
+    tag(writer, field, said)
+    metadata = signers.PdfSignatureMetadata(
+        field_name=name, md_algorithm=ONE_DIGEST, subfilter=fields.SigSeedSubFilter.PADES, name=signer.name,
+        reason=reason or None,
+    )  # fmt: skip
+    return asyncio.run(_signed(signers.PdfSigner(metadata, Adapted(signer), stamp_style=NoOpStampStyle()), writer, at))
+
+
+def appending(pdf: bytes) -> IncrementalPdfFileWriter:
+    """A writer that appends a revision, and draws nothing at random.
+
+    Raises
+    ------
+    CmmUqError : it cannot be read as a PDF.
+    """
+    with installed():
+        from pyhanko.pdf_utils import generic
+        from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+        from pyhanko.pdf_utils.misc import PdfError
+
+    class Appending(IncrementalPdfFileWriter):  # type: ignore[misc]
+        def _update_meta(self) -> None:
+            """Metadata stay: they are of the document, and PDF/A asks that both its copies agree."""
+
+        @classmethod
+        def _handle_id(cls, prev: Any) -> Any:
+            drawn = generic.ByteStringObject(hashlib.sha256(pdf).digest()[:16])
+            return generic.ArrayObject([prev.trailer["/ID"][0] if "/ID" in prev.trailer else drawn, drawn])
+
+    try:
+        return Appending(io.BytesIO(pdf))
+    except (PdfError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise CmmUqError(f"cannot be read as a PDF: {error}", fix="Name a PDF that is whole") from None
+
+
+def _field(writer: IncrementalPdfFileWriter) -> str:
+    """A name that no field has."""
+    from pyhanko.sign.fields import enumerate_sig_fields
+
+    taken = {name for name, _, _ in enumerate_sig_fields(writer)}
+    return next(name for name in (f"{FIELD}{i}" for i in range(1, len(taken) + 2)) if name not in taken)
+
+
+async def _signed(pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, at: dt.datetime) -> bytes:
+    """Signed at a time that is given."""
+    from pyhanko.sign.signers.pdf_cms import PdfCMSSignedAttributes
+
+    session = pdf_signer.init_signing_session(writer)
+    session.system_time = at
+    room = await session.estimate_signature_container_size(None)
+    document = session.prepare_tbs_document(None, room)
+    digest, output = document.digest_tbs_document()
+    await document.perform_signature(digest.document_digest, PdfCMSSignedAttributes(signing_time=at))
+    output.seek(0)
+    return bytes(output.read())

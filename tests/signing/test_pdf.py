@@ -1,0 +1,140 @@
+"""PDFs signed here are PAdES signatures that openssl and pyHanko confirm, and that say what was changed of a file."""
+
+from __future__ import annotations
+
+import datetime as dt
+import io
+import shutil
+import subprocess
+from pathlib import Path
+
+import pikepdf
+import pytest
+from cryptography.hazmat.primitives.serialization import Encoding
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.signing import Signature, Trust, sign_pdf, signatures_of_pdf
+from tests.signing.authority import LAST, SIGNED, Held, curve_key, issued, usage
+
+DER = Encoding.DER
+
+
+def only(found: tuple[Signature, ...]) -> Signature:
+    assert len(found) == 1
+    return found[0]
+
+
+@pytest.fixture(scope="session")
+def signed(pdf: bytes, held: Held) -> bytes:
+    return sign_pdf(pdf, held.signer, seal=None, at=SIGNED, reason="approval")
+
+
+def test_a_signature_holds_of_somebody_trusted_over_the_whole_file(signed: bytes, trust: Trust) -> None:
+    found = only(signatures_of_pdf(signed, trust))
+    assert found.good
+    assert (found.name, found.level, found.time, found.time_proven) == ("A. Huber", "PAdES B-B", SIGNED, False)
+    assert "Test Issuer" in found.issuer
+    assert not found.test_key
+    assert found.content == signed
+
+
+def test_every_byte_of_the_document_stays_as_it_was(pdf: bytes, signed: bytes) -> None:
+    assert signed.startswith(pdf)
+
+
+def test_nobody_is_trusted_by_default(signed: bytes) -> None:
+    found = only(signatures_of_pdf(signed, Trust()))
+    assert found.intact
+    assert not found.trusted
+    assert found.problems == ("nobody is trusted: name the certificates that you trust",)
+
+
+def test_an_authority_that_is_not_trusted_vouches_for_nobody(signed: bytes, curve_held: Held) -> None:
+    found = only(signatures_of_pdf(signed, Trust((curve_held.certificate.public_bytes(DER),))))
+    assert found.problems == ("no chain of certificates leads from the signer to anybody who is trusted",)
+
+
+@pytest.mark.parametrize("key", ["held", "curve_held"])
+def test_the_same_document_key_and_time_give_the_same_bytes(
+    key: str, pdf: bytes, request: pytest.FixtureRequest
+) -> None:
+    signer = request.getfixturevalue(key).signer
+    assert sign_pdf(pdf, signer, seal=None, at=SIGNED) == sign_pdf(pdf, signer, seal=None, at=SIGNED)
+
+
+def test_openssl_confirms_it(signed: bytes, anchor: Held, tmp_path: Path) -> None:
+    """The bytes of /ByteRange and the PKCS#7 between them, taken out by pikepdf."""
+    if shutil.which("openssl") is None:
+        pytest.skip("no openssl is installed")
+    with pikepdf.open(io.BytesIO(signed)) as opened:
+        value = opened.Root.AcroForm.Fields[0].V
+        first, before, second, after = map(int, value.ByteRange)
+        (tmp_path / "signature.der").write_bytes(bytes(value.Contents))
+    (tmp_path / "content").write_bytes(signed[first:before] + signed[second : second + after])
+    (tmp_path / "ca.pem").write_bytes(anchor.pem)
+    command = ["openssl", "cms", "-verify", "-inform", "DER", "-in", "signature.der", "-content", "content", "-binary",
+               "-CAfile", "ca.pem", "-purpose", "any", "-attime", str(int(SIGNED.timestamp())), "-cades",
+               "-out", "out"]  # fmt: skip
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "content").write_bytes(signed[first:before] + signed[second : second + after][:-1] + b" ")
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True).returncode != 0
+
+
+def test_pyhanko_confirms_it(signed: bytes, anchor: Held) -> None:
+    from asn1crypto import x509
+    from pyhanko.pdf_utils.reader import PdfFileReader
+    from pyhanko.sign.validation import validate_pdf_signature
+    from pyhanko_certvalidator import ValidationContext
+
+    context = ValidationContext(
+        trust_roots=[x509.Certificate.load(anchor.certificate.public_bytes(DER))], moment=SIGNED, allow_fetching=False
+    )
+    status = validate_pdf_signature(PdfFileReader(io.BytesIO(signed)).embedded_signatures[0], context)
+    assert status.bottom_line
+    assert status.coverage.name == "ENTIRE_FILE"
+
+
+@given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
+def test_one_altered_bit_is_found(signed: bytes, trust: Trust, place: float, bit: int) -> None:
+    altered = bytearray(signed)
+    altered[int(place * len(signed))] ^= 1 << bit
+    try:
+        found = signatures_of_pdf(bytes(altered), trust)
+    except CmmUqError:
+        return
+    assert not (len(found) == 1 and found[0].good) or _hexadecimal(signed, altered)
+
+
+def _hexadecimal(signed: bytes, altered: bytearray) -> bool:
+    """The signature itself is written in hexadecimal digits: small or capital letters are the same."""
+    return signed.lower() == bytes(altered).lower()
+
+
+def test_a_certificate_must_be_in_date_when_it_is_signed(pdf: bytes, held: Held) -> None:
+    with pytest.raises(CmmUqError, match="its certificate expired on 2027-01-31"):
+        sign_pdf(pdf, held.signer, seal=None, at=LAST + dt.timedelta(days=1))
+
+
+def test_a_revision_that_changes_a_page_is_named(signed: bytes, trust: Trust) -> None:
+    from pyhanko.pdf_utils.generic import StreamObject
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+
+    writer = IncrementalPdfFileWriter(io.BytesIO(signed))
+    writer.add_stream_to_page(0, writer.add_object(StreamObject(stream_data=b"0 0 100 100 re f")))
+    output = io.BytesIO()
+    writer.write(output)
+    found = only(signatures_of_pdf(output.getvalue(), trust))
+    assert found.intact
+    assert not found.covers_whole_file
+    assert "1 revision was appended after it, and changes" in found.problems[0]
+    assert "Page" in found.problems[0]
+    assert found.content == signed
+
+
+def test_a_key_that_is_not_for_signatures_does_not_sign(pdf: bytes, anchor: Held) -> None:
+    web = issued("web server", curve_key(), anchor, key_usage=usage(key_encipherment=True))
+    with pytest.raises(CmmUqError, match="not for signatures"):
+        sign_pdf(pdf, web.signer, seal=None, at=SIGNED)
