@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from cmm_uq.commands import analysis, diagnosing
-from cmm_uq.commands.reading import compared_with, read_job
+from cmm_uq.commands.reading import compared_with, in_language, read_job
 from cmm_uq.commands.written import Form, Stage, Told, Written, silent
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.documents.diagnosis_next import TO_FILL_IN
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
+from cmm_uq.languages.language import Code
 from cmm_uq.plugins import naming_package
 from cmm_uq.records.place import NONE
 
@@ -46,7 +47,7 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: 
 
 def write_report(
     job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
-    told: Told | None = None, records: str | Path | None = NONE,
+    told: Told | None = None, records: str | Path | None = NONE, language: Code | None = None,
 ) -> Written:  # fmt: skip
     """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
 
@@ -61,6 +62,7 @@ def write_report(
     stage : told of progress.
     told : of the job, before anything is computed.
     records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
+    language : of the documents, instead of the job's.
 
     Raises
     ------
@@ -69,7 +71,7 @@ def write_report(
     """
     tell = stage or silent
     tell("Reading the job", 0.0)
-    read = read_job(job)
+    read = in_language(read_job(job), language)
     analysis.report_recipe(read)  # refused before anything is made
     if told is not None:
         told(read)
@@ -112,6 +114,7 @@ def write_diagnosis(
     stage: Stage | None = None,
     told: Told | None = None,
     records: str | Path | None = NONE,
+    language: Code | None = None,
 ) -> Written:
     """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
 
@@ -128,13 +131,14 @@ def write_diagnosis(
     stage : told of progress.
     told : of the job, before anything is computed.
     records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
+    language : of the documents, instead of the job's.
 
     Raises
     ------
     CmmUqError : the job cannot be diagnosed, or something in the folder that this command did not write for this job.
     OutputError : the folder cannot be written to.
     """
-    read, tell = read_job(job), stage or silent
+    read, tell = in_language(read_job(job), language), stage or silent
     if against is not None:
         read = compared_with(read, against)
     if told is not None:

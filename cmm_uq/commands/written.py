@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.commands.recording import ledger_of, opened
+from cmm_uq.documents.fonts import fonts_of
 from cmm_uq.documents.in_short import Summary
 from cmm_uq.documents.outcome import Found, Outcome
 from cmm_uq.errors import CmmUqError
@@ -105,6 +106,7 @@ class Form:
         CmmUqError : as computing does, or something in the folder that this command did not write for this job.
         OutputError : the folder, or the records, cannot be written to.
         """
+        fonts_of(job.facts.job.language)  # refused before anything is computed
         owner = self.owner(job)
         folder = out or REPORTS / owner.job / self.below
         expected = (*self.names(job), RESULTS, *self.further)
@@ -134,11 +136,12 @@ class Form:
         if results_only:
             return {RESULTS: as_json(outcome.results)}
         from cmm_uq.documents.html import render_html
+        from cmm_uq.documents.in_language import said
         from cmm_uq.documents.origin import marked
         from cmm_uq.documents.pdf import render_pdf
 
         job, data = outcome.found.job, as_json(outcome.results)
-        document = marked(outcome.document, job)
+        document = said(marked(outcome.document, job), job.facts.job.language)
         for name in outcome.files.keys() & job.inputs.keys():
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cmm_uq.documents.document import Plot
+from cmm_uq.documents.lettering import lettered, measuring_fonts
 from cmm_uq.documents.plot_style import (
     ACCENT,
     INK,
@@ -256,7 +257,7 @@ class _Panels:
             size = SMALL if self.count <= 8 else TINY
             room = WIDTH_MM - self.left - k * self.panel_mm - 1
             self.ax.text(k, self.count - k - 0.04, label, ha="left", va="bottom", fontweight="bold",
-                         fontsize=size * min(1.0, room / _width_mm(label, size, "bold")))  # fmt: skip
+                         fontsize=size * min(1.0, room / _width_mm(lettered(label), size, "bold")))  # fmt: skip
 
     def strokes(self, x0: Floats, x1: Floats, y0: Floats, y1: Floats, colour: str) -> None:
         """Straight hairlines from (x0, y0) to (x1, y1), all in one path."""
@@ -270,7 +271,7 @@ def _width_mm(text: str, size: float, weight: str = "normal") -> float:
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextPath
 
-    font = FontProperties(family="DejaVu Sans", weight=weight)
+    font = FontProperties(family=measuring_fonts(), weight=weight)
     return _MM * max(_farthest_right(TextPath((0, 0), str.__str__(text), size=size, prop=font)), size)
 
 

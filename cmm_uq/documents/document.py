@@ -15,6 +15,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
 from cmm_uq.documents.view_words import label
+from cmm_uq.languages.language import code_of
+from cmm_uq.languages.saying import said_in
 from cmm_uq.messages import NOTHING, Text, say
 
 Outcome = Literal["pass", "conditional pass", "incomplete", "undecided", "conditional fail", "remeasure", "fail"]
@@ -178,7 +180,9 @@ class Document:
                 plain_block.pop("lettering", None)
                 if block.kind in _NUMBERED:
                     counted[block.kind] += 1
-                    plain_block["label"] = str.__str__(label(block.kind, counted[block.kind]))
+                    plain_block["label"] = str.__str__(
+                        said_in(label(block.kind, counted[block.kind]), code_of(self.language))
+                    )
                 if block.kind == "table":
                     _measure(plain_block)
         return data

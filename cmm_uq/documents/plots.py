@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.documents.document import Plot
+from cmm_uq.documents.lettering import lettered
 from cmm_uq.documents.plot_style import (
     ACCENT,
     BAND,
@@ -331,4 +332,5 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
 
 
 def _cut(text: Text, length: int) -> Text:
-    return text if len(text) <= length else Verbatim(text[: length - 1] + "…")
+    said = lettered(text)
+    return text if len(said) <= length else Verbatim(said[: length - 1] + "…")

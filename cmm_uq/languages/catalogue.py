@@ -1,0 +1,67 @@
+"""Catalogues: what each sentence of the program is in another language, from the ``.po`` files beside this module.
+
+An entry's ``msgid`` is a pattern as :func:`cmm_uq.messages.say` has it, placeholders included; those of a
+:class:`~cmm_uq.messages.Plural` are ``msgid`` and ``msgid_plural``. ``python -m tests.catalogues`` keeps the files in step
+with the sentences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from cmm_uq.languages.language import Code
+from cmm_uq.messages import fields_of
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """Patterns in one language, by the English ones.
+
+    Parameters
+    ----------
+    single : of messages.
+    plural : of plurals, by both forms of English: the forms of the language, that for one first.
+    """
+
+    single: Mapping[str, str]
+    plural: Mapping[tuple[str, str], tuple[str, ...]]
+
+    def of_count(self, one: str, many: str, *, singular: bool, exactly_one: bool) -> str | None:
+        """The form of a count; ``None`` where the catalogue has none.
+
+        A form that says its number in words ("une longueur") is for one alone, though the grammar of a language may use the
+        singular of other counts, as French does of 0.
+        """
+        forms = self.plural.get((one, many))
+        if forms is None:
+            return None
+        if singular and (exactly_one or fields_of(many) <= fields_of(forms[0])):
+            return forms[0]
+        return forms[-1]
+
+
+def file_of(code: Code) -> Path:
+    """The file of a language's catalogue."""
+    return Path(__file__).with_name(f"{code}.po")
+
+
+@cache
+def catalogue(code: Code) -> Catalogue:
+    """The catalogue of a language, read when it is first asked for."""
+    from babel.messages.pofile import read_po
+
+    single: dict[str, str] = {}
+    plural: dict[tuple[str, str], tuple[str, ...]] = {}
+    with file_of(code).open("rb") as file:
+        for entry in read_po(file):
+            forms = entry.string if isinstance(entry.string, tuple | list) else (entry.string or "",)
+            if not entry.id or entry.fuzzy or not all(forms):
+                continue
+            if isinstance(entry.id, str):
+                single[entry.id] = forms[0]
+            else:
+                plural[entry.id[0], entry.id[1]] = tuple(forms)
+    return Catalogue(single, plural)
