@@ -146,6 +146,7 @@ class Document:
     end : the mark after the last line.
     banner : what every page must say at its head, such as that nothing was measured.
     overview : what comes before everything else.
+    draft : whether the banner says only that something is still to be stated.
     """
 
     title: Text
@@ -164,6 +165,7 @@ class Document:
     end: Text = say("End of certificate")
     banner: Text = NOTHING
     overview: Overview | None = None
+    draft: bool = False
 
     def as_data(self) -> dict[str, Any]:
         """The document as plain dicts and lists of printable text, ready for JSON.

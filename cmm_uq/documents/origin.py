@@ -46,6 +46,7 @@ def marked(document: Document, job: Job) -> Document:
         title=TITLES[job.origin] if is_certificate else _of_such(document.title, job.origin),
         number=Verbatim(job.facts.job.id),
         banner=BANNERS[job.origin],
+        draft=False,
         warnings=warnings,
         statements=(),
         signatures=(),

@@ -26,6 +26,11 @@ def dates_out_of_order(of: Job) -> tuple[Text, ...]:
         (job.date, chain.date, say("the artefact was certified after it was measured with"), "[artefact.certificate] date"),
         (chain.due, job.date, say("the artefact was due for calibration before this"), "[artefact.certificate] due"),
         (chain.due, chain.date, say("the artefact's certificate was due before its date"), "[artefact.certificate] due"),
+        (job.date, job.received, say("it was measured before it was received"), "[job] received"),
+        (
+            job.issued, None if job.replaces is None else job.replaces.date,
+            say("issued before the certificate that it replaces"), "[job.replaces] date",
+        ),
         (job.date, found, say("the machine was found as it was after it was left"), KEY),
         (
             job.recalibration_agreed, job.date, say("the next calibration is agreed for a day before this one"),

@@ -20,6 +20,7 @@ from cmm_uq.jobs.artefact import Traceability
 from cmm_uq.jobs.job import JobFacts
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
+from cmm_uq.jobs.replaced import Replaced
 from cmm_uq.messages import Message, Number, Verbatim, say
 from cmm_uq.physics.catalogue import every
 from cmm_uq.uncertainty.budgets.tables import TABLES
@@ -35,7 +36,7 @@ EXAMPLES = sorted(path.name for path in (ROOT / "examples").iterdir() if (path /
 KEYS = [
     f"[{table}] {key}"
     for table, keys in (("job", JobFacts), ("laboratory", Laboratory), ("machine", MachineFacts),
-                        ("artefact.certificate", Traceability))
+                        ("artefact.certificate", Traceability), ("job.replaces", Replaced))
     for key in keys.model_fields
 ]  # fmt: skip
 """Of job.toml, as warnings name them."""
