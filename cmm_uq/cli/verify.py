@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = examples(
     "verify certificate.pdf", "verify reports/iota-1102-20C", "verify certificate.pdf certificate.html --no-rerun",
-    "verify certificate.pdf --json",
+    "verify certificate.pdf --trust roots --json",
 )  # fmt: skip
 SHOWN = 20
 """Findings that are told one by one."""
@@ -36,6 +36,10 @@ def command(
     rerun: Annotated[
         bool, typer.Option("--rerun/--no-rerun", help="Compute everything again from the inputs, and compare.")
     ] = True,
+    trust: Annotated[
+        list[Path] | None,
+        typer.Option(help="Certificates that you trust, PEM or DER: a file or a folder; again for more.", metavar="FILE|DIR"),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
@@ -49,7 +53,7 @@ def command(
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.verify import verify
 
-        found = verify(files, rerun=rerun, stage=stage or (lambda what, part: None))
+        found = verify(files, rerun=rerun, trust=trust or None, stage=stage or (lambda what, part: None))
     inquiry = found.inquiry
     if json:
         put_data({"schema": "cmm-uq/verification/1", "subject": found.subject, **inquiry.as_data()})

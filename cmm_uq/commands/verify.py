@@ -6,20 +6,26 @@ takes part in the computation is installed here.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from cmm_uq import __version__
 from cmm_uq.errors import CmmUqError
+from cmm_uq.languages.language import ENGLISH, Code
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.given import RESULTS, RESULTS_SCHEMA, Given, check_files, read_given
+from cmm_uq.verification.signed import check_signatures
 
 if TYPE_CHECKING:
     from cmm_uq.commands.written import Stage
     from cmm_uq.jobs.job import Job
     from cmm_uq.verification.again import Again
+
+
+Compute = Callable[["Given", "Job"], "Again"]
+"""The second computation: of the job that is inside a certificate."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +51,18 @@ class Verification:
         return str(self.given.results[1]["job"]["id"]) if self.given.results is not None else ""
 
 
-def verify(paths: Iterable[Path], *, rerun: bool = True, stage: Stage = lambda what, part: None) -> Verification:
+def verify(
+    paths: Iterable[Path], *, rerun: bool = True, trust: Iterable[Path] | None = None, compute: Compute | None = None,
+    stage: Stage = lambda what, part: None,
+) -> Verification:  # fmt: skip
     """Verify the files of one certificate.
 
     Parameters
     ----------
     paths : PDF, XML, HTML, ``results.json`` and what belongs to them, or the folder of a report.
     rerun : whether everything is computed again from the inputs.
+    trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
+    compute : the second computation; :func:`again` where none is given.
     stage : told of progress.
 
     Raises
@@ -63,19 +74,33 @@ def verify(paths: Iterable[Path], *, rerun: bool = True, stage: Stage = lambda w
     check_files(inquiry, given)
     _check_schema(inquiry, given)
     stage("Comparing the forms", 0.1)
+    trusted = None
+    if trust is not None:
+        from cmm_uq.signing import trust_of
+
+        trusted = trust_of(tuple(trust))
     job = _compare(inquiry, given)
-    _say_unsigned(inquiry, given)
+    check_signatures(inquiry, given, trusted)
     alike = False
     if not rerun:
         inquiry.left("computing again", "not asked for (--no-rerun)")
     elif job is not None:
-        alike = _compute_again(inquiry, given, job, stage)
+        alike = _compute_again(inquiry, given, job, compute or (lambda given, job: again(given, job, stage)))
     if given.pdf is not None and given.html is not None and not alike:
         from cmm_uq.verification.views_agree import compare_views
 
         compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
+    if given.html is not None and not alike and _version(given) == __version__:
+        from cmm_uq.verification.views_agree import check_style
+
+        check_style(inquiry, given.html[1], given.html[0])
     stage("Done", 1.0)
     return Verification(given, inquiry)
+
+
+def _version(given: Given) -> str:
+    """Of the package that made a certificate; empty where nothing says it."""
+    return "" if given.results is None else str(given.results[1]["software"]["version"])
 
 
 def _check_schema(inquiry: Inquiry, given: Given) -> None:
@@ -134,9 +159,12 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
 
 def _job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> Job:
     """The job of the inputs; a prediction that the job itself does not name was given with the command."""
-    from cmm_uq.commands.reading import job_of
+    from cmm_uq.commands.reading import in_language, job_of
 
-    job = job_of(inputs)
+    language = data["job"].get("language", ENGLISH)
+    if language not in get_args(Code):
+        raise CmmUqError(f"{language!r} is no language of documents", where=f"{RESULTS}: job.language")
+    job = in_language(job_of(inputs), language)
     beside = [name for name in inputs if name not in job.inputs]
     if len(beside) == 1 and (data.get("diagnosis") or {}).get("simulation"):
         from cmm_uq.jobs.predicted import against
@@ -145,18 +173,7 @@ def _job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> Job:
     return job
 
 
-def _say_unsigned(inquiry: Inquiry, given: Given) -> None:
-    if given.pdf is not None:
-        name, pdf = given.pdf
-        if len(pdf.ends) > 1:
-            inquiry.wrong(
-                "files", name, f"byte {pdf.ends[0]}", "was changed after it was made: a further revision follows"
-            )
-        elif not pdf.signatures:
-            inquiry.notes.append(f"{name} carries no electronic signature: who issued it is not shown.")
-
-
-def _compute_again(inquiry: Inquiry, given: Given, job: Job, stage: Stage) -> bool:
+def _compute_again(inquiry: Inquiry, given: Given, job: Job, compute: Compute) -> bool:
     """Everything from the inputs, by this version; whether the documents are the same to the byte."""
     if given.results is None:
         return False
@@ -170,7 +187,7 @@ def _compute_again(inquiry: Inquiry, given: Given, job: Job, stage: Stage) -> bo
     from cmm_uq.verification.again import compare_again
 
     try:
-        return compare_again(inquiry, given, again(given, job, stage))
+        return compare_again(inquiry, given, compute(given, job))
     except CmmUqError as error:
         inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
         return False

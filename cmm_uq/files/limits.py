@@ -31,9 +31,7 @@ MODEL_BYTES = Limit(4_000_000, "bytes", "model file of a budget", "holds 250 000
 TABLE_BYTES = Limit(64_000_000, "bytes", "recording, temperature log", "100 000 rows of 30 columns take half of it")
 UNPACKED = Limit(400_000_000, "bytes", "workbook once it is unpacked", "200 000 rows of 30 columns take half of it")
 MAP_BYTES = Limit(4_000_000, "bytes", "error map", "30 000 positions")
-DCC_BYTES = Limit(
-    64_000_000, "bytes", "digital certificate", "attached files and its human-readable copy take a few of them"
-)  # fmt: skip
+DCC_BYTES = Limit(64_000_000, "bytes", "digital certificate", "attached files and its human-readable copy take a few")
 SECRET_BYTES = Limit(4_096, "bytes", "file with a secret", "a password is one line")
 KEY_BYTES = Limit(1_000_000, "bytes", "file with a key, certificates or revocations", "a key with its chain takes ten thousand")
 SIGNED_BYTES = Limit(64_000_000, "bytes", "signed PDF or XML", "a certificate with its inputs takes a few million")

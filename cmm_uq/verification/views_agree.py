@@ -6,6 +6,7 @@ head of a table that goes on over pages, signs of lists. White space tells nothi
 
 from __future__ import annotations
 
+import html
 import re
 import unicodedata
 from collections.abc import Sequence
@@ -57,6 +58,22 @@ def compare_views(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, *, files: tupl
         inquiry.wrong("forms", name, f"page {len(pdf.pages)}", f"ends before {beside} does", "", whole[at:])
     inquiry.looked("forms", len(pdf.pages))
     _compare_information(inquiry, pdf, page, name)
+
+
+def check_style(inquiry: Inquiry, page: HtmlPage, name: str) -> None:
+    """Keep a style sheet that is not the template's: it could hide what a page says, or say something else.
+
+    Parameters
+    ----------
+    page : of this version of the package.
+    name : of its file.
+    """
+    from cmm_uq.documents.html import style_sheet
+
+    inquiry.looked("files")
+    should = style_sheet(page.title, page.banner, page.language)
+    if page.style.strip() != should.strip():
+        inquiry.wrong("files", name, "style sheet", "is not that of the template")
 
 
 def squashed(text: str) -> str:
@@ -130,6 +147,10 @@ def _compare_information(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, name: s
         stands = told.get(key, "")
         if " ".join(stands.split()) != " ".join(should.split()):
             inquiry.wrong("forms", name, f"information {key}", "is not that of the document", stands, should)
+    for key, value in told.items():
+        words = "".join(value.split())
+        if not key.endswith("Date") and words not in "".join(html.unescape(pdf.xmp).split()):
+            inquiry.wrong("forms", name, f"information {key}", "does not stand in the metadata", "", value)
     if pdf.language.lower() != page.language.lower():
         inquiry.wrong("forms", name, "language", "is not that of the document", pdf.language, page.language)
     inquiry.looked("forms", 4)
