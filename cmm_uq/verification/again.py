@@ -233,12 +233,15 @@ def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> bool:
     inquiry.looked("again")
     if pdf.content[: pdf.ends[0]] == again.pdf:
         return True
-    stands, should = pdf.content, again.pdf
-    at = next(
-        (i for i, (a, b) in enumerate(zip(stands, should, strict=False)) if a != b), min(len(stands), len(should))
-    )
-    objects = re.findall(rb"(?:^|[\r\n])(\d+) \d+ obj\b", stands[:at])
-    where = f"object {objects[-1].decode()}, byte {at}" if objects else f"byte {at}"
-    here, there = (content[at : at + 24].hex(" ") for content in (stands, should))
-    inquiry.wrong("again", name, where, "is not what its inputs give", here, there)
+    from cmm_uq.verification.pdf_parts import differing_parts
+
+    stands, should = pdf.content[: pdf.ends[0]], again.pdf
+    parts = differing_parts(stands, should)
+    for where, here, there in parts:
+        inquiry.wrong("again", name, where, "is not what its inputs give", here, there)
+    if not parts:
+        pairs = enumerate(zip(stands, should, strict=False))
+        at = next((i for i, (a, b) in pairs if a != b), min(len(stands), len(should)))
+        problem = "was written anew, or changed where nothing is stated: it is not the file that was made"
+        inquiry.wrong("again", name, f"byte {at}", problem)
     return False

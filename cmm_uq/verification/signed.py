@@ -32,7 +32,9 @@ def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> Non
 
             signed = signatures_of_pdf(pdf.content, trust or Trust(), where=name)
         elif len(pdf.ends) > 1:
-            inquiry.wrong("signatures", name, f"byte {pdf.ends[0]}", "was changed after it was made, and nobody signed that")
+            inquiry.wrong(
+                "signatures", name, f"byte {pdf.ends[0]}", "was changed after it was made, and nobody signed that"
+            )
         _all(inquiry, name, signed, trust)
     if given.xml is not None:
         name, content = given.xml
