@@ -18,14 +18,14 @@ def written(altered: Sequence[dict[str, Any]], good: Sequence[dict[str, Any]], *
     lines = [
         "# Alterations of certificates", "",
         "Written by `python benchmarks/tampering/study.py`, which reruns all of it; `--only 17` repeats one case.",
-        f"Seed {seed}, commit `{commit}`. Each case alters one thing of one certificate or diagnosis and verifies what an",
-        "auditor has of it: the PDF alone, the PDF with further forms, or everything but the PDF. The generator of alterations knows",
-        "files, not the package.", "",
+        f"Seed {seed}, commit `{commit}`. Each case alters one thing of one certificate or diagnosis and verifies what",
+        "an auditor has of it: the PDF alone, the PDF with further forms, or everything but the PDF.",
+        "The generator of alterations knows files, not the package.", "",
         "| | cases | found | of these without computing again | not found | seconds, median |",
         "| --- | --- | --- | --- | --- | --- |",
         f"| altered | {len(altered)} | {len(found)} | {len(without)} | {len(missed)} | {_median(altered)} |", "",
-        f"Good certificates: {len(good)}, refused or not wholly verified: {len(refused)}; median {_median(good)} s with computing",
-        "again and without.", "", "## By form and alteration", "",
+        f"Good certificates: {len(good)}, refused or not wholly verified: {len(refused)};",
+        f"median {_median(good)} s for both, with computing again and without.", "", "## By form and alteration", "",
         "| form | alteration | cases | found | without computing again |", "| --- | --- | --- | --- | --- |",
     ]  # fmt: skip
     count = Counter((one["form"], one["how"]) for one in altered)

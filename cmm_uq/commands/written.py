@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,7 +69,8 @@ class Form:
     Parameters
     ----------
     command : of ``cmm-uq``.
-    documents : their names; those of a recording that was not measured carry its origin.
+    documents : their names, in the order in which they are made: a digital certificate (``.xml``) carries the page before it,
+        and is attached to the PDF after it; those of a recording that was not measured carry its origin.
     below : folder in ``reports/<job id>`` that is written to by default.
     further : names of files that come with it.
     recorded : whether what it writes is kept in records.
@@ -145,15 +147,16 @@ class Form:
         for name in outcome.files.keys() & job.inputs.keys():
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
-        rendered = {}
+        rendered: dict[str, bytes] = {}
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
-            pdf = name.endswith(".pdf")
-            rendered[name] = (
-                render_pdf(document, {**job.inputs, RESULTS: data, **outcome.files})
-                if pdf
-                else render_html(document).encode()
-            )
+            if name.endswith(".html"):
+                rendered[name] = render_html(document).encode()
+            elif name.endswith(".xml"):
+                rendered[name] = _digital(job, data, rendered)
+            else:
+                digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
+                rendered[name] = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **outcome.files})
         return {**rendered, RESULTS: data, **outcome.files}
 
     def names(self, job: Job) -> list[str]:
@@ -161,3 +164,12 @@ class Form:
         from cmm_uq.documents.origin import file_name
 
         return [file_name(document, job.origin) for document in self.documents]
+
+
+def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:
+    """The digital certificate, of results.json and the job alone, with the page as its human-readable copy."""
+    from cmm_uq.dcc import written
+    from cmm_uq.documents.digital_certificate import digital_certificate
+
+    page = next((content for name, content in rendered.items() if name.endswith(".html")), None)
+    return written(digital_certificate(json.loads(results), job, html=page))

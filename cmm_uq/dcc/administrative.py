@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import datetime as dt
-from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from cmm_uq.dcc.fields import Child, Choice, Content, Many
+from cmm_uq.dcc.fields import Child, Choice, Content, Many, Part
 from cmm_uq.dcc.quantities import Complex, Constant, Hybrid, Real, RealList
 from cmm_uq.dcc.simple import BOOLEAN, COUNTRY, DATE, LANGUAGE, NOT_EMPTY, STRINGS, one_of
 from cmm_uq.dcc.texts import Attached, Id, RefId, RefType, Rich, Words
@@ -20,8 +19,7 @@ Flag = bool | None
 String = Annotated[str | None, Child("value", NOT_EMPTY)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Software:
+class Software(Part):
     """A program (``softwareType``)."""
 
     name: Annotated[Words, Child("name")]
@@ -32,8 +30,7 @@ class Software:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class RefTypeDefinition:
+class RefTypeDefinition(Part):
     """Where a family of ``refType`` is defined."""
 
     name: Annotated[Words, Child("name")]
@@ -46,8 +43,7 @@ class RefTypeDefinition:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Identification:
+class Identification(Part):
     """A serial number, an inventory number, ... with who issued it."""
 
     issuer: Annotated[str, Child("issuer", one_of(*ISSUERS))]
@@ -60,8 +56,7 @@ class Identification:
 Identifications = Annotated[tuple[Identification, ...], Many("identification", within="identifications")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Coordinates:
+class Coordinates(Part):
     """A place by coordinates."""
 
     system: Annotated[str, Child("positionCoordinateSystem", NOT_EMPTY)]
@@ -75,11 +70,10 @@ class Coordinates:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Location:
+class Location(Part):
     """An address (``locationType``), whose parts stand in any order."""
 
-    UNORDERED: ClassVar = True
+    UNORDERED: ClassVar[bool] = True
 
     city: Annotated[tuple[str, ...], Many("city", NOT_EMPTY)] = ()
     country: Annotated[tuple[str, ...], Many("countryCode", COUNTRY)] = ()
@@ -92,8 +86,7 @@ class Location:
     coordinates: Annotated[tuple[Coordinates, ...], Many("positionCoordinates")] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Contact:
+class Contact(Part):
     """Somebody with an address (``contactType``; where the schema lets the address go, ``contactNotStrictType``)."""
 
     name: Annotated[Words, Child("name")]
@@ -107,8 +100,7 @@ class Contact:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Hash:
+class Hash(Part):
     """Another document, with its hash (``hashType``)."""
 
     referral: Annotated[Words, Child("referral")]
@@ -123,8 +115,7 @@ class Hash:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class EquipmentClass:
+class EquipmentClass(Part):
     """A class of equipment by some classification."""
 
     reference: Annotated[str, Child("reference", NOT_EMPTY)]
@@ -133,15 +124,13 @@ class EquipmentClass:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True)
-class Characters:
+class Characters(Part, kw_only=False):
     """Words in place of a quantity."""
 
     words: Annotated[tuple[str, ...], Content(STRINGS)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class PrimitiveQuantity:
+class PrimitiveQuantity(Part):
     """A quantity of an item or of equipment (``primitiveQuantityType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -157,8 +146,7 @@ class PrimitiveQuantity:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Item:
+class Item(Part):
     """What is calibrated."""
 
     name: Annotated[Words, Child("name")]
@@ -173,8 +161,7 @@ class Item:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Items:
+class Items(Part):
     """The items, and what they have in common."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -186,8 +173,7 @@ class Items:
     items: Annotated[tuple[Item, ...], Many("item")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class PerformanceLocation:
+class PerformanceLocation(Part):
     """Where it was calibrated."""
 
     place: Annotated[str, Content(one_of(*LOCATIONS))]
@@ -196,8 +182,7 @@ class PerformanceLocation:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Replaced:
+class Replaced(Part):
     """A certificate that this one amends or substitutes."""
 
     change: Annotated[str, Child("typeOfChange", one_of(*CHANGES))]
@@ -206,8 +191,7 @@ class Replaced:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class CoreData:
+class CoreData(Part):
     """Identifier, languages and dates."""
 
     country: Annotated[str, Child("countryCodeISO3166_1", COUNTRY)]
@@ -224,8 +208,7 @@ class CoreData:
     previous: Annotated[Hash | None, Child("previousReport")] = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Laboratory:
+class Laboratory(Part):
     """The calibration laboratory."""
 
     code: Annotated[str | None, Child("calibrationLaboratoryCode", NOT_EMPTY)] = None
@@ -235,8 +218,7 @@ class Laboratory:
     time_stamp: Annotated[Flag, Child("cryptElectronicTimeStamp", BOOLEAN)] = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Person:
+class Person(Part):
     """Somebody responsible (``respPersonType``)."""
 
     person: Annotated[Contact, Child("person")]

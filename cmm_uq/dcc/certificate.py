@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from cmm_uq.dcc.administrative import Contact, CoreData, Items, Laboratory, Person, RefTypeDefinition, Software
-from cmm_uq.dcc.fields import Attribute, Child, Foreign, Many
+from cmm_uq.dcc.fields import Attribute, Child, Foreign, Many, Part
 from cmm_uq.dcc.results import Measurement, Statement
 from cmm_uq.dcc.simple import Simple
 from cmm_uq.dcc.texts import Attached
@@ -25,11 +24,10 @@ def _version(text: str) -> str:
     return text
 
 
-@dataclass(frozen=True, kw_only=True)
-class Administrative:
+class Administrative(Part):
     """Administrative data; its parts stand in any order."""
 
-    UNORDERED: ClassVar = True
+    UNORDERED: ClassVar[bool] = True
 
     software: Annotated[tuple[Software, ...], Many("software", within="dccSoftware")]
     ref_types: Annotated[tuple[RefTypeDefinition, ...], Many("refTypeDefinition", within="refTypeDefinitions")] = ()
@@ -41,15 +39,13 @@ class Administrative:
     statements: Annotated[tuple[Statement, ...], Many("statement", within="statements")] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Comment:
+class Comment(Part):
     """Whatever else is said, in XML of any kind."""
 
     nodes: Annotated[tuple[Node, ...], Foreign()] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Certificate:
+class Certificate(Part):
     """A certificate.
 
     Parameters

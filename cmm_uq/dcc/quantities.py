@@ -6,11 +6,10 @@ Of D-SI 2.2 only what it says anew of uncertainty is read: ``measurementUncertai
 from __future__ import annotations
 
 import datetime as dt
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated, ClassVar
 
-from cmm_uq.dcc.fields import Child, Choice, Many
+from cmm_uq.dcc.fields import Child, Choice, Many, Part
 from cmm_uq.dcc.simple import (
     DATE_TIME,
     DATE_TIMES,
@@ -33,14 +32,12 @@ Distribution = Annotated[str | None, Child("distribution", STRING)]
 Distributions = Annotated[tuple[str, ...], Child("distributionXMLList", STRINGS)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Si:
+class _Si(Part):
     """Of the namespace of D-SI."""
 
-    SPACE: ClassVar = "si"
+    SPACE: ClassVar[str] = "si"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Expanded(_Si):
     """Expanded uncertainty (``expandedUncType``)."""
 
@@ -50,7 +47,6 @@ class Expanded(_Si):
     distribution: Distribution = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Interval(_Si):
     """Coverage interval, which need not be symmetric (``coverageIntervalType``)."""
 
@@ -61,7 +57,6 @@ class Interval(_Si):
     distribution: Distribution = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class StandardMU(_Si):
     """Standard uncertainty (D-SI 2.2)."""
 
@@ -69,7 +64,6 @@ class StandardMU(_Si):
     distribution: Distribution = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class ExpandedMU(_Si):
     """Expanded uncertainty (D-SI 2.2)."""
 
@@ -79,7 +73,6 @@ class ExpandedMU(_Si):
     distribution: Distribution = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class IntervalMU(_Si):
     """Coverage interval (D-SI 2.2)."""
 
@@ -90,14 +83,12 @@ class IntervalMU(_Si):
     distribution: Distribution = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Univariate(_Si):
     """Uncertainty of one value (D-SI 2.2)."""
 
     stated: Annotated[StandardMU | ExpandedMU | IntervalMU, Choice(("standardMU", "expandedMU", "coverageIntervalMU"))]
 
 
-@dataclass(frozen=True, kw_only=True)
 class Real(_Si):
     r"""A value (``realQuantityType``); units in D-SI, ``\micro\metre``."""
 
@@ -111,7 +102,6 @@ class Real(_Si):
     ] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Constant(_Si):
     """A constant (``constantQuantityType``); its uncertainty is a standard uncertainty."""
 
@@ -123,7 +113,6 @@ class Constant(_Si):
     distribution: Distribution = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Covariance(_Si):
     """An element of a covariance matrix."""
 
@@ -131,14 +120,12 @@ class Covariance(_Si):
     unit: Annotated[str, Child("unit", STRING)]
 
 
-@dataclass(frozen=True, kw_only=True)
 class Column(_Si):
     """A column of a covariance matrix."""
 
     covariances: Annotated[tuple[Covariance, ...], Many("covariance")]
 
 
-@dataclass(frozen=True, kw_only=True)
 class Region(_Si):
     """A region of several values together (``ellipsoidalRegionType``, ``rectangularRegionType``)."""
 
@@ -148,17 +135,14 @@ class Region(_Si):
     distribution: Distribution = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Ellipsoid(Region):
     """An ellipsoid."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Box(Region):
     """A rectangular region."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Complex(_Si):
     """A complex value (``complexQuantityType``), by its parts or by magnitude and phase."""
 
@@ -173,7 +157,6 @@ class Complex(_Si):
     region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegion", "rectangularRegion"))] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class ExpandedList(_Si):
     """Expanded uncertainties of a list: one a value, or one for all."""
 
@@ -183,7 +166,6 @@ class ExpandedList(_Si):
     distributions: Distributions = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class IntervalList(_Si):
     """Coverage intervals of a list."""
 
@@ -194,7 +176,6 @@ class IntervalList(_Si):
     distributions: Distributions = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class ExpandedListMU(_Si):
     """Expanded uncertainties of a list (D-SI 2.2)."""
 
@@ -204,7 +185,6 @@ class ExpandedListMU(_Si):
     distributions: Distributions = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class StandardListMU(_Si):
     """Standard uncertainties of a list (D-SI 2.2)."""
 
@@ -212,14 +192,12 @@ class StandardListMU(_Si):
     distributions: Distributions = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class UnivariateList(_Si):
     """Uncertainties of the values of a list, each by itself (D-SI 2.2)."""
 
     stated: Annotated[StandardListMU | ExpandedListMU, Choice(("standardMUXMLList", "expandedMUXMLList"))]
 
 
-@dataclass(frozen=True, kw_only=True)
 class RealList(_Si):
     """Values with their units (``realListXMLListType``): a unit a value, or one for all."""
 
@@ -234,14 +212,12 @@ class RealList(_Si):
     region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegionXMLList", "rectangularRegionXMLList"))] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Spread(_Si):
     """Uncertainty of every value of a list alike (``listUnivariateUncType``)."""
 
     stated: Annotated[Expanded | Interval, Choice(("expandedUnc", "coverageInterval"))]
 
 
-@dataclass(frozen=True, kw_only=True)
 class RealInList(_Si):
     """A value in a list; its unit may be the list's."""
 
@@ -252,7 +228,6 @@ class RealInList(_Si):
     uncertainty: Annotated[Expanded | Interval | None, Choice(("expandedUnc", "coverageInterval"))] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Reals(_Si):
     """Values one by one (``realListType``)."""
 
@@ -264,14 +239,12 @@ class Reals(_Si):
     region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegion", "rectangularRegion"))] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Bivariate(_Si):
     """Region of every value of a list alike (``listBivariateUncType``)."""
 
     region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegion", "rectangularRegion"))] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Complexes(_Si):
     """Complex values one by one (``complexListType``)."""
 
@@ -284,7 +257,6 @@ class Complexes(_Si):
     region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegion", "rectangularRegion"))] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Lists(_Si):
     """Lists of lists (``listType`` of D-SI)."""
 
@@ -293,7 +265,6 @@ class Lists(_Si):
     lists: Annotated[tuple[Reals | Complexes | Lists, ...], Choice(("realList", "complexList", "list"), many=True)]
 
 
-@dataclass(frozen=True, kw_only=True)
 class Hybrid(_Si):
     """The same quantity in several units (``hybridType``); the first is that of the certificate."""
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 from cmm_uq.dcc.certificate import VERSION, Certificate, Comment
-from cmm_uq.dcc.fields import Attribute, Choice, Content, Field, Foreign, Many, by_tag, fields_of
+from cmm_uq.dcc.fields import Attribute, Choice, Content, Field, Foreign, Many, Part, by_tag, fields_of
 from cmm_uq.dcc.simple import Simple
 from cmm_uq.dcc.texts import Markup
 from cmm_uq.dcc.tree import Node, parsed
@@ -71,7 +71,7 @@ class _Reader:
         self.gathered, self.wrong = Gathered(), 0
         self.unread: list[str] = []
 
-    def read(self, node: Node, cls: type) -> Any:
+    def read(self, node: Node, cls: type[Part]) -> Any:
         """An element as a class; None where something of it is wrong."""
         fields, before = fields_of(cls), self.wrong
         children = self._sorted(node, cls)
@@ -81,12 +81,12 @@ class _Reader:
             return None
         return cls(**{name: value for name, value in values.items() if value is not None})
 
-    def _sorted(self, node: Node, cls: type) -> list[list[Node]]:
+    def _sorted(self, node: Node, cls: type[Part]) -> list[list[Node]]:
         """Children by the field that they belong to, in the order of the schema."""
         fields, places = fields_of(cls), by_tag(cls)
         rest = next((i for i, field in enumerate(fields) if isinstance(field.place, Foreign)), None)
         found: list[list[Node]] = [[] for _ in fields]
-        last, ordered = -1, not getattr(cls, "UNORDERED", False)
+        last, ordered = -1, not cls.UNORDERED
         for child in node.children:
             index = places.get(child.tag)
             if index is None and rest is not None and (cls in _ANYTHING or child.tag == "ds:Signature"):

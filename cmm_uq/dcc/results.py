@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-from dataclasses import dataclass
 from typing import Annotated
 
 from cmm_uq.dcc.administrative import (
@@ -16,7 +15,7 @@ from cmm_uq.dcc.administrative import (
     PrimitiveQuantity,
     Software,
 )
-from cmm_uq.dcc.fields import Child, Choice, Many
+from cmm_uq.dcc.fields import Child, Choice, Many, Part
 from cmm_uq.dcc.quantities import Complex, Constant, Hybrid, Lists, Real, RealList
 from cmm_uq.dcc.simple import BOOLEAN, BOOLEANS, COUNTRY, DATE, DATE_TIME, DATE_TIMES, NOT_EMPTY, STRING, listed, one_of
 from cmm_uq.dcc.texts import Attached, Id, Latex, Markup, RefId, RefType, Rich, Words
@@ -27,8 +26,7 @@ STATES = ("beforeAdjustment", "afterAdjustment", "beforeRepair", "afterRepair")
 Strings = tuple[str, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Method:
+class Method(Part):
     """A method that was used (``usedMethodType``)."""
 
     name: Annotated[Words, Child("name")]
@@ -43,8 +41,7 @@ Methods = Annotated[tuple[Method, ...], Many("usedMethod", within="usedMethods")
 UsedSoftware = Annotated[tuple[Software, ...], Many("software", within="usedSoftware")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Equipment:
+class Equipment(Part):
     """A piece of equipment (``measuringEquipmentType``); its certificate is how the result is traceable."""
 
     name: Annotated[Words, Child("name")]
@@ -61,8 +58,7 @@ class Equipment:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Equipments:
+class Equipments(Part):
     """The equipment, and what it has in common."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -73,8 +69,7 @@ class Equipments:
     equipment: Annotated[tuple[Equipment, ...], Many("measuringEquipment")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Data:
+class Data(Part):
     """What a result or a condition says, in its order (``dataType``)."""
 
     parts: Annotated[
@@ -86,8 +81,7 @@ class Data:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Condition:
+class Condition(Part):
     """Something that influences (``conditionType``)."""
 
     name: Annotated[Words, Child("name")]
@@ -102,8 +96,7 @@ class Condition:
 Conditions = Annotated[tuple[Condition, ...], Many("influenceCondition", within="influenceConditions")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Statement:
+class Statement(Part):
     """A statement, or metadata of a measurement (``statementMetaDataType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -135,15 +128,13 @@ class Statement:
 Statements = Annotated[tuple[Statement, ...], Many("metaData", within="measurementMetaData")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class RelativeUncertainty:
+class RelativeUncertainty(Part):
     """Relative uncertainty of a quantity."""
 
     stated: Annotated[RealList | Real, Choice(("relativeUncertaintyXmlList", "relativeUncertaintySingle"))]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Quantity:
+class Quantity(Part):
     """A quantity (``quantityType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -165,8 +156,7 @@ class Quantity:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class QuantityList:
+class QuantityList(Part):
     """Quantities that belong together, a table (``listType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -184,8 +174,7 @@ class QuantityList:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Result:
+class Result(Part):
     """A result."""
 
     name: Annotated[Words, Child("name")]
@@ -196,8 +185,7 @@ class Result:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Measurement:
+class Measurement(Part):
     """A measurement with its results (``measurementResultType``)."""
 
     name: Annotated[Words, Child("name")]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated
 
-from cmm_uq.dcc.fields import Attribute, Child, Choice, Content, Foreign, Many
+from cmm_uq.dcc.fields import Attribute, Child, Choice, Content, Foreign, Many, Part
 from cmm_uq.dcc.simple import BYTES, LANGUAGE, NAME, NAMES, NOT_EMPTY, STRING, STRINGS
 from cmm_uq.dcc.tree import Node
 
@@ -15,8 +14,7 @@ RefId = Annotated[tuple[str, ...], Attribute("refId", NAMES)]
 RefType = Annotated[tuple[str, ...], Attribute("refType", STRINGS)]
 
 
-@dataclass(frozen=True)
-class Said:
+class Said(Part, kw_only=False):
     """A text in a language (``stringWithLangType``)."""
 
     text: Annotated[str, Content(STRING)]
@@ -26,8 +24,7 @@ class Said:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True)
-class Words:
+class Words(Part, kw_only=False):
     """The same text in its languages (``textType``)."""
 
     contents: Annotated[tuple[Said, ...], Many("content")]
@@ -37,8 +34,7 @@ class Words:
         return text_of(self.contents)
 
 
-@dataclass(frozen=True)
-class Latex:
+class Latex(Part, kw_only=False):
     """A formula (``formulaType``), as LaTeX or MathML."""
 
     latex: Annotated[str | None, Child("latex", STRING)] = None
@@ -48,8 +44,7 @@ class Latex:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True)
-class Markup:
+class Markup(Part, kw_only=False):
     """XML of another namespace (``xmlType``)."""
 
     nodes: Annotated[tuple[Node, ...], Foreign()] = ()
@@ -58,8 +53,7 @@ class Markup:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Attached:
+class Attached(Part):
     """A file (``byteDataType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -72,8 +66,7 @@ class Attached:
     ref_type: RefType = ()
 
 
-@dataclass(frozen=True)
-class Rich:
+class Rich(Part, kw_only=False):
     """A text with what belongs to it (``richContentType``)."""
 
     name: Annotated[Words | None, Child("name")] = None

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from cmm_uq.dcc.certificate import Certificate
-from cmm_uq.dcc.fields import Attribute, Choice, Content, Field, Foreign, Many, fields_of
+from cmm_uq.dcc.fields import Attribute, Choice, Content, Field, Foreign, Many, Part, fields_of
 from cmm_uq.dcc.reading import ROOT
 from cmm_uq.dcc.simple import Simple
 from cmm_uq.dcc.tree import Node, serialised
@@ -27,9 +27,8 @@ def written(certificate: Certificate) -> bytes:
     return serialised(root)
 
 
-def _fill(node: Node, value: Any) -> None:
-    cls: type = type(value)
-    for field in fields_of(cls):
+def _fill(node: Node, value: Part) -> None:
+    for field in fields_of(type(value)):
         found = getattr(value, field.name)
         if found is None or (found == () and not field.required):
             continue

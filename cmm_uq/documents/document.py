@@ -203,23 +203,40 @@ def _measure(table: dict[str, Any]) -> None:
     for index, column in enumerate(table["columns"]):
         cells = [line for row in table["rows"] for line in row[index].split("\n")]
         head = [column["heading"], column["unit"]]
-        column["need"] = max(4, *map(len, head), *(len(line) for line in cells), 0)
-        column["numeric"] = column["numeric"] and column["need"] <= _LONGEST_FIGURE
+        column["need"] = max(4, *map(_letters, head), *map(_letters, cells), 0)
+        column["numeric"] = column["numeric"] and max(map(_letters, cells), default=0) <= _LONGEST_FIGURE
         column["longest"] = max(cells, key=_width, default="")
-        column["word"] = max((word for line in cells for word in line.split(" ")), key=_width, default="")
-        column["heading_word"] = max((word for line in head for word in line.split()), key=_width, default="")
-    kept = [max(len(c["longest"] if c["numeric"] else c["word"]), len(c["heading_word"])) for c in table["columns"]]
+        column["word"] = max((part for line in cells for part in _parts(line, " ")), key=_width, default="")
+        column["heading_word"] = max((part for line in head for part in _parts(line, None)), key=_width, default="")
+    kept = [
+        max(_letters(c["longest"] if c["numeric"] else c["word"]), _letters(c["heading_word"]))
+        for c in table["columns"]
+    ]
     table["least"] = sum(kept) + 2 * len(kept)
+
+
+def _letters(line: str) -> int:
+    """Of a line, in letters; a Chinese or Japanese character has the room of two."""
+    return len(line) + len(_WIDE.findall(line))
+
+
+def _parts(line: str, separator: str | None) -> list[str]:
+    """What a line is not broken within: words; Japanese, which is written without spaces, a few characters at a time."""
+    words = line.split(separator)
+    return [part for word in words for part in (_WIDE_PARTS.findall(word) if _WIDE.search(word) else [word])]
 
 
 def _width(line: str) -> float:
     """Of a line, roughly, in widths of a small letter."""
-    return sum(
+    return len(_WIDE.findall(line)) + sum(
         1.5 if c in "mwMW%—" else 0.6 if c in "fijlrtI.,:;'|()[] −-" else 1.2 if c.isupper() else 1.0 for c in line
     )
 
 
 _LONGEST_FIGURE = 28
+_CHARACTERS = "\u2e80-\ua4cf\uac00-\ud7a3\uf900-\ufaff\uff00-\uff60"
+"""Of Chinese, Japanese and Korean."""
+_WIDE, _WIDE_PARTS = re.compile(f"[{_CHARACTERS}]"), re.compile(f"[{_CHARACTERS}]{{1,6}}|[^{_CHARACTERS}]+")
 
 _LEFT_OUT = re.compile("[\u202a-\u202e\u2066-\u2069\ufeff]")
 _UNPRINTABLE = re.compile(

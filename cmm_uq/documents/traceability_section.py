@@ -104,6 +104,11 @@ def statement_of_traceability(facts: JobFile) -> Text:
     )
 
 
+def traceable(facts: JobFile) -> bool:
+    """Whether the results are said to be traceable to the metre."""
+    return statement_of_traceability(facts) not in (_CHANGES, _UNCALIBRATED, _OWN_MACHINE, _NO_CERTIFICATE)
+
+
 def traceability(result: Result) -> Section:
     """The artefact, what of it is certified, and what the fit makes of that."""
     artefact = result.job.facts.artefact

@@ -27,8 +27,9 @@ class Language:
     ----------
     code : by BCP 47.
     decimal : its decimal sign.
-    day : pattern of a date, for :meth:`datetime.date.strftime` but with ``{day}`` and ``{month}`` where no zero stands.
+    day : pattern of a date.
     singular : whether the form for one is said of a count; ``None`` where there is one form for all.
+    parting : what parts figures in a row, where a comma is their decimal sign.
     cases : whether it has capital and small letters to begin a sentence with.
     """
 
@@ -36,6 +37,7 @@ class Language:
     decimal: str
     day: str
     singular: Callable[[int], bool] | None
+    parting: str = ", "
     cases: bool = True
 
     def number(self, text: str) -> str:
@@ -57,8 +59,8 @@ class Language:
 
 LANGUAGES: Mapping[Code, Language] = MappingProxyType({language.code: language for language in (
     Language("en", ".", "{year:04d}-{month:02d}-{day:02d}", lambda count: count == 1),
-    Language("de", ",", "{day:02d}.{month:02d}.{year:04d}", lambda count: count == 1),
-    Language("fr", ",", "{day:02d}/{month:02d}/{year:04d}", lambda count: count in (0, 1)),
+    Language("de", ",", "{day:02d}.{month:02d}.{year:04d}", lambda count: count == 1, "; "),
+    Language("fr", ",", "{day:02d}/{month:02d}/{year:04d}", lambda count: count in (0, 1), "\u00a0; "),
     Language("ja", ".", "{year:04d}年{month}月{day}日", None, cases=False),
 )})  # fmt: skip
 """By their codes."""

@@ -53,22 +53,29 @@ def said_in(text: Text, code: Code) -> Text:
 
 
 def _filled(message: Message, language: Language) -> str:
-    pattern, arguments = _pattern(message, language), _arguments(message)
-    said = {
-        name: said_in(value, language.code) if isinstance(value, Text) else value for name, value in arguments.items()
-    }
-    if (
-        pattern in _JOINED
-        and language.decimal == ","
-        and all(_FIGURES.fullmatch(str.__str__(one)) for one in said.values())
-    ):
-        pattern = pattern.replace(",", ";")
-    return _formatter(language).vformat(pattern, (), said)
+    """The pattern with its arguments; figures with decimal commas that a comma would part are parted by a semicolon."""
+    pattern, arguments, formatter = _pattern(message, language), _arguments(message), _formatter(language)
+    parts: list[str] = []
+    joins: list[int] = []
+    for literal, name, spec, _ in formatter.parse(pattern):
+        text = "" if name is None else _argument(arguments[name], spec or "", formatter)
+        if literal == ", " and parts and _FIGURES.fullmatch(parts[-1]) and _FIGURES.fullmatch(text):
+            joins.append(len(parts))
+        parts += [literal, text]
+    if any(_DECIMAL.search(parts[place + side]) for place in joins for side in (-1, 1)):
+        for place in joins:
+            parts[place] = language.parting
+    return "".join(parts)
 
 
-_JOINED = ("{before}, {after}", "[{low}, {high}]")
-_FIGURES = re.compile(r"[-+−\d,;  ]*\d,\d[-+−\d,;  ]*")
-"""Figures with decimal commas: what parts them is a semicolon then."""
+def _argument(value: Argument, spec: str, formatter: _Localised) -> str:
+    said = said_in(value, formatter.language.code) if isinstance(value, Text) else value
+    return formatter.format_field(said, spec)
+
+
+_SIGNS = r"[-+−±\d,.; \u00a0×⁻⁰¹²³⁴⁵⁶⁷⁸⁹e]*"
+_FIGURES = re.compile(rf"{_SIGNS}\d{_SIGNS}")
+_DECIMAL = re.compile(r"\d,\d")
 
 
 def _pattern(message: Message, language: Language) -> str:

@@ -73,8 +73,6 @@ class _Pairs:
 
     def _stream(self, path: str, one: Any, other: Any) -> None:
         a, b = one.get_data(), other.get_data()
-        if path.endswith("/Metadata"):
-            a, b = (b" ".join(data.replace(b"><", b"> <").split()) for data in (a, b))
         if a != b:
             at = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
             self._tell(path, *(data[max(0, at - 20) : at + 20].decode("latin-1") for data in (a, b)))
