@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from cmm_uq import __version__
 from cmm_uq.errors import CmmUqError
 from cmm_uq.languages.language import ENGLISH, Code
+from cmm_uq.verification.digital import open_digital
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.given import RESULTS, RESULTS_SCHEMA, Given, check_files, read_given
 from cmm_uq.verification.signed import check_signatures
@@ -71,8 +73,9 @@ def verify(
     """
     stage("Opening the files", 0.0)
     given, inquiry = read_given(tuple(paths)), Inquiry()
-    check_files(inquiry, given)
     _check_schema(inquiry, given)
+    open_digital(inquiry, given)
+    check_files(inquiry, given)
     stage("Comparing the forms", 0.1)
     trusted = None
     if trust is not None:
@@ -154,7 +157,20 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
         return None
     check_job(inquiry, job, data, name)
     check_dates(inquiry, job)
+    _check_digital(inquiry, given, job)
     return job
+
+
+def _check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
+    """The digital certificate made again of results.json and the job, by the version that made it."""
+    if given.xml is None:
+        return
+    if (made := _version(given)) != __version__:
+        inquiry.left(f"{given.xml[0]} element by element", f"made by version {made}, and this is {__version__}")
+        return
+    from cmm_uq.verification.digital import check_digital
+
+    check_digital(inquiry, given, job)
 
 
 def _job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> Job:
@@ -209,7 +225,7 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
         form, outcome = REPORT, report_outcome(job, seed=seed, stage=stage)
     else:
         form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, stage=stage)
-    written = form.contents(outcome, stage)
+    written = form.contents(outcome, stage, finished=partial(_as_signed, given))
     pdf = next((content for name, content in written.items() if name.endswith(".pdf")), None)
     files = {name: content for name, content in written.items() if not name.endswith(".pdf")}
     if given.pdf is None or pdf is None:
@@ -218,6 +234,16 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
     if made != here:
         return Again(files, None, f"they were set by {made or 'another program'}, and here is {here}")
     return Again(files, pdf)
+
+
+def _as_signed(given: Given, name: str, content: bytes) -> bytes:
+    """The digital certificate as it is attached: signed, where it is the same but for that."""
+    attached = given.files.get(name)
+    if attached is None or attached == content or not name.endswith(".xml"):
+        return content
+    from cmm_uq.verification.digital import same_unsigned
+
+    return attached if same_unsigned(attached, content, name) else content
 
 
 def _seed(data: Mapping[str, Any]) -> int:

@@ -25,6 +25,15 @@ Told = Callable[[Job], None]
 REPORTS, RESULTS = Path("reports"), "results.json"
 
 
+Finished = Callable[[str, bytes], bytes]
+"""What becomes of a document that was made, by its name."""
+
+
+def unchanged(name: str, content: bytes) -> bytes:
+    """A document as it was made."""
+    return content
+
+
 def silent(what: str, part: float) -> None:
     """Nobody is told."""
 
@@ -130,9 +139,17 @@ class Form:
         return Owner(self.command, job.facts.job.id, job.origin)
 
     def contents(
-        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False
+        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, finished: Finished = unchanged
     ) -> dict[str, bytes]:  # fmt: skip
-        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
+        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted.
+
+        Parameters
+        ----------
+        outcome : that is written.
+        stage : told of progress.
+        results_only : whether nothing but ``results.json`` is wanted.
+        finished : what becomes of a document before the next is made of it, as of one that is signed.
+        """
         from cmm_uq.documents.results_file import as_json
 
         if results_only:
@@ -151,12 +168,13 @@ class Form:
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
             if name.endswith(".html"):
-                rendered[name] = render_html(document).encode()
+                made = render_html(document).encode()
             elif name.endswith(".xml"):
-                rendered[name] = _digital(job, data, rendered)
+                made = _digital(job, data, rendered)
             else:
                 digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
-                rendered[name] = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **outcome.files})
+                made = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **outcome.files})
+            rendered[name] = finished(name, made)
         return {**rendered, RESULTS: data, **outcome.files}
 
     def names(self, job: Job) -> list[str]:

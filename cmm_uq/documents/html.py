@@ -39,7 +39,7 @@ def style_sheet(heading: str, banner: str, language: str) -> str:
     language : of the document.
     """
     title, _, number = heading.partition(" ")
-    document = {"title": title, "number": number, "banner": banner}
+    document = {"title": title, "number": number, "banner": banner, "language": language}
     words = view_words(code_of(language))
     return (
         _environment().get_template("document.css").render(document=document, words=words, colour=plot_style.COLOURS)

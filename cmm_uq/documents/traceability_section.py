@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from cmm_uq.documents.document import Block, Facts, Paragraph, Section
-from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
 from cmm_uq.jobs.artefact import Traceability
 from cmm_uq.jobs.chain import certified_on_this_machine
@@ -14,6 +15,9 @@ from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, se
 from cmm_uq.model.artefact import Size
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from cmm_uq.documents.result import Result
 
 _NO_CERTIFICATE = say(
     "No certificate of the artefact is stated, so the results are not shown to be traceable to the International System of "

@@ -215,6 +215,9 @@ def _compare_attached(inquiry: Inquiry, given: Given, again: Again, *, kernels: 
     if given.pdf is None:
         return
     known = {*inputs, *again.files}
+    for name in again.files:
+        if name.endswith(".xml") and name not in given.pdf[1].files:
+            inquiry.wrong("again", given.pdf[0], f"attachment {name}", "is missing, and the inputs give it")
     for name in given.pdf[1].files.keys() - known:
         inquiry.wrong("again", given.pdf[0], f"attachment {name}", "belongs to nothing that the inputs give")
     for name in (*inputs, RESULTS):

@@ -31,6 +31,7 @@ class Given:
     Attributes
     ----------
     pdf, html, xml, results : each with its name; ``None`` where it is not given. ``results`` may be the one inside the PDF.
+    digital_inside : whether the XML is the one inside the PDF.
     others : further files by name: inputs, draws of the posterior.
     manifest : of a folder.
     """
@@ -39,6 +40,7 @@ class Given:
     html: tuple[str, HtmlPage, bytes] | None = None
     xml: tuple[str, bytes] | None = None
     results: tuple[str, dict[str, Any], bytes] | None = None
+    digital_inside: bool = False
     others: dict[str, bytes] = field(default_factory=dict)
     manifest: Manifest | None = None
     contents: dict[str, bytes] = field(default_factory=dict)

@@ -43,7 +43,8 @@ def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> Non
             from cmm_uq.signing import Trust, signatures_of_xml
 
             signed = signatures_of_xml(content, trust or Trust(), where=name)
-        _all(inquiry, name, signed, trust)
+        if signed or not given.digital_inside:  # what is inside a signed PDF is signed with it
+            _all(inquiry, name, signed, trust)
 
 
 def _all(inquiry: Inquiry, name: str, signed: Sequence[Signature], trust: Trust | None) -> None:
