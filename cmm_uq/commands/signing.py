@@ -6,10 +6,12 @@ import datetime as dt
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.job import Job
 from cmm_uq.messages import Verbatim
 from cmm_uq.scheduling import credentials
 from cmm_uq.signing import LEVELS, Level, Signer, Stamping, sign_pdf, sign_xml, signer_of_file, signing_time, trust_of
@@ -53,6 +55,10 @@ class Signing:
     signer: Signer
     at: dt.datetime
     stamping: Stamping | None = None
+
+    def of(self, job: Job) -> Callable[[str, bytes], bytes]:
+        """What signs the documents of a job, by their names."""
+        return partial(self.signed, laboratory=job.facts.laboratory.model_dump())
 
     def signed(self, name: str, data: bytes, laboratory: Mapping[str, Any]) -> bytes:
         """A file with its signature; what is neither PDF nor XML as it is.

@@ -29,6 +29,15 @@ Told = Callable[[Job], None]
 REPORTS, RESULTS = Path("reports"), "results.json"
 
 
+Finished = Callable[[str, bytes], bytes]
+"""What becomes of a document that was made, by its name."""
+
+
+def unchanged(name: str, content: bytes) -> bytes:
+    """A document as it was made."""
+    return content
+
+
 def silent(what: str, part: float) -> None:
     """Nobody is told."""
 
@@ -124,7 +133,7 @@ class Form:
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
             found = outcome()
-            contents = self.contents(found, stage, signing=signing)
+            contents = self.contents(found, stage, finished=unchanged if signing is None else signing.of(job))
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
             files = place.write(contents, ledger=ledger)
@@ -137,9 +146,17 @@ class Form:
         return Owner(self.command, job.facts.job.id, job.origin)
 
     def contents(
-        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, signing: Signing | None = None
+        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, finished: Finished = unchanged
     ) -> dict[str, bytes]:  # fmt: skip
-        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
+        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted.
+
+        Parameters
+        ----------
+        outcome : that is written.
+        stage : told of progress.
+        results_only : whether nothing but ``results.json`` is wanted.
+        finished : what becomes of a document before the next is made of it, as of one that is signed.
+        """
         from cmm_uq.documents.results_file import as_json
 
         if results_only:
@@ -157,7 +174,6 @@ class Form:
                              fix="Rename it, in job.toml too")  # fmt: skip
         rendered: dict[str, bytes] = {}
         further = {RESULTS: data, **outcome.files}
-        laboratory = job.facts.laboratory.model_dump()
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
             if name.endswith(".html"):
@@ -169,10 +185,7 @@ class Form:
                     further[FILE] = provenance(job, outcome.results, {**rendered, **further})
                 digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
                 made = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **further})
-            if signing is not None:
-                stage(f"Signing: {name}", 0.9)
-                made = signing.signed(name, made, laboratory)
-            rendered[name] = made
+            rendered[name] = finished(name, made)
         return {**rendered, **further}
 
     def names(self, job: Job) -> list[str]:

@@ -17,6 +17,7 @@ from cmm_uq.dcc.certificate import Administrative, Certificate
 from cmm_uq.dcc.quantities import Column, Covariance, Ellipsoid, ExpandedList, RealList
 from cmm_uq.dcc.results import Data, Measurement, Quantity, Result
 from cmm_uq.dcc.texts import Attached
+from cmm_uq.documents.as_json import as_json
 from cmm_uq.documents.clauses import certifies
 from cmm_uq.documents.digital_certificate_administration import (
     core_data,
@@ -34,7 +35,6 @@ from cmm_uq.documents.digital_certificate_measurement import conditions, equipme
 from cmm_uq.documents.digital_certificate_units import dsi_of, product, without_unit
 from cmm_uq.documents.digital_certificate_words import NOT_STATED, SayIn, speaking, words_of
 from cmm_uq.documents.origin import file_name
-from cmm_uq.documents.results_file import as_json
 from cmm_uq.jobs.job import Job
 from cmm_uq.languages.language import ENGLISH
 from cmm_uq.messages import Text, Verbatim, say

@@ -29,6 +29,21 @@ def render_html(document: Document) -> str:
     )
 
 
+def style_sheet(heading: str, banner: str, language: str) -> str:
+    """The style sheet of a page, which says what stands at head and foot of its printed pages.
+
+    Parameters
+    ----------
+    heading : title and number of the document, with a space between.
+    banner : at the head of every page, if any.
+    language : of the document.
+    """
+    title, _, number = heading.partition(" ")
+    document = {"title": title, "number": number, "banner": banner, "language": language}
+    words = view_words(code_of(language))
+    return _environment().get_template("document.css").render(document=document, words=words, colour=plot_style.COLOURS)
+
+
 @cache
 def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined

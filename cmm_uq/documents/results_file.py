@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +12,7 @@ from cmm_uq.conformity.statement import Decided, Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import corrections
+from cmm_uq.documents.as_json import as_json as as_json
 from cmm_uq.documents.diagnosis_costs import costs_data
 from cmm_uq.documents.diagnosis_next import next_data
 from cmm_uq.documents.diagnosis_unseen import unseen_data
@@ -22,7 +22,6 @@ from cmm_uq.documents.quantity_data import quantity_data as quantity_data
 from cmm_uq.documents.result import Diagnosed, Result
 from cmm_uq.documents.simulated import Simulated
 from cmm_uq.documents.withheld import periods_data, withheld_data
-from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.languages.language import ENGLISH
@@ -173,15 +172,6 @@ def improvement_data(gain: Improvement) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def as_json(data: Mapping[str, Any]) -> bytes:
-    """Plain data as UTF-8 JSON with finite numbers of ten digits, so that the last bits of rounding do not show."""
-    try:
-        return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
-    except ValueError as error:
-        raise CmmUqError(f"a figure is not finite: {error}", where="results.json",
-                         fix="Look for a number in the input that no measurement gives") from error  # fmt: skip
-
-
 def covariance_data(covariance: Covariance) -> dict[str, Any]:
     """How estimates vary together; an element of the matrix is in the product of the units of its row and column."""
     return {
@@ -268,11 +258,3 @@ def finding_data(finding: Finding, file: str) -> dict[str, Any]:
         "kind": finding.kind, "rows": [str(m) for m in finding.measurements], "lines": list(finding.lines),
         "file": file, "why": finding.why, "set_aside": finding.set_aside,
     }  # fmt: skip
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_rounded(item) for item in value]
-    return float(f"{value:.10g}") if isinstance(value, float) else value

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-from cmm_uq.conformity.statement import Statement
-from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import NOTHING, Text, Verbatim, foreign, number, say
 from cmm_uq.model.measurement import ARTEFACT
-from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
+
+if TYPE_CHECKING:
+    from cmm_uq.conformity.statement import Statement
+    from cmm_uq.documents.result import Result
+    from cmm_uq.physics.effect import Effect
 
 OUTCOME_WORDS: Mapping[str, Text] = {
     "pass": say("pass"), "fail": say("fail"), "undecided": say("undecided"), "incomplete": say("incomplete"),

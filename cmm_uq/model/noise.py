@@ -254,8 +254,8 @@ def _slow(
 def _turning(seen: Floats, measurement: Ints, quantity: Ints) -> bool:
     """Whether observations (m, 3) of one placing look along different directions.
 
-    Where each placing is a single quantity, all are one: a bar swept about a ball is seen from the machine, which drifts, along
-    ever other directions.
+    Where each placing is a single quantity, all are one: a bar swept about a ball is seen from the machine, which drifts,
+    along ever other directions.
     """
     if len(np.unique(quantity)) == len(np.unique(measurement)):
         measurement = np.zeros_like(measurement)

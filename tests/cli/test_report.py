@@ -19,7 +19,8 @@ from tests.cli.process import COMMAND, run, run_apart
 from tests.cli.terminal import everything, on_terminal, until
 
 FILES = [
-    "certificate.html", "certificate.pdf", "certificate.xml", "manifest.json", "posterior.npz", "provenance.json", "results.json"
+    "certificate.html", "certificate.pdf", "certificate.xml", "manifest.json", "posterior.npz", "provenance.json",
+    "results.json",
 ]  # fmt: skip
 
 

@@ -37,7 +37,8 @@ READ = {
 }  # fmt: skip
 """How long a command waits for another one's lock; the date that a new job begins with, for its reader to change; when a
 reading came, and when a simulated instrument sends one; when something was recorded or sent, on which day something is due,
-when something was signed, and how long a job, a lock, a cluster or a browser is waited for. No certificate and no results.json has any of these."""
+when something was signed, and how long a job, a lock, a cluster or a browser is waited for. No certificate and no
+results.json has any of these."""
 
 
 def clocks(source: str) -> set[str]:
