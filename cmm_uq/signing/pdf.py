@@ -57,11 +57,20 @@ class Stamping:
     server : address of a time stamp server.
     level : B-T, B-LT or B-LTA.
     trust : whom the chains of signer and server must lead to, for B-LT and B-LTA.
+
+    Raises
+    ------
+    CmmUqError : the address is none of HTTP.
     """
 
     server: str
     level: Level = "B-T"
     trust: Trust = NOBODY
+
+    def __post_init__(self) -> None:
+        if not self.server.startswith(("http://", "https://")):
+            raise CmmUqError("is no address of a time stamp server", where=self.server,
+                             fix="Give one that begins with https://")  # fmt: skip
 
 
 def sign_pdf(
