@@ -32,7 +32,7 @@ CONTENTS: dict[str, list[str]] = {
         "machine/effects", "limits", "words",
     ],
     "How it works": [
-        "certificate", "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
+        "certificate", "signing", "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",

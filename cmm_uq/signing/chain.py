@@ -150,8 +150,8 @@ def _lists(evidence: Evidence, trust: Trust) -> Sequence[crl.CertificateList]:
 def _listed(certificate: x509.Certificate, evidence: Evidence, trust: Trust) -> bool:
     """Whether a list of the issuer names the certificate, whenever that was."""
     return any(
-        revoked["user_certificate"].native == certificate.serial_number
+        revoked["user_certificate"] == certificate.serial_number
         for one in _lists(evidence, trust)
         if one.issuer == certificate.issuer
-        for revoked in one["tbs_cert_list"]["revoked_certificates"]
+        for revoked in one["tbs_cert_list"]["revoked_certificates"].native or ()
     )

@@ -116,6 +116,13 @@ def test_one_that_was_revoked_afterwards_counts_only_where_a_time_stamp_proves_i
     assert not revoked(pdf, world, "B-B", later).trusted
 
 
+def test_a_list_that_names_nobody_says_that_the_certificate_is_good(pdf: bytes, world: World) -> None:
+    given = Trust(world.trust.anchors, (revocations(world.anchor),))
+    (found,) = signatures_of_pdf(sign_pdf(pdf, world.signer.signer, seal=None, at=SIGNED), given)
+    assert found.revocation == "good"
+    assert found.good
+
+
 @pytest.mark.parametrize(("path", "why"), [
     ("/nonsense", "something else than a time stamp"), ("/page", "something else than a time stamp"),
     ("/broken", "answers 503"),
