@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from pyhanko_certvalidator import CertificateValidator, ValidationContext
 from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError, RevokedError
 
 from cmm_uq.messages import Text, Verbatim, day, say
+from cmm_uq.signing.extra import ran
 from cmm_uq.signing.found import Revocation, Trust
 from cmm_uq.signing.signer import is_test, unfit
 
@@ -122,7 +122,7 @@ def _validate(
     certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime, mode: str
 ) -> None:  # fmt: skip
     found = context(evidence, trust, at, mode)
-    asyncio.run(CertificateValidator(certificate, validation_context=found).async_validate_path())
+    ran(CertificateValidator(certificate, validation_context=found).async_validate_path())
 
 
 def context(evidence: Evidence, trust: Trust, at: dt.datetime, mode: str = "soft-fail") -> ValidationContext:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import datetime as dt
 import io
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import SIGNED_BYTES
 from cmm_uq.messages import Text, Verbatim, commas, plural, say
-from cmm_uq.signing.extra import installed
+from cmm_uq.signing.extra import installed, ran
 from cmm_uq.signing.found import Signature, Trust
 
 if TYPE_CHECKING:
@@ -130,7 +129,7 @@ def _intact(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Tex
         return False, [BROKEN]
     nobody = ValidationContext(trust_roots=[], allow_fetching=False)  # who signed is judged elsewhere
     try:
-        status = asyncio.run(
+        status = ran(
             cms_basic_validation(embedded.signed_data, raw_digest=embedded.compute_digest(), validation_context=nobody,
                                  key_usage_settings=KeyUsageConstraints(key_usage=set()))
         )  # fmt: skip
@@ -221,7 +220,7 @@ def _stamped(embedded: EmbeddedPdfSignature, evidence: Evidence, trust: Trust) -
     if token is None:
         return None, False
     at = token["encap_content_info"]["content"].parsed["gen_time"].native
-    status = asyncio.run(
+    status = ran(
         validate_tst_signed_data(token, context(evidence, trust, at), message_imprint_checker(embedded.signer_info))
     )
     if not (status["intact"] and status["valid"]):

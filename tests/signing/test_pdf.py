@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import datetime as dt
 import io
 import shutil
@@ -11,7 +12,7 @@ from pathlib import Path
 import pikepdf
 import pytest
 from cryptography.hazmat.primitives.serialization import Encoding
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError
@@ -42,6 +43,19 @@ def test_a_signature_holds_of_somebody_trusted_over_the_whole_file(signed: bytes
 
 def test_every_byte_of_the_document_stays_as_it_was(pdf: bytes, signed: bytes) -> None:
     assert signed.startswith(pdf)
+
+
+def test_it_is_made_and_found_where_a_loop_runs_already(pdf: bytes, signed: bytes, held: Held, trust: Trust) -> None:
+    """As in a notebook."""
+
+    async def inside() -> tuple[bytes, Signature]:
+        return sign_pdf(pdf, held.signer, seal=None, at=SIGNED, reason="approval"), only(
+            signatures_of_pdf(signed, trust)
+        )
+
+    again, found = asyncio.run(inside())
+    assert again == signed
+    assert found.good
 
 
 def test_nobody_is_trusted_by_default(signed: bytes) -> None:
@@ -107,6 +121,7 @@ def test_a_second_person_signs_the_same_document(signed: bytes, curve_held: Held
     assert first.content == signed
 
 
+@settings(max_examples=40)
 @given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_one_altered_bit_is_found(signed: bytes, trust: Trust, place: float, bit: int) -> None:
     altered = bytearray(signed)

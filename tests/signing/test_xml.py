@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
@@ -100,6 +100,7 @@ def test_the_signature_stands_where_the_schema_of_the_dcc_has_it() -> None:
     assert [one.get("ref") for one in sequence.iterchildren(f"{xs}element")][-1] == "ds:Signature"
 
 
+@settings(max_examples=40)
 @given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_one_altered_bit_is_found_or_changes_nothing(signed: bytes, trust: Trust, place: float, bit: int) -> None:
     altered = bytearray(signed)
