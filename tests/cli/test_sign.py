@@ -6,6 +6,7 @@ import base64
 import json
 import os
 import shutil
+import socket
 import stat
 import subprocess
 import sys
@@ -248,6 +249,20 @@ def _encryption():  # type: ignore[no-untyped-def]
     from cryptography.hazmat.primitives.serialization import BestAvailableEncryption
 
     return BestAvailableEncryption(PASSPHRASE.encode())
+
+
+def test_a_server_that_does_not_answer_leaves_the_set_as_it_was(key: Path, laboratory: Path) -> None:
+    folder = laboratory / "reports" / "mount"
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # bound, and never listening
+        server = f"http://127.0.0.1:{taken.getsockname()[1]}/"
+        done = run(
+            "sign", folder / "certificate.pdf", "--key", key, "--records", laboratory / PLACE, "--time-server", server
+        )
+    assert done.returncode == 2
+    assert f"{server}: the time stamp server does not answer" in done.stderr
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
 def test_a_scheduled_run_does_not_sign(key: Path, laboratory: Path) -> None:
