@@ -27,6 +27,15 @@ Told = Callable[[Job], None]
 REPORTS, RESULTS = Path("reports"), "results.json"
 
 
+Finished = Callable[[str, bytes], bytes]
+"""What becomes of a document that was made, by its name."""
+
+
+def unchanged(name: str, content: bytes) -> bytes:
+    """A document as it was made."""
+    return content
+
+
 def silent(what: str, part: float) -> None:
     """Nobody is told."""
 
@@ -120,7 +129,8 @@ class Form:
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
             found = outcome()
-            contents = self.contents(found, stage, signing=signing)
+            finished = unchanged if signing is None else signing.finished(job.facts.laboratory.model_dump())
+            contents = self.contents(found, stage, finished=finished)
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
             files = place.write(contents, ledger=ledger)
@@ -133,9 +143,17 @@ class Form:
         return Owner(self.command, job.facts.job.id, job.origin)
 
     def contents(
-        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, signing: Signing | None = None
+        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, finished: Finished = unchanged
     ) -> dict[str, bytes]:  # fmt: skip
-        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
+        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted.
+
+        Parameters
+        ----------
+        outcome : that is written.
+        stage : told of progress.
+        results_only : whether nothing but ``results.json`` is wanted.
+        finished : what becomes of a document before the next is made of it, as of one that is signed.
+        """
         from cmm_uq.documents.results_file import as_json
 
         if results_only:
@@ -153,15 +171,12 @@ class Form:
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
             pdf = name.endswith(".pdf")
-            rendered[name] = (
+            made = (
                 render_pdf(document, {**job.inputs, RESULTS: data, **outcome.files})
                 if pdf
                 else render_html(document).encode()
             )
-        if signing is not None:
-            stage("Signing", 0.9)
-            laboratory = job.facts.laboratory.model_dump()
-            rendered = {name: signing.signed(name, content, laboratory) for name, content in rendered.items()}
+            rendered[name] = finished(name, made)
         return {**rendered, RESULTS: data, **outcome.files}
 
     def names(self, job: Job) -> list[str]:
