@@ -103,7 +103,7 @@ def _signed(path: Path, signing: Signing, content: bytes | None = None) -> bytes
     name = path.name.lower()
     laboratory = _laboratory(content) if name.endswith(".pdf") else {}
     try:
-        return signing.signed(name, content, laboratory)
+        return signing.finished(laboratory)(name, content)
     except CmmUqError as error:
         raise error if error.where else CmmUqError(error.problem, where=str(path), fix=error.fix) from None
 

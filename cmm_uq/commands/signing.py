@@ -6,13 +6,11 @@ import datetime as dt
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.job import Job
-from cmm_uq.messages import Verbatim
+from cmm_uq.messages import Text, Verbatim
 from cmm_uq.scheduling import credentials
 from cmm_uq.signing import LEVELS, Level, Signer, Stamping, sign_pdf, sign_xml, signer_of_file, signing_time, trust_of
 from cmm_uq.signing.token import SCHEME, signer_of_token
@@ -56,31 +54,30 @@ class Signing:
     at: dt.datetime
     stamping: Stamping | None = None
 
-    def of(self, job: Job) -> Callable[[str, bytes], bytes]:
-        """What signs the documents of a job, by their names."""
-        return partial(self.signed, laboratory=job.facts.laboratory.model_dump())
-
-    def signed(self, name: str, data: bytes, laboratory: Mapping[str, Any]) -> bytes:
-        """A file with its signature; what is neither PDF nor XML as it is.
+    def finished(
+        self, laboratory: Mapping[str, Any], *, language: str = "en", said: Callable[[Text], Text] | None = None
+    ) -> Callable[[str, bytes], bytes]:  # fmt: skip
+        """Signs a document by its name: PDF and XML; others stay as they are.
 
         Parameters
         ----------
-        name : of the file.
-        data : its bytes.
         laboratory : name and accreditation, for the seal, where they are known.
-
-        Raises
-        ------
-        CmmUqError : it cannot be signed.
+        language : of the documents.
+        said : says a text in that language.
         """
-        if name.endswith(".xml"):
-            return sign_xml(data, self.signer, at=self.at, where=name)
-        if not name.endswith(".pdf"):
-            return data
-        from cmm_uq.documents.seal import seal
 
-        told = (Verbatim(str(laboratory.get(key) or "")) for key in ("name", "accreditation"))
-        return sign_pdf(data, self.signer, seal=seal(self.signer, self.at, *told), at=self.at, stamping=self.stamping)
+        def signed(name: str, data: bytes) -> bytes:
+            if name.endswith(".xml"):
+                return sign_xml(data, self.signer, at=self.at, where=name)
+            if not name.endswith(".pdf"):
+                return data
+            from cmm_uq.documents.seal import same, seal
+
+            told = (Verbatim(str(laboratory.get(key) or "")) for key in ("name", "accreditation"))
+            seen = seal(self.signer, self.at, *told, language=language, said=said or same)
+            return sign_pdf(data, self.signer, seal=seen, at=self.at, stamping=self.stamping)
+
+        return signed
 
 
 def signing(wanted: Wanted, asking: Asking) -> Signing:

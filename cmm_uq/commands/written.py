@@ -14,6 +14,7 @@ from cmm_uq.documents.in_short import Summary
 from cmm_uq.documents.outcome import Found, Outcome
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.languages.saying import said_in
 from cmm_uq.records.place import NONE
 from cmm_uq.writing import Owner, staged
 
@@ -133,7 +134,8 @@ class Form:
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
             found = outcome()
-            contents = self.contents(found, stage, finished=unchanged if signing is None else signing.of(job))
+            finished = unchanged if signing is None else _signed_by(signing, job)
+            contents = self.contents(found, stage, finished=finished)
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
             files = place.write(contents, ledger=ledger)
@@ -169,7 +171,7 @@ class Form:
 
         job, data = outcome.found.job, as_json(outcome.results)
         document = said(marked(outcome.document, job), job.facts.job.language)
-        for name in {*outcome.files, *self.further} & job.inputs.keys():
+        for name in {*outcome.files, *({FILE} & {*self.further})} & job.inputs.keys():
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
         rendered: dict[str, bytes] = {}
@@ -182,9 +184,9 @@ class Form:
                 made = _digital(job, data, rendered)
             else:
                 if FILE in self.further:
-                    further[FILE] = provenance(job, outcome.results, {**rendered, **further})
+                    further[FILE] = finished(FILE, provenance(job, outcome.results, {**rendered, **further}))
                 digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
-                made = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **further})
+                made = render_pdf(document, {**job.inputs, **digital, **further})
             rendered[name] = finished(name, made)
         return {**rendered, **further}
 
@@ -202,3 +204,11 @@ def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:
 
     page = next((content for name, content in rendered.items() if name.endswith(".html")), None)
     return written(digital_certificate(json.loads(results), job, html=page))
+
+
+def _signed_by(signing: Signing, job: Job) -> Finished:
+    """What signs the documents of a job, in its language."""
+    language = job.facts.job.language
+    return signing.finished(
+        job.facts.laboratory.model_dump(), language=language, said=lambda text: said_in(text, language)
+    )

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -66,31 +67,22 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     return _with_fallback(content, [str(file.parent) for file in fonts_of(language)])
 
 
-def picture(template: str, content: Mapping[str, Any]) -> bytes:
+def picture(template: str, content: Mapping[str, Any], language: Code = "en") -> bytes:
     """A template alone as a PDF page without tags, to be shown inside another.
 
     Parameters
     ----------
     template : its file name.
-    content : what it shows.
+    content : what it shows, as ``document``; characters that no font has become □.
+    language : of it.
+
+    Raises
+    ------
+    CmmUqError : Typst refuses it, and what it says.
     """
-    import typst
-
-    def made(*, system_fonts: bool) -> bytes:
-        return typst.compile(
-            (template_folder() / template).read_bytes(),
-            font_paths=typst.Fonts(include_system_fonts=system_fonts),
-            ignore_system_fonts=not system_fonts,
-            sys_inputs={"input": json.dumps(content)},
-            pdf_standards=["a-3b"],
-            pdf_tags=False,
-            timestamp=0,
-        )
-
-    try:
-        return made(system_fonts=False)
-    except typst.TypstError:
-        return made(system_fonts=True)
+    compiled = partial(_compile, template=template, standards=("a-3b",), tagged=False)
+    shown = {"document": content, "colour": COLOURS, "fonts": [FACE, JAPANESE] if language == "ja" else [FACE]}
+    return _with_fallback(shown, [str(file.parent) for file in fonts_of(language)], compiled)
 
 
 def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
@@ -109,36 +101,41 @@ def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
     }
 
 
-def _with_fallback(content: dict[str, Any], folders: list[str]) -> bytes:
+def _with_fallback(content: dict[str, Any], folders: list[str], compiled: Callable[..., bytes] | None = None) -> bytes:
     """Compile with the embedded fonts; then with the machine's too; then without the characters that both lack."""
     from typst import TypstError
 
+    made = compiled or _compile
     try:
-        return _compile(content, folders, system_fonts=False)
+        return made(content, folders, system_fonts=False)
     except TypstError as error:
         if not _missing(error):
             raise _refused(error) from error
     try:
-        return _compile(content, folders, system_fonts=True)
+        return made(content, folders, system_fonts=True)
     except TypstError as error:
         missing = _missing(error)
         if not missing:
             raise _refused(error) from error
     try:
-        return _compile(_without(content, missing), folders, system_fonts=True)
+        return made(_without(content, missing), folders, system_fonts=True)
     except TypstError as error:
         raise _refused(error) from error
 
 
-def _compile(content: Mapping[str, Any], folders: list[str], *, system_fonts: bool) -> bytes:
+def _compile(
+    content: Mapping[str, Any], folders: list[str], *, system_fonts: bool, template: str = "document.typ",
+    standards: Sequence[Any] = ("a-3a", "ua-1"), tagged: bool = True,
+) -> bytes:  # fmt: skip
     import typst
 
     return typst.compile(
-        (template_folder() / "document.typ").read_bytes(),
+        (template_folder() / template).read_bytes(),
         font_paths=typst.Fonts(include_system_fonts=system_fonts, font_paths=folders),
         ignore_system_fonts=not system_fonts,
         sys_inputs={"input": json.dumps(content)},
-        pdf_standards=["a-3a", "ua-1"],
+        pdf_standards=list(standards),
+        pdf_tags=tagged,
         timestamp=0,
     )
 

@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Callable
 
 from cmm_uq.documents.pdf import picture
-from cmm_uq.documents.plot_style import COLOURS
+from cmm_uq.languages.language import code_of
 from cmm_uq.messages import Text, Verbatim, commas, say, sentences
 from cmm_uq.signing import TEST_NOTE, Seal, Signer
 
@@ -44,10 +44,10 @@ def seal(
     facts = commas([part for part in (laboratory, accreditation, time) if part])
     mark = [say("TEST KEY: {note}.", note=TEST_NOTE)] if signer.test_key else []
     shown = picture("seal.typ", {
-        "width": WIDTH_MM, "height": HEIGHT_MM, "language": language.split("-")[0].lower(), "colour": COLOURS,
+        "width": WIDTH_MM, "height": HEIGHT_MM, "language": language.split("-")[0].lower(),
         "lines": [str.__str__(said(head)), str.__str__(said(facts))],
         "mark": str.__str__(said(say("TEST"))) if signer.test_key else "",
-    })  # fmt: skip
+    }, code_of(language))  # fmt: skip
     says = said(sentences([*mark, say("{head}: {facts}.", head=head, facts=facts)]))
     return Seal(shown, tuple(_place(i) for i in range(SEALS)), str.__str__(says))
 

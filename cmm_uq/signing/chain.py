@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from pyhanko_certvalidator import CertificateValidator, ValidationContext
 from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError, RevokedError
 
 from cmm_uq.messages import Text, Verbatim, day, say
+from cmm_uq.signing.extra import ran
 from cmm_uq.signing.found import Revocation, Trust
 from cmm_uq.signing.signer import is_test, unfit
 
@@ -122,7 +122,7 @@ def _validate(
     certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime, mode: str
 ) -> None:  # fmt: skip
     found = context(evidence, trust, at, mode)
-    asyncio.run(CertificateValidator(certificate, validation_context=found).async_validate_path())
+    ran(CertificateValidator(certificate, validation_context=found).async_validate_path())
 
 
 def context(evidence: Evidence, trust: Trust, at: dt.datetime, mode: str = "soft-fail") -> ValidationContext:
@@ -150,8 +150,8 @@ def _lists(evidence: Evidence, trust: Trust) -> Sequence[crl.CertificateList]:
 def _listed(certificate: x509.Certificate, evidence: Evidence, trust: Trust) -> bool:
     """Whether a list of the issuer names the certificate, whenever that was."""
     return any(
-        revoked["user_certificate"].native == certificate.serial_number
+        revoked["user_certificate"] == certificate.serial_number
         for one in _lists(evidence, trust)
         if one.issuer == certificate.issuer
-        for revoked in one["tbs_cert_list"]["revoked_certificates"]
+        for revoked in one["tbs_cert_list"]["revoked_certificates"].native or ()
     )

@@ -1,13 +1,17 @@
-"""What signatures are made with: the extra ``cmm-uq[sign]``, imported when it is needed, and missed in one line."""
+"""What signatures are made with: the extra ``cmm-uq[sign]``, imported when it is needed, and missed in one line; its ways."""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
 
 from cmm_uq.errors import CmmUqError
 
+_T = TypeVar("_T")
 _SILENT = logging.NullHandler()
 
 
@@ -26,3 +30,18 @@ def installed() -> Iterator[None]:
     except ImportError as error:
         raise CmmUqError(f"signatures need {error.name or 'a package'}, which is not installed",
                          fix="Install it: pip install 'cmm-uq[sign]'") from None  # fmt: skip
+
+
+def ran(coroutine: Coroutine[Any, Any, _T]) -> _T:
+    """What a coroutine of the library returns, also where a loop runs already, as in a notebook.
+
+    Parameters
+    ----------
+    coroutine : not yet begun.
+    """
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return asyncio.run(coroutine)
+    with ThreadPoolExecutor(1) as other:
+        return other.submit(asyncio.run, coroutine).result()

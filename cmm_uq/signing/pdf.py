@@ -5,7 +5,6 @@ The date of the metadata stays that of the document. The same document, key and 
 
 from __future__ import annotations
 
-import asyncio
 import datetime as dt
 import hashlib
 import io
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.signing.extra import installed
+from cmm_uq.signing.extra import installed, ran
 from cmm_uq.signing.found import NOBODY, Trust
 from cmm_uq.signing.signer import ONE_DIGEST, Signer
 
@@ -57,11 +56,20 @@ class Stamping:
     server : address of a time stamp server.
     level : B-T, B-LT or B-LTA.
     trust : whom the chains of signer and server must lead to, for B-LT and B-LTA.
+
+    Raises
+    ------
+    CmmUqError : the address is none of HTTP.
     """
 
     server: str
     level: Level = "B-T"
     trust: Trust = NOBODY
+
+    def __post_init__(self) -> None:
+        if not self.server.startswith(("http://", "https://")):
+            raise CmmUqError("is no address of a time stamp server", where=self.server,
+                             fix="Give one that begins with https://")  # fmt: skip
 
 
 def sign_pdf(
@@ -108,12 +116,12 @@ def sign_pdf(
     )  # fmt: skip
     adapted, style = Adapted(signer), NoOpStampStyle()
     if stamping is None or stamping.level == "B-B":
-        return asyncio.run(_signed(signers.PdfSigner(metadata, adapted, stamp_style=style), writer, at))
+        return ran(_signed(signers.PdfSigner(metadata, adapted, stamp_style=style), writer, at))
     from cmm_uq.signing.time_server import Server
 
     server = Server(stamping.server)
     pdf_signer = signers.PdfSigner(metadata, adapted, timestamper=server, stamp_style=style)
-    return asyncio.run(_stamped(pdf_signer, writer, signer, stamping, at))
+    return ran(_stamped(pdf_signer, writer, signer, stamping, at))
 
 
 def appending(pdf: bytes) -> IncrementalPdfFileWriter:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import asyncio
 import datetime as dt
 import io
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import SIGNED_BYTES
 from cmm_uq.messages import Text, Verbatim, commas, plural, say
-from cmm_uq.signing.extra import installed
+from cmm_uq.signing.extra import installed, ran
 from cmm_uq.signing.found import Signature, Trust
 
 if TYPE_CHECKING:
@@ -99,11 +99,12 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> Signature:
     if embedded.sig_object.get("/SubFilter") != PADES:
         problems.append(NO_PADES)
     judged = standing(certificate, evidence, file.trust, at, proven=proven)
+    level = _level(file, embedded, stamped, known=judged.revocation == "good")
     signed = embedded.byte_range
     return Signature(
         certificate.subject.human_friendly,
         str(certificate.subject.native.get("common_name", certificate.subject.human_friendly)),
-        certificate.issuer.human_friendly, f"PAdES B-{_level(file, embedded, stamped)}", at, time_proven=proven,
+        certificate.issuer.human_friendly, f"PAdES B-{level}", at, time_proven=proven,
         intact=intact, covers_whole_file=intact and whole, trusted=judged.trusted, revocation=judged.revocation,
         test_key=judged.test_key, problems=(*problems, *appended, *judged.problems),
         content=file.data[: int(signed[2]) + int(signed[3])] if intact else b"",
@@ -130,7 +131,7 @@ def _intact(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Tex
         return False, [BROKEN]
     nobody = ValidationContext(trust_roots=[], allow_fetching=False)  # who signed is judged elsewhere
     try:
-        status = asyncio.run(
+        status = ran(
             cms_basic_validation(embedded.signed_data, raw_digest=embedded.compute_digest(), validation_context=nobody,
                                  key_usage_settings=KeyUsageConstraints(key_usage=set()))
         )  # fmt: skip
@@ -209,21 +210,27 @@ def _token(embedded: EmbeddedPdfSignature) -> Any:
 
 
 def _stamped(embedded: EmbeddedPdfSignature, evidence: Evidence, trust: Trust) -> tuple[dt.datetime | None, bool]:
-    """Time of the signature's time stamp, and whether somebody trusted made it."""
-    from pyhanko.sign.validation.generic_cms import (
-        message_imprint_checker,
-        validate_tst_signed_data,
+    """Time of the signature's time stamp, where that fits, and whether somebody trusted made it."""
+    from pyhanko.sign.validation.generic_cms import message_imprint_checker
+
+    token = _token(embedded)
+    return (
+        (None, False)
+        if token is None
+        else _stamp(token, message_imprint_checker(embedded.signer_info), evidence, trust)
     )
+
+
+def _stamp(
+    token: Any, imprint: Callable[[str], bytes], evidence: Evidence, trust: Trust
+) -> tuple[dt.datetime | None, bool]:  # fmt: skip
+    """Time of a time stamp, where it fits what it is to be of, and whether somebody trusted made it."""
+    from pyhanko.sign.validation.generic_cms import validate_tst_signed_data
 
     from cmm_uq.signing.chain import context
 
-    token = _token(embedded)
-    if token is None:
-        return None, False
     at = token["encap_content_info"]["content"].parsed["gen_time"].native
-    status = asyncio.run(
-        validate_tst_signed_data(token, context(evidence, trust, at), message_imprint_checker(embedded.signer_info))
-    )
+    status = ran(validate_tst_signed_data(token, context(evidence, trust, at), imprint))
     if not (status["intact"] and status["valid"]):
         return None, False
     return at, bool(status.get("trust_problem_indic") is None and status.get("validation_path") is not None)
@@ -248,14 +255,21 @@ def _evidence(reader: PdfFileReader) -> Evidence:
     )  # fmt: skip
 
 
-def _level(file: _File, embedded: EmbeddedPdfSignature, stamped: dt.datetime | None) -> str:
-    """B, T, LT or LTA (ETSI EN 319 142-1)."""
+def _level(file: _File, embedded: EmbeddedPdfSignature, stamped: dt.datetime | None, *, known: bool) -> str:
+    """B, T, LT or LTA (ETSI EN 319 142-1), as far as it holds.
+
+    Parameters
+    ----------
+    file : that it is in.
+    embedded : the signature.
+    stamped : time of its time stamp.
+    known : whether its certificate is proven not to be revoked.
+    """
     if stamped is None:
         return "B"
-    if not (file.evidence.revocations or file.evidence.answers):
+    if not known or not (file.evidence.revocations or file.evidence.answers):
         return "T"
-    archived = any(
-        one.sig_object.get("/Type") == "/DocTimeStamp" and one.signed_revision > embedded.signed_revision
-        for one in file.embedded
-    )
+    later = [one for one in file.embedded if one.sig_object.get("/Type") == "/DocTimeStamp"
+             and one.signed_revision > embedded.signed_revision]  # fmt: skip
+    archived = any(_stamp(one.signed_data, one.compute_digest, file.evidence, file.trust)[1] for one in later)
     return "LTA" if archived else "LT"

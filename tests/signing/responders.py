@@ -11,6 +11,7 @@ from threading import Thread
 from asn1crypto import keys, tsp, x509
 from cryptography import x509 as certificates
 from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.x509 import ocsp
 from pyhanko.sign.timestamps import DummyTimeStamper
 from pyhanko_certvalidator.registry import SimpleCertificateStore
 
@@ -78,6 +79,26 @@ def revocations(held: Held, *revoked: tuple[int, dt.datetime], at: dt.datetime =
             certificates.RevokedCertificateBuilder().serial_number(serial).revocation_date(since).build()
         )
     return builder.sign(held.key, hashes.SHA256()).public_bytes(serialization.Encoding.DER)
+
+
+def status(issuer: Held, *known: Held, at: dt.datetime = SIGNED) -> Callable[[bytes], Answer]:
+    """What the responder of an authority (OCSP, RFC 6960) answers: good for the certificates that it knows."""
+    by_number = {one.certificate.serial_number: one.certificate for one in known}
+
+    def answer(body: bytes) -> Answer:
+        asked = ocsp.load_der_ocsp_request(body)
+        response = (
+            ocsp.OCSPResponseBuilder()
+            .add_response(by_number[asked.serial_number], issuer.certificate, hashes.SHA1(),
+                          ocsp.OCSPCertStatus.GOOD, at - dt.timedelta(hours=1), at + dt.timedelta(days=7), None, None)
+            .responder_id(ocsp.OCSPResponderEncoding.HASH, issuer.certificate)
+        )  # fmt: skip
+        for extension in asked.extensions:
+            response = response.add_extension(extension.value, critical=False)
+        signed = response.sign(issuer.key, hashes.SHA256())
+        return 200, "application/ocsp-response", signed.public_bytes(serialization.Encoding.DER)
+
+    return answer
 
 
 def of_der(certificate: certificates.Certificate) -> x509.Certificate:

@@ -12,12 +12,12 @@ import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding
-from cryptography.x509.oid import ExtendedKeyUsageOID
+from cryptography.x509.oid import AuthorityInformationAccessOID, ExtendedKeyUsageOID
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.signing import Level, Signature, Stamping, Trust, sign_pdf, signatures_of_pdf
 from tests.signing.authority import LAST, SIGNED, Held, curve_key, issued, root, usage
-from tests.signing.responders import REPLY, revocations, serving, stamps
+from tests.signing.responders import REPLY, revocations, serving, stamps, status
 
 STAMPED = SIGNED + dt.timedelta(seconds=7)
 
@@ -83,6 +83,26 @@ def test_pyhanko_confirms_it_without_a_network(level: Level, pdf: bytes, world: 
     assert len(reader.embedded_timestamp_signatures) == (level == "B-LTA")
 
 
+def test_a_responder_may_say_that_nothing_was_revoked(pdf: bytes, rsa_key: rsa.RSAPrivateKey) -> None:
+    """OCSP in place of revocation lists; kept in the file, and read from it when the responder is gone."""
+    anchor, answers = root("Answering Root"), {}
+    trusting = Trust((anchor.certificate.public_bytes(Encoding.DER),))
+    with serving(answers) as url:
+        place = x509.AccessDescription(
+            AuthorityInformationAccessOID.OCSP, x509.UniformResourceIdentifier(f"{url}/status")
+        )
+        asked = (x509.AuthorityInformationAccess([place]), False)
+        signer = issued("D. Wolf", curve_key(), anchor, further=(asked,))
+        stamper = issued("Time", rsa_key, anchor, key_usage=usage(digital_signature=True),
+                         further=(asked, (x509.ExtendedKeyUsage([ExtendedKeyUsageOID.TIME_STAMPING]), True)))  # fmt: skip
+        answers |= {"/stamps": stamps(stamper, STAMPED), "/status": status(anchor, signer, stamper)}
+        stamping = Stamping(f"{url}/stamps", "B-LTA", trusting)
+        signed = sign_pdf(pdf, signer.signer, seal=None, at=SIGNED, stamping=stamping)
+    (found,) = signatures_of_pdf(signed, trusting)
+    assert found.good
+    assert (found.level, found.revocation) == ("PAdES B-LTA", "good")
+
+
 def test_who_does_not_trust_the_time_stamp_has_only_the_signers_word(
     pdf: bytes, world: World, rsa_key: rsa.RSAPrivateKey
 ) -> None:
@@ -114,6 +134,13 @@ def test_one_that_was_revoked_afterwards_counts_only_where_a_time_stamp_proves_i
     later = SIGNED + dt.timedelta(hours=1)
     assert revoked(pdf, world, "B-T", later).trusted
     assert not revoked(pdf, world, "B-B", later).trusted
+
+
+def test_a_list_that_names_nobody_says_that_the_certificate_is_good(pdf: bytes, world: World) -> None:
+    given = Trust(world.trust.anchors, (revocations(world.anchor),))
+    (found,) = signatures_of_pdf(sign_pdf(pdf, world.signer.signer, seal=None, at=SIGNED), given)
+    assert found.revocation == "good"
+    assert found.good
 
 
 @pytest.mark.parametrize(("path", "why"), [

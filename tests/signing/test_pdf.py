@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import datetime as dt
 import io
 import shutil
@@ -11,7 +12,7 @@ from pathlib import Path
 import pikepdf
 import pytest
 from cryptography.hazmat.primitives.serialization import Encoding
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError
@@ -42,6 +43,19 @@ def test_a_signature_holds_of_somebody_trusted_over_the_whole_file(signed: bytes
 
 def test_every_byte_of_the_document_stays_as_it_was(pdf: bytes, signed: bytes) -> None:
     assert signed.startswith(pdf)
+
+
+def test_it_is_made_and_found_where_a_loop_runs_already(pdf: bytes, signed: bytes, held: Held, trust: Trust) -> None:
+    """As in a notebook."""
+
+    async def inside() -> tuple[bytes, Signature]:
+        return sign_pdf(pdf, held.signer, seal=None, at=SIGNED, reason="approval"), only(
+            signatures_of_pdf(signed, trust)
+        )
+
+    again, found = asyncio.run(inside())
+    assert again == signed
+    assert found.good
 
 
 def test_nobody_is_trusted_by_default(signed: bytes) -> None:
@@ -107,6 +121,7 @@ def test_a_second_person_signs_the_same_document(signed: bytes, curve_held: Held
     assert first.content == signed
 
 
+@settings(max_examples=40)
 @given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_one_altered_bit_is_found(signed: bytes, trust: Trust, place: float, bit: int) -> None:
     altered = bytearray(signed)
@@ -142,6 +157,69 @@ def test_a_revision_that_changes_a_page_is_named(signed: bytes, trust: Trust) ->
     assert "1 revision was appended after it, and changes" in found.problems[0]
     assert "Page" in found.problems[0]
     assert found.content == signed
+
+
+def also(writer: object, change: str) -> None:
+    """What somebody changes while a further signature is made."""
+    from pyhanko.pdf_utils.generic import NameObject, pdf_string
+
+    root = writer.root  # type: ignore[attr-defined]
+    tree = root["/StructTreeRoot"]
+    top = tree["/K"][0]
+    if change == "words":  # what a screen reader says of the first element
+        first = top["/K"][0]
+        first[NameObject("/ActualText")] = pdf_string("conforms")
+        writer.update_container(first)  # type: ignore[attr-defined]
+    elif change == "order":
+        kids = top["/K"]
+        kids[0], kids[1] = kids.raw_get(1), kids.raw_get(0)
+        writer.update_container(kids)  # type: ignore[attr-defined]
+        writer.update_container(top)  # type: ignore[attr-defined]
+    elif change == "roles":
+        tree["/RoleMap"][NameObject("/Figure")] = NameObject("/Artifact")
+        writer.update_container(tree["/RoleMap"])  # type: ignore[attr-defined]
+    elif change == "language":
+        root[NameObject("/Lang")] = pdf_string("tlh")
+        writer.update_root()  # type: ignore[attr-defined]
+    elif change == "a file":
+        names = root["/Names"]["/EmbeddedFiles"]["/Names"]
+        names[0] = pdf_string("renamed")
+        writer.update_container(names)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("change", ["words", "order", "roles", "language", "a file"])
+def test_a_further_signature_may_change_nothing_else(
+    change: str, signed: bytes, curve_held: Held, trust: Trust, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from cmm_uq.signing import tagging
+
+    tag = tagging.tag
+
+    def changed(writer, *arguments):  # type: ignore[no-untyped-def]
+        tag(writer, *arguments)
+        also(writer, change)
+
+    monkeypatch.setattr(tagging, "tag", changed)
+    twice = sign_pdf(signed, curve_held.signer, seal=None, at=SIGNED)
+    first, second = signatures_of_pdf(twice, trust)
+    assert second.good
+    assert first.intact
+    assert not first.covers_whole_file
+    assert first.problems[0].startswith("1 revision was appended after it, and changes ")
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"%PDF-1.7\n", b"%PDF-1.7\ntrailer<</Root 1 0 R/Size 9>>\nstartxref\n0\n%%EOF", b"\0" * 4096]
+)
+def test_what_is_no_pdf_is_refused(content: bytes, held: Held, trust: Trust) -> None:
+    with pytest.raises(CmmUqError, match="cannot be read as a PDF"):
+        signatures_of_pdf(content, trust)
+    with pytest.raises(CmmUqError, match="cannot be read as a PDF"):
+        sign_pdf(content, held.signer, seal=None, at=SIGNED)
+
+
+def test_a_file_without_a_signature_has_none(pdf: bytes, trust: Trust) -> None:
+    assert signatures_of_pdf(pdf, trust) == ()
 
 
 def test_a_key_that_is_not_for_signatures_does_not_sign(pdf: bytes, anchor: Held) -> None:
