@@ -19,7 +19,7 @@ from cmm_uq.dcc.quantities import Expanded, ExpandedList, Interval, IntervalList
 from cmm_uq.dcc.results import Quantity, QuantityList
 from cmm_uq.documents.digital_certificate_units import ONE, dsi_of, named_unit, product, ratio, unit_of, without_unit
 from cmm_uq.documents.digital_certificate_words import SayIn, english, rich_of, words_of
-from cmm_uq.documents.effect_words import effect_of, parameter_title
+from cmm_uq.documents.effect_words import effect_of, parameter_title, title_of
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.units import Unit
 
@@ -51,14 +51,51 @@ def decimal(value: float) -> Decimal:
     return Decimal(repr(value)) if isinstance(value, float) else Decimal(value)
 
 
+def plain_name(text: str) -> str:
+    """Without what an id cannot have."""
+    return _ILLEGAL.sub("_", text)
+
+
 def is_number(value: object) -> bool:
     """Whether it is one; true and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def is_quantity(value: object) -> bool:
-    """Whether it has a value with its uncertainty."""
-    return isinstance(value, Mapping) and "value" in value and "u" in value and "budget" not in value
+    """Whether it has a value with its uncertainty, and is no budget."""
+    if not isinstance(value, Mapping) or not {"value", "u"} <= value.keys() or "budget" in value:
+        return False
+    sizes, interval = [value["u"], value.get("U"), value.get("k")], value.get("interval95")
+    return (
+        (value["value"] is None or is_number(value["value"]))
+        and all(size is None or (is_number(size) and size >= 0) for size in sizes)
+        and (interval is None or (are_numbers(interval, 2) and interval[0] <= interval[1]))
+    )
+
+
+def are_numbers(values: object, count: int | None = None) -> bool:
+    """Whether it is a list of numbers, of so many where that is said."""
+    return isinstance(values, list) and all(map(is_number, values)) and (count is None or len(values) == count)
+
+
+def _is_budget(data: Mapping[str, Any]) -> bool:
+    lines = data.get("budget")
+    return (
+        data.keys() >= _BUDGET and isinstance(lines, list) and bool(lines)
+        and all(isinstance(line, Mapping) and line.keys() >= _LINE for line in lines)
+    )  # fmt: skip
+
+
+_BUDGET = {"value", "u", "U", "k", "dof", "unit", "budget"}
+_LINE = {"input", "value", "u", "unit", "distribution", "dof", "sensitivity", "contribution", "share", "source"}
+
+
+def _is_matrix(data: Mapping[str, Any]) -> bool:
+    """Whether it is a covariance matrix with names and units of its rows."""
+    if data.keys() != {"parameters", "units", "matrix"} or not all(isinstance(one, list) for one in data.values()):
+        return False
+    count = len(data["units"])
+    return len(data["matrix"]) == count and all(are_numbers(row, count) for row in data["matrix"])
 
 
 class Figures:
@@ -99,7 +136,8 @@ class Figures:
 
     def id_of(self, path: Path) -> str:
         """An id that no other part has."""
-        wanted = found = _ILLEGAL.sub("_", ".".join(path))
+        wanted = plain_name(".".join(path))
+        wanted = found = wanted if wanted[0].isalpha() or wanted[0] == "_" else f"_{wanted}"
         count = 1
         while found in self._ids:
             count += 1
@@ -113,6 +151,8 @@ class Figures:
             return TITLES[path[-1]]
         if len(path) > 1 and effect_of(path[-2]) is not None:
             return parameter_title(path[-2], path[-1])
+        if effect_of(path[-1]) is not None:
+            return title_of(path[-1])
         return Verbatim(without_unit(path[-1]))
 
     def _quantity(self, path: Path, value: Any, *, name: Text | None = None) -> Quantity:
@@ -138,9 +178,9 @@ class Figures:
 
     def _group(self, path: Path, data: Mapping[str, Any], unit: Unit | None) -> Iterator[Part]:
         """What belongs together."""
-        if "budget" in data:
+        if _is_budget(data):
             inner = list(self._budget(path, data))
-        elif data.keys() == {"parameters", "units", "matrix"}:
+        elif _is_matrix(data):
             inner = list(self._matrix((*path, "matrix"), data["matrix"], [dsi_of(one) for one in data["units"]]))
         else:
             inner = list(self._curve(path, data, unit))
@@ -152,8 +192,9 @@ class Figures:
         taken: set[str] = set()
         for key, value in data.items():
             ending = key.removeprefix("error_")
-            u, interval = data.get(f"u_{ending}"), data.get(f"interval95_{ending}")
-            if key != ending and isinstance(value, list) and u and interval:
+            u: Any = data.get(f"u_{ending}")
+            interval: Any = data.get(f"interval95_{ending}")
+            if key != ending and _is_curve(value, u, interval):
                 low, high = interval
                 stated = IntervalList(
                     standards=_decimals(u), lows=_decimals(low), highs=_decimals(high), probabilities=(P95,)
@@ -165,7 +206,7 @@ class Figures:
                 yield from self.parts((*path, key), value, unit)
 
     def _list(self, path: Path, values: Sequence[Any], unit: Unit, above: Unit | None) -> Iterator[Part]:
-        if all(is_number(value) for value in values):
+        if are_numbers(values):
             yield self._quantity(path, RealList(values=_decimals(values), units=(unit.dsi,)))
         elif all(isinstance(value, str | bool) for value in values):
             yield self._quantity(path, _texts(values))
@@ -265,6 +306,17 @@ class Figures:
         )
 
 
+def _is_curve(value: Any, u: Any, interval: Any) -> bool:
+    """Whether these are the points of a curve with u and interval of each."""
+    if not are_numbers(value) or not value or not isinstance(interval, list) or len(interval) != 2:
+        return False
+    low, high = interval
+    return (
+        all(are_numbers(one, len(value)) for one in (u, low, high))
+        and min(u) >= 0 and all(one <= other for one, other in zip(low, high, strict=True))
+    )  # fmt: skip
+
+
 def _decimals(values: Sequence[float]) -> tuple[Decimal, ...]:
     return tuple(decimal(value) for value in values)
 
@@ -279,7 +331,7 @@ def _texts(values: Sequence[Any]) -> Any:
 
 def _plain_cell(value: Any) -> bool:
     if isinstance(value, list):
-        return 0 < len(value) <= _SHORT and all(is_number(one) for one in value)
+        return 0 < len(value) <= _SHORT and are_numbers(value)
     return not isinstance(value, Mapping) or (is_quantity(value) and value["value"] is not None)
 
 
@@ -298,7 +350,7 @@ def _expanded(data: Mapping[str, Any]) -> Expanded | None:
 
 def _interval(data: Mapping[str, Any]) -> Interval | None:
     """The 95 % coverage interval."""
-    if not data.get("interval95"):
+    if not data.get("interval95") or data["u"] is None:
         return None
     low, high = data["interval95"]
     return Interval(
@@ -308,9 +360,9 @@ def _interval(data: Mapping[str, Any]) -> Interval | None:
 
 def _symmetric(data: Mapping[str, Any]) -> bool:
     """Whether both sides of the interval are the same to the two digits that are printed of U."""
-    value, (low, high), U = data["value"], data["interval95"], data["U"]
+    value, (low, high), U = data["value"], data["interval95"], data.get("U")
     if not U:
-        return True
+        return bool(U == 0)
     step = 10.0 ** (math.floor(math.log10(U)) - 1)
     return bool(round((high - value) / step) == round((value - low) / step))
 
