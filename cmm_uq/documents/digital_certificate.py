@@ -29,8 +29,10 @@ from cmm_uq.documents.digital_certificate_administration import (
     ref_types,
 )
 from cmm_uq.documents.digital_certificate_conformity import evidence, statements
-from cmm_uq.documents.digital_certificate_figures import P95, Figures, decimal, is_quantity, plain_name
+from cmm_uq.documents.digital_certificate_figures import Figures
 from cmm_uq.documents.digital_certificate_measurement import conditions, equipment, metadata, methods, software
+from cmm_uq.documents.digital_certificate_shapes import decimal, is_quantity, plain_name
+from cmm_uq.documents.digital_certificate_uncertainty import P95
 from cmm_uq.documents.digital_certificate_units import dsi_of, product, without_unit
 from cmm_uq.documents.digital_certificate_words import NOT_STATED, SayIn, speaking, words_of
 from cmm_uq.documents.origin import file_name
