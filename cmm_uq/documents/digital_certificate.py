@@ -30,8 +30,10 @@ from cmm_uq.documents.digital_certificate_administration import (
     ref_types,
 )
 from cmm_uq.documents.digital_certificate_conformity import evidence, statements
-from cmm_uq.documents.digital_certificate_figures import P95, Figures, decimal
+from cmm_uq.documents.digital_certificate_figures import Figures
 from cmm_uq.documents.digital_certificate_measurement import conditions, equipment, metadata, methods, software
+from cmm_uq.documents.digital_certificate_shapes import decimal, is_quantity, plain_name
+from cmm_uq.documents.digital_certificate_uncertainty import P95
 from cmm_uq.documents.digital_certificate_units import dsi_of, product, without_unit
 from cmm_uq.documents.digital_certificate_words import NOT_STATED, SayIn, speaking, words_of
 from cmm_uq.documents.origin import file_name
@@ -131,12 +133,14 @@ def _results(results: Mapping[str, Any], say_in: SayIn, figures: Figures) -> lis
         data = results[key]
         parts = (
             tuple(part for name, value in data.items() for part in figures.parts((key, name), value))
-            if isinstance(data, Mapping) and "budget" not in data and "value" not in data
+            if isinstance(data, Mapping) and not is_quantity(data) and "budget" not in data
             else tuple(figures.parts((key,), data))
         )
         if parts:
             title = _TITLES.get(key, Verbatim(without_unit(key).capitalize()))
-            found.append(Result(name=words_of(title, say_in), data=Data(parts=parts), ref_type=(f"cmm_{key}",)))
+            found.append(
+                Result(name=words_of(title, say_in), data=Data(parts=parts), ref_type=(plain_name(f"cmm_{key}"),))
+            )
     together = _together(results, say_in, figures)
     return found if together is None else [*found, together]
 

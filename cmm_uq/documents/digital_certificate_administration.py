@@ -184,7 +184,9 @@ def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
         told = (replaced_certificate(facts.replaces), Verbatim(facts.replaces.reason), Verbatim(facts.replaces.changed))
         found.append(
             Statement(
-                name=words_of(say("Replaces"), say_in), declaration=rich_of(told, say_in), ref_type=("basic_revision",)
+                name=words_of(say("Replaces certificate"), say_in),
+                declaration=rich_of(told, say_in),
+                ref_type=("basic_revision",),
             )
         )
     if facts.recalibration_agreed:
@@ -192,7 +194,7 @@ def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
         found.append(Statement(name=name, date=facts.recalibration_agreed, ref_type=("basic_recalibration",)))
     further = [
         (say("Place"), facts.place), (say("Deviations from the method"), facts.deviations),
-        (say("Results of external providers"), facts.external), (say("Data of the customer"), facts.from_customer),
+        (say("Results of external providers"), facts.external), (say("Data from the customer"), facts.from_customer),
         (say("Remarks"), facts.remarks),
     ]  # fmt: skip
     for what, text in further:

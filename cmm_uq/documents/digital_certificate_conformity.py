@@ -15,7 +15,8 @@ from typing import Any
 from cmm_uq.dcc.quantities import Expanded, ExpandedList, Real, RealList
 from cmm_uq.dcc.results import Data, Quantity, QuantityList, Result, Statement
 from cmm_uq.dcc.texts import Rich
-from cmm_uq.documents.digital_certificate_figures import Figures, Part, decimal
+from cmm_uq.documents.digital_certificate_figures import Figures, Part
+from cmm_uq.documents.digital_certificate_shapes import decimal
 from cmm_uq.documents.digital_certificate_units import ONE, ratio
 from cmm_uq.documents.digital_certificate_words import SayIn, english, one_line, rich_of, words_of
 from cmm_uq.messages import Text, Verbatim, say

@@ -7,31 +7,42 @@ interval is not symmetric, to the two digits that are printed of U, a second qua
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from decimal import Decimal
 from typing import Any
 
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.dcc.administrative import Characters
-from cmm_uq.dcc.quantities import Expanded, ExpandedList, Interval, IntervalList, Real, RealList
+from cmm_uq.dcc.quantities import IntervalList, Real, RealList
 from cmm_uq.dcc.results import Quantity, QuantityList
+from cmm_uq.documents.digital_certificate_shapes import (
+    are_numbers,
+    decimal,
+    decimals,
+    is_budget,
+    is_curve,
+    is_matrix,
+    is_number,
+    is_quantity,
+    plain_cell,
+    plain_name,
+)
+from cmm_uq.documents.digital_certificate_uncertainty import (
+    P95,
+    expanded_of,
+    interval_of,
+    intervals_of,
+    spread_of,
+    symmetric,
+)
 from cmm_uq.documents.digital_certificate_units import ONE, dsi_of, named_unit, product, ratio, unit_of, without_unit
 from cmm_uq.documents.digital_certificate_words import SayIn, english, rich_of, words_of
-from cmm_uq.documents.effect_words import effect_of, parameter_title
+from cmm_uq.documents.effect_words import effect_of, parameter_title, title_of
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.units import Unit
 
 Path = tuple[str, ...]
 Part = Quantity | QuantityList
 
-P95 = Decimal("0.95")
-P_STANDARD = Decimal("0.6827")
-"""Probability of a normal distribution within one standard deviation."""
-
-POSTERIOR = "posterior"
-"""In place of a named distribution: that of the draws in posterior.npz."""
 
 NOT_DETERMINED = say("not determined by this recording")
 _ESTIMATED = ("estimates", "artefact")
@@ -39,26 +50,6 @@ _ESTIMATED = ("estimates", "artefact")
 
 _NO_RESULT = ("noise", "least_squares")
 """Keys of what is there for comparison, which nobody who looks for measured values should find."""
-
-_SHORT = 4
-"""Numbers of a list that stand in columns of their own: a point, a direction."""
-
-_ILLEGAL = re.compile(r"[^A-Za-z0-9_.\-]")
-
-
-def decimal(value: float) -> Decimal:
-    """A number as results.json has it."""
-    return Decimal(repr(value)) if isinstance(value, float) else Decimal(value)
-
-
-def is_number(value: object) -> bool:
-    """Whether it is one; true and false are not."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def is_quantity(value: object) -> bool:
-    """Whether it has a value with its uncertainty."""
-    return isinstance(value, Mapping) and "value" in value and "u" in value and "budget" not in value
 
 
 class Figures:
@@ -99,7 +90,8 @@ class Figures:
 
     def id_of(self, path: Path) -> str:
         """An id that no other part has."""
-        wanted = found = _ILLEGAL.sub("_", ".".join(path))
+        wanted = plain_name(".".join(path))
+        wanted = found = wanted if wanted[0].isalpha() or wanted[0] == "_" else f"_{wanted}"
         count = 1
         while found in self._ids:
             count += 1
@@ -113,6 +105,8 @@ class Figures:
             return TITLES[path[-1]]
         if len(path) > 1 and effect_of(path[-2]) is not None:
             return parameter_title(path[-2], path[-1])
+        if effect_of(path[-1]) is not None:
+            return title_of(path[-1])
         return Verbatim(without_unit(path[-1]))
 
     def _quantity(self, path: Path, value: Any, *, name: Text | None = None) -> Quantity:
@@ -124,10 +118,10 @@ class Figures:
         if data["value"] is None or (path[0] in _ESTIMATED and ".".join(path[-2:]) in self.free):
             yield self._quantity(path, rich_of((NOT_DETERMINED,), self.say_in))
             return
-        value, interval = decimal(data["value"]), _interval(data) if data["u"] else None
-        stated = _expanded(data) or interval
+        value, interval = decimal(data["value"]), interval_of(data) if data["u"] else None
+        stated = expanded_of(data) or interval
         yield self._quantity(path, Real(value=value, unit=unit.dsi, uncertainty=stated))
-        if interval is not None and interval is not stated and not _symmetric(data):
+        if interval is not None and interval is not stated and not symmetric(data):
             named = say("{what}, 95 % coverage interval", what=self.title(path))
             yield self._quantity(
                 (*path, "interval95"), Real(value=value, unit=unit.dsi, uncertainty=interval), name=named
@@ -138,9 +132,9 @@ class Figures:
 
     def _group(self, path: Path, data: Mapping[str, Any], unit: Unit | None) -> Iterator[Part]:
         """What belongs together."""
-        if "budget" in data:
+        if is_budget(data):
             inner = list(self._budget(path, data))
-        elif data.keys() == {"parameters", "units", "matrix"}:
+        elif is_matrix(data):
             inner = list(self._matrix((*path, "matrix"), data["matrix"], [dsi_of(one) for one in data["units"]]))
         else:
             inner = list(self._curve(path, data, unit))
@@ -152,21 +146,22 @@ class Figures:
         taken: set[str] = set()
         for key, value in data.items():
             ending = key.removeprefix("error_")
-            u, interval = data.get(f"u_{ending}"), data.get(f"interval95_{ending}")
-            if key != ending and isinstance(value, list) and u and interval:
+            u: Any = data.get(f"u_{ending}")
+            interval: Any = data.get(f"interval95_{ending}")
+            if key != ending and is_curve(value, u, interval):
                 low, high = interval
                 stated = IntervalList(
-                    standards=_decimals(u), lows=_decimals(low), highs=_decimals(high), probabilities=(P95,)
+                    standards=decimals(u), lows=decimals(low), highs=decimals(high), probabilities=(P95,)
                 )
                 dsi = unit_of(key, unit).dsi
-                yield self._quantity((*path, key), RealList(values=_decimals(value), units=(dsi,), uncertainty=stated))
+                yield self._quantity((*path, key), RealList(values=decimals(value), units=(dsi,), uncertainty=stated))
                 taken |= {f"u_{ending}", f"interval95_{ending}"}
             elif key not in taken:
                 yield from self.parts((*path, key), value, unit)
 
     def _list(self, path: Path, values: Sequence[Any], unit: Unit, above: Unit | None) -> Iterator[Part]:
-        if all(is_number(value) for value in values):
-            yield self._quantity(path, RealList(values=_decimals(values), units=(unit.dsi,)))
+        if are_numbers(values):
+            yield self._quantity(path, RealList(values=decimals(values), units=(unit.dsi,)))
         elif all(isinstance(value, str | bool) for value in values):
             yield self._quantity(path, _texts(values))
         elif all(isinstance(value, Mapping) for value in values):
@@ -182,7 +177,7 @@ class Figures:
 
     def _rows(self, path: Path, rows: Sequence[Mapping[str, Any]]) -> Iterator[Part]:
         """A table by its columns; row by row where a cell holds more than a figure, a text or a point."""
-        if not all(_plain_cell(value) for row in rows for value in row.values()):
+        if not all(plain_cell(value) for row in rows for value in row.values()):
             inner = [part for i, row in enumerate(rows) for part in self.parts((*path, str(i)), dict(row))]
         else:
             keys = list(dict.fromkeys(key for row in rows for key in row))
@@ -198,12 +193,12 @@ class Figures:
         labels = tuple(row for row, _ in held) if len(held) < len(cells) else ()
         values, unit = [cell for _, cell in held], unit_of(path[-1], None)
         if all(is_number(value) for value in values):
-            yield self._quantity(path, RealList(labels=labels, values=_decimals(values), units=(unit.dsi,)))
+            yield self._quantity(path, RealList(labels=labels, values=decimals(values), units=(unit.dsi,)))
         elif all(is_quantity(value) for value in values):
             yield from self._column_of_quantities(path, held, labels, unit)
         elif all(isinstance(value, list) for value in values) and len({len(value) for value in values}) == 1:
             for i in range(len(values[0])):
-                part = RealList(labels=labels, values=_decimals([value[i] for value in values]), units=(unit.dsi,))
+                part = RealList(labels=labels, values=decimals([value[i] for value in values]), units=(unit.dsi,))
                 yield self._quantity((*path, str(i)), part, name=say("{what} {i}", what=self.title(path), i=i + 1))
         else:
             yield self._quantity(path, _texts([str(value) for value in values]))
@@ -213,15 +208,15 @@ class Figures:
     ) -> Iterator[Part]:
         """With the uncertainty of each, or one by one where D-SI has no list for what is known of them."""
         values = [value for _, value in held]
-        uncertainty, intervals = _spread(values), _intervals(values)
+        uncertainty, intervals = spread_of(values), intervals_of(values)
         if uncertainty is None:
             for row, value in held:
                 yield from self._with_uncertainty((*path, str(int(row) - 1)), value, unit)
             return
-        found = _decimals([value["value"] for value in values])
+        found = decimals([value["value"] for value in values])
         column = RealList(labels=labels, values=found, units=(unit.dsi,), uncertainty=uncertainty)
         yield self._quantity(path, column)
-        if intervals is not None and not all(map(_symmetric, values)):
+        if intervals is not None and not all(map(symmetric, values)):
             named = say("{what}, 95 % coverage interval", what=self.title(path))
             yield self._quantity((*path, "interval95"), column.with_changes(uncertainty=intervals), name=named)
 
@@ -229,12 +224,12 @@ class Figures:
         """A covariance matrix, row by row, each element in the product of its units."""
         for i, (row, one) in enumerate(zip(rows, units, strict=True)):
             elements = tuple(product(one, other) for other in units)
-            yield self._quantity((*path, str(i)), RealList(values=_decimals(row), units=elements))
+            yield self._quantity((*path, str(i)), RealList(values=decimals(row), units=elements))
 
     def _budget(self, path: Path, data: Mapping[str, Any]) -> Iterator[Part]:
         """A budget of uncertainty: what is combined, and its lines."""
         unit = dsi_of(data["unit"])
-        stated = _expanded(data)
+        stated = expanded_of(data)
         value = Real(value=decimal(data["value"]), unit=unit, uncertainty=stated) if data["value"] is not None else None
         if value is not None:
             yield self._quantity((*path, "value"), value)
@@ -257,16 +252,12 @@ class Figures:
             if held:
                 labels = tuple(str(i + 1) for i in held) if len(held) < len(lines) else ()
                 found = RealList(
-                    labels=labels, values=_decimals([lines[i][key] for i in held]), units=tuple(units[i] for i in held)
+                    labels=labels, values=decimals([lines[i][key] for i in held]), units=tuple(units[i] for i in held)
                 )
                 inner.append(self._quantity((*below, key), found))
         yield QuantityList(
             name=words_of(say("Uncertainty budget"), self.say_in), parts=tuple(inner), id=self.id_of(below)
         )
-
-
-def _decimals(values: Sequence[float]) -> tuple[Decimal, ...]:
-    return tuple(decimal(value) for value in values)
 
 
 def _texts(values: Sequence[Any]) -> Any:
@@ -275,68 +266,6 @@ def _texts(values: Sequence[Any]) -> Any:
     if all(text and text.split() == [text] for text in texts):
         return Characters(tuple(texts))
     return english(texts)
-
-
-def _plain_cell(value: Any) -> bool:
-    if isinstance(value, list):
-        return 0 < len(value) <= _SHORT and all(is_number(one) for one in value)
-    return not isinstance(value, Mapping) or (is_quantity(value) and value["value"] is not None)
-
-
-def _expanded(data: Mapping[str, Any]) -> Expanded | None:
-    """U with k and 95 %; where only u is known, that with k = 1; None where there is none that D-SI takes."""
-    u, U, k = data["u"], data.get("U"), data.get("k")
-    if not u:
-        return None
-    if U is None:
-        return Expanded(uncertainty=decimal(u), factor=Decimal(1), probability=P_STANDARD, distribution="normal")
-    if k is None or k < 1:
-        return None
-    distribution = POSTERIOR if "interval95" in data else None
-    return Expanded(uncertainty=decimal(U), factor=decimal(k), probability=P95, distribution=distribution)
-
-
-def _interval(data: Mapping[str, Any]) -> Interval | None:
-    """The 95 % coverage interval."""
-    if not data.get("interval95"):
-        return None
-    low, high = data["interval95"]
-    return Interval(
-        standard=decimal(data["u"]), low=decimal(low), high=decimal(high), probability=P95, distribution=POSTERIOR
-    )
-
-
-def _symmetric(data: Mapping[str, Any]) -> bool:
-    """Whether both sides of the interval are the same to the two digits that are printed of U."""
-    value, (low, high), U = data["value"], data["interval95"], data["U"]
-    if not U:
-        return True
-    step = 10.0 ** (math.floor(math.log10(U)) - 1)
-    return bool(round((high - value) / step) == round((value - low) / step))
-
-
-def _spread(values: Sequence[Mapping[str, Any]]) -> ExpandedList | IntervalList | None:
-    """Uncertainties of a column: U with k of each, or the interval of each; None where neither is known of all."""
-    none = Expanded(uncertainty=Decimal(0), factor=Decimal(1), probability=P95)  # of what is known without one
-    stated = [_expanded(value) or (none if not value["u"] else None) for value in values]
-    found = [one for one in stated if one is not None]
-    if len(found) == len(stated):
-        return ExpandedList(
-            uncertainties=tuple(one.uncertainty for one in found), factors=tuple(one.factor for one in found),
-            probabilities=tuple(one.probability for one in found),
-        )  # fmt: skip
-    return _intervals(values)
-
-
-def _intervals(values: Sequence[Mapping[str, Any]]) -> IntervalList | None:
-    """The interval of each; None where it is not known of all. What has no uncertainty is an interval of no width."""
-    intervals = [one for one in map(_interval, values) if one is not None]
-    if len(intervals) < len(values):
-        return None
-    return IntervalList(
-        standards=tuple(one.standard for one in intervals), lows=tuple(one.low for one in intervals),
-        highs=tuple(one.high for one in intervals), probabilities=(P95,),
-    )  # fmt: skip
 
 
 def _ref_type(path: Path, value: Any) -> tuple[str, ...]:

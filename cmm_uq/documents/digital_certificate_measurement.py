@@ -10,7 +10,7 @@ from cmm_uq.dcc.administrative import Hash, Identification, PrimitiveQuantity, S
 from cmm_uq.dcc.quantities import Expanded, Hybrid, Real
 from cmm_uq.dcc.results import Condition, Data, Equipment, Equipments, Method, Quantity, Statement
 from cmm_uq.documents.conditions import TEMPERATURES
-from cmm_uq.documents.digital_certificate_figures import P_STANDARD
+from cmm_uq.documents.digital_certificate_uncertainty import P_STANDARD
 from cmm_uq.documents.digital_certificate_words import NOT_STATED, SayIn, english, one_line, rich_of, words_of
 from cmm_uq.documents.stated import SIGN, UNCERTAINTY
 from cmm_uq.jobs.artefact import CertificateFile, Traceability

@@ -101,6 +101,7 @@ def test_resumed_it_does_what_is_missing_or_changed_and_nothing_else(tmp_path: P
     (out / "b" / "results.json").unlink()
     (out / "b" / "certificate-simulated.html").unlink()
     (out / "b" / "certificate-simulated.pdf").unlink()
+    (out / "b" / "certificate-simulated.xml").unlink()
     found = done(jobs, out, resume=True)
     assert (found.written, found.already) == (2, 2)
     after = contents(out)
