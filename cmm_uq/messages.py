@@ -115,7 +115,7 @@ def _plain(value: float) -> float:
     return value if item is None else item()
 
 
-class _English(string.Formatter):
+class Filled(string.Formatter):
     """``str.format`` with names only, and capitals."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
@@ -127,7 +127,12 @@ class _English(string.Formatter):
         return format(value, format_spec)
 
 
-_ENGLISH = _English()
+_ENGLISH = Filled()
+
+
+def fields_of(pattern: str) -> frozenset[str]:
+    """Names of a pattern's placeholders."""
+    return frozenset(name for _, name, _, _ in _ENGLISH.parse(pattern) if name)
 
 
 def say(pattern: str, /, **arguments: Argument) -> Message:

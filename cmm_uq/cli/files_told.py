@@ -11,6 +11,7 @@ from cmm_uq.writing import MANIFEST
 _WHAT = {
     "certificate.html": "the certificate",
     "certificate.pdf": "the certificate",
+    "certificate.xml": "the digital certificate (DCC), for other programs",
     "diagnosis.html": "the diagnosis, with its plots",
     "diagnosis.pdf": "the diagnosis, with its plots",
     "plan.html": "the plan, with a picture of each placing",

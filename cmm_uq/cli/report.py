@@ -9,7 +9,7 @@ import typer
 
 from cmm_uq.cli.completion import job_folders
 from cmm_uq.cli.importing import show_imported
-from cmm_uq.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
+from cmm_uq.cli.options import Force, Json, Language, Quiet, Records, Seed, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
 from cmm_uq.errors import CmmUqError
@@ -36,6 +36,7 @@ def command(
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
+    language: Language = None,
     records: Records = None,
     scheduled: Annotated[
         bool,
@@ -61,9 +62,10 @@ def command(
         bool, typer.Option("--dry-run", help="With --scheduled: say what would happen, and do nothing.")
     ] = False,
 ) -> None:
-    """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
-    _check(job, {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run} if not scheduled else
-           {"--force": force, "--strict": strict, "--verbose": verbose}, scheduled=scheduled)  # fmt: skip
+    """Estimate, decide, and write certificate.html, certificate.pdf, certificate.xml and results.json."""
+    alone: dict[str, object] = {"--force": force, "--strict": strict, "--verbose": verbose, "--language": language}
+    many: dict[str, object] = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
+    _check(job, alone if scheduled else many, scheduled=scheduled)
     if scheduled:
         from cmm_uq.cli.scheduled import STANDARD_OUTPUT, run
         from cmm_uq.commands.scheduled import Asked
@@ -74,7 +76,9 @@ def command(
         from cmm_uq.commands.report import write_report
 
         told = None if quiet or json else show_imported
-        report = write_report(job[0], out, seed=seed, force=force, stage=stage, told=told, records=records)
+        report = write_report(
+            job[0], out, seed=seed, force=force, stage=stage, told=told, records=records, language=language
+        )
     conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.commands.recording import ledger_of, opened
+from cmm_uq.documents.fonts import fonts_of
 from cmm_uq.documents.in_short import Summary
 from cmm_uq.documents.outcome import Found, Outcome
 from cmm_uq.errors import CmmUqError
@@ -67,7 +69,8 @@ class Form:
     Parameters
     ----------
     command : of ``cmm-uq``.
-    documents : their names; those of a recording that was not measured carry its origin.
+    documents : their names, in the order in which they are made: a digital certificate (``.xml``) carries the page before it,
+        and is attached to the PDF after it; those of a recording that was not measured carry its origin.
     below : folder in ``reports/<job id>`` that is written to by default.
     further : names of files that come with it.
     recorded : whether what it writes is kept in records.
@@ -105,6 +108,7 @@ class Form:
         CmmUqError : as computing does, or something in the folder that this command did not write for this job.
         OutputError : the folder, or the records, cannot be written to.
         """
+        fonts_of(job.facts.job.language)  # refused before anything is computed
         owner = self.owner(job)
         folder = out or REPORTS / owner.job / self.below
         expected = (*self.names(job), RESULTS, *self.further)
@@ -134,25 +138,29 @@ class Form:
         if results_only:
             return {RESULTS: as_json(outcome.results)}
         from cmm_uq.documents.html import render_html
+        from cmm_uq.documents.in_language import said
         from cmm_uq.documents.origin import marked
         from cmm_uq.documents.pdf import render_pdf
         from cmm_uq.documents.provenance import FILE, provenance
 
         job, data = outcome.found.job, as_json(outcome.results)
-        document = marked(outcome.document, job)
-        for name in {*outcome.files, *self.further} & job.inputs.keys():
+        document = said(marked(outcome.document, job), job.facts.job.language)
+        for name in {*outcome.files, *({FILE} & {*self.further})} & job.inputs.keys():
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
         rendered: dict[str, bytes] = {}
         further = {RESULTS: data, **outcome.files}
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
-            if name.endswith(".pdf"):
+            if name.endswith(".html"):
+                rendered[name] = render_html(document).encode()
+            elif name.endswith(".xml"):
+                rendered[name] = _digital(job, data, rendered)
+            else:
                 if FILE in self.further:
                     further[FILE] = provenance(job, outcome.results, {**rendered, **further})
-                rendered[name] = render_pdf(document, {**job.inputs, **further})
-            else:
-                rendered[name] = render_html(document).encode()
+                digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
+                rendered[name] = render_pdf(document, {**job.inputs, **digital, **further})
         return {**rendered, **further}
 
     def names(self, job: Job) -> list[str]:
@@ -160,3 +168,12 @@ class Form:
         from cmm_uq.documents.origin import file_name
 
         return [file_name(document, job.origin) for document in self.documents]
+
+
+def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:
+    """The digital certificate, of results.json and the job alone, with the page as its human-readable copy."""
+    from cmm_uq.dcc import written
+    from cmm_uq.documents.digital_certificate import digital_certificate
+
+    page = next((content for name, content in rendered.items() if name.endswith(".html")), None)
+    return written(digital_certificate(json.loads(results), job, html=page))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from cmm_uq.dcc.administrative import Contact, Hash, Identification
+from cmm_uq.dcc.administrative import Contact, Hash, Identification, Somebody
 from cmm_uq.dcc.certificate import Certificate
 from cmm_uq.dcc.figures import Figures, Stated, figures, of_data, statements
 from cmm_uq.dcc.results import Measurement, Statement
@@ -191,7 +191,9 @@ def _value(one: Figures, i: int) -> str:
     return f"{one.values[i]} {unit}".rstrip() + U
 
 
-def _item(name: str, model: str | None, identifications: Iterable[Identification], maker: Contact | None) -> str:
+def _item(
+    name: str, model: str | None, identifications: Iterable[Identification], maker: Contact | Somebody | None
+) -> str:
     return ", ".join(
         filter(None, (name, "" if maker is None else str(maker.name), model, *_identified(identifications)))
     )

@@ -32,13 +32,12 @@ from cmm_uq.documents.digital_certificate_conformity import evidence, statements
 from cmm_uq.documents.digital_certificate_figures import P95, Figures, decimal
 from cmm_uq.documents.digital_certificate_measurement import conditions, equipment, metadata, methods, software
 from cmm_uq.documents.digital_certificate_units import dsi_of, product, without_unit
-from cmm_uq.documents.digital_certificate_words import NOT_STATED, SayIn, in_english, words_of
+from cmm_uq.documents.digital_certificate_words import NOT_STATED, SayIn, speaking, words_of
 from cmm_uq.documents.origin import file_name
 from cmm_uq.documents.results_file import as_json
 from cmm_uq.jobs.job import Job
+from cmm_uq.languages.language import ENGLISH
 from cmm_uq.messages import Text, Verbatim, say
-
-NAME = "certificate.xml"
 
 _TITLES: Mapping[str, Text] = MappingProxyType({
     "accuracy_uncertainty": say("Figures of performance"), "estimates": say("Error factors of the machine"),
@@ -60,18 +59,16 @@ _MOST = 40
 """Estimates whose covariance is written out; of more, the attached results.json has it."""
 
 
-def digital_certificate(
-    results: Mapping[str, Any], job: Job, *, html: bytes | None, say_in: SayIn = in_english
-) -> Certificate:
-    """The certificate.
+def digital_certificate(results: Mapping[str, Any], job: Job, *, html: bytes | None) -> Certificate:
+    """The certificate, in the language that results.json names, and in English.
 
     Parameters
     ----------
     results : as results.json has them.
     job : whose they are.
     html : the human-readable copy, which the certificate carries.
-    say_in : a text in the languages of the certificate, the mandatory one first.
     """
+    say_in = speaking(results["job"].get("language", ENGLISH))
     figures = Figures(say_in, free(results))
     real, decided = certifies(job), results.get("conformity", ())
     stated = statements(decided, say_in, figures, certifies=real)

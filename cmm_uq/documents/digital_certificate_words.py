@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 from cmm_uq.dcc.texts import Rich, Said, Words
+from cmm_uq.languages.language import ENGLISH, Code
+from cmm_uq.languages.saying import said_in
 from cmm_uq.messages import Day, Number, Text, Verbatim, say
 
 SayIn = Callable[[Text], Mapping[str, str]]
@@ -13,9 +15,14 @@ SayIn = Callable[[Text], Mapping[str, str]]
 NOT_STATED = say("not stated")
 
 
-def in_english(text: Text) -> Mapping[str, str]:
-    """In English alone."""
-    return {"en": str.__str__(text)}
+def speaking(code: Code) -> SayIn:
+    """What says a text in a language, and in English beside it."""
+
+    def say_in(text: Text) -> Mapping[str, str]:
+        codes = (code,) if code == ENGLISH else (code, ENGLISH)
+        return {one: str.__str__(said_in(text, one)) for one in codes}
+
+    return say_in
 
 
 def said(text: str, say_in: SayIn) -> tuple[Said, ...]:

@@ -14,6 +14,7 @@ from cmm_uq.documents import plot_style
 from cmm_uq.documents.document import Document
 from cmm_uq.documents.templates import template_folder
 from cmm_uq.documents.view_words import view_words
+from cmm_uq.languages.language import code_of
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -24,7 +25,7 @@ def render_html(document: Document) -> str:
     return (
         _environment()
         .get_template("document.html")
-        .render(document=document.as_data(), words=view_words(), colour=plot_style.COLOURS)
+        .render(document=document.as_data(), words=view_words(code_of(document.language)), colour=plot_style.COLOURS)
     )
 
 

@@ -54,6 +54,9 @@ def marked(document: Document, job: Job) -> Document:
     )
 
 
+DIGITAL = "certificate.xml"
+"""The digital certificate."""
+
 CERTIFICATE = say("Calibration certificate")
 """Title of a document that certifies."""
 

@@ -25,6 +25,7 @@ from cmm_uq.documents.withheld import periods_data, withheld_data
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.languages.language import ENGLISH
 from cmm_uq.screening.screened import Finding
 from cmm_uq.uncertainty.budget_results import budget_data
 from cmm_uq.uncertainty.covariance import Covariance
@@ -57,6 +58,7 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
             **({"derived_from": derived.model_dump()} if derived else {}),
             **({"replaces": facts.replaces.model_dump(mode="json")} if facts.replaces else {}),
             **({"altered": list(job.altered)} if job.altered else {}),
+            **({"language": facts.language} if facts.language != ENGLISH else {}),
             "inputs_sha256": sha256(job.inputs),
         },
         **({"acquisition": job.acquired.data} if job.acquired else {}),

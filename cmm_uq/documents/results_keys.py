@@ -33,6 +33,7 @@ RESULTS: Mapping[str, str] = MappingProxyType(
         "job.derived_from.KEY": "Of a derived recording, what it was made from, as job.toml has it.",
         "job.altered": "Files that were changed after a command derived them.",
         "job.replaces.KEY": "Of a certificate that replaces another: number, date, reason, changed.",
+        "job.language": "Language of the documents, where it is not English.",
         "job.inputs_sha256.FILE": "SHA-256 of each input.",
         "import[].KEY": "Of each file in another format than the project's own, how it was read: format, encoding, unit, …",
         "import[].columns.COLUMN": "Heading of the file that a column of the recording was taken from.",

@@ -38,6 +38,7 @@ from cmm_uq.jobs.table import (
     Table,
     at_least,
 )
+from cmm_uq.languages.language import ENGLISH, Code
 from cmm_uq.notebook import html_table
 from cmm_uq.points import Points
 from cmm_uq.writing import Owner, staged
@@ -89,6 +90,8 @@ class JobFacts(Table):
     """Data that the customer gave and the results may rest on; the certificate says that they are the customer's (7.8.2.2)."""
     remarks: str = ""
     """Free text of the certificate."""
+    language: Code = ENGLISH
+    """Language of the documents: `en`, `de`, `fr` or `ja`; files for programs stay English."""
     diagnosis_on_certificate: bool = False
     """Whether the whole diagnosis is printed in the certificate's annex."""
     recalibration_agreed: dt.date | None = None
