@@ -13,7 +13,7 @@ from cmm_uq.jobs.artefact import Traceability
 from cmm_uq.jobs.as_found import KEY
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.messages import Text, Verbatim, day, say, semicolons
+from cmm_uq.messages import Text, Verbatim, day, foreign, say, semicolons
 
 _INTERIM = say("An interim check ([job] interim): no calibration certificate, whatever the title says.")
 
@@ -35,7 +35,7 @@ def contradictions(job: Job) -> tuple[Text, ...]:
 
 def _missing(facts: JobFile) -> list[Text]:
     wanted = [
-        say("{what} ({clause}): {key}", what=one.asks, clause=Verbatim(one.clause), key=Verbatim(one.key))
+        say("{what} ({clause}): {key}", what=foreign(one.asks), clause=Verbatim(one.clause), key=Verbatim(one.key))
         for one in missing(facts)
     ]
     if not wanted:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 from cmm_uq.dcc import Certificate, written
-from cmm_uq.dcc.administrative import Contact, Person
+from cmm_uq.dcc.administrative import Person, Somebody
 from cmm_uq.dcc.quantities import Column, Covariance, Ellipsoid, Expanded, ExpandedList, Real, RealList
 from cmm_uq.dcc.results import Data, Measurement, Quantity, QuantityList, Result, Statement
 from cmm_uq.dcc.texts import words
@@ -57,7 +57,7 @@ def issued(
     core = made.administrative.core.with_changes(identifier="D-K-4711", issued=dt.date(2026, 3, 5))
     found = Result(name=words(result), data=Data(parts=held))
     administrative = made.administrative.with_changes(
-        items=items, core=core, statements=(DUE,), persons=(Person(person=Contact(name=words("A. Huber"))),)
+        items=items, core=core, statements=(DUE,), persons=(Person(person=Somebody(name=words("A. Huber"))),)
     )  # fmt: skip
     measurement = Measurement(name=words("Calibration"), results=(found,))
     return made.with_changes(administrative=administrative, measurements=(measurement,), document=None)

@@ -221,6 +221,7 @@ def test_a_standard_that_needs_the_uncertainty_has_it_from_the_certificate() -> 
 
 def test_an_item_of_several_is_not_named_for_the_job() -> None:
     made = BALL_BAR.administrative
-    two = made.with_changes(items=made.items.with_changes(items=made.items.items * 2))
+    other = made.items.items[0].with_changes(id="other")
+    two = made.with_changes(items=made.items.with_changes(items=(*made.items.items, other)))
     artefact = job("ballbar", BALL_BAR.with_changes(administrative=two)).facts.artefact
     assert (artefact.name, artefact.serial) == ("", "")
