@@ -123,11 +123,32 @@ def _measured(measurement: Measurement) -> tuple[str, Rows, tuple[Grid, ...]]:
 
 
 def _grid(title: str, found: Sequence[Figures]) -> Grid:
-    """Quantities of one length side by side; one that has fewer values fills its first rows only."""
+    """Lists side by side, one that has fewer values in the first rows only; quantities of one value each below each other."""
+    if len(found) > 1 and all(len(one.values) <= 1 for one in found):
+        return _below_each_other(title, found)
     columns = [column for one in found for column in _columns(one)]
     count = max((len(cells) for _, cells in columns), default=0)
     rows = tuple(tuple(cells[i] if i < len(cells) else "" for _, cells in columns) for i in range(count))
     return Grid(title, tuple(heading for heading, _ in columns), rows)
+
+
+def _below_each_other(title: str, found: Sequence[Figures]) -> Grid:
+    rows = [("Quantity", "Value", "Unit", "U", "k", "u", "Interval")]
+    for one in found:
+        name = " / ".join(filter(None, (*one.place, one.name)))
+        for value, unit, stated in zip(one.values, one.units, one.uncertainties, strict=True):
+            told = (
+                _text(stated.expanded) or "",
+                _text(stated.factor) or "",
+                _text(stated.standard) or "",
+                _interval(stated),
+            )
+            rows.append((name, str(value), unit_shown(unit), *told))
+        if not one.values:
+            rows.append((name, " ".join(one.words), "", "", "", "", ""))
+    kept = [i for i in range(len(rows[0])) if any(row[i] for row in rows[1:])]
+    head, *rest = (tuple(row[i] for i in kept) for row in rows)
+    return Grid(title, head, tuple(rest))
 
 
 def _columns(one: Figures) -> list[tuple[str, list[str]]]:
@@ -191,7 +212,9 @@ def _value(one: Figures, i: int) -> str:
     return f"{one.values[i]} {unit}".rstrip() + U
 
 
-def _item(name: str, model: str | None, identifications: Iterable[Identification], maker: Somebody | None) -> str:
+def _item(
+    name: str, model: str | None, identifications: Iterable[Identification], maker: Contact | Somebody | None
+) -> str:
     return ", ".join(
         filter(None, (name, "" if maker is None else str(maker.name), model, *_identified(identifications)))
     )

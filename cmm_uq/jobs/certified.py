@@ -209,12 +209,19 @@ def _longest(certificate: Certificate, content: bytes, where: str, given: Mappin
     sources = found.recognised.columns
     wanted = [name for name in ("reference_mm", *(f"reference_{axis}_mm" for axis in AXES)) if name in found.columns]
     headings = [sources.get(name) or sources.get(name.removeprefix("reference_")) for name in wanted]
-    named = [next((one for one in figures(certificate) if heading(one) == head), None) for head in headings]
-    if given.get("nominal") or any(one is None or any(s.u is None for s in one.uncertainties) for one in named):
-        return {}
-    length, u_um = _farthest([one for one in named if one is not None])
-    if "length_mm" in given:
+    held = [one for head in headings for one in figures(certificate) if heading(one) == head]
+    known = len(held) == len(wanted) and all(
+        stated.u is not None and unit in _METRES
+        for one in held
+        for stated, unit in zip(one.uncertainties, one.units, strict=True)
+    )
+    if given.get("nominal") or "length_mm" in given or not known:
         return {}  # what is stated of another length cannot be compared
+    if all(len(set(one.values)) == 1 for one in held):
+        raise CmmUqError(
+            "certifies no distance: all its points are in one place", where=where, fix="Is it the right file?"
+        )
+    length, u_um = _farthest(held)
     return {"length_mm": length, **_uncertain("u_um", u_um, given, where, "[artefact] u_um", "its longest distance")}
 
 

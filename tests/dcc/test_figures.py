@@ -112,6 +112,12 @@ def test_a_person_is_shown_particulars_and_tables_with_printed_units() -> None:
     assert (unit_shown(r"\micro\metre"), unit_shown(r"\one"), unit_shown(r"\volt")) == ("µm", "", r"\volt")
 
 
+def test_quantities_of_one_value_each_stand_below_each_other() -> None:
+    ((_, _, (grid,)),) = shown(SPHERE).parts
+    assert grid.headings == ("Quantity", "Value", "Unit", "U", "k")
+    assert grid.rows == (("Diameter", "25.0012", "mm", "0.0002", "2"), ("Form deviation", "0.10", "µm", "0.05", "2"))
+
+
 def test_data_keeps_the_digits_of_the_certificate() -> None:
     (nominal, length) = data(BALL_BAR)["quantities"]
     assert (nominal["values"], nominal["U"], nominal["u"]) == (["404"], [None], [None])

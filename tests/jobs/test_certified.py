@@ -105,6 +105,10 @@ def test_a_shifted_artefact_has_its_known_length_between_the_points_that_the_job
     certificate = issued(value("Length of 22 steps", "440.00021", "0.0006"))
     artefact = job("shift", certificate, known={"from": 1, "to": 23}).facts.artefact
     assert artefact.model_dump()["known"] == {"from_point": 1, "to_point": 23, "length_mm": 440.00021, "u_um": 0.3}
+    two = issued(value("Length A", "440.1", "0.0006"), value("Length B", "440.2", "0.0006"))
+    columns = {"columns": {"known.length_mm": "Length B"}}
+    named = job("shift", two, known={"from": 1, "to": 23}, certificate=columns).facts.artefact
+    assert named.model_dump()["known"]["length_mm"] == 440.2
     with pytest.raises(CmmUqError, match="no certified value of a recording of kind 'shift' is read"):
         job("shift", certificate, known=None)
 
@@ -137,6 +141,12 @@ def test_lists_without_uncertainty_leave_it_to_the_job() -> None:
     bare = issued(listed("Face", "1 2 3 4", unit=r"\one"), listed("Certified length", "0 20 40 60"), table=True)
     artefact = gauge(bare, u_um=0.7).facts.artefact
     assert (artefact.length_mm, artefact.u_um) == (None, 0.7)
+
+
+def test_a_list_of_one_place_certifies_no_distance() -> None:
+    one = issued(listed("Face", "1 2 3 4", unit=r"\one"), listed("Certified length", "0 0 0 0", "0.0002"), table=True)
+    with pytest.raises(CmmUqError, match=r"artefact\.xml: certifies no distance"):
+        gauge(one)
 
 
 def test_units_of_the_certificate_are_converted() -> None:
@@ -211,6 +221,7 @@ def test_a_standard_that_needs_the_uncertainty_has_it_from_the_certificate() -> 
 
 def test_an_item_of_several_is_not_named_for_the_job() -> None:
     made = BALL_BAR.administrative
-    two = made.with_changes(items=made.items.with_changes(items=made.items.items * 2))
+    other = made.items.items[0].with_changes(id="other")
+    two = made.with_changes(items=made.items.with_changes(items=(*made.items.items, other)))
     artefact = job("ballbar", BALL_BAR.with_changes(administrative=two)).facts.artefact
     assert (artefact.name, artefact.serial) == ("", "")
