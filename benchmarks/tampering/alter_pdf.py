@@ -51,7 +51,9 @@ def packed_number(content: bytes, rng: random.Random) -> Altered:
 def _repacked(content: bytes, data: bytes, match: re.Match[bytes]) -> bytes:
     """With a stream in place of another, the file written anew so that every place in it is right."""
     raw = zlib.compress(data)
-    length = content[match.start() : match.end()].replace(b"/Length " + match[1], b"/Length " + str(len(raw)).encode(), 1)
+    length = content[match.start() : match.end()].replace(
+        b"/Length " + match[1], b"/Length " + str(len(raw)).encode(), 1
+    )
     spoilt = content[: match.start()] + length + raw + content[match.end() + int(match[1]) :]
     try:
         with pikepdf.open(io.BytesIO(spoilt), attempt_recovery=True) as pdf:
@@ -144,7 +146,11 @@ def covered(content: bytes, rng: random.Random) -> Altered:
         at = rng.randrange(len(pdf.pages))
         how = rng.choice(("field", "invisible"))
         x, y = rng.randint(50, 400), rng.randint(50, 700)
-        more = f"q 1 1 1 rg {x} {y} 120 40 re f Q".encode() if how == "field" else b"q BT 3 Tr /f0 9 Tf (\\000\\001) Tj ET Q"
+        more = (
+            f"q 1 1 1 rg {x} {y} 120 40 re f Q".encode()
+            if how == "field"
+            else b"q BT 3 Tr /f0 9 Tf (\\000\\001) Tj ET Q"
+        )
         pdf.pages[at].contents_add(more)
         return _saved(pdf), f"page {at + 1}: {how}"
 
@@ -182,7 +188,9 @@ def resaved(content: bytes, rng: random.Random) -> Altered:
 
 def _saved(pdf: pikepdf.Pdf) -> bytes:
     out = io.BytesIO()
-    pdf.save(out, object_stream_mode=pikepdf.ObjectStreamMode.disable, deterministic_id=True, fix_metadata_version=False)
+    pdf.save(
+        out, object_stream_mode=pikepdf.ObjectStreamMode.disable, deterministic_id=True, fix_metadata_version=False
+    )
     return out.getvalue()
 
 

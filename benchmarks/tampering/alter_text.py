@@ -28,7 +28,9 @@ def one_digit(content: bytes, rng: random.Random) -> Altered:
     """A digit, to another."""
     found = rng.choice([match.start() for match in _DIGIT.finditer(content)])
     new = rng.choice([digit for digit in b"0123456789" if digit != content[found]])
-    return content[:found] + bytes([new]) + content[found + 1 :], f"digit at {found}: {chr(content[found])} to {chr(new)}"
+    return content[:found] + bytes([new]) + content[
+        found + 1 :
+    ], f"digit at {found}: {chr(content[found])} to {chr(new)}"
 
 
 def one_number(content: bytes, rng: random.Random) -> Altered:
@@ -38,7 +40,9 @@ def one_number(content: bytes, rng: random.Random) -> Altered:
         return one_digit(content, rng)
     match = rng.choice(found)
     new = match[0][1:] if match[0].startswith(b"-") else b"-" + match[0]
-    return content[: match.start()] + new + content[match.end() :], f"{match[0].decode()} at {match.start()} to {new.decode()}"
+    return content[: match.start()] + new + content[
+        match.end() :
+    ], f"{match[0].decode()} at {match.start()} to {new.decode()}"
 
 
 def one_date(content: bytes, rng: random.Random) -> Altered:
@@ -87,7 +91,9 @@ def one_line(content: bytes, rng: random.Random) -> Altered:
 def html_rows(content: bytes, rng: random.Random) -> Altered:
     """Two rows of a table exchanged, or one removed."""
     rows = list(re.finditer(rb"<tr role=\"row\">(?:(?!</tr>).)*<td.*?</tr>", content, re.DOTALL))
-    pairs = [i for i in range(len(rows) - 1) if rows[i][0] != rows[i + 1][0] and rows[i + 1].start() - rows[i].end() < 4]
+    pairs = [
+        i for i in range(len(rows) - 1) if rows[i][0] != rows[i + 1][0] and rows[i + 1].start() - rows[i].end() < 4
+    ]
     if not pairs:
         return one_digit(content, rng)
     at = rng.choice(pairs)
@@ -173,7 +179,19 @@ def json_form(content: bytes, rng: random.Random) -> Altered:
 
 TEXT = (one_byte, one_digit, one_number, one_date, one_unit, one_line)
 HTML = (one_byte, one_digit, one_digit, one_number, one_date, one_unit, html_rows, html_added, html_picture, html_style)
-JSON = (one_byte, one_digit, one_digit, one_number, one_date, one_hash, one_line, json_value, json_value, json_keys, json_form)
+JSON = (
+    one_byte,
+    one_digit,
+    one_digit,
+    one_number,
+    one_date,
+    one_hash,
+    one_line,
+    json_value,
+    json_value,
+    json_keys,
+    json_form,
+)
 
 Alteration = Callable[[bytes, random.Random], Altered]
 

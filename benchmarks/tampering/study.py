@@ -48,7 +48,9 @@ def main() -> None:
         bases(WORK / "bases")
         _run(_altered, WORK / "altered.jsonl", options.cases, options.workers)
         _run(_good, WORK / "good.jsonl", options.good, options.workers)
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout.strip()
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True
+    ).stdout.strip()
     text = page.written(_records(WORK / "altered.jsonl"), _records(WORK / "good.jsonl"), seed=SEED, commit=commit)
     (ROOT / "docs" / "tampering-study.md").write_text(text, encoding="utf-8")
 

@@ -38,7 +38,11 @@ def command(
     ] = True,
     trust: Annotated[
         list[Path] | None,
-        typer.Option(help="Certificates that you trust, PEM or DER: a file or a folder; again for more.", metavar="FILE|DIR"),
+        typer.Option(
+            help="Certificates that you trust, PEM or DER: a file or a folder; again for more.",
+            metavar="FILE|DIR",
+            show_default="nobody",
+        ),
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,

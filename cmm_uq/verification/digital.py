@@ -99,14 +99,14 @@ def _compare(inquiry: Inquiry, name: str, content: bytes, should: bytes, source:
     inquiry.looked("forms")
     if content == should:
         return
-    root = parsed(content, name)
+    root, wished = parsed(content, name), parsed(should, source)
     count = 0
-    for path, stands, wanted in differences(root, parsed(should, source)):
+    for path, stands, wanted in differences(root, wished):
         count += 1
         if count > _MOST:
             break
         inquiry.wrong("forms", name, path, f"is not what {source} says", stands, wanted)
-    if not count and not any(_is_signature(child) for child in root.children):
+    if not count and not any(map(_is_signature, (*root.children, *wished.children))):
         inquiry.wrong("forms", name, "", "is written otherwise, though it says the same: it is not the file that was made")
 
 
