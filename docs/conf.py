@@ -32,7 +32,8 @@ CONTENTS: dict[str, list[str]] = {
         "machine/effects", "limits", "words",
     ],
     "How it works": [
-        "certificate", "verify", "iso17025", "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
+        "certificate", "verify", "dcc", "iso17025", "languages", "standards", "noise", "screening", "diagnosis", "planning",
+        "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",

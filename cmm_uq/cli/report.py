@@ -62,7 +62,7 @@ def command(
         bool, typer.Option("--dry-run", help="With --scheduled: say what would happen, and do nothing.")
     ] = False,
 ) -> None:
-    """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
+    """Estimate, decide, and write certificate.html, certificate.pdf, certificate.xml and results.json."""
     alone: dict[str, object] = {"--force": force, "--strict": strict, "--verbose": verbose, "--language": language}
     many: dict[str, object] = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
     _check(job, alone if scheduled else many, scheduled=scheduled)

@@ -86,8 +86,8 @@ class Location(Part):
     coordinates: Annotated[tuple[Coordinates, ...], Many("positionCoordinates")] = ()
 
 
-class Contact(Part):
-    """Somebody with an address (``contactType``; where the schema lets the address go, ``contactNotStrictType``)."""
+class Somebody(Part):
+    """Somebody, perhaps without an address (``contactNotStrictType``)."""
 
     name: Annotated[Words, Child("name")]
     email: Annotated[str | None, Child("eMail", NOT_EMPTY)] = None
@@ -98,6 +98,12 @@ class Contact(Part):
     id: Id = None
     ref_id: RefId = ()
     ref_type: RefType = ()
+
+
+class Contact(Somebody):
+    """Somebody with an address (``contactType``)."""
+
+    location: Annotated[Location, Child("location")]
 
 
 class Hash(Part):
@@ -153,7 +159,7 @@ class Item(Part):
     equipment_class: Annotated[tuple[EquipmentClass, ...], Many("equipmentClass")] = ()
     description: Annotated[Rich | None, Child("description")] = None
     software: Annotated[tuple[Software, ...], Many("software", within="installedSoftwares")] = ()
-    manufacturer: Annotated[Contact | None, Child("manufacturer")] = None
+    manufacturer: Annotated[Somebody | None, Child("manufacturer")] = None
     model: Annotated[str | None, Child("model", NOT_EMPTY)] = None
     identifications: Identifications
     quantities: Annotated[tuple[PrimitiveQuantity, ...], Many("itemQuantity", within="itemQuantities")] = ()
@@ -168,7 +174,7 @@ class Items(Part):
     equipment_class: Annotated[tuple[EquipmentClass, ...], Many("equipmentClass")] = ()
     description: Annotated[Rich | None, Child("description")] = None
     owner: Annotated[Contact | None, Child("owner")] = None
-    manufacturer: Annotated[Contact | None, Child("manufacturer")] = None
+    manufacturer: Annotated[Somebody | None, Child("manufacturer")] = None
     identifications: Identifications = ()
     items: Annotated[tuple[Item, ...], Many("item")]
 
@@ -221,7 +227,7 @@ class Laboratory(Part):
 class Person(Part):
     """Somebody responsible (``respPersonType``)."""
 
-    person: Annotated[Contact, Child("person")]
+    person: Annotated[Somebody, Child("person")]
     description: Annotated[Rich | None, Child("description")] = None
     role: Annotated[str | None, Child("role", NOT_EMPTY)] = None
     main_signer: Annotated[Flag, Child("mainSigner", BOOLEAN)] = None

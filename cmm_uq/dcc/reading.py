@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 from cmm_uq.dcc.certificate import VERSION, Certificate, Comment
+from cmm_uq.dcc.checks import ids_and_references, problems_of
 from cmm_uq.dcc.fields import Attribute, Choice, Content, Field, Foreign, Many, Part, by_tag, fields_of
 from cmm_uq.dcc.simple import Simple
 from cmm_uq.dcc.texts import Markup
@@ -37,6 +38,7 @@ def read(data: bytes, where: str) -> Certificate:
     root = _root(data, where)
     reader = _Reader(where, strict=root.attributes.get("schemaVersion") == VERSION)
     found = reader.read(root, Certificate)
+    reader.connected(root)
     reader.gathered.refuse()
     return cast("Certificate", found)
 
@@ -79,7 +81,15 @@ class _Reader:
         values = {field.name: self._value(node, field, children[i]) for i, field in enumerate(fields)}
         if self.wrong > before:
             return None
-        return cls(**{name: value for name, value in values.items() if value is not None})
+        part = cls(**{name: value for name, value in values.items() if value is not None})
+        for problem, fix in problems_of(part):
+            self._wrong(node, problem, fix)
+        return part
+
+    def connected(self, root: Node) -> None:
+        """Look at what refers to what."""
+        for node, (problem, fix) in ids_and_references(root):
+            self._wrong(node, problem, fix)
 
     def _sorted(self, node: Node, cls: type[Part]) -> list[list[Node]]:
         """Children by the field that they belong to, in the order of the schema."""

@@ -14,6 +14,7 @@ from cmm_uq.dcc.administrative import (
     Location,
     PrimitiveQuantity,
     Software,
+    Somebody,
 )
 from cmm_uq.dcc.fields import Child, Choice, Many, Part
 from cmm_uq.dcc.quantities import Complex, Constant, Hybrid, Lists, Real, RealList
@@ -48,7 +49,7 @@ class Equipment(Part):
     equipment_class: Annotated[tuple[EquipmentClass, ...], Many("equipmentClass")] = ()
     description: Annotated[Rich | None, Child("description")] = None
     certificate: Annotated[Hash | None, Child("certificate")] = None
-    manufacturer: Annotated[Contact | None, Child("manufacturer")] = None
+    manufacturer: Annotated[Somebody | None, Child("manufacturer")] = None
     model: Annotated[str | None, Child("model", NOT_EMPTY)] = None
     identifications: Identifications = ()
     quantities: Annotated[

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from cmm_uq.dcc.certificate import Certificate
+from cmm_uq.dcc.checks import ids_and_references, problems_of
 from cmm_uq.dcc.fields import Attribute, Choice, Content, Field, Foreign, Many, Part, fields_of
 from cmm_uq.dcc.reading import ROOT
 from cmm_uq.dcc.simple import Simple
@@ -24,10 +25,14 @@ def written(certificate: Certificate) -> bytes:
     version = certificate.version
     root.attributes["xsi:schemaLocation"] = f"https://ptb.de/dcc https://ptb.de/dcc/v{version}/dcc.xsd"
     _fill(root, certificate)
+    for node, (problem, fix) in ids_and_references(root):
+        raise CmmUqError(problem, where=node.xpath, fix=fix)
     return serialised(root)
 
 
 def _fill(node: Node, value: Part) -> None:
+    for problem, fix in problems_of(value):
+        raise CmmUqError(problem, where=node.xpath, fix=fix)
     for field in fields_of(type(value)):
         found = getattr(value, field.name)
         if found is None or (found == () and not field.required):
@@ -76,9 +81,9 @@ def _added(parent: Node, tag: str) -> Node:
 def _text(node: Node, simple: Simple, value: Any) -> str:
     text = simple.write(value)
     try:
-        simple.read(text)
+        kept = simple.read(text) == value
     except (ValueError, KeyError, OverflowError):
-        raise CmmUqError(
-            f"{text[:60]!r} is not {simple.what}", where=node.xpath, fix="The schema of DCC asks for it"
-        ) from None
+        kept = False
+    if not kept:
+        raise CmmUqError(f"{text[:60]!r} is not {simple.what}", where=node.xpath, fix="The schema of DCC asks for it")
     return text

@@ -23,6 +23,7 @@ from cmm_uq.dcc.administrative import (
     PrimitiveQuantity,
     RefTypeDefinition,
     Replaced,
+    Somebody,
 )
 from cmm_uq.dcc.quantities import RealList
 from cmm_uq.dcc.results import Statement
@@ -105,7 +106,7 @@ def items(job: Job, say_in: SayIn) -> Items:
         id="machine",
         name=words_of(Verbatim(machine.name), say_in),
         description=None if (mark := mark_of(job)) is None else rich_of((mark.banner,), say_in),
-        manufacturer=Contact(name=words_of(Verbatim(machine.manufacturer), say_in)) if machine.manufacturer else None,
+        manufacturer=Somebody(name=words_of(Verbatim(machine.manufacturer), say_in)) if machine.manufacturer else None,
         model=one_line(machine.model) or None,
         identifications=(serial,),
         quantities=tuple(_travel(job, say_in)),
@@ -145,16 +146,16 @@ def persons(job: Job, say_in: SayIn) -> tuple[Person, ...]:
     """Who authorises the certificate, and who measured."""
     facts, found = job.facts.laboratory, []
     if not certifies(job):
-        return (Person(person=Contact(name=words_of(_NOBODY, say_in))),)
+        return (Person(person=Somebody(name=words_of(_NOBODY, say_in))),)
     if facts.signatory:
         found.append(
-            Person(person=Contact(name=words_of(Verbatim(facts.signatory), say_in)),
+            Person(person=Somebody(name=words_of(Verbatim(facts.signatory), say_in)),
                    role=one_line(facts.signatory_role) or None, main_signer=True)
         )  # fmt: skip
     if job.facts.job.operator:
-        who = Contact(name=words_of(Verbatim(job.facts.job.operator), say_in))
+        who = Somebody(name=words_of(Verbatim(job.facts.job.operator), say_in))
         found.append(Person(person=who, role="operator", main_signer=False))
-    return tuple(found) or (Person(person=Contact(name=words_of(NOT_STATED, say_in))),)
+    return tuple(found) or (Person(person=Somebody(name=words_of(NOT_STATED, say_in))),)
 
 
 def customer(job: Job, say_in: SayIn) -> Contact:
@@ -183,7 +184,7 @@ def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
         told = (replaced_certificate(facts.replaces), Verbatim(facts.replaces.reason), Verbatim(facts.replaces.changed))
         found.append(
             Statement(
-                name=words_of(say("Replaces"), say_in), declaration=rich_of(told, say_in), ref_type=("basic_revision",)
+                name=words_of(say("Replaces certificate"), say_in), declaration=rich_of(told, say_in), ref_type=("basic_revision",)
             )
         )
     if facts.recalibration_agreed:
@@ -191,7 +192,7 @@ def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
         found.append(Statement(name=name, date=facts.recalibration_agreed, ref_type=("basic_recalibration",)))
     further = [
         (say("Place"), facts.place), (say("Deviations from the method"), facts.deviations),
-        (say("Results of external providers"), facts.external), (say("Data of the customer"), facts.from_customer),
+        (say("Results of external providers"), facts.external), (say("Data from the customer"), facts.from_customer),
         (say("Remarks"), facts.remarks),
     ]  # fmt: skip
     for what, text in further:

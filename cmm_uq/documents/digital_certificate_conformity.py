@@ -16,7 +16,7 @@ from cmm_uq.dcc.quantities import Expanded, ExpandedList, Real, RealList
 from cmm_uq.dcc.results import Data, Quantity, QuantityList, Result, Statement
 from cmm_uq.dcc.texts import Rich
 from cmm_uq.documents.digital_certificate_figures import Figures, Part, decimal
-from cmm_uq.documents.digital_certificate_units import ONE
+from cmm_uq.documents.digital_certificate_units import ONE, ratio
 from cmm_uq.documents.digital_certificate_words import SayIn, english, one_line, rich_of, words_of
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.units import UNITS
@@ -117,7 +117,7 @@ def _figures(path: tuple[str, ...], one: Mapping[str, Any], say_in: SayIn, figur
 
 def _permissible(path: tuple[str, ...], mpe: Mapping[str, Any], say_in: SayIn, figures: Figures) -> Iterator[Part]:
     """A, K and B of a maximum permissible error A + L/K, at most B."""
-    units = {"a_um": _MICROMETRE, "k": rf"{_MILLIMETRE}\per{_MICROMETRE}", "b_um": _MICROMETRE}
+    units = {"a_um": _MICROMETRE, "k": ratio(_MILLIMETRE, _MICROMETRE), "b_um": _MICROMETRE}
     for key, value in mpe.items():
         if value is not None:
             letter = key.partition("_")[0].upper()

@@ -124,7 +124,7 @@ class Figures:
         if data["value"] is None or (path[0] in _ESTIMATED and ".".join(path[-2:]) in self.free):
             yield self._quantity(path, rich_of((NOT_DETERMINED,), self.say_in))
             return
-        value, interval = decimal(data["value"]), _interval(data)
+        value, interval = decimal(data["value"]), _interval(data) if data["u"] else None
         stated = _expanded(data) or interval
         yield self._quantity(path, Real(value=value, unit=unit.dsi, uncertainty=stated))
         if interval is not None and interval is not stated and not _symmetric(data):
@@ -200,13 +200,30 @@ class Figures:
         if all(is_number(value) for value in values):
             yield self._quantity(path, RealList(labels=labels, values=_decimals(values), units=(unit.dsi,)))
         elif all(is_quantity(value) for value in values):
-            yield self._quantity(path, _quantities(values, labels, unit))
+            yield from self._column_of_quantities(path, held, labels, unit)
         elif all(isinstance(value, list) for value in values) and len({len(value) for value in values}) == 1:
             for i in range(len(values[0])):
                 part = RealList(labels=labels, values=_decimals([value[i] for value in values]), units=(unit.dsi,))
                 yield self._quantity((*path, str(i)), part, name=say("{what} {i}", what=self.title(path), i=i + 1))
         else:
             yield self._quantity(path, _texts([str(value) for value in values]))
+
+    def _column_of_quantities(
+        self, path: Path, held: Sequence[tuple[str, Mapping[str, Any]]], labels: tuple[str, ...], unit: Unit
+    ) -> Iterator[Part]:
+        """With the uncertainty of each, or one by one where D-SI has no list for what is known of them."""
+        values = [value for _, value in held]
+        uncertainty, intervals = _spread(values), _intervals(values)
+        if uncertainty is None:
+            for row, value in held:
+                yield from self._with_uncertainty((*path, str(int(row) - 1)), value, unit)
+            return
+        found = _decimals([value["value"] for value in values])
+        column = RealList(labels=labels, values=found, units=(unit.dsi,), uncertainty=uncertainty)
+        yield self._quantity(path, column)
+        if intervals is not None and not all(map(_symmetric, values)):
+            named = say("{what}, 95 % coverage interval", what=self.title(path))
+            yield self._quantity((*path, "interval95"), column.with_changes(uncertainty=intervals), name=named)
 
     def _matrix(self, path: Path, rows: Sequence[Sequence[float]], units: Sequence[str]) -> Iterator[Part]:
         """A covariance matrix, row by row, each element in the product of its units."""
@@ -281,7 +298,7 @@ def _expanded(data: Mapping[str, Any]) -> Expanded | None:
 
 def _interval(data: Mapping[str, Any]) -> Interval | None:
     """The 95 % coverage interval."""
-    if not data.get("interval95") or not data["u"]:
+    if not data.get("interval95"):
         return None
     low, high = data["interval95"]
     return Interval(
@@ -292,26 +309,34 @@ def _interval(data: Mapping[str, Any]) -> Interval | None:
 def _symmetric(data: Mapping[str, Any]) -> bool:
     """Whether both sides of the interval are the same to the two digits that are printed of U."""
     value, (low, high), U = data["value"], data["interval95"], data["U"]
+    if not U:
+        return True
     step = 10.0 ** (math.floor(math.log10(U)) - 1)
     return bool(round((high - value) / step) == round((value - low) / step))
 
 
-def _quantities(values: Sequence[Mapping[str, Any]], labels: tuple[str, ...], unit: Unit) -> RealList:
-    """Quantities of a column, with the uncertainty of each where all have one."""
-    stated = [_expanded(value) for value in values]
+def _spread(values: Sequence[Mapping[str, Any]]) -> ExpandedList | IntervalList | None:
+    """Uncertainties of a column: U with k of each, or the interval of each; None where neither is known of all."""
+    none = Expanded(uncertainty=Decimal(0), factor=Decimal(1), probability=P95)  # of what is known without one
+    stated = [_expanded(value) or (none if not value["u"] else None) for value in values]
     found = [one for one in stated if one is not None]
-    uncertainty = None
     if len(found) == len(stated):
-        uncertainty = ExpandedList(
+        return ExpandedList(
             uncertainties=tuple(one.uncertainty for one in found), factors=tuple(one.factor for one in found),
             probabilities=tuple(one.probability for one in found),
         )  # fmt: skip
-    return RealList(
-        labels=labels,
-        values=_decimals([value["value"] for value in values]),
-        units=(unit.dsi,),
-        uncertainty=uncertainty,
-    )
+    return _intervals(values)
+
+
+def _intervals(values: Sequence[Mapping[str, Any]]) -> IntervalList | None:
+    """The interval of each; None where it is not known of all. What has no uncertainty is an interval of no width."""
+    intervals = [one for one in map(_interval, values) if one is not None]
+    if len(intervals) < len(values):
+        return None
+    return IntervalList(
+        standards=tuple(one.standard for one in intervals), lows=tuple(one.low for one in intervals),
+        highs=tuple(one.high for one in intervals), probabilities=(P95,),
+    )  # fmt: skip
 
 
 def _ref_type(path: Path, value: Any) -> tuple[str, ...]:

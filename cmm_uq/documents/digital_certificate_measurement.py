@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from typing import Any
 
-from cmm_uq.dcc.administrative import Contact, Hash, Identification, PrimitiveQuantity, Software
+from cmm_uq.dcc.administrative import Hash, Identification, PrimitiveQuantity, Software, Somebody
 from cmm_uq.dcc.quantities import Expanded, Hybrid, Real
 from cmm_uq.dcc.results import Condition, Data, Equipment, Equipments, Method, Quantity, Statement
 from cmm_uq.documents.conditions import TEMPERATURES
@@ -71,7 +71,7 @@ def equipment(job: Job, say_in: SayIn) -> Equipments:
     found += [
         Equipment(
             name=words_of(Verbatim(one.name), say_in), model=one_line(one.model or "") or None,
-            manufacturer=Contact(name=words_of(Verbatim(one.maker), say_in)) if one.maker else None,
+            manufacturer=Somebody(name=words_of(Verbatim(one.maker), say_in)) if one.maker else None,
             certificate=_paper(one.certificate, say_in) if one.certificate else None,
             identifications=_serial(one.serial or "", say_in), ref_type=("cmm_instrument",),
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -42,18 +43,37 @@ def without_unit(key: str) -> str:
 
 def dsi_of(symbol: str) -> str:
     """A unit of results.json in D-SI; of another package, which D-SI does not know, after the bar that marks such units."""
-    return UNITS[symbol].dsi if symbol in UNITS else f"|{symbol}"
+    return UNITS[symbol].dsi if symbol in UNITS else _foreign(symbol)
+
+
+def _foreign(text: str) -> str:
+    """Without spaces, which would part it where it stands in a list."""
+    return "|" + "_".join(text.replace("|", "").split())
 
 
 def product(one: str, other: str) -> str:
     """Unit of an element of a covariance matrix."""
+    if "|" in one + other:
+        return _foreign(f"{one}·{other}")
     if one == ONE.dsi:
         return other
     return one if other == ONE.dsi else one + other
 
 
 def ratio(one: str, other: str) -> str:
-    """Unit of a sensitivity; D-SI takes one fraction."""
-    if one == other:
-        return ONE.dsi
-    return one if other == ONE.dsi else rf"{one}\per{other}"
+    """Unit of a sensitivity."""
+    if "|" in one + other:
+        return _foreign(f"{one}/({other})")
+    return ONE.dsi if one == other else product(one, _inverse(other))
+
+
+_FACTOR = re.compile(r"((?:\\(?:nano|micro|milli|centi|kilo))?\\[a-z]+)(?:\\tothe\{(-?\d+)\})?")
+"""A unit with its prefix, and the power of both; those of the table."""
+
+
+def _inverse(unit: str) -> str:
+    """One over a unit: every power with the other sign."""
+    if unit == ONE.dsi:
+        return unit
+    factors = ((name, -int(power or 1)) for name, power in _FACTOR.findall(unit))
+    return "".join(name if power == 1 else rf"{name}\tothe{{{power}}}" for name, power in factors)

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
 from cmm_uq.documents.view_words import label
-from cmm_uq.languages.language import code_of
+from cmm_uq.languages.language import ENGLISH, code_of
 from cmm_uq.languages.saying import said_in
 from cmm_uq.messages import NOTHING, Text, say
 
@@ -176,35 +176,36 @@ class Document:
         data: dict[str, Any] = _printable(asdict(self))
         data["date"] = self.date.isoformat() if self.date else None
         counted: Counter[str] = Counter()
+        language = code_of(self.language)
         for section, plain in zip(self.sections, data["sections"], strict=True):
             for block, plain_block in zip(section.blocks, plain["blocks"], strict=True):
                 plain_block["kind"] = block.kind
                 plain_block.pop("lettering", None)
                 if block.kind in _NUMBERED:
                     counted[block.kind] += 1
-                    plain_block["label"] = str.__str__(
-                        said_in(label(block.kind, counted[block.kind]), code_of(self.language))
-                    )
+                    plain_block["label"] = str.__str__(said_in(label(block.kind, counted[block.kind]), language))
                 if block.kind == "table":
-                    _measure(plain_block)
+                    _measure(plain_block, english=language == ENGLISH)
         return data
 
 
 _NUMBERED = ("table", "plot")
 
 
-def _measure(table: dict[str, Any]) -> None:
+def _measure(table: dict[str, Any], *, english: bool) -> None:
     """What the views must know to lay a table out.
 
     Every column is given its longest line in characters (``need``), and the texts that are likely to be its widest: a line
     (``longest``), a word of its cells (``word``) and one of its heading (``heading_word``). What is longer than any figure is
-    set as text. The table is given the characters of its narrowest line (``least``): figures whole, texts broken at words.
+    set as text; figures stay figures below the longer headings of languages other than English. The table is given the
+    characters of its narrowest line (``least``): figures whole, texts broken at words.
     """
     for index, column in enumerate(table["columns"]):
         cells = [line for row in table["rows"] for line in row[index].split("\n")]
         head = [column["heading"], column["unit"]]
         column["need"] = max(4, *map(_letters, head), *map(_letters, cells), 0)
-        column["numeric"] = column["numeric"] and max(map(_letters, cells), default=0) <= _LONGEST_FIGURE
+        longest = column["need"] if english else max(map(_letters, cells), default=0)
+        column["numeric"] = column["numeric"] and longest <= _LONGEST_FIGURE
         column["longest"] = max(cells, key=_width, default="")
         column["word"] = max((part for line in cells for part in _parts(line, " ")), key=_width, default="")
         column["heading_word"] = max((part for line in head for part in _parts(line, None)), key=_width, default="")

@@ -55,8 +55,9 @@ def _known_to_matplotlib() -> str:
     from matplotlib.font_manager import fontManager
 
     fontManager.addfont(japanese_font())
-    [only] = [entry for entry in fontManager.ttflist if entry.name == JAPANESE]
-    fontManager.ttflist.append(replace(only, weight=700))  # its one weight serves bold lettering, too
+    fontManager.ttflist.append(
+        replace(fontManager.ttflist[-1], weight=700)
+    )  # its one weight serves bold lettering, too
     return JAPANESE
 
 

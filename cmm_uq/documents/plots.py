@@ -34,6 +34,7 @@ from cmm_uq.documents.plot_style import (
 )
 from cmm_uq.documents.shown import shown, told
 from cmm_uq.errors import CmmUqError
+from cmm_uq.languages.saying import Said
 from cmm_uq.messages import Text, Verbatim, say, semicolons, signed
 from cmm_uq.points import Floats
 
@@ -346,7 +347,8 @@ _NAMES_MM = 54.0
 def _cut(text: Text, length: int) -> Text:
     said = lettered(text)
     if said is not text:  # longer or wider letters than English ones
-        while width_mm(said, SMALL) > _NAMES_MM:
-            said = Verbatim(said.removesuffix("…")[:-1].rstrip(" ,") + "…")
-        return said
+        kept = str.__str__(said)
+        while width_mm(kept, SMALL) > _NAMES_MM:
+            kept = kept.removesuffix("…")[:-1].rstrip(" ,") + "…"
+        return Said(kept, text)
     return text if len(text) <= length else Verbatim(text[: length - 1] + "…")

@@ -7,7 +7,8 @@ with the sentences.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -51,17 +52,37 @@ def file_of(code: Code) -> Path:
 @cache
 def catalogue(code: Code) -> Catalogue:
     """The catalogue of a language, read when it is first asked for."""
-    from babel.messages.pofile import read_po
-
     single: dict[str, str] = {}
     plural: dict[tuple[str, str], tuple[str, ...]] = {}
-    with file_of(code).open("rb") as file:
-        for entry in read_po(file):
-            forms = entry.string if isinstance(entry.string, tuple | list) else (entry.string or "",)
-            if not entry.id or entry.fuzzy or not all(forms):
-                continue
-            if isinstance(entry.id, str):
-                single[entry.id] = forms[0]
-            else:
-                plural[entry.id[0], entry.id[1]] = tuple(forms)
+    for entry in _entries(file_of(code).read_text(encoding="utf-8")):
+        forms = tuple(text for name, text in entry.items() if name.startswith("msgstr"))
+        if not entry["msgid"] or not all(forms):
+            continue
+        if "msgid_plural" in entry:
+            plural[entry["msgid"], entry["msgid_plural"]] = forms
+        else:
+            single[entry["msgid"]] = forms[0]
     return Catalogue(single, plural)
+
+
+def _entries(text: str) -> Iterator[dict[str, str]]:
+    """Texts of each entry that is not fuzzy, by their keywords: ``msgid``, ``msgstr[0]``."""
+    entry: dict[str, str] = {}
+    fuzzy, ignored, last = False, False, ""
+    for line in (*text.splitlines(), 'msgid ""'):
+        if line.startswith("#,"):
+            fuzzy = "fuzzy" in line
+        keyword, quote, rest = line.partition('"')
+        if line.startswith("#") or not quote:
+            continue
+        if keyword == "msgid ":
+            if entry:
+                yield entry
+            entry, ignored, fuzzy = {}, fuzzy, False
+        if keyword:
+            last = keyword.strip()
+        if not ignored:
+            entry[last] = entry.get(last, "") + _ESCAPED.sub(lambda found: _MEANT.get(found[1], found[1]), rest[:-1])
+
+
+_ESCAPED, _MEANT = re.compile(r"\\(.)"), {"n": "\n", "t": "\t"}

@@ -17,6 +17,7 @@ from cmm_uq.dcc.administrative import (
     PerformanceLocation,
     Person,
     Software,
+    Somebody,
 )
 from cmm_uq.dcc.certificate import Administrative
 from cmm_uq.dcc.quantities import Expanded, Real
@@ -61,7 +62,7 @@ def certificate(value: Real = LENGTH) -> Certificate:
                 )
             ),
             laboratory=Laboratory(contact=somebody),
-            persons=(Person(person=Contact(name=words('A < B & "C"'))),),
+            persons=(Person(person=Somebody(name=words('A < B & "C"'))),),
             customer=somebody,
         ),
         measurements=(Measurement(name=words("Calibration"), methods=(method,), results=(result,), ref_id=("bar",)),),

@@ -31,6 +31,7 @@ def test_the_digits_of_a_printed_number_stay() -> None:
 def test_any_quantity_is_read_as_it_was_written(
     value: Decimal, u: Decimal, low: Decimal, high: Decimal, label: str
 ) -> None:
+    low, high = sorted((low, high))
     ways = (
         Expanded(uncertainty=u, factor=Decimal(2), probability=Decimal("0.95")),
         Interval(standard=u, low=low, high=high, probability=Decimal("0.95"), distribution="t"),

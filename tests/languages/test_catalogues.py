@@ -7,9 +7,9 @@ import ast
 import polib
 import pytest
 
-from cmm_uq.languages.catalogue import file_of
+from cmm_uq.languages.catalogue import catalogue, file_of
 from cmm_uq.languages.language import Code
-from tests.catalogues import FORMS, TRANSLATED, key_of, merged, patterns, problems, read, sentences
+from tests.catalogues import FORMS, TRANSLATED, forms_of, key_of, merged, patterns, problems, read, sentences
 
 WANTED = sentences()
 
@@ -24,6 +24,13 @@ def test_a_catalogue_stands_in_the_order_of_the_files(code: Code) -> None:
     assert [key_of(entry) for entry in read(file_of(code))] == list(WANTED)
 
 
+@pytest.mark.parametrize("code", TRANSLATED)
+def test_the_program_reads_a_catalogue_as_gettext_does(code: Code) -> None:
+    found, entries = catalogue(code), read(file_of(code))
+    assert found.single == {entry.msgid: entry.msgstr for entry in entries if not entry.msgid_plural}
+    assert found.plural == {key_of(entry): tuple(forms_of(entry)) for entry in entries if entry.msgid_plural}
+
+
 def test_the_sentences_are_those_of_the_calls() -> None:
     source = (
         "a = say('one {x}')\nb = plural(n, one=say('a thing'), many=say('{n} things', n=n))\nc = say(f'no {literal}')\n"
@@ -36,7 +43,7 @@ def test_the_sentences_are_those_of_the_calls() -> None:
 SMALL = {("a {x:.2f} b",): ["a.py"], ("one", "{n} many"): ["b.py"]}
 
 
-def catalogue(x: str = "A {x:.2f}", one: str = "eins", many: str = "{n} viele") -> polib.POFile:
+def small(x: str = "A {x:.2f}", one: str = "eins", many: str = "{n} viele") -> polib.POFile:
     file = polib.POFile()
     file.append(polib.POEntry(msgid="a {x:.2f} b", msgstr=x))
     file.append(polib.POEntry(msgid="one", msgid_plural="{n} many", msgstr_plural={0: one, 1: many}))
@@ -44,14 +51,14 @@ def catalogue(x: str = "A {x:.2f}", one: str = "eins", many: str = "{n} viele") 
 
 
 @pytest.mark.parametrize(("file", "told"), [
-    (catalogue(), []),
-    (catalogue(x=""), ["empty: 'a {x:.2f} b'"]),
-    (catalogue(x="A {x:.3f}"), ["placeholders: 'A {x:.3f}' of 'a {x:.2f} b'"]),
-    (catalogue(x="A"), ["placeholders: 'A' of 'a {x:.2f} b'"]),
-    (catalogue(x="A {x:.2f} {y}"), ["placeholders: 'A {x:.2f} {y}' of 'a {x:.2f} b'"]),
-    (catalogue(x="A {x:.2f"), ["placeholders: 'A {x:.2f' of 'a {x:.2f} b'"] ),
-    (catalogue(one="{n} eins"), []),
-    (catalogue(many="viele"), ["placeholders: 'viele' of '{n} many'"]),
+    (small(), []),
+    (small(x=""), ["empty: 'a {x:.2f} b'"]),
+    (small(x="A {x:.3f}"), ["placeholders: 'A {x:.3f}' of 'a {x:.2f} b'"]),
+    (small(x="A"), ["placeholders: 'A' of 'a {x:.2f} b'"]),
+    (small(x="A {x:.2f} {y}"), ["placeholders: 'A {x:.2f} {y}' of 'a {x:.2f} b'"]),
+    (small(x="A {x:.2f"), ["placeholders: 'A {x:.2f' of 'a {x:.2f} b'"] ),
+    (small(one="{n} eins"), []),
+    (small(many="viele"), ["placeholders: 'viele' of '{n} many'"]),
     (polib.POFile(), ["missing: 'a {x:.2f} b'", "missing: '{n} many'"]),
 ])  # fmt: skip
 def test_what_is_wrong_with_a_catalogue_is_found(file: polib.POFile, told: list[str]) -> None:
@@ -60,7 +67,7 @@ def test_what_is_wrong_with_a_catalogue_is_found(file: polib.POFile, told: list[
 
 def test_a_changed_sentence_keeps_its_translation_to_be_looked_at_and_one_said_nowhere_is_dropped() -> None:
     wanted = {("a {x:.2f} c",): ["a.py"], ("quite another sentence",): ["a.py"]}
-    made = merged(catalogue(), wanted, "de")
+    made = merged(small(), wanted, "de")
     assert [(entry.msgid, entry.msgstr, entry.fuzzy) for entry in made] == [
         ("a {x:.2f} c", "A {x:.2f}", True), ("quite another sentence", "", False),
     ]  # fmt: skip
