@@ -105,7 +105,7 @@ def test_a_revision_after_the_signature_is_named(signed: Path, again: Again, tru
 
 @pytest.mark.parametrize(("old", "new", "place"), [
     (b"404.2050562", b"404.2060562", "si:"), (rb"\micro\metre", rb"\milli\metre", "si:"),
-    (b"2004-09-01", b"2005-09-01", "dcc:"),
+    (b"DEA Iota 1102", b"DEA Iota 1103", "dcc:"),
     (b"McMaster", b"MacMaster", "dcc:"),
 ])  # fmt: skip
 def test_an_element_of_the_digital_certificate_is_named_by_its_path(
