@@ -44,6 +44,12 @@ def command(
             show_default="nobody",
         ),
     ] = None,
+    schema: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder with PTB's schemas of the DCC, that the XML is held to.", metavar="DIR", show_default="none"
+        ),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
@@ -57,7 +63,7 @@ def command(
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.verify import verify
 
-        found = verify(files, rerun=rerun, trust=trust or None, stage=stage or (lambda what, part: None))
+        found = verify(files, rerun=rerun, trust=trust or None, schema=schema, stage=stage or (lambda what, part: None))
     inquiry = found.inquiry
     if json:
         put_data({"schema": "cmm-uq/verification/1", "subject": found.subject, **inquiry.as_data()})

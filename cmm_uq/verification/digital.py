@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmm_uq.errors import CmmUqError
@@ -36,7 +37,9 @@ def open_digital(inquiry: Inquiry, given: Given) -> None:
         if given.xml is None:
             given.xml, given.digital_inside = (f"{attached.name} in {given.pdf[0]}", attached.content), True
         elif given.xml[1] != attached.content:
-            _compare(inquiry, f"attachment {attached.name} of {given.pdf[0]}", attached.content, given.xml[1], given.xml[0])
+            _compare(
+                inquiry, f"attachment {attached.name} of {given.pdf[0]}", attached.content, given.xml[1], given.xml[0]
+            )
     if given.xml is None:
         return
     name, content = given.xml
@@ -86,6 +89,31 @@ def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
     _compare(inquiry, name, content, should, given.results[0])
 
 
+def check_schema(inquiry: Inquiry, given: Given, folder: Path) -> None:
+    """Keep what the schema of PTB refuses.
+
+    Parameters
+    ----------
+    folder : with the schemas.
+
+    Raises
+    ------
+    CmmUqError : there is no digital certificate, no schema of its version there, or what reads schemas is not installed.
+    """
+    from cmm_uq.dcc.schema import checked_by_schema
+
+    if given.xml is None:
+        raise CmmUqError("there is no digital certificate to be held to a schema", where="--schema", fix="Leave it out")
+    inquiry.looked("files")
+    try:
+        checked_by_schema(given.xml[1], folder, given.xml[0])
+    except CmmUqError as error:
+        if error.where is None or not error.where.startswith(given.xml[0]):
+            raise
+        for one in (error, *error.also):
+            inquiry.wrong("files", given.xml[0], (one.where or "").removeprefix(f"{given.xml[0]}, "), one.problem)
+
+
 def same_unsigned(one: bytes, other: bytes, where: str) -> bool:
     """Whether two certificates are the same but for their signatures."""
     from cmm_uq.dcc.tree import parsed
@@ -107,7 +135,9 @@ def _compare(inquiry: Inquiry, name: str, content: bytes, should: bytes, source:
             break
         inquiry.wrong("forms", name, path, f"is not what {source} says", stands, wanted)
     if not count and not any(map(_is_signature, (*root.children, *wished.children))):
-        inquiry.wrong("forms", name, "", "is written otherwise, though it says the same: it is not the file that was made")
+        inquiry.wrong(
+            "forms", name, "", "is written otherwise, though it says the same: it is not the file that was made"
+        )
 
 
 def differences(one: Node, other: Node) -> Iterator[Difference]:

@@ -16,6 +16,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.signing import sign_pdf, sign_xml, signer_of_file
 from cmm_uq.verification.again import Again
 from cmm_uq.verification.found import Inquiry
+from tests.conftest import ROOT
 from tests.signing.authority import SIGNED, Held, curve_key, issued, root
 from tests.verification.test_forms import spoil
 
@@ -141,3 +142,16 @@ def test_a_document_type_in_xml_is_refused(certificate: Path, made: Path, again:
     (certificate / "certificate.xml").write_bytes(content[:at] + head + content[at:])
     with pytest.raises(CmmUqError):
         inquiry(certificate, again, None)
+
+
+def test_the_digital_certificate_is_held_to_the_schema_where_one_is_given(made: Path, again: Again) -> None:
+    folder = ROOT.parent / "shared" / "schemas"
+    if not folder.is_dir():
+        pytest.skip("no schemas here")
+    found = verify([made], schema=folder, compute=lambda given, job: again).inquiry
+    assert found.word == "VERIFIED", told_of(found)
+
+
+def test_a_folder_without_schemas_is_refused(made: Path, again: Again, tmp_path: Path) -> None:
+    with pytest.raises(CmmUqError, match="no schema of DCC"):
+        verify([made], schema=tmp_path, compute=lambda given, job: again)
