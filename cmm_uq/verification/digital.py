@@ -48,6 +48,7 @@ def open_digital(inquiry: Inquiry, given: Given) -> None:
     if document is None:
         inquiry.wrong("forms", name, "/dcc:digitalCalibrationCertificate", "carries no copy for reading")
         return
+    given.page_inside = document.data
     place = "/dcc:digitalCalibrationCertificate/dcc:document"
     if given.html is None:
         where = f"{document.file_name} in {name}"
@@ -74,15 +75,12 @@ def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
         return
     import json
 
-    from cmm_uq.dcc import read, written
+    from cmm_uq.dcc import written
     from cmm_uq.documents.digital_certificate import digital_certificate
 
     name, content = given.xml
-    document = read(content, name).document
     try:
-        should = written(
-            digital_certificate(json.loads(given.results[2]), job, html=None if document is None else document.data)
-        )
+        should = written(digital_certificate(json.loads(given.results[2]), job, html=given.page_inside))
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, CmmUqError) as error:
         inquiry.wrong("forms", name, "", f"cannot be made of {given.results[0]} ({type(error).__name__}: {error})")
         return

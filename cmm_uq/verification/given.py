@@ -32,6 +32,7 @@ class Given:
     ----------
     pdf, html, xml, results : each with its name; ``None`` where it is not given. ``results`` may be the one inside the PDF.
     digital_inside : whether the XML is the one inside the PDF.
+    page_inside : the page that the XML carries.
     others : further files by name: inputs, draws of the posterior.
     manifest : of a folder.
     """
@@ -41,6 +42,7 @@ class Given:
     xml: tuple[str, bytes] | None = None
     results: tuple[str, dict[str, Any], bytes] | None = None
     digital_inside: bool = False
+    page_inside: bytes | None = None
     others: dict[str, bytes] = field(default_factory=dict)
     manifest: Manifest | None = None
     contents: dict[str, bytes] = field(default_factory=dict)
