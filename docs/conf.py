@@ -32,8 +32,8 @@ CONTENTS: dict[str, list[str]] = {
         "machine/effects", "limits", "words",
     ],
     "How it works": [
-        "certificate", "verify", "dcc", "iso17025", "languages", "standards", "noise", "screening", "diagnosis", "planning",
-        "proving", "selfcalibration",
+        "certificate", "verify", "dcc", "iso17025", "provenance", "qif", "languages", "standards", "noise", "screening",
+        "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",

@@ -25,6 +25,7 @@ _WHAT = {
     "budget.pdf": "the budget",
     "results.json": "every figure, for other programs",
     "posterior.npz": "draws of the posterior, for other programs",
+    "provenance.json": "from what, by what and on what it was made",
     "correction_table.csv": "correction table, for compensate",
     "job.toml": "the job",
     "truth.toml": "what it was drawn from",

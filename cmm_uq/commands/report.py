@@ -11,6 +11,7 @@ from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.documents.diagnosis_next import TO_FILL_IN
 from cmm_uq.documents.origin import DIGITAL
 from cmm_uq.documents.outcome import Outcome
+from cmm_uq.documents.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job
 from cmm_uq.languages.language import Code
 from cmm_uq.plugins import naming_package
@@ -18,7 +19,7 @@ from cmm_uq.records.place import NONE
 
 CERTIFICATE = ("certificate.html", DIGITAL, "certificate.pdf")
 DIAGNOSIS = ("diagnosis.html", "diagnosis.pdf")
-REPORT = Form("report", CERTIFICATE, recorded=True)
+REPORT = Form("report", CERTIFICATE, further=(PROVENANCE,), recorded=True)
 DIAGNOSE = Form("diagnose", DIAGNOSIS, "diagnosis", (TO_FILL_IN,), recorded=True)
 
 
@@ -51,7 +52,7 @@ def write_report(
     job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
     told: Told | None = None, records: str | Path | None = NONE, language: Code | None = None,
 ) -> Written:  # fmt: skip
-    """Analyse a job and write ``certificate.html``, ``.xml`` (DCC) and ``.pdf``, and ``results.json``, all or none.
+    """Analyse a job and write its certificate (HTML, DCC and PDF), ``results.json`` and ``provenance.json``, all or none.
 
     A kind may add files of its own. Documents of a recording that was not measured carry its origin in their names.
 

@@ -230,25 +230,35 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
     else:
         alpha = _alpha(data, FALSE_ALARMS)
         form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, alpha=alpha, stage=stage)
-    written = form.contents(outcome, stage, finished=partial(_as_signed, given))
+    kept: list[str] = []
+    written = form.contents(outcome, stage, finished=partial(_as_attached, given, kept))
     pdf = next((content for name, content in written.items() if name.endswith(".pdf")), None)
     files = {name: content for name, content in written.items() if not name.endswith(".pdf")}
     if given.pdf is None or pdf is None:
-        return Again(files)
+        return Again(files, kept=tuple(kept))
     made, here = given.pdf[1].information.get("/Creator", ""), _creator(pdf)
     if made != here:
-        return Again(files, None, f"they were set by {made or 'another program'}, and here is {here}")
-    return Again(files, pdf)
+        return Again(files, None, f"they were set by {made or 'another program'}, and here is {here}", tuple(kept))
+    return Again(files, pdf, kept=tuple(kept))
 
 
-def _as_signed(given: Given, name: str, content: bytes) -> bytes:
-    """The digital certificate as it is attached: signed, where it is the same but for that."""
-    attached = given.files.get(name)
-    if attached is None or attached == content or not name.endswith(".xml"):
-        return content
+def _as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
+    """A file as it is attached where it is the same but for a signature, or for the platform, which is then kept in mind."""
+    from cmm_uq.documents.provenance import FILE, same_but_for_the_platform
     from cmm_uq.verification.digital import same_unsigned
 
-    return attached if same_unsigned(attached, content, name) else content
+    attached = given.files.get(name)
+    if attached is None or attached == content or not (name == FILE or name.endswith(".xml")):
+        return content
+    try:
+        if name.endswith(".xml"):
+            return attached if same_unsigned(attached, content, name) else content
+        if not same_but_for_the_platform(attached, content):
+            return content
+    except (CmmUqError, ValueError):
+        return content
+    kept.append(name)
+    return attached
 
 
 def _seed(data: Mapping[str, Any]) -> int:

@@ -158,13 +158,15 @@ class Form:
         from cmm_uq.documents.in_language import said
         from cmm_uq.documents.origin import marked
         from cmm_uq.documents.pdf import render_pdf
+        from cmm_uq.documents.provenance import FILE, provenance
 
         job, data = outcome.found.job, as_json(outcome.results)
         document = said(marked(outcome.document, job), job.facts.job.language)
-        for name in outcome.files.keys() & job.inputs.keys():
+        for name in {*outcome.files, *({FILE} & {*self.further})} & job.inputs.keys():
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
         rendered: dict[str, bytes] = {}
+        further = {RESULTS: data, **outcome.files}
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
             if name.endswith(".html"):
@@ -172,10 +174,12 @@ class Form:
             elif name.endswith(".xml"):
                 made = _digital(job, data, rendered)
             else:
+                if FILE in self.further:
+                    further[FILE] = finished(FILE, provenance(job, outcome.results, {**rendered, **further}))
                 digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
-                made = render_pdf(document, {**job.inputs, RESULTS: data, **digital, **outcome.files})
+                made = render_pdf(document, {**job.inputs, **digital, **further})
             rendered[name] = finished(name, made)
-        return {**rendered, RESULTS: data, **outcome.files}
+        return {**rendered, **further}
 
     def names(self, job: Job) -> list[str]:
         """Of the documents of a job."""

@@ -9,6 +9,7 @@ from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conditions import conditions
 from cmm_uq.documents.document import Document, Facts, Section, Signature
 from cmm_uq.documents.origin import CERTIFICATE, DIGITAL, came_about, file_name
+from cmm_uq.documents.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed
@@ -57,7 +58,10 @@ def certificate_of(
         signatures=(Signature(Verbatim(facts.laboratory.signatory), Verbatim(facts.laboratory.signatory_role)),)
         if facts.laboratory.signatory
         else (),
-        attachments=(*names(job.inputs), Verbatim("results.json"), Verbatim(file_name(DIGITAL, job.origin)), *files),
+        attachments=(
+            *names(job.inputs), Verbatim("results.json"), Verbatim(file_name(DIGITAL, job.origin)), *files,
+            Verbatim(PROVENANCE),
+        ),
         produced_by=produced_by,
         date=facts.job.issued or facts.job.date,
         banner=DRAFT if draft(job) else NOTHING,

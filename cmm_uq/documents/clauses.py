@@ -48,14 +48,14 @@ class Clause:
     Parameters
     ----------
     clause : its number, with the letter where it has one.
-    asks : what for.
+    asks : what for; a text that can be said in other languages where a certificate may have to name it.
     status : whether the certificate has it.
     stated : what satisfies it; empty where nothing does.
     key : of job.toml, that states it or would; empty where the form of the certificate does.
     """
 
     clause: str
-    asks: Text
+    asks: str
     status: Status
     stated: str
     key: str
@@ -105,17 +105,17 @@ def replaced_certificate(replaced: Replaced) -> Text:
     return say("{number} of {date}", number=Verbatim(replaced.number), date=day(replaced.date))
 
 
-def _asked(clause: str, asks: Text, stated: object, key: str = "") -> Clause:
+def _asked(clause: str, asks: str, stated: object, key: str = "") -> Clause:
     """Of every certificate."""
     return Clause(clause, asks, "stated" if stated else "missing", _plain(stated), key)
 
 
-def _where(clause: str, asks: Text, stated: object, key: str = "") -> Clause:
+def _where(clause: str, asks: str, stated: object, key: str = "") -> Clause:
     """Where there is any."""
     return Clause(clause, asks, "stated" if stated else "not applicable", _plain(stated), key)
 
 
-def _done(clause: str, asks: Text, key: str = "") -> Clause:
+def _done(clause: str, asks: str, key: str = "") -> Clause:
     return Clause(clause, asks, "laboratory", "", key)
 
 
@@ -129,9 +129,9 @@ def _lines(parts: Iterable[str]) -> str:
 
 def _reporting(facts: JobFile) -> tuple[Clause, ...]:
     return (
-        _done("7.8.1.1", say("results reviewed and authorised before release"), "[laboratory] four_eyes"),
-        _asked("7.8.1.2", say("results and all that their interpretation needs, in a report"), _number(facts)),
-        _done("7.8.1.3", say("a simplified report only as agreed with the customer")),
+        _done("7.8.1.1", "results reviewed and authorised before release", "[laboratory] four_eyes"),
+        _asked("7.8.1.2", "results and all that their interpretation needs, in a report", _number(facts)),
+        _done("7.8.1.3", "a simplified report only as agreed with the customer"),
     )
 
 
@@ -140,28 +140,28 @@ def _of_every_report(facts: JobFile) -> tuple[Clause, ...]:
     named = (machine.manufacturer, machine.model, machine.name)
     item = f"{_lines(named)}, serial number {machine.serial}" if machine.serial else ""
     return (
-        _asked("7.8.2.1 a", say("title"), CERTIFICATE),
+        _asked("7.8.2.1 a", "title", CERTIFICATE),
         _asked("7.8.2.1 b", say("name of the laboratory"), laboratory.name, "[laboratory] name"),
         _asked("7.8.2.1 b", say("address of the laboratory"), _lines([laboratory.address]), "[laboratory] address"),
         _asked("7.8.2.1 c", say("place of the measurement"), job.place, "[job] place"),
-        _asked("7.8.2.1 d", say("every part known as part of one report, and its end"),
+        _asked("7.8.2.1 d", "every part known as part of one report, and its end",
                f"number {_number(facts)} and page of pages on every page; mark of the end", "[job] number"),
         _asked("7.8.2.1 e", say("customer"), job.customer, "[job] customer"),
         _asked("7.8.2.1 e", say("how to reach the customer"), _lines([job.address]), "[job] address"),
         _asked("7.8.2.1 f", say("method"), job.procedure, "[job] procedure"),
         _asked("7.8.2.1 g", say("serial number of the machine"), item, "[machine] serial"),
-        _where("7.8.2.1 h", say("date of receipt, where it matters"), job.received, "[job] received"),
-        _asked("7.8.2.1 i", say("date of the measurement"), job.date, "[job] date"),
+        _where("7.8.2.1 h", "date of receipt, where it matters", job.received, "[job] received"),
+        _asked("7.8.2.1 i", "date of the measurement", job.date, "[job] date"),
         _asked("7.8.2.1 j", say("date of issue"), job.issued, "[job] issued"),
-        _where("7.8.2.1 k", say("sampling plan, where anything is sampled"), ""),
-        _asked("7.8.2.1 l", say("that the results relate to the item alone"), STATEMENTS[0]),
-        _asked("7.8.2.1 m", say("results with their units"), "the unit with every figure"),
-        _where("7.8.2.1 n", say("additions to, deviations from and exclusions from the method"), job.deviations,
+        _where("7.8.2.1 k", "sampling plan, where anything is sampled", ""),
+        _asked("7.8.2.1 l", "that the results relate to the item alone", STATEMENTS[0]),
+        _asked("7.8.2.1 m", "results with their units", "the unit with every figure"),
+        _where("7.8.2.1 n", "additions to, deviations from and exclusions from the method", job.deviations,
                "[job] deviations"),
         _asked("7.8.2.1 o", say("who authorises it"), _lines([laboratory.signatory, laboratory.signatory_role])
                if laboratory.signatory else "", "[laboratory] signatory"),
-        _where("7.8.2.1 p", say("results from external providers"), job.external, "[job] external"),
-        _where("7.8.2.2", say("data from the customer, and that the laboratory does not answer for them"), job.from_customer,
+        _where("7.8.2.1 p", "results from external providers", job.external, "[job] external"),
+        _where("7.8.2.2", "data from the customer, and that the laboratory does not answer for them", job.from_customer,
                "[job] from_customer"),
     )  # fmt: skip
 
@@ -169,16 +169,16 @@ def _of_every_report(facts: JobFile) -> tuple[Clause, ...]:
 def _of_a_calibration(facts: JobFile) -> tuple[Clause, ...]:
     job = facts.job
     return (
-        _asked("7.8.4.1 a", say("measurement uncertainty in the unit of the result"),
+        _asked("7.8.4.1 a", "measurement uncertainty in the unit of the result",
                "U, k and 95 % with every result", "[laboratory] cmc"),
         _asked("7.8.4.1 b", say("conditions"), job.conditions, "[job] conditions"),
         *_traceable(facts),
-        _where("7.8.4.1 d", say("results before and after an adjustment"), job.as_found, "[job] as_found"),
-        _where("7.8.4.1 e", say("statement of conformity"), _standards(facts), "[[conformity]]"),
-        _where("7.8.4.1 f", say("opinions and interpretations"), "annex of opinions and interpretations",
+        _where("7.8.4.1 d", "results before and after an adjustment", job.as_found, "[job] as_found"),
+        _where("7.8.4.1 e", "statement of conformity", _standards(facts), "[[conformity]]"),
+        _where("7.8.4.1 f", "opinions and interpretations", "annex of opinions and interpretations",
                "[job] diagnosis_on_certificate"),
-        _where("7.8.4.2", say("sampling by the laboratory"), ""),
-        _asked("7.8.4.3", say("no calibration interval that was not agreed with the customer"),
+        _where("7.8.4.2", "sampling by the laboratory", ""),
+        _asked("7.8.4.3", "no calibration interval that was not agreed with the customer",
                f"next calibration as agreed: {job.recalibration_agreed}" if job.recalibration_agreed else "none is printed",
                "[job] recalibration_agreed"),
     )  # fmt: skip
@@ -193,7 +193,7 @@ def _traceable(facts: JobFile) -> tuple[Clause, ...]:
     if facts.short_gauge is not None:
         found += _chain(facts.short_gauge.certificate, "[short_gauge.certificate]", say("certificate of the short gauge"),
                         say("who certified the short gauge"))  # fmt: skip
-    statement = _asked("7.8.4.1 c", say("how the results are traceable"), statement_of_traceability(facts))
+    statement = _asked("7.8.4.1 c", "how the results are traceable", statement_of_traceability(facts))
     return (statement, *found)
 
 
@@ -210,24 +210,24 @@ def _statements(facts: JobFile) -> tuple[Clause, ...]:
     rules = "; ".join(dict.fromkeys(rule_name(wish.rule) for wish in facts.conformity))
     stated = "value, measurement and length named with each statement" if decided else ""
     return (
-        _where("7.8.6.1", say("a decision rule, with the risk that it takes"),
+        _where("7.8.6.1", "a decision rule, with the risk that it takes",
                f"{rules}: guard band and probability with each statement" if decided else "", "[[conformity]] rule"),
-        _where("7.8.6.2 a", say("to which results a statement of conformity applies"), stated, "[[conformity]]"),
-        _where("7.8.6.2 b", say("which specifications are met or not met"), _standards(facts), "[[conformity]] standard"),
-        _where("7.8.6.2 c", say("the decision rule applied"), rules, "[[conformity]] rule"),
-        _done("7.8.7.1", say("opinions by authorised people, on a documented basis")),
-        _where("7.8.7.2", say("opinions rest on the results and are marked as such"), "in the annex, under its own heading"),
-        _done("7.8.7.3", say("what was said of them to the customer is recorded")),
+        _where("7.8.6.2 a", "to which results a statement of conformity applies", stated, "[[conformity]]"),
+        _where("7.8.6.2 b", "which specifications are met or not met", _standards(facts), "[[conformity]] standard"),
+        _where("7.8.6.2 c", "the decision rule applied", rules, "[[conformity]] rule"),
+        _done("7.8.7.1", "opinions by authorised people, on a documented basis"),
+        _where("7.8.7.2", "opinions rest on the results and are marked as such", "in the annex, under its own heading"),
+        _done("7.8.7.3", "what was said of them to the customer is recorded"),
     )  # fmt: skip
 
 
 def _replacing(facts: JobFile) -> tuple[Clause, ...]:
     replaced = facts.job.replaces
     return (
-        _where("7.8.8.1", say("what was changed, and why"), replaced and f"{replaced.changed} ({replaced.reason})",
+        _where("7.8.8.1", "what was changed, and why", replaced and f"{replaced.changed} ({replaced.reason})",
                "[job.replaces] changed"),
-        _where("7.8.8.2", say("amendments as a further document that says so"), ""),
-        _where("7.8.8.3", say("a number of its own, and which certificate it replaces"),
+        _where("7.8.8.2", "amendments as a further document that says so", ""),
+        _where("7.8.8.3", "a number of its own, and which certificate it replaces",
                replaced and replaced_certificate(replaced), "[job.replaces] number"),
     )  # fmt: skip
 

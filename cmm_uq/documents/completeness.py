@@ -9,7 +9,7 @@ from cmm_uq.documents.clauses import missing
 from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.messages import Text, Verbatim, say, semicolons
+from cmm_uq.messages import Text, Verbatim, foreign, say, semicolons
 
 _INTERIM = say("An interim check ([job] interim): no calibration certificate, whatever the title says.")
 
@@ -30,7 +30,7 @@ def contradictions(job: Job) -> tuple[Text, ...]:
 
 def _missing(facts: JobFile) -> list[Text]:
     wanted = [
-        say("{what} ({clause}): {key}", what=one.asks, clause=Verbatim(one.clause), key=Verbatim(one.key))
+        say("{what} ({clause}): {key}", what=foreign(one.asks), clause=Verbatim(one.clause), key=Verbatim(one.key))
         for one in missing(facts)
     ]
     if not wanted:

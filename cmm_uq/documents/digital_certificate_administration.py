@@ -184,7 +184,9 @@ def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
         told = (replaced_certificate(facts.replaces), Verbatim(facts.replaces.reason), Verbatim(facts.replaces.changed))
         found.append(
             Statement(
-                name=words_of(say("Replaces certificate"), say_in), declaration=rich_of(told, say_in), ref_type=("basic_revision",)
+                name=words_of(say("Replaces certificate"), say_in),
+                declaration=rich_of(told, say_in),
+                ref_type=("basic_revision",),
             )
         )
     if facts.recalibration_agreed:

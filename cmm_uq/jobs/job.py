@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -296,6 +296,7 @@ class Job:
     beside : files that it was read from and that lie outside its folder.
     imported : how files in another format than the project's own were read.
     acquired : how the recording was taken live, where it was.
+    certified : keys of ``[artefact]`` that its digital certificate says, and job.toml does not.
     """
 
     folder: Path
@@ -310,6 +311,7 @@ class Job:
     beside: tuple[Path, ...] = ()
     imported: tuple[Recognised, ...] = ()
     acquired: Provenance | None = None
+    certified: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def circumstances(self) -> Circumstances:

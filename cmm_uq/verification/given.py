@@ -157,6 +157,11 @@ def check_files(inquiry: Inquiry, given: Given) -> None:
             if one.relationship != should:
                 inquiry.wrong("files", name, f"attachment {one.name}", "has another relationship to the document",
                               one.relationship, should)  # fmt: skip
+        inside = pdf.files
+        for other in sorted(given.others.keys() & inside.keys()):
+            inquiry.looked("forms")
+            if given.others[other] != inside[other]:
+                inquiry.wrong("forms", other, "", f"is another file than the one of that name in {name}")
     if given.html is not None:
         inquiry.looked("files")
         for place, problem in given.html[1].problems:

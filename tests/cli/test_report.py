@@ -18,7 +18,10 @@ from cmm_uq.dcc import read
 from tests.cli.process import COMMAND, run, run_apart
 from tests.cli.terminal import everything, on_terminal, until
 
-FILES = ["certificate.html", "certificate.pdf", "certificate.xml", "manifest.json", "posterior.npz", "results.json"]
+FILES = [
+    "certificate.html", "certificate.pdf", "certificate.xml", "manifest.json", "posterior.npz", "provenance.json",
+    "results.json",
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +68,7 @@ def test_the_pdf_carries_the_job_and_the_results(
     assert attached["results.json"] == (report / "results.json").read_bytes()
     assert attached["certificate.xml"] == (report / "certificate.xml").read_bytes()
     assert attached["posterior.npz"] == (report / "posterior.npz").read_bytes()
+    assert attached["provenance.json"] == (report / "provenance.json").read_bytes()
     assert attached["job.toml"] == (iota / "job.toml").read_bytes()
     assert attached["ballbar.csv"] == (iota / "ballbar.csv").read_bytes()
 

@@ -28,6 +28,15 @@ BAR_MM, BAR_U_UM = 404.2357, 5.0
 """Of the example's job.toml."""
 
 
+LABORATORY = """
+[laboratory]
+name = "L"
+address = "A"
+signatory = "S"
+four_eyes = true
+"""
+
+
 @pytest.fixture(scope="module")
 def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The twenty bars reported into records in French, with a serial number and two keys for them."""
@@ -35,9 +44,10 @@ def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     job = Path(shutil.copytree(ROOT / "examples" / "iota-1102-20C", folder / "job"))
     toml = (job / "job.toml").read_text(encoding="utf-8")
     toml = toml.replace('manufacturer = "DEA"', 'manufacturer = "DEA"\nserial = "1102"')
-    toml = toml.replace("[job]\n", '[job]\nadjusted_since = 2004-03-01\noperator = "J. Harris"\n')
+    stated = 'issued = 2004-09-02\ncustomer = "C"\naddress = "D"\n'  # what a certificate must state to be released
+    toml = toml.replace("[job]\n", f'[job]\nadjusted_since = 2004-03-01\noperator = "J. Harris"\n{stated}')
     toml = toml.replace("[recording]", "due = 2005-01-01\n\n[recording]")
-    (job / "job.toml").write_text(toml + "\n[laboratory]\nfour_eyes = true\n", encoding="utf-8")
+    (job / "job.toml").write_text(toml + LABORATORY, encoding="utf-8")
     write_report(job, folder / "reports" / "iota", records=folder / "reports" / "records.db", language="fr")
     return folder / "reports"
 
