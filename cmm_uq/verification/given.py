@@ -142,32 +142,36 @@ def _once(before: object, what: str, where: str) -> None:
 def check_files(inquiry: Inquiry, given: Given) -> None:
     """Keep what does not belong in the files, and which of them are not what the folder's manifest says."""
     if given.pdf is not None:
-        name, pdf = given.pdf
-        inquiry.looked("files")
-        for place, problem in pdf.problems:
-            inquiry.wrong("files", name, place, problem)
-        seen: set[str] = set()
-        for one in pdf.attachments:
-            if one.name in seen:
-                inquiry.wrong("files", name, f"attachment {one.name}", "is attached twice: readers may show either")
-            seen.add(one.name)
-            if not plain_name(one.name) or "/" in one.name:
-                inquiry.wrong("files", name, f"attachment {one.name}", "has a name that leads out of its folder")
-            should = "Data" if one.name.lower().endswith((".json", ".npz", ".xml")) else "Source"
-            if one.relationship != should:
-                inquiry.wrong("files", name, f"attachment {one.name}", "has another relationship to the document",
-                              one.relationship, should)  # fmt: skip
-        inside = pdf.files
-        for other in sorted(given.others.keys() & inside.keys()):
+        _check_pdf(inquiry, *given.pdf)
+        inside = given.pdf[1].files
+        for name in sorted(given.others.keys() & inside.keys()):
             inquiry.looked("forms")
-            if given.others[other] != inside[other]:
-                inquiry.wrong("forms", other, "", f"is another file than the one of that name in {name}")
+            if given.others[name] != inside[name]:
+                inquiry.wrong("forms", name, "", f"is another file than the one of that name in {given.pdf[0]}")
     if given.html is not None:
         inquiry.looked("files")
         for place, problem in given.html[1].problems:
             inquiry.wrong("files", given.html[0], place, problem)
     if given.manifest is not None:
         _check_manifest(inquiry, given, given.manifest)
+
+
+def _check_pdf(inquiry: Inquiry, name: str, pdf: PdfFile) -> None:
+    """What does not belong in a PDF, and what is wrong with the names of its files."""
+    inquiry.looked("files")
+    for place, problem in pdf.problems:
+        inquiry.wrong("files", name, place, problem)
+    seen: set[str] = set()
+    for one in pdf.attachments:
+        place = f"attachment {one.name}"
+        if one.name in seen:
+            inquiry.wrong("files", name, place, "is attached twice: readers may show either")
+        seen.add(one.name)
+        if not plain_name(one.name) or "/" in one.name:
+            inquiry.wrong("files", name, place, "has a name that leads out of its folder")
+        should = "Data" if one.name.lower().endswith((".json", ".npz", ".xml")) else "Source"
+        if one.relationship != should:
+            inquiry.wrong("files", name, place, "has another relationship to the document", one.relationship, should)
 
 
 def _check_manifest(inquiry: Inquiry, given: Given, manifest: Manifest) -> None:
