@@ -8,11 +8,12 @@ from __future__ import annotations
 import hashlib
 import json
 import random
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from benchmarks.tampering import alter_text
 from benchmarks.tampering.alter_pdf import PDF
+from benchmarks.tampering.signatures import OTHER, ROOT, spoilt, stripped
 
 SEED = 20261122
 
@@ -20,6 +21,10 @@ SETS = (
     ("pdf",), ("pdf", "html"), ("pdf", "html", "results"), ("pdf", "html", "results", "xml"), ("html", "results", "inputs"),
 )  # fmt: skip
 """What an auditor has: the PDF alone, with further forms, or everything but the PDF."""
+
+
+SIGNED = "iota-1102-20C-signed"
+"""The certificate that is signed; one case in eight is of it."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,7 @@ class Case:
     form : of that file.
     how, what : name of the alteration, and what it did.
     files : that are given.
+    trust : certificate of the authority that is trusted, of what is signed.
     """
 
     number: int
@@ -43,6 +49,7 @@ class Case:
     how: str
     what: str
     files: Mapping[str, bytes]
+    trust: bytes | None = None
 
 
 def form_of(name: str, inputs: set[str]) -> str:
@@ -62,10 +69,12 @@ def case(number: int, bases: Mapping[str, Mapping[str, bytes]], seed: int = SEED
     bases : files of each certificate, its inputs among them, by name.
     """
     rng = random.Random(f"{seed}:{number}")
-    base = sorted(bases)[rng.randrange(len(bases))]
+    plain = sorted(set(bases) - {SIGNED})
+    base = SIGNED if rng.random() < 1 / 8 else plain[rng.randrange(len(plain))]
     files = dict(bases[base])
+    others = {name: files.pop(name) for name in list(files) if name.startswith(OTHER) or name == ROOT}
     inputs = set(json.loads(files["results.json"])["job"]["inputs_sha256"])
-    given = rng.choice(SETS)
+    given = rng.choice(SETS[:4] if base == SIGNED else SETS)
     forms = {name: form_of(name, inputs) for name in files}
     kept = {name: content for name, content in files.items() if forms[name] in given}
     asked = rng.choice([form for form in given if form in forms.values()])
@@ -74,10 +83,19 @@ def case(number: int, bases: Mapping[str, Mapping[str, bytes]], seed: int = SEED
         how, what, kept = _forged(name, kept, rng)
     else:
         alterations = {"pdf": PDF, "html": alter_text.HTML, "results": alter_text.JSON}.get(asked, alter_text.TEXT)
+        if base == SIGNED and asked in ("pdf", "xml"):
+            alterations = (*alterations, *(stripped, spoilt, _by_another(others[OTHER + name])) * 2)
         alteration = rng.choice(alterations)
         new, what = alteration(kept[name], rng)
         how, kept = alteration.__name__, {**kept, name: new}
-    return Case(number, base, name, asked, how, what, kept)
+    return Case(number, base, name, asked, how, what, kept, others.get(ROOT))
+
+
+def _by_another(content: bytes) -> Callable[[bytes, random.Random], alter_text.Altered]:
+    def signed_by_another(before: bytes, rng: random.Random) -> alter_text.Altered:
+        return content, "signed by somebody else of the same name"
+
+    return signed_by_another
 
 
 def _forged(name: str, files: Mapping[str, bytes], rng: random.Random) -> tuple[str, str, dict[str, bytes]]:

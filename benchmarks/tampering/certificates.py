@@ -8,7 +8,9 @@ import random
 import shutil
 from pathlib import Path
 
-from benchmarks.tampering.cases import SEED
+from benchmarks.tampering.cases import SEED, SIGNED
+from benchmarks.tampering.signatures import ROOT as ROOT_PEM
+from benchmarks.tampering.signatures import signed
 from cmm_uq.commands.report import write_diagnosis, write_report
 
 ROOT = Path(__file__).parents[2]
@@ -35,7 +37,9 @@ def bases(folder: Path) -> dict[str, dict[str, bytes]]:
             files = {one.name: one.read_bytes() for one in out.iterdir() if one.name != "manifest.json"}
             inputs = {one.name: one.read_bytes() for one in (EXAMPLES / name).iterdir() if one.is_file()}
             found[label] = {**inputs, **files}
-    return found
+    if not (folder / SIGNED / ROOT_PEM).exists():
+        signed(folder / SIGNED, folder / REPORTED[0])
+    return {**found, SIGNED: {one.name: one.read_bytes() for one in (folder / SIGNED).iterdir()}}
 
 
 def good(number: int, folder: Path, seed: int = SEED) -> Path:
@@ -53,7 +57,7 @@ def good(number: int, folder: Path, seed: int = SEED) -> Path:
     (job / "job.toml").write_text(toml, encoding="utf-8")
     recording = next(job.glob("*.csv")) if not (job / "recording.csv").exists() else job / "recording.csv"
     recording.write_text(_noisy(recording.read_text(encoding="utf-8"), rng), encoding="utf-8")
-    write = write_diagnosis if rng.random() < 0.15 else write_report
+    write = write_diagnosis if rng.random() < 0.15 and not name.startswith("shift") else write_report
     write(job, out, seed=rng.randrange(1000))
     return out
 

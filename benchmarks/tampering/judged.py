@@ -27,12 +27,16 @@ def judged(case: Case, folder: Path) -> dict[str, Any]:
     for name, content in case.files.items():
         (folder / name).write_bytes(content)
     paths = [folder / name for name in case.files]
+    trust = None
+    if case.trust is not None:
+        trust = [folder.with_suffix(".pem")]
+        trust[0].write_bytes(case.trust)
     record: dict[str, Any] = {"number": case.number, "base": case.base, "file": case.file, "form": case.form,
                               "given": sorted({name.rpartition(".")[2] for name in case.files}), "how": case.how,
                               "what": case.what}  # fmt: skip
     began = time.monotonic()
     try:
-        found = verify(paths, compute=_once).inquiry
+        found = verify(paths, compute=_once, trust=trust).inquiry
         record |= {"said": found.word, "findings": [str(one) for one in found.findings[:5]],
                    "checks": sorted({one.check for one in found.findings}),
                    "not_checked": [str(one) for one in found.unchecked]}  # fmt: skip

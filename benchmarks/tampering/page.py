@@ -12,7 +12,8 @@ FOUND = ("NOT VERIFIED", "REFUSED")
 def written(altered: Sequence[dict[str, Any]], good: Sequence[dict[str, Any]], *, seed: int, commit: str) -> str:
     """The page."""
     found = [one for one in altered if one["said"] in FOUND]
-    missed = [one for one in altered if one["said"] not in FOUND]
+    neutral = [one for one in altered if one["said"] == "VERIFIED" and one["how"] == "forged_hash"]
+    missed = [one for one in altered if one["said"] not in FOUND and one not in neutral]
     without = [one for one in found if one["checks"] != ["again"]]
     refused = [one for one in good if one["said"] != "VERIFIED" or one["findings"]]
     lines = [
@@ -21,9 +22,12 @@ def written(altered: Sequence[dict[str, Any]], good: Sequence[dict[str, Any]], *
         f"Seed {seed}, commit `{commit}`. Each case alters one thing of one certificate or diagnosis and verifies what",
         "an auditor has of it: the PDF alone, the PDF with further forms, or everything but the PDF.",
         "The generator of alterations knows files, not the package.", "",
-        "| | cases | found | of these without computing again | not found | seconds, median |",
-        "| --- | --- | --- | --- | --- | --- |",
-        f"| altered | {len(altered)} | {len(found)} | {len(without)} | {len(missed)} | {_median(altered)} |", "",
+        "| | cases | found | without computing again | changes nothing stated | not found | seconds, median |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+        f"| altered | {len(altered)} | {len(found)} | {len(without)} | {len(neutral)} | {len(missed)} | {_median(altered)} |",
+        "", "What changes nothing that is stated is an input altered together with its hash, so that the files are a",
+        "certificate of that input; computed again from it, every figure and the page are the same to the byte, as of a",
+        "coordinate that the kind does not use, or of the order of two keys.", "",
         f"Good certificates: {len(good)}, refused or not wholly verified: {len(refused)};",
         f"median {_median(good)} s for both, with computing again and without.", "", "## By form and alteration", "",
         "| form | alteration | cases | found | without computing again |", "| --- | --- | --- | --- | --- |",
@@ -33,6 +37,15 @@ def written(altered: Sequence[dict[str, Any]], good: Sequence[dict[str, Any]], *
     plain = Counter((one["form"], one["how"]) for one in without)
     for (form, how), n in sorted(count.items()):
         lines.append(f"| {form} | {how} | {n} | {hit[form, how]} | {plain[form, how]} |")
+    if neutral:
+        lines += [
+            "",
+            "## Changes nothing that is stated",
+            "",
+            "| case | certificate | file | alteration |",
+            "| --- | --- | --- | --- |",
+        ]
+        lines += [f"| {one['number']} | {one['base']} | {one['file']} | {_cell(one['what'])} |" for one in neutral]
     if missed:
         lines += ["", "## Not found", "", "| case | certificate | form | alteration | said | not checked |",
                   "| --- | --- | --- | --- | --- | --- |"]  # fmt: skip

@@ -58,7 +58,9 @@ def main() -> None:
 def _records(path: Path) -> list[dict[str, Any]]:
     if not path.exists():
         return []
-    found = {record["number"]: record for record in map(json.loads, path.read_text(encoding="utf-8").splitlines())}
+    found = {
+        record["number"]: record for record in map(json.loads, path.read_text(encoding="utf-8").strip().split("\n"))
+    }
     return [found[number] for number in sorted(found)]
 
 
@@ -67,7 +69,8 @@ def _run(work: Any, path: Path, count: int, workers: int) -> None:
     done = {record["number"] for record in _records(path)}
     left = [number for number in range(count) if number not in done]
     began = time.monotonic()
-    with multiprocessing.get_context("spawn").Pool(workers, maxtasksperchild=400) as pool, path.open("a") as file:
+    spawn = multiprocessing.get_context("spawn")
+    with spawn.Pool(workers, maxtasksperchild=400) as pool, path.open("a", encoding="utf-8") as file:
         for record in pool.imap_unordered(work, left, chunksize=4):
             file.write(json.dumps(record, ensure_ascii=False) + "\n")
             file.flush()

@@ -39,7 +39,15 @@ def command(
     trust: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Certificates that you trust, PEM or DER: a file or a folder; again for more.", metavar="FILE|DIR"
+            help="Certificates that you trust, PEM or DER: a file or a folder; again for more.",
+            metavar="FILE|DIR",
+            show_default="nobody",
+        ),
+    ] = None,
+    schema: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder with PTB's schemas of the DCC, that the XML is held to.", metavar="DIR", show_default="none"
         ),
     ] = None,
     quiet: Quiet = False,
@@ -55,7 +63,7 @@ def command(
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.verify import verify
 
-        found = verify(files, rerun=rerun, trust=trust or None, stage=stage or (lambda what, part: None))
+        found = verify(files, rerun=rerun, trust=trust or None, schema=schema, stage=stage or (lambda what, part: None))
     inquiry = found.inquiry
     if json:
         put_data({"schema": "cmm-uq/verification/1", "subject": found.subject, **inquiry.as_data()})

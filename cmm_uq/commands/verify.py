@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from cmm_uq import __version__
 from cmm_uq.errors import CmmUqError
 from cmm_uq.languages.language import ENGLISH, Code
-from cmm_uq.verification.digital import open_digital
+from cmm_uq.verification.digital import check_schema, open_digital
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.given import RESULTS, RESULTS_SCHEMA, Given, check_files, read_given
 from cmm_uq.verification.signed import check_signatures
@@ -54,8 +54,8 @@ class Verification:
 
 
 def verify(
-    paths: Iterable[Path], *, rerun: bool = True, trust: Iterable[Path] | None = None, compute: Compute | None = None,
-    stage: Stage = lambda what, part: None,
+    paths: Iterable[Path], *, rerun: bool = True, trust: Iterable[Path] | None = None, schema: Path | None = None,
+    compute: Compute | None = None, stage: Stage = lambda what, part: None,
 ) -> Verification:  # fmt: skip
     """Verify the files of one certificate.
 
@@ -64,6 +64,7 @@ def verify(
     paths : PDF, XML, HTML, ``results.json`` and what belongs to them, or the folder of a report.
     rerun : whether everything is computed again from the inputs.
     trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
+    schema : folder with PTB's schemas, that the digital certificate is held to as well.
     compute : the second computation; :func:`again` where none is given.
     stage : told of progress.
 
@@ -84,6 +85,8 @@ def verify(
         trusted = trust_of(tuple(trust))
     job = _compare(inquiry, given)
     check_signatures(inquiry, given, trusted)
+    if schema is not None:
+        check_schema(inquiry, given, schema)
     alike = False
     if not rerun:
         inquiry.left("computing again", "not asked for (--no-rerun)")
@@ -217,6 +220,7 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
     CmmUqError : nothing.
     """
     from cmm_uq.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
+    from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
     from cmm_uq.verification.again import Again
 
     data = given.results[1] if given.results else {}
@@ -224,26 +228,37 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
     if "estimates" in data:
         form, outcome = REPORT, report_outcome(job, seed=seed, stage=stage)
     else:
-        form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, stage=stage)
-    written = form.contents(outcome, stage, finished=partial(_as_signed, given))
+        alpha = _alpha(data, FALSE_ALARMS)
+        form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, alpha=alpha, stage=stage)
+    kept: list[str] = []
+    written = form.contents(outcome, stage, finished=partial(_as_attached, given, kept))
     pdf = next((content for name, content in written.items() if name.endswith(".pdf")), None)
     files = {name: content for name, content in written.items() if not name.endswith(".pdf")}
     if given.pdf is None or pdf is None:
-        return Again(files)
+        return Again(files, kept=tuple(kept))
     made, here = given.pdf[1].information.get("/Creator", ""), _creator(pdf)
     if made != here:
-        return Again(files, None, f"they were set by {made or 'another program'}, and here is {here}")
-    return Again(files, pdf)
+        return Again(files, None, f"they were set by {made or 'another program'}, and here is {here}", tuple(kept))
+    return Again(files, pdf, kept=tuple(kept))
 
 
-def _as_signed(given: Given, name: str, content: bytes) -> bytes:
-    """The digital certificate as it is attached: signed, where it is the same but for that."""
-    attached = given.files.get(name)
-    if attached is None or attached == content or not name.endswith(".xml"):
-        return content
+def _as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
+    """A file as it is attached where it is the same but for a signature, or for the platform, which is then kept in mind."""
+    from cmm_uq.documents.provenance import FILE, same_but_for_the_platform
     from cmm_uq.verification.digital import same_unsigned
 
-    return attached if same_unsigned(attached, content, name) else content
+    attached = given.files.get(name)
+    if attached is None or attached == content or not (name == FILE or name.endswith(".xml")):
+        return content
+    try:
+        if name.endswith(".xml"):
+            return attached if same_unsigned(attached, content, name) else content
+        if not same_but_for_the_platform(attached, content):
+            return content
+    except (CmmUqError, ValueError):
+        return content
+    kept.append(name)
+    return attached
 
 
 def _seed(data: Mapping[str, Any]) -> int:
@@ -251,6 +266,13 @@ def _seed(data: Mapping[str, Any]) -> int:
     if not isinstance(seed, int) or seed < 0:
         raise CmmUqError(f"{seed!r} is no seed", where=f"{RESULTS}: sampling.seed")
     return seed
+
+
+def _alpha(data: Mapping[str, Any], usual: float) -> float:
+    alpha = (data.get("diagnosis") or {}).get("false_alarms", usual)
+    if not isinstance(alpha, float) or not 0.0 < alpha < 1.0:
+        raise CmmUqError(f"{alpha!r} is no rate of false alarms", where=f"{RESULTS}: diagnosis.false_alarms")
+    return alpha
 
 
 def _creator(pdf: bytes) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.statement import Decided, Statement
-from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
+from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import corrections
 from cmm_uq.documents.as_json import as_json as as_json
@@ -113,6 +113,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         **({} if found.simulated is None else {"simulation": _simulation(found.simulated, d)}),
         "verdict": d.verdict,
         "p_value": d.p_value,
+        **false_alarms(d.alpha),
         "where": [
             {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,
              "amplitude_um": place.amplitude_um, "what": place.what, "direction": place.along, "also": list(place.also)}
@@ -145,6 +146,11 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
             "conformity": [{"before": _statement(a), "after": _statement(b)} for a, b in changes.statements],
         },
     }  # fmt: skip
+
+
+def false_alarms(alpha: float) -> dict[str, float]:
+    """The rate of false alarms that was asked for, where it is not the usual one: without it nothing can be made again."""
+    return {} if alpha == FALSE_ALARMS else {"false_alarms": alpha}
 
 
 def _simulation(simulated: Simulated, diagnosis: Diagnosis) -> dict[str, Any]:

@@ -126,6 +126,7 @@ RESULTS: Mapping[str, str] = MappingProxyType(
         "conformity[].errors[].position": "Where it was measured, in words.",
         "conformity[].errors[].standing": "What it counts for in the test.",
         "diagnosis.verdict": "Whether recording and model agree: consistent, explained, partial or unexplained.",
+        "diagnosis.false_alarms": "Rate of false alarms that was asked for, where it is not 0.01.",
         "diagnosis.p_value": "Of the lack-of-fit test.",
         "diagnosis.where[].KEY": "Where they do not agree: covariate, region, axis along which, what shows the same as well.",
         "diagnosis.effects[].effect": "An effect that was left out.",

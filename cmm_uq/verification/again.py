@@ -37,11 +37,13 @@ class Again:
     files : whatever the command writes, by name, with ``results.json``; without the PDF.
     pdf : the PDF, with the files attached that the given one has; ``None`` where it cannot be set by the same program.
     why_no_pdf : that is so.
+    kept : files that say on what platform they were made, and are otherwise what the inputs give.
     """
 
     files: Mapping[str, bytes]
     pdf: bytes | None = None
     why_no_pdf: str = ""
+    kept: tuple[str, ...] = ()
 
 
 Difference = tuple[str, Any, Any]
@@ -71,6 +73,10 @@ def compare_again(inquiry: Inquiry, given: Given, again: Again) -> bool:
     found = differences(data, new)
     for path, stands, should in found if not kernels else beyond_sampling(data, new, found):
         inquiry.wrong("again", name, path, "is not what its inputs give", stands, should)
+    for kept in again.kept:
+        inquiry.left(
+            f"platform and versions of packages in {kept}", "they are others than here, and nothing else tells them"
+        )
     alike = _compare_html(inquiry, given, again, kernels=kernels)
     _compare_attached(inquiry, given, again, kernels=kernels)
     return same and _compare_pdf(inquiry, given, again) and alike

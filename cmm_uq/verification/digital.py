@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmm_uq.errors import CmmUqError
@@ -47,6 +48,7 @@ def open_digital(inquiry: Inquiry, given: Given) -> None:
     if document is None:
         inquiry.wrong("forms", name, "/dcc:digitalCalibrationCertificate", "carries no copy for reading")
         return
+    given.page_inside = document.data
     place = "/dcc:digitalCalibrationCertificate/dcc:document"
     if given.html is None:
         where = f"{document.file_name} in {name}"
@@ -73,19 +75,41 @@ def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
         return
     import json
 
-    from cmm_uq.dcc import read, written
+    from cmm_uq.dcc import written
     from cmm_uq.documents.digital_certificate import digital_certificate
 
     name, content = given.xml
-    document = read(content, name).document
     try:
-        should = written(
-            digital_certificate(json.loads(given.results[2]), job, html=None if document is None else document.data)
-        )
+        should = written(digital_certificate(json.loads(given.results[2]), job, html=given.page_inside))
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, CmmUqError) as error:
         inquiry.wrong("forms", name, "", f"cannot be made of {given.results[0]} ({type(error).__name__}: {error})")
         return
     _compare(inquiry, name, content, should, given.results[0])
+
+
+def check_schema(inquiry: Inquiry, given: Given, folder: Path) -> None:
+    """Keep what the schema of PTB refuses.
+
+    Parameters
+    ----------
+    folder : with the schemas.
+
+    Raises
+    ------
+    CmmUqError : there is no digital certificate, no schema of its version there, or what reads schemas is not installed.
+    """
+    from cmm_uq.dcc.schema import checked_by_schema
+
+    if given.xml is None:
+        raise CmmUqError("there is no digital certificate to be held to a schema", where="--schema", fix="Leave it out")
+    inquiry.looked("files")
+    try:
+        checked_by_schema(given.xml[1], folder, given.xml[0])
+    except CmmUqError as error:
+        if error.where is None or not error.where.startswith(given.xml[0]):
+            raise
+        for one in (error, *error.also):
+            inquiry.wrong("files", given.xml[0], (one.where or "").removeprefix(f"{given.xml[0]}, "), one.problem)
 
 
 def same_unsigned(one: bytes, other: bytes, where: str) -> bool:
@@ -101,14 +125,14 @@ def _compare(inquiry: Inquiry, name: str, content: bytes, should: bytes, source:
     inquiry.looked("forms")
     if content == should:
         return
-    root = parsed(content, name)
+    root, wished = parsed(content, name), parsed(should, source)
     count = 0
-    for path, stands, wanted in differences(root, parsed(should, source)):
+    for path, stands, wanted in differences(root, wished):
         count += 1
         if count > _MOST:
             break
         inquiry.wrong("forms", name, path, f"is not what {source} says", stands, wanted)
-    if not count and not any(_is_signature(child) for child in root.children):
+    if not count and not any(map(_is_signature, (*root.children, *wished.children))):
         inquiry.wrong(
             "forms", name, "", "is written otherwise, though it says the same: it is not the file that was made"
         )

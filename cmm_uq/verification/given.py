@@ -32,6 +32,7 @@ class Given:
     ----------
     pdf, html, xml, results : each with its name; ``None`` where it is not given. ``results`` may be the one inside the PDF.
     digital_inside : whether the XML is the one inside the PDF.
+    page_inside : the page that the XML carries.
     others : further files by name: inputs, draws of the posterior.
     manifest : of a folder.
     """
@@ -41,6 +42,7 @@ class Given:
     xml: tuple[str, bytes] | None = None
     results: tuple[str, dict[str, Any], bytes] | None = None
     digital_inside: bool = False
+    page_inside: bytes | None = None
     others: dict[str, bytes] = field(default_factory=dict)
     manifest: Manifest | None = None
     contents: dict[str, bytes] = field(default_factory=dict)
@@ -140,27 +142,36 @@ def _once(before: object, what: str, where: str) -> None:
 def check_files(inquiry: Inquiry, given: Given) -> None:
     """Keep what does not belong in the files, and which of them are not what the folder's manifest says."""
     if given.pdf is not None:
-        name, pdf = given.pdf
-        inquiry.looked("files")
-        for place, problem in pdf.problems:
-            inquiry.wrong("files", name, place, problem)
-        seen: set[str] = set()
-        for one in pdf.attachments:
-            if one.name in seen:
-                inquiry.wrong("files", name, f"attachment {one.name}", "is attached twice: readers may show either")
-            seen.add(one.name)
-            if not plain_name(one.name) or "/" in one.name:
-                inquiry.wrong("files", name, f"attachment {one.name}", "has a name that leads out of its folder")
-            should = "Data" if one.name.lower().endswith((".json", ".npz", ".xml")) else "Source"
-            if one.relationship != should:
-                inquiry.wrong("files", name, f"attachment {one.name}", "has another relationship to the document",
-                              one.relationship, should)  # fmt: skip
+        _check_pdf(inquiry, *given.pdf)
+        inside = given.pdf[1].files
+        for name in sorted(given.others.keys() & inside.keys()):
+            inquiry.looked("forms")
+            if given.others[name] != inside[name]:
+                inquiry.wrong("forms", name, "", f"is another file than the one of that name in {given.pdf[0]}")
     if given.html is not None:
         inquiry.looked("files")
         for place, problem in given.html[1].problems:
             inquiry.wrong("files", given.html[0], place, problem)
     if given.manifest is not None:
         _check_manifest(inquiry, given, given.manifest)
+
+
+def _check_pdf(inquiry: Inquiry, name: str, pdf: PdfFile) -> None:
+    """What does not belong in a PDF, and what is wrong with the names of its files."""
+    inquiry.looked("files")
+    for place, problem in pdf.problems:
+        inquiry.wrong("files", name, place, problem)
+    seen: set[str] = set()
+    for one in pdf.attachments:
+        place = f"attachment {one.name}"
+        if one.name in seen:
+            inquiry.wrong("files", name, place, "is attached twice: readers may show either")
+        seen.add(one.name)
+        if not plain_name(one.name) or "/" in one.name:
+            inquiry.wrong("files", name, place, "has a name that leads out of its folder")
+        should = "Data" if one.name.lower().endswith((".json", ".npz", ".xml")) else "Source"
+        if one.relationship != should:
+            inquiry.wrong("files", name, place, "has another relationship to the document", one.relationship, should)
 
 
 def _check_manifest(inquiry: Inquiry, given: Given, manifest: Manifest) -> None:

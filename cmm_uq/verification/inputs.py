@@ -54,10 +54,6 @@ def inputs_of(inquiry: Inquiry, given: Given) -> dict[str, bytes] | None:
             inquiry.wrong(
                 "inputs", _file_of(given, input_), "", f"is not the file whose hash {name} has", stands, digest
             )
-        if input_ in given.others and files[input_] != given.others[input_]:
-            inquiry.wrong(
-                "inputs", input_, "", f"is another file than the one of that name in {given.pdf and given.pdf[0]}"
-            )
     if given.pdf is None and not sound and not (wanted.keys() & files.keys()):
         inquiry.left("inputs", "neither a PDF that has them inside nor the files themselves are given")
     elif given.pdf is None and not sound:
@@ -85,8 +81,6 @@ def _check_posterior(inquiry: Inquiry, given: Given, data: Mapping[str, Any], fi
     if stands != entry["sha256"]:
         inquiry.wrong("inputs", _file_of(given, name), "", "is not the file whose hash results.json has", stands,
                       entry["sha256"])  # fmt: skip
-    if name in given.others and given.others[name] != files[name]:
-        inquiry.wrong("inputs", name, "", "is another file than the one of that name in the PDF")
 
 
 def check_job(inquiry: Inquiry, job: Job, data: Mapping[str, Any], file: str) -> None:

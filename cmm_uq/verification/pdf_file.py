@@ -94,7 +94,7 @@ class PdfFile:
         ------
         CmmUqError : they are damaged, or beyond the limits.
         """
-        with _reading(self.where):
+        with reading(self.where):
             return list(_texts(self))
 
     @property
@@ -125,13 +125,13 @@ def read_pdf(content: bytes, where: str) -> PdfFile:
         if not content.startswith(b"xref", int(match[1])):
             raise CmmUqError("has no table of its objects where it says: it is damaged, or no PDF of cmm-uq",
                              where=f"{where}: byte {match.start()}", fix=_FIX)  # fmt: skip
-    with _reading(where):
+    with reading(where):
         _read(found, where)
     return found
 
 
 @contextmanager
-def _reading(where: str) -> Iterator[None]:
+def reading(where: str) -> Iterator[None]:
     """Whatever a damaged file makes of the library that reads it, said in one sentence."""
     from pypdf.errors import PyPdfError
 

@@ -6,6 +6,8 @@ import io
 import re
 from typing import Any
 
+from cmm_uq.verification.pdf_file import reading
+
 MOST = 8
 """Differences that are told."""
 
@@ -25,8 +27,9 @@ def differing_parts(stands: bytes, should: bytes) -> list[Part]:
     """
     from pypdf import PdfReader
 
-    a, b = (PdfReader(io.BytesIO(content), strict=False).trailer for content in (stands, should))
-    return _Pairs().compared(a, b)
+    with reading("the PDF"):
+        a, b = (PdfReader(io.BytesIO(content), strict=False).trailer for content in (stands, should))
+        return _Pairs().compared(a, b)
 
 
 class _Pairs:

@@ -67,13 +67,12 @@ def test_without_computing_again_not_everything_is_checked(made: Path) -> None:
 
 
 @pytest.mark.parametrize(("old", "new", "place"), [
-    (">404.2051<", ">404.2061<", "page 1"), ("> 339.9", "> 39.9", ""), ("2004-09-01", "2014-09-01", "information /Subject"),
+    (">404.2051<", ">404.2061<", "page 1"), ("2004-09-01", "2014-09-01", "information /Subject"),
     (">ppm<", ">ppb<", "page"), ("Fail</p>", "Pass</p>", "page"),
 ])  # fmt: skip
 def test_html_that_says_something_else_than_the_pdf_is_named(made: Path, old: str, new: str, place: str) -> None:
     page = (made / "certificate.html").read_text(encoding="utf-8")
-    if old not in page:
-        pytest.skip(f"{old!r} is not on the page")
+    assert old in page
     pdf, inquiry = read_pdf((made / "certificate.pdf").read_bytes(), "certificate.pdf"), Inquiry()
     spoilt = read_html(page.replace(old, new, 1).encode(), "certificate.html")
     compare_views(inquiry, pdf, spoilt, files=("certificate.pdf", "certificate.html"))

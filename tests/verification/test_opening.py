@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import pikepdf
 import pytest
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.files.limits import PDF_UNPACKED
+from cmm_uq.verification import pdf_file
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.given import Given, check_files, read_given
 from cmm_uq.verification.html_page import read_html
@@ -116,8 +119,10 @@ def test_an_encrypted_pdf_is_refused(made: Path) -> None:
 
 
 def test_a_stream_that_unpacks_without_end_is_refused(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thousand times as large as it is packed; here with a lower limit, so that it is soon reached."""
+    monkeypatch.setattr(pdf_file, "PDF_UNPACKED", replace(PDF_UNPACKED, most=30_000_000))
     packing = zlib.compressobj()
-    bomb = b"".join(packing.compress(bytes(10**6)) for _ in range(450)) + packing.flush()
+    bomb = b"".join(packing.compress(bytes(10**6)) for _ in range(40)) + packing.flush()
 
     def change(pdf: pikepdf.Pdf) -> None:
         pdf.Root.More = pikepdf.Stream(pdf, bomb, Filter=pikepdf.Name.FlateDecode)
