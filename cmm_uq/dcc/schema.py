@@ -74,7 +74,14 @@ def _schema(folder: Path, version: str, where: str) -> Any:
                 f"imports {location}, which is not beside it", where=str(file), fix="Put it into the same folder"
             )
         text = text.replace(f'"{location}"', f'"{Path(wanted).as_uri()}"')
-    return xmlschema.XMLSchema(text, base_url=str(folder), allow="local", defuse="always")
+    beside = {"http://qudt.org/vocab/": str(folder / "qudt.xsd")} if (folder / "qudt.xsd").is_file() else None
+    try:
+        return xmlschema.XMLSchema(text, base_url=str(folder), locations=beside, allow="local", defuse="always")
+    except xmlschema.XMLSchemaException as error:
+        problem = str(error).strip().partition("\n")[0]
+        raise CmmUqError(
+            f"cannot be used: {problem}", where=str(file), fix="What it imports has to be in the same folder"
+        ) from None
 
 
 def _beside(folder: Path) -> dict[str, Path]:

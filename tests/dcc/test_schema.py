@@ -134,3 +134,13 @@ def test_what_is_missing_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_a_certificate_of_3_3_is_one_too() -> None:
     made = written(certificate().with_changes(version="3.3.0"))
     assert by_lxml("3.3.0").validate(etree.fromstring(made))
+    checked_by_schema(made, FOLDER, "c.xml")
+
+
+def test_a_schema_that_cannot_be_used_is_said(tmp_path: Path, schema: Any) -> None:
+    (tmp_path / "dcc-3.2.1.xsd").write_bytes((FOLDER / "dcc-3.2.1.xsd").read_bytes())
+    with pytest.raises(CmmUqError, match="which is not beside it"):
+        checked_by_schema(GOOD, tmp_path, "c.xml")
+    (tmp_path / "SI_Format-2.1.0.xsd").write_text("<a/>", encoding="utf-8")
+    with pytest.raises(CmmUqError, match="cannot be used"):
+        checked_by_schema(GOOD, tmp_path, "c.xml")
