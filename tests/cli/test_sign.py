@@ -85,7 +85,7 @@ def test_a_signed_report_is_one_set_and_says_who_signed(key: Path, laboratory: P
     done = run("report", laboratory / "job", "--out", out, "--records", "none", "--sign", key)
     assert done.returncode == 0, done.stderr
     assert done.stdout.endswith(
-        f"Signed by TEST KEY – A. Huber on 2026-03-02 09:30 UTC: certificate.pdf\nTEST KEY: {NOTE}\n"
+        f"Signed by TEST KEY – A. Huber on 2026-03-02 09:30 UTC: certificate.xml, certificate.pdf\nTEST KEY: {NOTE}\n"
     )
     (found,) = signatures_of_pdf((out / "certificate.pdf").read_bytes(), trust_of([key.with_suffix(".pem")]))
     assert (found.intact, found.trusted, found.covers_whole_file, found.problems) == (True, True, True, ())

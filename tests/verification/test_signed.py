@@ -76,7 +76,7 @@ def test_a_signature_of_somebody_else_is_named(certificate: Path, again: Again, 
 
 def test_a_test_key_is_named(certificate: Path, again: Again, tmp_path: Path, trusted: list[Path]) -> None:
     key = tmp_path / "key.p12"
-    key.write_bytes(signing.test_key("A. Huber", "open", SIGNED - dt.timedelta(days=1)))
+    key.write_bytes(signing.trial_key("A. Huber", "open", SIGNED - dt.timedelta(days=1)).key)
     pdf = certificate / "certificate.pdf"
     pdf.write_bytes(sign_pdf(pdf.read_bytes(), signer_of_file(key, "open"), seal=None, at=SIGNED))
     assert "test key" in told_of(inquiry(certificate, again, None))
