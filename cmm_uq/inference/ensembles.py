@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from cmm_uq.inference.proposals import LogDensity, Proposal
+from cmm_uq.inference.proposals import LogDensity, Proposes
 from cmm_uq.inference.side_by_side import SideBySide
 from cmm_uq.points import Floats
 
@@ -75,7 +75,7 @@ def converged(ess_min: float, rhat_max: float, steps: int, autocorrelation_time:
 
 def run_ensembles(
     density: LogDensity,
-    proposal: Proposal,
+    proposal: Proposes,
     seed: int,
     progress: Progress | None = None,
     *,
@@ -125,7 +125,7 @@ def _randoms(seed: int) -> list[Any]:
     return [np.random.RandomState(np.random.MT19937(child)) for child in np.random.SeedSequence(seed).spawn(ENSEMBLES)]
 
 
-def _start(density: LogDensity, proposal: Proposal, walkers: int, random: Any) -> Floats:
+def _start(density: LogDensity, proposal: Proposes, walkers: int, random: Any) -> Floats:
     """Where the walkers begin: draws that the density does not forbid."""
     z = proposal.draws(walkers, random)
     for _ in range(100):
