@@ -144,30 +144,33 @@ class Marginal:
 
     def _without_slow_noise(self, slow: SlowFirst, v: Floats, sizes: Sizes) -> tuple[Floats, Floats]:
         """As :meth:`_factors`, slow noise eliminated ahead of the placings."""
-        precision, log = self._of_slow(sizes)
+        precision, ties, log = self._of_slow(sizes)
         c, free = precision.shape[1], self._freedoms.count
         P = len(self._length)
         prior = np.zeros((free + P - c, free + P - c))
         prior[free:, free:] = self._prior[c:, c:]
         at = np.arange(free)
         prior[at, at] = self._absent.ravel()
-        left, logs = slow.precision(v, prior.ravel(), precision)
+        left, logs = slow.precision(v, prior.ravel(), precision, self._tied, ties)
         diagonal = np.arange(left.shape[1])
         left[:, diagonal, diagonal] *= 1 + _JITTER
         return _cholesky(left), log - 0.5 * np.log(v) @ self._counts - logs
 
-    def _of_slow(self, sizes: Sizes) -> tuple[Floats, Floats]:
-        """Precision (w, c, c) beforehand of slow noise' coefficients, and half the logarithm of its determinant (w,)."""
+    def _of_slow(self, sizes: Sizes) -> tuple[Floats, Floats, Floats]:
+        """Precision (w, c) beforehand of slow noise' coefficients, how much they are tied (w,), and half the logarithm of the
+        determinant (w,), which the ties leave as it is.
+        """
         variances = np.maximum(self.noise.variances(sizes)[1], (1e-6 * self._scale) ** 2)
-        c, at = variances.shape[1], np.arange(variances.shape[1])
-        own = self._length[:c]
-        precision = np.zeros((len(variances), c, c))
-        precision[:, at, at] = 1 / (variances * own**2)
-        walks = sizes.rate == 0
-        if np.any(walks):
-            constant = int(np.flatnonzero(self.noise.frequency == 0)[0])  # all have one variance
-            precision[walks] += self.noise.tied / own / own[:, None] / variances[walks, constant, None, None]
-        return precision, -0.5 * np.log(variances).sum(axis=1)
+        constant = int(np.flatnonzero(self.noise.frequency == 0)[0])  # all have one variance
+        ties = np.where(sizes.rate == 0, 1 / variances[:, constant], 0.0)
+        own = self._length[: variances.shape[1]]
+        return 1 / (variances * own**2), ties, -0.5 * np.log(variances).sum(axis=1)
+
+    @cached_property
+    def _tied(self) -> Floats:
+        """(c, c) what ties the coefficients of a random walk, in units of the columns."""
+        own = self._length[: self.noise.slow.shape[1]]
+        return np.asarray(self.noise.tied / own / own[:, None])
 
     def _factors(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them.
@@ -188,8 +191,9 @@ class Marginal:
         if absent:  # what is left of slow noise whose variance goes to zero
             log += np.log(self._length[:c]).sum()
         else:
-            precision, own = self._of_slow(sizes)
-            whole[:, :c, :c] += precision
+            precision, ties, own = self._of_slow(sizes)
+            whole[:, :c, :c] += ties[:, None, None] * self._tied
+            whole.reshape(len(whole), -1)[:, : c * P : P + 1] += precision
             log += own
         whole.reshape(len(whole), -1)[:, :: P + 1] *= 1 + _JITTER
         if self._freedoms.count:
@@ -219,7 +223,10 @@ class Marginal:
         """Which sizes to reckon with at once: those without slow noise, which need smaller matrices, apart."""
         j, c = self._freedoms.columns.shape[1], self.noise.slow.shape[1]
         for chosen, P in ((sizes.slow == 0, len(self._length) - c), (sizes.slow > 0, len(self._length))):
-            size = max(1, _NUMBERS // (P**2 + self._freedoms.count * (j + P) + 3 * len(self._counts)))
+            numbers = P**2 + self._freedoms.count * (j + P)
+            if P > len(self._length) - c and self._slow_first is not None:
+                numbers = self._slow_first.numbers
+            size = max(1, _NUMBERS // (numbers + 3 * len(self._counts)))
             at = np.flatnonzero(chosen)
             yield from (at[i : i + size] for i in range(0, len(at), size))
 

@@ -56,41 +56,52 @@ class SlowFirst:
 
     @cached_property
     def _bordered(self) -> list[tuple[Ints, Ints, Floats]]:
-        """Of each group: its columns, its classes, and the products (classes, c·(c + R)) of its cosines with everything."""
+        """Of each group: its columns, its classes, and the products (classes, (c + R)²) of its cosines with everything.
+
+        Those of the other columns with each other stay zero.
+        """
         found = []
         for columns, rows in self.groups:
             own, index = np.unique(self.classes[rows], return_inverse=True)
-            cosines = self.cosines[np.ix_(rows, columns)]
-            whole = np.hstack([cosines, self.others[rows]])
-            found.append((columns, own, products(cosines, whole, index, len(own))))
+            cosines, size = self.cosines[np.ix_(rows, columns)], len(columns) + self.others.shape[1]
+            whole = np.zeros((len(own), size, size))
+            every = np.hstack([cosines, self.others[rows]])
+            whole[:, :, : len(columns)] = products(every, cosines, index, len(own)).reshape(len(own), size, -1)
+            found.append((columns, own, whole.reshape(len(own), -1)))
         return found
 
-    def precision(self, v: Floats, prior: Floats, of_cosines: Floats) -> tuple[Floats, Floats]:
+    @cached_property
+    def numbers(self) -> int:
+        """In the largest matrices that one of the densities takes."""
+        return max((len(columns) + self.others.shape[1]) ** 2 for columns, _ in self.groups)
+
+    def precision(self, v: Floats, prior: Floats, of_cosines: Floats, tied: Floats, ties: Floats) -> tuple[Floats, Floats]:
         """What is left of the other columns' precision (w, R, R), and half the logarithm of the cosines' determinant (w,).
 
         Parameters
         ----------
         v : (w, classes) variance of the observations of each class.
         prior : (R²,) precision of the other columns beforehand.
-        of_cosines : (w, c, c) precision of the cosines beforehand, that of each axis by itself.
+        of_cosines : (w, c) precision of the cosines beforehand.
+        tied : (c, c) what ties those of one axis to each other.
+        ties : (w,) how much of it.
         """
-        w, R = len(v), self.others.shape[1]
+        w, R, tying = len(v), self.others.shape[1], np.flatnonzero(ties)
         left = ((1 / v) @ self._others + prior).reshape(w, R, R)
         most = _LARGEST * np.einsum("wii->wi", left).sum(axis=1)
         logs = np.zeros(w)
         for columns, own, of_classes in self._bordered:
             c = len(columns)
-            bordered = np.zeros((w, c + R, c + R))
-            now = ((1 / v[:, own]) @ of_classes).reshape(w, c, c + R)
-            bordered[:, :c] = now
-            bordered[:, c:, :c] = now[:, :, c:].transpose(0, 2, 1)
-            at, beyond = np.arange(c), np.arange(c, c + R)
-            bordered[:, :c, :c] += of_cosines[:, columns[:, None], columns]
-            bordered[:, beyond, beyond] = most[:, None]
+            bordered = ((1 / v[:, own]) @ of_classes).reshape(w, c + R, c + R)
+            if len(tying):
+                bordered[tying, :c, :c] += ties[tying, None, None] * tied[np.ix_(columns, columns)]
+            diagonal = bordered.reshape(w, -1)[:, :: c + R + 1]
+            diagonal[:, :c] += of_cosines[:, columns]
+            diagonal[:, c:] = most[:, None]
             factor = np.linalg.cholesky(bordered)
             rows = factor[:, c:, :c]
             left -= rows @ rows.transpose(0, 2, 1)
-            logs += np.log(factor[:, at, at]).sum(axis=1)
+            logs += np.log(np.einsum("wii->wi", factor)[:, :c]).sum(axis=1)
         return left, logs
 
 

@@ -65,11 +65,11 @@ def test_what_is_left_is_the_schur_complement() -> None:
     v, prior, own = (
         np.array([[1.0, 4.0, 0.25]]),
         np.diag([0.0, 0.1, 0.2, 0.3]),
-        np.diag(random.uniform(0.5, 2.0, 15)) + noise.tied,
+        random.uniform(0.5, 2.0, 15),
     )
-    left, logs = SlowFirst(noise.slow, others, classes, 3).precision(v, prior.ravel(), own[None])
+    left, logs = SlowFirst(noise.slow, others, classes, 3).precision(v, prior.ravel(), own[None], noise.tied, np.array([0.7]))
     weight = np.diag(1 / v[0, classes])
-    S = noise.slow.T @ weight @ noise.slow + own
+    S = noise.slow.T @ weight @ noise.slow + np.diag(own) + 0.7 * noise.tied
     across = noise.slow.T @ weight @ others
     wanted = others.T @ weight @ others + prior - across.T @ np.linalg.solve(S, across)
     assert left[0] == pytest.approx(wanted, rel=1e-10, abs=1e-10)
