@@ -82,6 +82,7 @@ def run_ensembles(
     effective_samples: int = EFFECTIVE_SAMPLES,
     steps_at_once: int = STEPS_AT_ONCE,
     walkers: int | None = None,
+    burn_in: int = BURN_IN,
 ) -> Chains:
     """Sample a density with emcee.
 
@@ -94,6 +95,7 @@ def run_ensembles(
     effective_samples : to reach in every parameter.
     steps_at_once : between two looks at how many there are.
     walkers : in each ensemble; by default 32, or four for each dimension.
+    burn_in : steps that are left out.
     """
     import emcee
 
@@ -106,7 +108,7 @@ def run_ensembles(
     begin = np.vstack([_start(whitened, proposal, walkers, random) for random in _randoms(seed)])
     move = SideBySide(proposal, _randoms(seed))
     sampler = emcee.EnsembleSampler(len(begin), d, whitened, vectorize=True, moves=[move])
-    state, steps = sampler.run_mcmc(begin, BURN_IN, store=False), 0
+    state, steps = sampler.run_mcmc(begin, burn_in, store=False), 0
     while True:
         state = sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
         steps += steps_at_once

@@ -257,20 +257,26 @@ class Marginal:
         return max(10_000, _NUMBERS_DRAWN // len(self._length) ** 2)
 
     def draw(self, sizes: Sizes, random: np.random.Generator) -> Floats:
-        """One exact draw (w, k) of the parameters for each of w sizes."""
+        """One exact draw (w, k) of the parameters for each of w sizes; sizes that come again are reckoned with once."""
         count, k = len(sizes.placing), len(self.model.unknowns)
         if not k:
             return np.zeros((count, 0))
         found = np.empty((count, k))
-        for part in self._batches(sizes):
-            factors, _ = self._factors(sizes.at(part))
+        first, index = sizes.different if np.any(sizes.slow) else (np.arange(count), np.arange(count))
+        once = sizes.at(first)
+        for part in self._batches(once):
+            factors, _ = self._factors(once.at(part))
             # the parameters stand last before the observations: the lower right of the factor is all that they need
-            own, mean = factors[:, -1 - k : -1, -1 - k : -1], factors[:, -1, -1 - k : -1]
+            lower, place = factors[:, -1 - k :, -1 - k : -1], np.full(len(first), -1)
+            place[part] = np.arange(len(part))
+            which = place[index]
+            drawn = np.flatnonzero(which >= 0)
+            own, mean = lower[which[drawn], :-1], lower[which[drawn], -1]
             normal = mean + random.standard_normal(mean.shape)
             for i in reversed(range(k)):  # back substitution
                 normal[:, i] /= own[:, i, i]
                 normal[:, :i] -= own[:, i, :i] * normal[:, i : i + 1]
-            found[part] = normal
+            found[drawn] = normal
         return np.asarray(self.estimate.value + found / self._length[-1 - k : -1])
 
 

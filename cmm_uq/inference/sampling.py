@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Progress, run_ensembles
+from cmm_uq.inference.ensembles import BURN_IN, LEAST_EFFECTIVE_SAMPLES, Progress, run_ensembles
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.marginal import Marginal
@@ -18,6 +18,9 @@ from cmm_uq.points import Floats
 
 _LOOKED_AT = 400
 """Draws by which it is judged whether slow noise is quicker than a few cosines."""
+
+_BURN_IN = 30
+"""Steps that are left out where what is proposed knows which components are present: each other one is taken, or more."""
 
 
 def sample_with_noise(
@@ -43,6 +46,7 @@ def sample_with_noise(
         effective_samples=LEAST_EFFECTIVE_SAMPLES,
         steps_at_once=100,
         walkers=max(16, (2 if noise.most else 4) * noise.dimension + 2 * bool(noise.most)),
+        burn_in=_BURN_IN if noise.most else BURN_IN,
     )  # everything but the noise is drawn independently, given it
     every = chains.thinning(marginal.affordable_draws)
     sizes = noise.sizes(chains.thinned(every))

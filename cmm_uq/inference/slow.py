@@ -75,7 +75,9 @@ class SlowFirst:
         """In the largest matrices that one of the densities takes."""
         return max((len(columns) + self.others.shape[1]) ** 2 for columns, _ in self.groups)
 
-    def precision(self, v: Floats, prior: Floats, of_cosines: Floats, tied: Floats, ties: Floats) -> tuple[Floats, Floats]:
+    def precision(
+        self, v: Floats, prior: Floats, of_cosines: Floats, tied: Floats, ties: Floats
+    ) -> tuple[Floats, Floats]:
         """What is left of the other columns' precision (w, R, R), and half the logarithm of the cosines' determinant (w,).
 
         Parameters
