@@ -15,7 +15,7 @@ import numpy as np
 from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel
-from cmm_uq.inference.noise import Components, Sizes
+from cmm_uq.inference.noise import Components, Sizes, slow_variances
 from cmm_uq.inference.slow import SlowFirst, products
 from cmm_uq.points import Floats, Ints
 
@@ -140,37 +140,49 @@ class Marginal:
         if not c or self._freedoms.count > _MOST_FREE:
             return None
         others = np.hstack([self._freedoms.dense(), self._turned[:, c:]])
-        return SlowFirst(self._turned[:, :c], others, self.noise.classes[0], len(self._counts))
+        index, shares = self.noise.classes
+        return SlowFirst(self._turned[:, :c], others, index, shares[:, -1], self._walk)
 
     def _without_slow_noise(self, slow: SlowFirst, v: Floats, sizes: Sizes) -> tuple[Floats, Floats]:
         """As :meth:`_factors`, slow noise eliminated ahead of the placings."""
-        precision, ties, log = self._of_slow(sizes)
+        precision, walks, log = self._of_slow(sizes)
         c, free = precision.shape[1], self._freedoms.count
         P = len(self._length)
         prior = np.zeros((free + P - c, free + P - c))
         prior[free:, free:] = self._prior[c:, c:]
         at = np.arange(free)
         prior[at, at] = self._absent.ravel()
-        left, logs = slow.precision(v, prior.ravel(), precision, self._tied, ties)
+        left, logs = slow.precision(v, prior.ravel(), precision, walks)
         diagonal = np.arange(left.shape[1])
         left[:, diagonal, diagonal] *= 1 + _JITTER
         return _cholesky(left), log - 0.5 * np.log(v) @ self._counts - logs
 
     def _of_slow(self, sizes: Sizes) -> tuple[Floats, Floats, Floats]:
-        """Precision (w, c) beforehand of slow noise' coefficients, how much they are tied (w,), and half the logarithm of the
-        determinant (w,), which the ties leave as it is.
+        """What is known beforehand of slow noise' coefficients.
+
+        Returns
+        -------
+        Precision (w, c) of all but walks; by what that of a walk is multiplied (w,), zero of what is none; half the
+        logarithm of the determinant (w,).
         """
         variances = np.maximum(self.noise.variances(sizes)[1], (1e-6 * self._scale) ** 2)
-        constant = int(np.flatnonzero(self.noise.frequency == 0)[0])  # all have one variance
-        ties = np.where(sizes.rate == 0, 1 / variances[:, constant], 0.0)
+        walks, constant = sizes.rate == 0, variances[:, 0]
+        variances[walks] = constant[walks, None] * self._walked
         own = self._length[: variances.shape[1]]
-        return 1 / (variances * own**2), ties, -0.5 * np.log(variances).sum(axis=1)
+        precision = np.where(walks[:, None], 0.0, 1 / (variances * own**2))
+        return precision, np.where(walks, 1 / constant, 0.0), -0.5 * np.log(variances).sum(axis=1)
 
     @cached_property
-    def _tied(self) -> Floats:
-        """(c, c) what ties the coefficients of a random walk, in units of the columns."""
+    def _walked(self) -> Floats:
+        """(c,) variances of the coefficients of a walk, over that of its first, which is a constant."""
+        variances = slow_variances(np.ones(1), np.zeros(1), self.noise.frequency)[0][0]
+        return np.asarray(variances / variances[0])
+
+    @cached_property
+    def _walk(self) -> Floats:
+        """(c, c) precision of the coefficients of a walk whose constants have the variance one, but for what ties them."""
         own = self._length[: self.noise.slow.shape[1]]
-        return np.asarray(self.noise.tied / own / own[:, None])
+        return np.asarray((np.diag(1 / self._walked) + self.noise.tied) / own / own[:, None])
 
     def _factors(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them.
@@ -191,8 +203,8 @@ class Marginal:
         if absent:  # what is left of slow noise whose variance goes to zero
             log += np.log(self._length[:c]).sum()
         else:
-            precision, ties, own = self._of_slow(sizes)
-            whole[:, :c, :c] += ties[:, None, None] * self._tied
+            precision, walks, own = self._of_slow(sizes)
+            whole[:, :c, :c] += walks[:, None, None] * self._walk
             whole.reshape(len(whole), -1)[:, : c * P : P + 1] += precision
             log += own
         whole.reshape(len(whole), -1)[:, :: P + 1] *= 1 + _JITTER
@@ -222,10 +234,12 @@ class Marginal:
     def _batches(self, sizes: Sizes) -> Iterator[Ints]:
         """Which sizes to reckon with at once: those without slow noise, which need smaller matrices, apart."""
         j, c = self._freedoms.columns.shape[1], self.noise.slow.shape[1]
-        for chosen, P in ((sizes.slow == 0, len(self._length) - c), (sizes.slow > 0, len(self._length))):
-            numbers = P**2 + self._freedoms.count * (j + P)
-            if P > len(self._length) - c and self._slow_first is not None:
-                numbers = self._slow_first.numbers
+        without, whole = (
+            (sizes.slow == 0, len(self._length) - c, None),
+            (sizes.slow > 0, len(self._length), self._slow_first),
+        )
+        for chosen, P, first in (without, whole):
+            numbers = first.numbers if first else P**2 + self._freedoms.count * (j + P)
             size = max(1, _NUMBERS // (numbers + 3 * len(self._counts)))
             at = np.flatnonzero(chosen)
             yield from (at[i : i + size] for i in range(0, len(at), size))

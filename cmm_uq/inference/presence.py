@@ -31,7 +31,7 @@ _SWITCHES = {"spread": ABSENT[AXES], PLACING: ABSENT[PLACING], GROWTH: ABSENT[GR
 _LEAST = -8.0
 """Of a standard normal number: what is less probable is not told from it."""
 
-_TRIED, _BY_PRIOR = 1500, 0.03
+TRIED, _BY_PRIOR = 1500, 0.03
 """Draws of a round; part of what is proposed that goes by the prior of what is present."""
 
 _OUTER, _FARTHER = 0.15, 2.0
@@ -214,7 +214,7 @@ def beginning(names: Sequence[str], log_sigma: float = 0.0, width: float = 1.0) 
     return Present(numbers, np.exp(numbers.log_prior), each)
 
 
-def present(density: LogDensity, begin: Present, seed: int, looks: int = _LOOKS) -> Present:
+def present(density: LogDensity, begin: Present, seed: int, looks: int = _LOOKS, tried: int = TRIED) -> Present:
     """An approximation of a density of the numbers that say the sizes of noise.
 
     Parameters
@@ -223,6 +223,7 @@ def present(density: LogDensity, begin: Present, seed: int, looks: int = _LOOKS)
     begin : from where to look.
     seed : of the draws.
     looks : how often to draw where the density itself is looked at.
+    tried : draws of each round.
     """
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(17,))))
     proposals: list[Present] = [begin]
@@ -230,7 +231,7 @@ def present(density: LogDensity, begin: Present, seed: int, looks: int = _LOOKS)
     gains: list[Floats] = []
     power, enough, left = 0.0, _ENOUGH, looks
     for _ in range(_ROUNDS):
-        z = proposals[-1].draws(_TRIED, random)
+        z = proposals[-1].draws(tried, random)
         draws = [*draws, z][-_RECALLED:]
         gains = [*gains, np.maximum(density(z) - begin.log_density(z), _NEVER)][-_RECALLED:]
         every, gain = np.vstack(draws), np.concatenate(gains)

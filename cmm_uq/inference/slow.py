@@ -2,6 +2,9 @@
 
 Observations that see one axis of the machine each share no cosine with those of another. The precision of the cosines is then
 made of blocks, and what is left of all other columns once they are eliminated is a small matrix.
+
+Where the noise beside a random walk is alike in all observations of an axis, the cosines are turned once into what they and
+that noise make independent of each other, and at new sizes there is nothing to factorise.
 """
 
 from __future__ import annotations
@@ -16,6 +19,9 @@ from cmm_uq.points import Floats, Ints
 _NOTHING = 1e-9
 """Part of the largest below which a cosine is zero for an observation."""
 
+_ALIKE = 1e-12
+"""Relative difference up to which variances are the same."""
+
 _LARGEST = 2.0
 """Times the largest product of the other columns: what makes a bordered matrix positive definite; its value has no effect."""
 
@@ -29,12 +35,20 @@ class SlowFirst:
     cosines : (m, c), turned.
     others : (m, R), turned.
     classes : (m,) the class of each observation, 0 to ``count`` − 1.
+    base : (count,) variance of each class, of any size, where the noise is alike in all observations.
+    walk : (c, c) precision beforehand of the cosines of a random walk of some size.
     """
 
     cosines: Floats
     others: Floats
     classes: Ints
-    count: int
+    base: Floats
+    walk: Floats
+
+    @property
+    def count(self) -> int:
+        """Of the classes."""
+        return len(self.base)
 
     @cached_property
     def groups(self) -> tuple[tuple[Ints, Ints], ...]:
@@ -73,38 +87,95 @@ class SlowFirst:
     @cached_property
     def numbers(self) -> int:
         """In the largest matrices that one of the densities takes."""
-        return max((len(columns) + self.others.shape[1]) ** 2 for columns, _ in self.groups)
+        return int(max((len(columns) + self.others.shape[1]) ** 2 for columns, _ in self.groups))
 
-    def precision(
-        self, v: Floats, prior: Floats, of_cosines: Floats, tied: Floats, ties: Floats
-    ) -> tuple[Floats, Floats]:
+    @cached_property
+    def _turned(self) -> list[_Turned]:
+        """Of each group."""
+        return [
+            _Turned.of(self._of_base(of_classes, own, len(columns)), self.walk[np.ix_(columns, columns)])
+            for columns, own, of_classes in self._bordered
+        ]
+
+    def _of_base(self, of_classes: Floats, own: Ints, c: int) -> Floats:
+        """Products (c + R, c) of cosines with everything where the noise is alike."""
+        return np.asarray(((1 / self.base[own]) @ of_classes).reshape(c + self.others.shape[1], -1)[:, :c])
+
+    def precision(self, v: Floats, prior: Floats, of_cosines: Floats, walks: Floats) -> tuple[Floats, Floats]:
         """What is left of the other columns' precision (w, R, R), and half the logarithm of the cosines' determinant (w,).
 
         Parameters
         ----------
         v : (w, classes) variance of the observations of each class.
         prior : (R²,) precision of the other columns beforehand.
-        of_cosines : (w, c) precision of the cosines beforehand.
-        tied : (c, c) what ties those of one axis to each other.
-        ties : (w,) how much of it.
+        of_cosines : (w, c) precision of the cosines beforehand, but for walks.
+        walks : (w,) by what that of a walk is to be multiplied; zero of what is none.
         """
-        w, R, tying = len(v), self.others.shape[1], np.flatnonzero(ties)
+        w, R = len(v), self.others.shape[1]
         left = ((1 / v) @ self._others + prior).reshape(w, R, R)
         most = _LARGEST * np.einsum("wii->wi", left).sum(axis=1)
         logs = np.zeros(w)
-        for columns, own, of_classes in self._bordered:
-            c = len(columns)
-            bordered = ((1 / v[:, own]) @ of_classes).reshape(w, c + R, c + R)
-            if len(tying):
-                bordered[tying, :c, :c] += ties[tying, None, None] * tied[np.ix_(columns, columns)]
-            diagonal = bordered.reshape(w, -1)[:, :: c + R + 1]
-            diagonal[:, :c] += of_cosines[:, columns]
-            diagonal[:, c:] = most[:, None]
+        for (columns, own, of_classes), turned in zip(self._bordered, self._turned, strict=True):
+            times = v[:, own] / self.base[own]
+            alike = (walks > 0) & (np.ptp(times, axis=1) <= _ALIKE * times[:, 0])
+            if alike.any():
+                lost, log = turned.lost(times[alike, 0], walks[alike])
+                left[alike] -= lost
+                logs[alike] += log
+            at = np.flatnonzero(~alike)
+            if not len(at):
+                continue
+            c, walking = len(columns), np.flatnonzero(walks[at])
+            bordered = ((1 / v[np.ix_(at, own)]) @ of_classes).reshape(len(at), c + R, c + R)
+            if len(walking):
+                bordered[walking, :c, :c] += walks[at][walking, None, None] * self.walk[np.ix_(columns, columns)]
+            diagonal = bordered.reshape(len(at), -1)[:, :: c + R + 1]
+            diagonal[:, :c] += of_cosines[np.ix_(at, columns)]
+            diagonal[:, c:] = most[at, None]
             factor = np.linalg.cholesky(bordered)
             rows = factor[:, c:, :c]
-            left -= rows @ rows.transpose(0, 2, 1)
-            logs += np.log(np.einsum("wii->wi", factor)[:, :c]).sum(axis=1)
+            left[at] -= rows @ rows.transpose(0, 2, 1)
+            logs[at] += np.log(np.einsum("wii->wi", factor)[:, :c]).sum(axis=1)
         return left, logs
+
+
+@dataclass(frozen=True, eq=False)
+class _Turned:
+    """Cosines of a walk in coordinates in which they are independent of each other, before and after noise that is alike.
+
+    Parameters
+    ----------
+    known : (c,) precision that noise of variance one leaves of each, where that beforehand is one.
+    taken : (c, R²) what each takes from the precision of the other columns.
+    log : half the logarithm of the determinant of the walk's precision.
+    """
+
+    known: Floats
+    taken: Floats
+    log: float
+
+    @classmethod
+    def of(cls, products: Floats, walk: Floats) -> _Turned:
+        """From inner products (c + R, c) of cosines with all columns, and the precision of a walk (c, c)."""
+        c, factor = len(walk), np.linalg.cholesky(walk)
+        own = np.linalg.solve(factor, np.linalg.solve(factor, products[:c].T).T)
+        known, axes = np.linalg.eigh(0.5 * (own + own.T))
+        across = axes.T @ np.linalg.solve(factor, products[c:].T)
+        taken = (across[:, :, None] * across[:, None, :]).reshape(c, -1)
+        return cls(np.maximum(known, 0.0), taken, float(np.log(np.diag(factor)).sum()))
+
+    def lost(self, variance: Floats, times: Floats) -> tuple[Floats, Floats]:
+        """What other columns' precision loses (w, R, R), and half the logarithm of the cosines' determinant (w,).
+
+        Parameters
+        ----------
+        variance : (w,) of the noise.
+        times : (w,) by what the precision of the walk is multiplied.
+        """
+        each = self.known / variance[:, None] + times[:, None]
+        size = int(np.sqrt(self.taken.shape[1]))
+        lost = (1 / (each * variance[:, None] ** 2)) @ self.taken
+        return lost.reshape(-1, size, size), self.log + 0.5 * np.log(each).sum(axis=1)
 
 
 def products(first: Floats, second: Floats, classes: Ints, count: int) -> Floats:
