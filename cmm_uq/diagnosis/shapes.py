@@ -177,10 +177,11 @@ def _more(shapes: Shapes, few: Sequence[_Density], told: Sequence[_Density]) -> 
     """
     n, d = shapes.latent.shape
     components = told[0].marginal.noise
-    begin = beginning(components.names[1:])
-    proposals = [present(density, begin, seed, tried=_TRIED) for seed, density in enumerate(few)]
-    if told is not few:
-        proposals = [present(*each, seed, 1, _TRIED) for seed, each in enumerate(zip(told, proposals, strict=True))]
+    near = present(few[0], beginning(components.names[1:]), 0, tried=_TRIED)
+    proposals = []
+    for seed, density in enumerate(told):  # beside rivals it costs the more, and lies near that without them
+        near = near if density is few[0] else present(density, near, seed, 1, _TRIED)
+        proposals.append(near)
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(len(proposals))))
     drawn = [proposal.parameters(proposal.draws(_MORE, random)) for proposal in proposals]
     numbers = np.vstack([shapes.latent[:, 1:], *drawn])

@@ -61,7 +61,7 @@ def test_cosines_that_meet_in_one_observation_are_eliminated_together() -> None:
 @pytest.mark.parametrize("walks", [0.0, 0.7])
 @pytest.mark.parametrize("alike", [False, True])
 def test_what_is_left_is_the_schur_complement(walks: float, alike: bool) -> None:
-    """Of the precision of cosines and other columns together, by dense algebra; a walk beside noise that is alike is turned."""
+    """Of the precision of cosines and other columns together, by dense algebra; a walk beside one noise is turned."""
     random, noise = np.random.default_rng(4), three_axes()
     others, classes = random.standard_normal((M, 4)), (AXIS + 3 * (PART > 0.5)).astype(np.int64)
     v = np.array([[1.0, 4.0, 0.25, 1.5, 6.0, 0.375], [2.0, 0.5, 3.0, 3.0, 0.75, 4.5]])
