@@ -91,6 +91,19 @@ def test_density_and_draws_do_not_depend_on_what_is_eliminated_first(monkeypatch
     assert draws[0] == pytest.approx(draws[1], rel=1e-7)
 
 
+def test_sizes_that_come_again_are_drawn_for_as_if_alone() -> None:
+    """Each of three, two of them mixed, by mean and standard deviation against draws of its own."""
+    noise, model = three_axes(), linear()
+    marginal, which = Marginal(model, noise, solve(model)), np.tile([0, 3, 1, 3], 5000)
+    mixed = marginal.draw(SIZES.at(which), np.random.default_rng(5))
+    for i in (0, 1, 3):
+        own, alone = mixed[which == i], marginal.draw(SIZES.at(np.full(5000, i)), np.random.default_rng(6))
+        u, count = alone.std(axis=0), len(own)
+        assert len(np.unique(own[:, 0])) == count
+        assert np.all(np.abs(own.mean(axis=0) - alone.mean(axis=0)) < 4.5 * u * np.sqrt(1 / count + 1 / 5000))
+        assert own.std(axis=0) == pytest.approx(u, rel=4.5 * np.sqrt(0.5 / count + 0.5 / 5000))
+
+
 def kernel(rate: float, sd: float) -> Floats:
     return np.asarray(sd**2 * np.exp(-rate * np.abs(PART[:, None] - PART)) * (AXIS[:, None] == AXIS))
 
