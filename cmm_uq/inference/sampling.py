@@ -16,7 +16,7 @@ from cmm_uq.inference.presence import beginning, present
 from cmm_uq.inference.proposals import Proposes, tempered, weights
 from cmm_uq.points import Floats
 
-_LOOKED_AT = 400
+_LOOKED_AT = 2000
 """Draws by which it is judged whether slow noise is quicker than a few cosines."""
 
 _BURN_IN = 30
