@@ -16,7 +16,7 @@ from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.noise import Components, Sizes, slow_variances
-from cmm_uq.inference.slow import SlowFirst, products
+from cmm_uq.inference.slow import SlowFirst, groups, products
 from cmm_uq.points import Floats, Ints
 
 SIGMA_BOUNDS = (1e-6, 10.0)
@@ -139,9 +139,12 @@ class Marginal:
         c = self.noise.slow.shape[1]
         if not c or self._freedoms.count > _MOST_FREE:
             return None
-        others = np.hstack([self._freedoms.dense(), self._turned[:, c:]])
+        cosines, group = self._turned[:, :c], np.full(len(self._turned), -1)
+        for number, (_, rows) in enumerate(groups(cosines)):
+            group[rows] = number
+        others = np.hstack([self._freedoms.apart(group).dense(), self._turned[:, c:]])
         index, shares = self.noise.classes
-        return SlowFirst(self._turned[:, :c], others, index, shares[:, -1], self._walk)
+        return SlowFirst(cosines, others, index, shares[:, -1], self._walk)
 
     def _without_slow_noise(self, slow: SlowFirst, v: Floats, sizes: Sizes) -> tuple[Floats, Floats]:
         """As :meth:`_factors`, slow noise eliminated ahead of the placings."""
