@@ -125,5 +125,5 @@ def test_what_is_free_is_told_apart_by_groups_as_far_as_that_goes() -> None:
         was = freedoms.columns[place == number]
         assert own @ own.T == pytest.approx(was @ was.T, abs=1e-12)
         assert own.T @ own == pytest.approx(np.diag(np.any(own, axis=0).astype(float)), abs=1e-12)
-        seen = [len(np.unique(axis[place == number][column != 0])) for column in own.T]
+        seen = [len(np.unique(axis[place == number][np.abs(column) > 1e-12])) for column in own.T]
         assert sorted(seen) == groups
