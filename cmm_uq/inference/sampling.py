@@ -20,7 +20,7 @@ _LOOKED_AT = 2000
 """Draws by which it is judged whether slow noise is quicker than a few cosines."""
 
 _BURN_IN = 30
-"""Steps that are left out where what is proposed knows which components are present: each other one is taken, or more."""
+"""Steps that are left out where what is proposed knows which components are present: about every other one is taken."""
 
 
 def sample_with_noise(
