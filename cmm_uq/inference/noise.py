@@ -104,6 +104,13 @@ class Sizes:
             np.median(self.reading, axis=0, keepdims=True), *(np.median(part, keepdims=True) for part in others)
         )
 
+    @property
+    def different(self) -> tuple[Ints, Ints]:
+        """The first (u,) of each of the different draws, and which of those each draw (w,) is."""
+        table = np.column_stack([self.reading, self.placing, self.growth, self.slow, self.rate])
+        _, first, index = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        return np.asarray(first), np.asarray(index.ravel())
+
     def at(self, chosen: Ints | slice) -> Sizes:
         """Some of the draws."""
         return Sizes(*(part[chosen] for part in (self.reading, self.placing, self.growth, self.slow, self.rate)))
