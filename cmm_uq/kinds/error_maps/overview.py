@@ -53,8 +53,10 @@ def _found(d: MapsDiagnosis) -> Text:
     ]
     said += [_difference(difference) for difference in d.differences[:_SHOWN]]
     if (more := len(d.differences) - _SHOWN) > 0:
-        many = say("{more} more differences are told below.", more=more)
-        said.append(plural(more, one=say("One more difference is told below."), many=many))
+        said.append(plural(
+            more, one=say("One more difference is told below."),
+            many=say("{more} more differences are told below.", more=more),
+        ))  # fmt: skip
     return lines(said)
 
 

@@ -77,7 +77,7 @@ def next_words(d: MapsDiagnosis) -> list[tuple[tuple[Text, ...], Text]]:
         if len(temperatures) == 2:
             what = say("Map the {title} a third time: with two maps nothing says which of them is off.", title=title)
         else:
-            chosen = [t for t in temperatures if any(name.endswith(f" {t:g} °C") for name in names)]
+            chosen = [t for k, t in enumerate(temperatures) if any(k in one.maps for one in some)]
             shown = [number(t, "g") for t in (chosen if len(chosen) == 1 else temperatures)]
             what = say("Measure the {title} again at {temperatures} °C.", title=title, temperatures=listed(shown))
         found.append((names, what))
