@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from cmm_uq.documents.effect_words import title_of
 from cmm_uq.documents.wording import probability
 from cmm_uq.kinds.error_maps.diagnosis import Difference, MapsDiagnosis
-from cmm_uq.messages import Text, Verbatim, listed, number, say, semicolons, sentences
+from cmm_uq.messages import Text, Verbatim, listed, number, say, semicolons, sentences, signed
 
 VERDICTS: Mapping[str, Text] = {
     "consistent": say("The maps agree with each other within their noise."),
@@ -24,9 +24,9 @@ def difference_words(difference: Difference) -> Text:
     rival = difference.rival
     low, high = difference.region
     size = say(
-        "by up to {amplitude:.2g}\u00a0{unit}, most of all from {axis} = {low:g} to {high:g}\u00a0mm",
+        "by up to {amplitude:.2g}\u00a0{unit}, most of all from {axis} = {low} to {high}\u00a0mm",
         amplitude=difference.amplitude, unit=difference.column.unit[0], axis=Verbatim(difference.column.axis.upper()),
-        low=low, high=high,
+        low=signed(low, "g"), high=signed(high, "g"),
     )  # fmt: skip
     chance = probability(difference.probability)
     if rival.map is not None:
