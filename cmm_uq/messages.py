@@ -198,6 +198,11 @@ def commas(words: Iterable[Text]) -> Text:
     return _folded(list(words), lambda before, after: say("{before}, {after}", before=before, after=after))
 
 
+def in_a_row(figures: Iterable[Text]) -> Text:
+    """Figures in a row: coordinates, the ends of an interval, values of a list."""
+    return _folded(list(figures), lambda left, right: say("{left}, {right}", left=left, right=right))
+
+
 def semicolons(words: Iterable[Text]) -> Text:
     """Words with semicolons."""
     return _folded(list(words), lambda before, after: say("{before}; {after}", before=before, after=after))

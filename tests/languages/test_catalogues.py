@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import ast
+import os
+import subprocess
+from collections import Counter
+from shutil import which
 
 import polib
 import pytest
 
 from cmm_uq.languages.catalogue import catalogue, file_of
 from cmm_uq.languages.language import Code
-from tests.catalogues import FORMS, TRANSLATED, forms_of, key_of, merged, patterns, problems, read, sentences
+from tests.catalogues import FORMS, PACKAGE, TRANSLATED, forms_of, key_of, merged, patterns, problems, read, sentences
 
 WANTED = sentences()
 
@@ -29,6 +33,32 @@ def test_the_program_reads_a_catalogue_as_gettext_does(code: Code) -> None:
     found, entries = catalogue(code), read(file_of(code))
     assert found.single == {entry.msgid: entry.msgstr for entry in entries if not entry.msgid_plural}
     assert found.plural == {key_of(entry): tuple(forms_of(entry)) for entry in entries if entry.msgid_plural}
+
+
+@pytest.mark.parametrize("code", TRANSLATED)
+def test_other_programs_read_a_catalogue_too(code: Code) -> None:
+    """No ``msgid`` stands twice, not even as the singular of another; and gettext's own compiler has nothing against it."""
+    said = [entry.msgid for entry in read(file_of(code))]
+    assert [one for one, count in Counter(said).items() if count > 1] == []
+    if (program := which("msgfmt")) is not None:
+        done = subprocess.run([program, "-c", "-o", os.devnull, file_of(code)], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+
+def test_no_sentence_begins_or_ends_with_a_blank_that_a_translator_would_lose() -> None:
+    assert [pattern for key in WANTED for pattern in key if pattern != pattern.strip()] == []
+
+
+def test_every_plural_has_both_forms_where_it_is_called() -> None:
+    """Else each form would be an entry by itself, without the forms that a language has for it."""
+    calls = [
+        (path.name, key) for path in sorted(PACKAGE.rglob("*.py"))
+        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "plural"
+        for key in list(patterns(call))[:1]
+    ]  # fmt: skip
+    assert len(calls) > 40
+    assert [(name, key) for name, key in calls if len(key) != 2] == []
 
 
 def test_the_sentences_are_those_of_the_calls() -> None:

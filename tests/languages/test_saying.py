@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from cmm_uq.documents.wording import probability
 from cmm_uq.languages import catalogue as catalogues
 from cmm_uq.languages.catalogue import Catalogue, catalogue
 from cmm_uq.languages.language import Code
@@ -21,11 +22,13 @@ from cmm_uq.messages import (
     Verbatim,
     commas,
     day,
+    in_a_row,
     lines,
     number,
     plural,
     say,
     sentences,
+    signed,
 )
 from cmm_uq.units import unit
 
@@ -137,6 +140,20 @@ def test_japanese_sentences_follow_each_other_without_a_space() -> None:
     text = said_in(sentences([say("Warning"), say("Warnings")]), "ja")
     assert " " not in text
     assert said_in(lines([say("Warning"), say("Warnings")]), "ja").count("\n") == 1
+
+
+@pytest.mark.parametrize(("code", "said"), [
+    ("en", "250, 0.5, −40"), ("de", "250; 0,5; −40"), ("fr", "250\u202f; 0,5\u202f; −40"), ("ja", "250, 0.5, −40"),
+])  # fmt: skip
+def test_figures_in_a_row_are_parted_by_one_sign_whether_they_have_decimals_or_not(code: Code, said: str) -> None:
+    """And not by the comma of words, which in Japanese is another."""
+    figures = in_a_row([number(250, "g"), number(0.5, "g"), signed(-40, "g")])
+    assert said_in(figures, code) == said
+
+
+def test_a_probability_that_is_hardly_0_or_1_has_the_decimal_sign_of_the_language() -> None:
+    assert said_in(probability(1e-6), "de") == "<\u00a00,01\u00a0%"
+    assert said_in(probability(1 - 1e-6), "fr") == ">\u00a099,99\u00a0%"
 
 
 @pytest.mark.parametrize("code", ["de", "fr", "ja"])
