@@ -5,9 +5,11 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from asn1crypto import crl, ocsp, x509
 from cryptography import x509 as certificates
+from cryptography.exceptions import InvalidSignature
 from pyhanko_certvalidator import CertificateValidator, ValidationContext
 from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError, RevokedError
 
@@ -21,6 +23,7 @@ UNTRUSTED = say("no chain of certificates leads from the signer to anybody who i
 NOBODY = say("nobody is trusted: name the certificates that you trust")
 REVOKED = say("the certificate was revoked")
 UNREADABLE = say("the certificate cannot be read")
+SPOILT = say("a certificate that comes with the signature was changed")
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,8 @@ def standing(
     except ValueError:
         return Standing(trusted=False, revocation="not known", test_key=False, problems=(UNREADABLE,))
     found: list[Text] = [Verbatim(why) for why in reasons]
+    if _spoilt(evidence, trust):
+        found.append(SPOILT)
     if at is None:
         return Standing(trusted=False, revocation="not known", test_key=test, problems=(*found, NO_TIME))
     if not signer.not_valid_before_utc <= at <= signer.not_valid_after_utc:
@@ -90,6 +95,33 @@ def standing(
     if revocation == "revoked" and REVOKED not in found:
         found.append(REVOKED)
     return Standing(trusted and revocation != "revoked", revocation, test, tuple(found))
+
+
+def _spoilt(evidence: Evidence, trust: Trust) -> bool:
+    """Whether a certificate of the file is not as its issuer, who is known here too, has signed it.
+
+    The signature does not cover them; one that no chain needs could be altered unseen.
+    """
+    brought = [one.dump() for one in evidence.certificates]
+    try:
+        all_known = [certificates.load_der_x509_certificate(data) for data in {*brought, *trust.anchors}]
+        return not all(map(partial(_as_issued, all_known), map(certificates.load_der_x509_certificate, brought)))
+    except ValueError:
+        return True
+
+
+def _as_issued(known: Sequence[certificates.Certificate], one: certificates.Certificate) -> bool:
+    """Whether one of the issuers of its name has signed it, as far as any is known."""
+    issuers = [other for other in known if other.subject == one.issuer]
+    return not issuers or any(map(partial(_signed, one), issuers))
+
+
+def _signed(one: certificates.Certificate, issuer: certificates.Certificate) -> bool:
+    try:
+        one.verify_directly_issued_by(issuer)
+    except (ValueError, TypeError, InvalidSignature):
+        return False
+    return True
 
 
 def _path(

@@ -30,8 +30,10 @@ METHODS = frozenset(f"http://www.w3.org/2001/04/xmldsig-more#{key}-sha{bits}" fo
                     for bits in (256, 384, 512))  # fmt: skip
 
 LEVEL = "XAdES B-B"
-PROPERTIES = f"{DS}Object/{XADES}QualifyingProperties/{XADES}SignedProperties"
+QUALIFYING = f"{DS}Object/{XADES}QualifyingProperties"
+PROPERTIES = f"{QUALIFYING}/{XADES}SignedProperties"
 
+OF_ANOTHER = say("the signed properties are not those of this signature")
 NO_XADES = say("the signature has no signed properties, as XAdES asks for")
 ELSEWHERE = say("the signature does not stand as the last element of the root")
 PARTIAL = say("the signature covers a part of the file, or more than the file: only one over the whole root counts")
@@ -98,6 +100,8 @@ def _shape(element: _Element) -> list[Text]:
         found.append(PARTIAL)
     if element.find(PROPERTIES) is None:
         found.append(NO_XADES)
+    elif element.find(QUALIFYING).get("Target") != f"#{element.get('Id')}":
+        found.append(OF_ANOTHER)
     digests = {str(one.get("Algorithm")) for one in element.iterfind(f"{DS}SignedInfo/{DS}Reference/{DS}DigestMethod")}
     methods = [str(one.get("Algorithm")) for one in element.iterfind(f"{DS}SignedInfo/{DS}SignatureMethod")]
     if not digests <= DIGESTS or len(methods) != 1 or methods[0] not in METHODS:

@@ -73,6 +73,8 @@ def compare_again(inquiry: Inquiry, given: Given, again: Again) -> bool:
     found = differences(data, new)
     for path, stands, should in found if not kernels else beyond_sampling(data, new, found):
         inquiry.wrong("again", name, path, "is not what its inputs give", stands, should)
+    if not (same or kernels or found):
+        inquiry.wrong("again", name, "", "is written otherwise than its inputs give it, though its figures are equal")
     for kept in again.kept:
         inquiry.left(
             f"platform and versions of packages in {kept}", "they are others than here, and nothing else tells them"

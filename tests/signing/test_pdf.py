@@ -58,6 +58,18 @@ def test_it_is_made_and_found_where_a_loop_runs_already(pdf: bytes, signed: byte
     assert found.good
 
 
+def test_a_certificate_that_comes_with_the_signature_and_that_no_chain_needs_is_held_to_its_issuer(
+    signed: bytes, anchor: Held, trust: Trust
+) -> None:  # fmt: skip
+    """One bit of the root's own signature: the chain ends at the root that is trusted, not at the one in the file."""
+    brought = anchor.certificate.public_bytes(DER).hex().encode()
+    assert brought in signed.lower()
+    at = signed.lower().index(brought) + len(brought) - 1
+    spoilt = signed[:at] + (b"1" if signed[at : at + 1] == b"0" else b"0") + signed[at + 1 :]
+    assert only(signatures_of_pdf(signed, trust)).problems == ()
+    assert "a certificate that comes with the signature was changed" in only(signatures_of_pdf(spoilt, trust)).problems
+
+
 def test_nobody_is_trusted_by_default(signed: bytes) -> None:
     found = only(signatures_of_pdf(signed, Trust()))
     assert found.intact

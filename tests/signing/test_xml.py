@@ -45,6 +45,13 @@ def test_what_was_verified_is_the_root_without_its_signature(xml: bytes, signed:
     assert found.content == etree.tostring(etree.fromstring(xml), method="c14n")
 
 
+def test_properties_that_are_of_another_signature_by_their_target_do_not_count(signed: bytes, trust: Trust) -> None:
+    """No signature covers its own name; what is signed says whose properties it is (XAdES, EN 319 132-1, 5.1)."""
+    (name,) = {one.get("Id") for one in etree.fromstring(signed).iter(f"{DS}Signature")}
+    other = signed.replace(f'Id="{name}"'.encode(), f'Id="{name}9"'.encode(), 1)
+    assert only(signatures_of_xml(other, trust)).problems == ("the signed properties are not those of this signature",)
+
+
 @pytest.mark.parametrize("key", ["held", "curve_held"])
 def test_the_same_file_key_and_time_give_the_same_bytes(key: str, xml: bytes, request: pytest.FixtureRequest) -> None:
     signer = request.getfixturevalue(key).signer

@@ -126,6 +126,15 @@ def test_an_input_with_a_forged_hash_is_computed_again(certificate: Path, again:
     assert any(one.place == "job.inputs_sha256.ballbar.csv" for one in found.inquiry.findings)
 
 
+def test_a_figure_written_otherwise_is_named_though_it_is_equal(certificate: Path, again: Again) -> None:
+    for name in ("certificate.pdf", "certificate.xml", "certificate.html"):
+        (certificate / name).unlink()
+    for name in ("job.toml", "ballbar.csv"):
+        shutil.copy(ROOT / "examples" / "iota-1102-20C" / name, certificate)
+    spoil(certificate / "results.json", lambda content: content.replace(b": 0.0,", b": -0.0,", 1))
+    assert "written otherwise than its inputs give it" in told(checked(certificate, again))
+
+
 def resaved(path: Path, change: Callable[[pikepdf.Pdf], None]) -> None:
     with pikepdf.open(io.BytesIO(path.read_bytes())) as pdf:
         change(pdf)
