@@ -60,7 +60,7 @@ class Language:
 LANGUAGES: Mapping[Code, Language] = MappingProxyType({language.code: language for language in (
     Language("en", ".", "{year:04d}-{month:02d}-{day:02d}", lambda count: count == 1),
     Language("de", ",", "{day:02d}.{month:02d}.{year:04d}", lambda count: count == 1, "; "),
-    Language("fr", ",", "{day:02d}/{month:02d}/{year:04d}", lambda count: count in (0, 1), "\u00a0; "),
+    Language("fr", ",", "{day:02d}/{month:02d}/{year:04d}", lambda count: count in (0, 1), "\u202f; "),
     Language("ja", ".", "{year:04d}年{month}月{day}日", None, cases=False),
 )})  # fmt: skip
 """By their codes."""

@@ -73,7 +73,7 @@ def _argument(value: Argument, spec: str, formatter: _Localised) -> str:
     return formatter.format_field(said, spec)
 
 
-_SIGNS = r"[-+−±\d,.; \u00a0×⁻⁰¹²³⁴⁵⁶⁷⁸⁹e]*"
+_SIGNS = r"[-+−±\d,.; \u00a0\u202f×⁻⁰¹²³⁴⁵⁶⁷⁸⁹e]*"
 _FIGURES = re.compile(rf"{_SIGNS}\d{_SIGNS}")
 _DECIMAL = re.compile(r"\d,\d")
 

@@ -114,7 +114,7 @@ def test_what_the_catalogue_lacks_or_only_guesses_stays_english_with_its_numbers
 def test_figures_with_decimal_commas_are_parted_by_semicolons() -> None:
     figures = commas([number(1.5), number(2), number(-0.25)])
     assert said_in(figures, "de") == "1,5; 2; -0,25"
-    assert said_in(figures, "fr") == "1,5\u00a0; 2\u00a0; -0,25"
+    assert said_in(figures, "fr") == "1,5\u202f; 2\u202f; -0,25"
     assert said_in(figures, "ja") == "1.5, 2, -0.25"
     assert said_in(commas([number(1), number(2)]), "de") == "1, 2"
     assert said_in(commas([say("error"), number(2.5)]), "de") == "abweichung, 2,5"
