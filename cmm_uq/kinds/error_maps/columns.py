@@ -12,7 +12,7 @@ import numpy as np
 
 from cmm_uq.kinds.error_maps.copies import copies
 from cmm_uq.kinds.error_maps.spikes import DAMAGED, spikes
-from cmm_uq.messages import Text, Verbatim, in_a_row, listed, number, say, signed
+from cmm_uq.messages import Text, Verbatim, commas, listed, number, say, signed
 from cmm_uq.physics.error_map import COLUMNS, ErrorMap
 from cmm_uq.points import AXES, Floats
 from cmm_uq.screening.finding import Finding
@@ -192,7 +192,7 @@ def _damaged(title: Text, error_map: ErrorMap) -> Finding:
 
 def _alike(same: dict[tuple[float, ...], list[Text]], unmeasured: list[Text]) -> Iterator[Finding]:
     for temperatures, titles in same.items():
-        shown = in_a_row(number(t, "g") for t in temperatures)
+        shown = commas(number(t, "g") for t in temperatures)
         why = say(
             "{titles}: the maps at {temperatures} °C give the same figures. They were measured once, and say "
             "nothing of how the maps differ; measure them at each temperature",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.documents.document import Column, Section, Table
-from cmm_uq.messages import Text, Verbatim, in_a_row, number, say, signed
+from cmm_uq.messages import Text, Verbatim, commas, number, say, signed
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.screening.finding import Finding
 from cmm_uq.units import ARCSECOND
@@ -35,7 +35,7 @@ def squareness_findings(maps: Sequence[ErrorMap]) -> list[Finding]:
             say(
                 "squareness: the maps at {temperatures} °C give the same figures. They were measured once, and say "
                 "nothing of how it changes; measure it at each temperature",
-                temperatures=in_a_row(number(t, "g") for t in temperatures),
+                temperatures=commas(number(t, "g") for t in temperatures),
             ),
         )
         for temperatures in same.values()
