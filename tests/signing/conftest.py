@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Iterator
+
 import pytest
 
 pytest.importorskip("pyhanko")
@@ -21,6 +24,15 @@ XML = """<?xml version="1.0" encoding="UTF-8"?>
   <si:real><si:value>73.2</si:value><si:unit>\\micro\\metre</si:unit></si:real>
 </dcc:digitalCalibrationCertificate>
 """.encode()
+
+
+@pytest.fixture(autouse=True)
+def no_loop_of_other_tests() -> Iterator[None]:
+    """A browser that tests before these have opened keeps its loop running in this thread; others' programs here begin one."""
+    before = asyncio._get_running_loop()
+    asyncio._set_running_loop(None)
+    yield
+    asyncio._set_running_loop(before)
 
 
 @pytest.fixture(scope="session")
