@@ -63,7 +63,7 @@ class Unchecked:
 
 CHECKS = {
     "files": "the files are what cmm-uq writes, with nothing active, hidden or further in them",
-    "signatures": "signatures are intact, cover the whole file and lead to a trusted anchor",
+    "signatures": "signatures are intact and cover the whole file; whom one must trust for them is trusted, or named above",
     "forms": "PDF, XML, HTML and results.json say the same",
     "figures": "the documents state the figures of results.json, and these agree with each other",
     "decisions": "decisions follow from figures, uncertainties, limits and rules",
