@@ -9,7 +9,7 @@ from collections.abc import Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.errors import NotInstalledError
 
 _T = TypeVar("_T")
 _SILENT = logging.NullHandler()
@@ -21,15 +21,15 @@ def installed() -> Iterator[None]:
 
     Raises
     ------
-    CmmUqError : one is not installed.
+    NotInstalledError : one is not installed.
     """
     for name in ("pyhanko", "pyhanko_certvalidator", "signxml"):
         logging.getLogger(name).addHandler(_SILENT)  # what matters is said once, by what is found
     try:
         yield
     except ImportError as error:
-        raise CmmUqError(f"signatures need {error.name or 'a package'}, which is not installed",
-                         fix="Install it: pip install 'cmm-uq[sign]'") from None  # fmt: skip
+        raise NotInstalledError(f"signatures need {(error.name or 'a package').partition('.')[0]}, which is not installed",
+                                fix="Install it: pip install 'cmm-uq[sign]'") from None  # fmt: skip
 
 
 def ran(coroutine: Coroutine[Any, Any, _T]) -> _T:

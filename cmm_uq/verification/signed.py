@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from cmm_uq.errors import NotInstalledError
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.given import Given
 
@@ -30,7 +31,11 @@ def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> Non
         if pdf.signatures:
             from cmm_uq.signing import Trust, signatures_of_pdf
 
-            signed = signatures_of_pdf(pdf.content, trust or Trust(), where=name)
+            try:
+                signed = signatures_of_pdf(pdf.content, trust or Trust(), where=name)
+            except NotInstalledError as error:
+                inquiry.left("electronic signatures", f"{error.problem}. {error.fix}")
+                return
         elif len(pdf.ends) > 1:
             inquiry.wrong(
                 "signatures", name, f"byte {pdf.ends[0]}", "was changed after it was made, and nobody signed that"
@@ -42,7 +47,11 @@ def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> Non
         if _OPENING in content:
             from cmm_uq.signing import Trust, signatures_of_xml
 
-            signed = signatures_of_xml(content, trust or Trust(), where=name)
+            try:
+                signed = signatures_of_xml(content, trust or Trust(), where=name)
+            except NotInstalledError as error:
+                inquiry.left("electronic signatures", f"{error.problem}. {error.fix}")
+                return
         if signed or not given.digital_inside:  # what is inside a signed PDF is signed with it
             _all(inquiry, name, signed, trust)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import sys
 from pathlib import Path
 
 import pytest
@@ -81,6 +82,23 @@ def test_a_test_key_is_named(certificate: Path, again: Again, tmp_path: Path, tr
     pdf.write_bytes(sign_pdf(pdf.read_bytes(), signer_of_file(key, "open"), seal=None, at=SIGNED))
     assert "test key" in told_of(inquiry(certificate, again, None))
     assert inquiry(certificate, again, trusted).word == "NOT VERIFIED"
+
+
+def test_without_what_signatures_need_all_else_is_checked(
+    signed: Path, again: Again, trusted: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
+    for name in [name for name in sys.modules if name.split(".")[0] in ("pyhanko", "pyhanko_certvalidator", "signxml")]:
+        monkeypatch.delitem(sys.modules, name)
+    for name in [name for name in sys.modules if name.startswith("cmm_uq.signing.")]:
+        monkeypatch.delitem(sys.modules, name)
+    for name in ("pyhanko", "pyhanko_certvalidator", "signxml"):
+        monkeypatch.setitem(sys.modules, name, None)
+    found = inquiry(signed, again, None)
+    assert found.word == "NOT WHOLLY CHECKED"
+    assert [one.why for one in found.unchecked if one.what == "electronic signatures"] == [
+        "signatures need pyhanko, which is not installed. Install it: pip install 'cmm-uq[sign]'"
+    ]
+    assert found.done["figures"] > 10
 
 
 def test_a_byte_of_what_was_signed_breaks_the_signature(signed: Path, again: Again, trusted: list[Path]) -> None:
