@@ -91,6 +91,10 @@ class OutputError(CmmUqError):
     """The system refuses the output: a full disk, a missing permission, a closed pipe."""
 
 
+class NotInstalledError(CmmUqError):
+    """What is asked for needs a package of an extra; all else goes on without it."""
+
+
 class Gathered:
     """What is wrong with an input, one thing beside the other, until nothing more can be said of it."""
 

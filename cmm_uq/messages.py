@@ -115,7 +115,7 @@ def _plain(value: float) -> float:
     return value if item is None else item()
 
 
-class _English(string.Formatter):
+class Filled(string.Formatter):
     """``str.format`` with names only, and capitals."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
@@ -127,7 +127,12 @@ class _English(string.Formatter):
         return format(value, format_spec)
 
 
-_ENGLISH = _English()
+_ENGLISH = Filled()
+
+
+def fields_of(pattern: str) -> frozenset[str]:
+    """Names of a pattern's placeholders."""
+    return frozenset(name for _, name, _, _ in _ENGLISH.parse(pattern) if name)
 
 
 def say(pattern: str, /, **arguments: Argument) -> Message:
@@ -191,6 +196,11 @@ def together(words: Iterable[Text]) -> Text:
 def commas(words: Iterable[Text]) -> Text:
     """Words with commas."""
     return _folded(list(words), lambda before, after: say("{before}, {after}", before=before, after=after))
+
+
+def in_a_row(figures: Iterable[Text]) -> Text:
+    """Figures in a row: coordinates, the ends of an interval, values of a list."""
+    return _folded(list(figures), lambda left, right: say("{left}, {right}", left=left, right=right))
 
 
 def semicolons(words: Iterable[Text]) -> Text:

@@ -73,6 +73,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType({row[0]: Unit(*row) for row in (
     ("mm", r"\milli\metre", "millimeter", 1e-3),
     ("µm", r"\micro\metre", "micrometer", 1e-6),
     ("nm", r"\nano\metre", "nanometer", 1e-9),
+    ("mm²", r"\milli\metre\tothe{2}", "square millimeter", 1e-6),
     ("µm/m", r"\micro\metre\metre\tothe{-1}", "micrometer per meter", 1e-6),
     ("µm/mm", r"\micro\metre\milli\metre\tothe{-1}", "micrometer per millimeter", 1e-3),
     ("µm/°", r"\micro\metre\degree\tothe{-1}", "micrometer per degree", 1e-6 * 180 / pi),

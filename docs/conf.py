@@ -32,14 +32,15 @@ CONTENTS: dict[str, list[str]] = {
         "machine/effects", "limits", "words",
     ],
     "How it works": [
-        "certificate", "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
+        "certificate", "verify", "languages", "dcc", "signing", "iso17025", "provenance", "qif",
+        "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features", "machine/parts",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],
     "What it rests on": [
         "validation", "coverage-study", "noise-ranks", "diagnosis-study", "diagnosis-second-study", "mutation-study",
-        "hostile-study", "records/drift-study", "uncertainty/validation",
+        "hostile-study", "tampering-study", "records/drift-study", "uncertainty/validation",
         "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
         "peers", "sources", "machine/source-errors", "uncertainty/harris-2004",
     ],

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.instruments.library import ready
+from tests.catalogues import TRANSLATED
 from tests.conftest import ROOT
 
 
@@ -28,11 +29,12 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "site"
 
 
-def test_the_wheel_holds_the_templates_its_type_marker_and_the_profiles(unpacked: Path) -> None:
+def test_the_wheel_holds_the_templates_the_catalogues_its_type_marker_and_the_profiles(unpacked: Path) -> None:
     packed = {path.name for path in (unpacked / "cmm_uq" / "templates").iterdir()}
     assert packed == {path.name for path in (ROOT / "templates").iterdir()}
     assert (unpacked / "cmm_uq" / "py.typed").is_file()
     assert {path.stem for path in (unpacked / "cmm_uq" / "instruments" / "profiles").iterdir()} == set(ready())
+    assert {path.stem for path in (unpacked / "cmm_uq" / "languages").glob("*.po")} == set(TRANSLATED)
     assert not (unpacked / "tests").exists()
 
 

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.api.outcomes import Diagnosis, Plan, Proof, Report
-from cmm_uq.commands.reading import compared_with, read_job
+from cmm_uq.commands.reading import compared_with, in_language, read_job
 from cmm_uq.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.languages.language import Code
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,13 +99,14 @@ def job(
     return job_from_frames(points, told, files or {})
 
 
-def report(job: Job | str | Path, *, seed: int = 0) -> Report:
+def report(job: Job | str | Path, *, seed: int = 0, language: Code | None = None) -> Report:
     """Estimate the errors that a job names, decide, and diagnose what it leaves out.
 
     Parameters
     ----------
     job : a job, or its folder.
     seed : of everything random; the same seed gives the same figures.
+    language : of the documents, instead of the job's.
 
     Raises
     ------
@@ -119,7 +121,7 @@ def report(job: Job | str | Path, *, seed: int = 0) -> Report:
     >>> found.figures.loc["b89_range_um", "value"].round(1)
     np.float64(339.9)
     """
-    return Report(report_outcome(_job(job), seed=seed))
+    return Report(report_outcome(in_language(_job(job), language), seed=seed))
 
 
 def diagnose(
@@ -128,6 +130,7 @@ def diagnose(
     seed: int = 0,
     alpha: float = FALSE_ALARMS,
     against: pd.DataFrame | str | Path | None = None,
+    language: Code | None = None,
 ) -> Diagnosis:
     """Say where recording and model differ, and what was left out.
 
@@ -138,12 +141,13 @@ def diagnose(
     alpha : rate of false alarms.
     against : what a simulation predicts for the recording, as a file or a DataFrame with the columns of one: the recording is
         then compared with that, whatever the job names.
+    language : of the documents, instead of the job's.
 
     Raises
     ------
     CmmUqError : the job cannot be diagnosed as it stands, or the prediction is none of its recording.
     """
-    read = _job(job)
+    read = in_language(_job(job), language)
     if against is not None:
         from cmm_uq.commands.frames import compared_with_frame
 
@@ -155,7 +159,7 @@ def diagnose(
     return Diagnosis(diagnosis_outcome(read, seed=seed, alpha=alpha))
 
 
-def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0) -> Plan:
+def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0, language: Code | None = None) -> Plan:
     """Say what placings of the artefact determine, and search for better ones.
 
     Parameters
@@ -163,6 +167,7 @@ def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0) -> Plan:
     job : a job, or its folder; its recording may be missing.
     power : whether to predict what the diagnosis would find, which takes most of the time.
     seed : of the recordings drawn for that.
+    language : of the page, instead of the job's.
 
     Raises
     ------
@@ -170,11 +175,12 @@ def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0) -> Plan:
     """
     from cmm_uq.commands.plan import plan_outcome
 
-    return Plan(plan_outcome(_job(job), power=power, seed=seed))
+    return Plan(plan_outcome(in_language(_job(job), language), power=power, seed=seed))
 
 
 def prove(
-    job: Job | str | Path, *, cases: int = 200, workers: int | None = None, seed: int = 0, alpha: float = FALSE_ALARMS
+    job: Job | str | Path, *, cases: int = 200, workers: int | None = None, seed: int = 0, alpha: float = FALSE_ALARMS,
+    language: Code | None = None,
 ) -> Proof:  # fmt: skip
     """Try the diagnosis on sealed cases drawn with the set-ups, the artefact and the noise of a job.
 
@@ -185,6 +191,7 @@ def prove(
     workers : processes at once, as many as there are processors by default; the figures do not depend on it.
     seed : of the cases.
     alpha : rate of false alarms that the diagnosis is asked for.
+    language : of the page, instead of the job's.
 
     Raises
     ------
@@ -195,7 +202,7 @@ def prove(
     from cmm_uq.scheduling.pool import processes
 
     asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
-    return Proof(prove_outcome(_job(job), asked))
+    return Proof(prove_outcome(in_language(_job(job), language), asked))
 
 
 def simulate(job: Job | str | Path, truth: Mapping[str, Any] | str | Path, *, seed: int | None = None) -> Job:

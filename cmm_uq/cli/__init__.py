@@ -2,6 +2,7 @@
 
 Exit codes: 0 done; 2 bad input; 3 output impossible; 4 done, and not conforming or inconsistent (with ``--strict``);
 130 after SIGINT, 143 after SIGTERM; 1 done, and something needs a person (``report --scheduled``, ``schedule test``).
+``verify`` alone: 1 something is wrong with the certificate, 3 not all of it could be checked.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ NO_OUTPUT = 3
 
 NOT_CONFORMING = 4
 """Exit code of a strict run that found a machine not conforming, or a recording that contradicts its model."""
+
+NOT_VERIFIED, NOT_WHOLLY_CHECKED = 1, 3
+"""Exit codes of a verification that found something wrong, and of one that could not check everything."""
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Matrices here are small: more threads cost more than they gain, and how many there are would show in the last digits."""

@@ -9,9 +9,10 @@ import typer
 
 from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.cli.completion import toml_files
-from cmm_uq.cli.options import Force, Json, Quiet, Settled, Verbose, examples, out
+from cmm_uq.cli.options import Force, Json, Language, Quiet, Settled, Verbose, examples, out
 from cmm_uq.cli.printing import put_json, show_summary
 from cmm_uq.cli.progress import shown
+from cmm_uq.languages.language import ENGLISH
 
 if TYPE_CHECKING:
     from cmm_uq.documents.in_short import Summary
@@ -36,13 +37,14 @@ def command(
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
+    language: Language = None,
 ) -> None:
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.budget import write_budget
         from cmm_uq.commands.written import silent
 
-        written = write_budget(file, out, seed=seed, force=force, stage=stage or silent)
+        written = write_budget(file, out, seed=seed, force=force, stage=stage or silent, language=language or ENGLISH)
     if json:
         put_json(written.results.decode())
     elif not quiet:

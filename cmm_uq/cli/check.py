@@ -11,22 +11,30 @@ from cmm_uq.cli import BAD_INPUT
 from cmm_uq.cli.completion import job_folders
 from cmm_uq.cli.deferred import defer_scipy
 from cmm_uq.cli.options import Json, Quiet, examples
-from cmm_uq.cli.printing import layout, put_data, show
+from cmm_uq.cli.printing import layout, put, put_data, show
+from cmm_uq.errors import printable
 
 if TYPE_CHECKING:
     from cmm_uq.commands.check import Checked
     from cmm_uq.documents.in_short import Summary
 
-EXAMPLES = examples("check JOB", "check jobs/a jobs/b", "check JOB --json")
+EXAMPLES = examples("check JOB", "check jobs/a jobs/b", "check JOB --clauses", "check JOB --json")
 SCHEMA = "cmm-uq/check/1"
 
 
 def command(
     jobs: Annotated[list[Path], typer.Argument(help="Job folders.", metavar="JOB...", autocompletion=job_folders)],
+    clauses: Annotated[
+        bool,
+        typer.Option("--clauses", help="Every clause of ISO/IEC 17025:2017, 7.8, and what of it is stated."),
+    ] = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Say all that is wrong with each job at once: file, line, key, fix. Exit code 2 when something would stop report."""
+    """Say all that is wrong with each job at once: file, line, key, fix. Exit code 2 when something would stop report.
+
+    What ISO/IEC 17025:2017, 7.8 asks for and a job does not state makes its certificate a draft, and is told with its key.
+    """
     defer_scipy()
     from cmm_uq.commands.check import check_job
 
@@ -36,8 +44,22 @@ def command(
     elif not quiet:
         for one in found:
             show(layout(verbose=True).screen(_summary(one)))
+            if clauses:
+                _show_clauses(one)
     if not all(one.sound for one in found):
         raise typer.Exit(BAD_INPUT)
+
+
+def _show_clauses(found: Checked) -> None:
+    """Each clause on a line: what it asks for, and what satisfies it or would."""
+    if not found.clauses:
+        put("No calibration certificate is made of this job, so ISO/IEC 17025:2017, 7.8 asks nothing of it.\n")
+    for one in found.clauses:
+        content = {
+            "stated": one.stated, "missing": f"MISSING: {one.key}", "not applicable": f"none stated ({one.key})",
+            "laboratory": "of the laboratory, not of the certificate",
+        }[one.status].removesuffix(" ()")  # fmt: skip
+        put(printable(f"{one.clause:<11} {one.asks}: {content}") + "\n")
 
 
 def _summary(found: Checked) -> Summary:

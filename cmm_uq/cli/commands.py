@@ -21,9 +21,12 @@ from cmm_uq.cli import (
     history,
     importing,
     instruments,
+    keys,
     new,
     plan,
     prove,
+    qif,
+    read,
     records,
     release,
     report,
@@ -31,7 +34,9 @@ from cmm_uq.cli import (
     schema,
     selftest,
     serve,
+    sign,
     simulate,
+    verify,
 )
 from cmm_uq.cli.options import examples
 from cmm_uq.cli.printing import say
@@ -41,8 +46,8 @@ app = typer.Typer(
     name="cmm-uq",
     help="Uncertainty of coordinate measuring machines, and the certificates that state it.",
     epilog="Exit codes: 0 done; 2 bad input; 3 output impossible; 4 with --strict: done, not conforming or inconsistent; "
-    "130, 143 interrupted; 1 with report --scheduled: done, and something needs a person.\n\n"
-    + examples("report examples/iota-1102-20C", "report --help", "--install-completion"),
+    "130, 143 interrupted; 1 with report --scheduled: done, and something needs a person; of verify: 1 not verified, "
+    "3 not wholly checked.\n\n" + examples("report examples/iota-1102-20C", "report --help", "--install-completion"),
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # brackets of TOML stay as they are, and help is there at once
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -63,7 +68,11 @@ for module, short in {
     compensate: "A recording corrected by its machine's error maps.",
     fleet: "The drift that is usual for all machines of the records, and who differs.",
     budget: "The uncertainty of any measurement model in a file.",
+    verify: "A certificate's files against each other, its figures, and its inputs computed again.",
     release: "A certificate released, withdrawn or replaced.",
+    qif: "The results of a report as QIF 3.0.",
+    read: "A digital calibration certificate (DCC), printed.",
+    sign: "A certificate signed electronically: PDF and XML.",
     affected: "Which certificates a correction of the package touches.",
     serve: "The records to look at, in a browser.",
     schema: "JSON Schema of a file, for editors that complete and explain.",
@@ -76,6 +85,7 @@ app.add_typer(instruments.app, name="instruments", short_help="Instruments: read
 app.add_typer(
     schedule.app, name="schedule", short_help="Scheduled runs: what they go by, whom they tell, what starts them."
 )
+app.add_typer(keys.app, name="keys", short_help="Keys for electronic signatures: a new one for trying.")
 app.add_typer(records.app, name="records", short_help="The history: verified, imported, backed up, brought up to date.")
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),

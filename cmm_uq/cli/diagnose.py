@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cmm_uq.cli.importing import show_imported
-from cmm_uq.cli.options import Force, Job, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
+from cmm_uq.cli.options import Force, Job, Json, Language, Quiet, Records, Seed, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
 
@@ -37,6 +37,7 @@ def command(
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
+    language: Language = None,
     records: Records = None,
 ) -> None:
     """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
@@ -45,7 +46,7 @@ def command(
 
         told = None if quiet or json else show_imported
         written = write_diagnosis(
-            job, out, seed=seed, alpha=alpha, against=against, force=force, stage=stage, told=told,
+            job, out, seed=seed, alpha=alpha, against=against, force=force, stage=stage, told=told, language=language,
             records=records,
         )  # fmt: skip
     conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)

@@ -11,6 +11,7 @@ from cmm_uq.writing import MANIFEST
 _WHAT = {
     "certificate.html": "the certificate",
     "certificate.pdf": "the certificate",
+    "certificate.xml": "the digital certificate (DCC), for other programs",
     "diagnosis.html": "the diagnosis, with its plots",
     "diagnosis.pdf": "the diagnosis, with its plots",
     "plan.html": "the plan, with a picture of each placing",
@@ -24,6 +25,7 @@ _WHAT = {
     "budget.pdf": "the budget",
     "results.json": "every figure, for other programs",
     "posterior.npz": "draws of the posterior, for other programs",
+    "provenance.json": "from what, by what and on what it was made",
     "correction_table.csv": "correction table, for compensate",
     "job.toml": "the job",
     "truth.toml": "what it was drawn from",

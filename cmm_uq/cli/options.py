@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cmm_uq.cli.completion import job_folders
+from cmm_uq.languages.language import Code
 
 
 def examples(*lines: str) -> str:
@@ -26,6 +27,10 @@ Job = Annotated[
     typer.Argument(
         help="Job folder: job.toml and the recording that it names.", metavar="JOB", autocompletion=job_folders
     ),
+]
+Language = Annotated[
+    Code | None,
+    typer.Option(help="Language of the documents; files for programs stay English.", show_default="the job's, else en"),
 ]
 Seed = Annotated[
     int, typer.Option(help="Seed of everything random; the same seed gives the same bytes.", metavar="N", min=0)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cmm_uq.cli.completion import job_folders
-from cmm_uq.cli.options import Force, Json, Quiet, Strict, Verbose, examples, out
+from cmm_uq.cli.options import Force, Json, Language, Quiet, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
 
@@ -33,10 +33,11 @@ def command(
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
+    language: Language = None,
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.plan import write_plan
 
-        written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage)
+        written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage, language=language)
     conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from cmm_uq.cli.completion import job_folders
-from cmm_uq.cli.options import Force, Json, Quiet, Verbose, examples, out
+from cmm_uq.cli.options import Force, Json, Language, Quiet, Verbose, examples, out
 from cmm_uq.cli.printing import conclude, say
 from cmm_uq.cli.progress import shown
 
@@ -50,6 +50,7 @@ def command(
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
+    language: Language = None,
 ) -> None:
     """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
     with shown(quiet=quiet or json, verbose=verbose) as stage:
@@ -58,7 +59,9 @@ def command(
         from cmm_uq.scheduling.pool import processes
 
         asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
-        written = write_proof(job, asked, out, force=force, stage=stage, sealed=None if quiet or json else _tell)
+        written = write_proof(
+            job, asked, out, force=force, stage=stage, sealed=None if quiet or json else _tell, language=language
+        )
     conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
 
 

@@ -34,7 +34,8 @@ def command(
 ) -> None:
     """Release a certificate: until then it is a draft. By two persons where [laboratory] four_eyes = true.
 
-    Refused for an artefact that was out of date on the day of the measurement, and for what was simulated or compensated.
+    Refused for an artefact that was out of date on the day of the measurement, for what was simulated or compensated, and for
+    what says DRAFT on its pages, since ISO/IEC 17025:2017, 7.8 asks for something that it does not state.
     """
     if withdraw and replaced_by is not None:
         raise CmmUqError("a certificate is withdrawn or replaced, not both", where="--withdraw", fix="Leave out one")

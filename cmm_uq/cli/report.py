@@ -9,14 +9,15 @@ import typer
 
 from cmm_uq.cli.completion import job_folders
 from cmm_uq.cli.importing import show_imported
-from cmm_uq.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
+from cmm_uq.cli.options import Force, Json, Language, Quiet, Records, Seed, Strict, Verbose, examples, out
 from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
+from cmm_uq.cli.signing_options import Level, Sign, TimeServer, Trusted, asked_signing, said_of
 from cmm_uq.errors import CmmUqError
 
 EXAMPLES = examples(
     "report examples/iota-1102-20C", "report JOB --out DIR --seed 3", "report JOB --json --strict > results.json",
-    "report --scheduled jobs --dry-run",
+    "report JOB --sign laboratory.p12", "report --scheduled jobs --dry-run",
 )  # fmt: skip
 
 
@@ -36,7 +37,12 @@ def command(
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
+    language: Language = None,
     records: Records = None,
+    sign: Sign = None,
+    time_server: TimeServer = None,
+    level: Level = None,
+    trust: Trusted = None,
     scheduled: Annotated[
         bool,
         typer.Option(
@@ -61,21 +67,32 @@ def command(
         bool, typer.Option("--dry-run", help="With --scheduled: say what would happen, and do nothing.")
     ] = False,
 ) -> None:
-    """Estimate, decide, and write certificate.html, certificate.pdf and results.json."""
-    _check(job, {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run} if not scheduled else
-           {"--force": force, "--strict": strict, "--verbose": verbose}, scheduled=scheduled)  # fmt: skip
+    """Estimate, decide, and write certificate.html, certificate.pdf, certificate.xml and results.json."""
+    alone: dict[str, object] = {
+        "--force": force, "--strict": strict, "--verbose": verbose, "--language": language, "--sign": sign,
+    }  # fmt: skip
+    many: dict[str, object] = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
+    _check(job, alone if scheduled else many, scheduled=scheduled)
     if scheduled:
         from cmm_uq.cli.scheduled import STANDARD_OUTPUT, run
         from cmm_uq.commands.scheduled import Asked
 
         asked = Asked(tuple(job), out, schedule, records, seed or None, dry_run)
         raise typer.Exit(run(asked, None if quiet and lines is None else lines or STANDARD_OUTPUT))
+    signing = None if sign is None else asked_signing(sign, time_server, level, trust)
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.commands.report import write_report
 
         told = None if quiet or json else show_imported
-        report = write_report(job[0], out, seed=seed, force=force, stage=stage, told=told, records=records)
-    conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)
+        report = write_report(
+            job[0], out, seed=seed, force=force, stage=stage, told=told, records=records, language=language,
+            signing=signing,
+        )  # fmt: skip
+    try:
+        conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)
+    finally:
+        if signing is not None and not (quiet or json):
+            said_of(signing, [path for path in report.files.values() if path.suffix in (".pdf", ".xml")])
 
 
 def _check(jobs: list[Path], others: dict[str, object], *, scheduled: bool) -> None:

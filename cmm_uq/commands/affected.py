@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
 from cmm_uq.commands.corrections import Correction, Inputs, between, order, said
-from cmm_uq.commands.reading import job_of
+from cmm_uq.commands.reading import in_language, job_of
 from cmm_uq.commands.recording import called
 from cmm_uq.commands.records_kept import RESULTS, inputs_of
 from cmm_uq.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
@@ -22,6 +22,7 @@ from cmm_uq.documents.outcome import Outcome
 from cmm_uq.documents.results_file import as_json
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.languages.language import ENGLISH, code_of
 from cmm_uq.records import content as contents
 from cmm_uq.records.facts import STANDING, Certificate, Value
 from cmm_uq.records.place import NONE
@@ -151,8 +152,7 @@ def _again(
     where: str | None,
 ) -> Affected:  # fmt: skip
     try:
-        job = job_of(files)
-        outcome = _outcome(certificate, job)
+        job, outcome = _outcome(certificate, job_of(files))
         data = json.loads(as_json(outcome.results))
         changes = tuple(compared(certificate.values, [Value(*row) for row in contents.values(data, called)]))
         verdict = str((data.get("diagnosis") or {}).get("verdict") or "")
@@ -167,11 +167,13 @@ def _again(
         return Affected(certificate, touching, problem=str(error))
 
 
-def _outcome(certificate: Certificate, job: Job) -> Outcome:
-    """With the seed of the first time."""
-    sampling: Mapping[str, Any] = json.loads((Path(certificate.folder) / RESULTS).read_bytes()).get("sampling") or {}
-    seed = int(sampling.get("seed") or 0)
-    return report_outcome(job, seed=seed) if certificate.command == "report" else diagnosis_outcome(job, seed=seed)
+def _outcome(certificate: Certificate, job: Job) -> tuple[Job, Outcome]:
+    """In the language and with the seed of the first time."""
+    before: Mapping[str, Any] = json.loads((Path(certificate.folder) / RESULTS).read_bytes())
+    seed = int((before.get("sampling") or {}).get("seed") or 0)
+    job = in_language(job, code_of(before["job"].get("language", ENGLISH)))
+    again = report_outcome if certificate.command == "report" else diagnosis_outcome
+    return job, again(job, seed=seed)
 
 
 def compared(before: tuple[Value, ...], after: list[Value]) -> Iterator[Change]:

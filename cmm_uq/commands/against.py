@@ -14,7 +14,7 @@ from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.simulation import KEY, SimulationFacts
 from cmm_uq.kinds import kind_of
-from cmm_uq.messages import Text, plural, say
+from cmm_uq.messages import Text, in_a_row, plural, say, signed
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import Observe
@@ -166,10 +166,10 @@ def _odd(found: PredictedErrors) -> list[Finding]:
             many=say("{count} rows of the prediction are of no point of the recording, and were not used", count=found.unused),
         ))  # fmt: skip
     if not found.frame.is_the_same:
-        x, y, z = found.frame.shift
         told.append(say(
-            "the prediction is in another frame; it was turned by {angle:.3g}° and shifted by {x:.2f}, {y:.2f}, {z:.2f} mm",
-            angle=float(np.degrees(found.frame.angle)), x=float(x), y=float(y), z=float(z),
+            "the prediction is in another frame; it was turned by {angle:.3g}° and shifted by {shift} mm",
+            angle=float(np.degrees(found.frame.angle)),
+            shift=in_a_row(signed(float(one), ".2f") for one in found.frame.shift),
         ))  # fmt: skip
     if found.apart > _FAR:
         turned = float(found.turned.max()) / MICROMETRE

@@ -14,6 +14,7 @@ from cmm_uq.commands.written import RESULTS
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.languages.language import ENGLISH
 from cmm_uq.records.content import decision
 from cmm_uq.scheduling.found import job_folders
 from cmm_uq.writing import Manifest, read_manifest, sha256_of
@@ -129,6 +130,7 @@ class Wanted:
             data is not None
             and data.get("software", {}).get("version") == __version__
             and data.get("job", {}).get("inputs_sha256") == sha256(job.inputs)
+            and data.get("job", {}).get("language", ENGLISH) == job.facts.job.language
             and data.get("sampling", {}).get("seed", self.seed) == self.seed
         )
         return data if same else None

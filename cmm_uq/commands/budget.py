@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.commands.written import Stage, silent
+from cmm_uq.documents.fonts import fonts_of
 from cmm_uq.errors import CmmUqError
+from cmm_uq.languages.language import ENGLISH, Code
 from cmm_uq.uncertainty.evaluation import Evaluation
 from cmm_uq.uncertainty.model_file import read_model_file
 from cmm_uq.writing import Owner, staged
@@ -26,7 +28,13 @@ class WrittenBudget:
 
 
 def write_budget(
-    file: Path, out: Path | None = None, *, seed: int | None = None, force: bool = False, stage: Stage = silent
+    file: Path,
+    out: Path | None = None,
+    *,
+    seed: int | None = None,
+    force: bool = False,
+    stage: Stage = silent,
+    language: Code = ENGLISH,
 ) -> WrittenBudget:
     """Evaluate a model file and write ``budget.html``, ``budget.pdf`` and ``results.json``, all or none.
 
@@ -37,12 +45,14 @@ def write_budget(
     seed : instead of the file's.
     force : keep what stands in the way instead of refusing.
     stage : told of progress.
+    language : of the documents.
 
     Raises
     ------
     CmmUqError : the model cannot be evaluated, or something in the folder is not this command's.
     OutputError : the folder cannot be written to.
     """
+    fonts_of(language)  # refused before anything is computed
     model = read_model_file(file)
     folder = out or Path("reports") / file.stem
     if file.name in FILES:
@@ -54,12 +64,16 @@ def write_budget(
         stage("Rendering", 0.7)
         from cmm_uq.documents.budget_page import budget_document
         from cmm_uq.documents.html import render_html
+        from cmm_uq.documents.in_language import said
+        from cmm_uq.documents.lettering import lettered_in
         from cmm_uq.documents.pdf import render_pdf
         from cmm_uq.documents.results_file import as_json
         from cmm_uq.uncertainty.budget_results import results_of
 
-        data = as_json({**results_of(evaluation), **model.further(), "inputs_sha256": {file.name: model.sha256}})
-        document = budget_document(model, evaluation, file.name)
+        data = as_json({**results_of(evaluation), **model.further(), "inputs_sha256": {file.name: model.sha256},
+                        **({"language": language} if language != ENGLISH else {})})  # fmt: skip
+        with lettered_in(language):
+            document = said(budget_document(model, evaluation, file.name), language)
         pdf = render_pdf(document, {file.name: model.content, "results.json": data})
         contents = {"budget.html": render_html(document).encode(), "budget.pdf": pdf, "results.json": data}
         files = place.write(contents)

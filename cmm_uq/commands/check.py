@@ -16,7 +16,8 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import refuse_unmeasured
 from cmm_uq.conformity.standards import decidable
-from cmm_uq.documents.completeness import contradictions, unstated
+from cmm_uq.documents.clauses import Clause, certifies, clauses, missing
+from cmm_uq.documents.completeness import contradictions
 from cmm_uq.errors import CmmUqError, Gathered
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import JOB_BYTES, TABLE_BYTES
@@ -87,11 +88,13 @@ class Checked:
     job : its folder, or its job.toml.
     problems : that would stop ``report``.
     warnings : that the certificate would state, or that what stands there is not a measurement.
+    clauses : of ISO/IEC 17025:2017, 7.8, with what of each the certificate will state; none where there will be none.
     """
 
     job: str
     problems: tuple[Problem, ...]
     warnings: tuple[Problem, ...]
+    clauses: tuple[Clause, ...] = ()
 
     @property
     def sound(self) -> bool:
@@ -102,7 +105,7 @@ class Checked:
         """For results in JSON."""
         return {
             "job": self.job, "sound": self.sound, "problems": [one.as_data() for one in self.problems],
-            "warnings": [one.as_data() for one in self.warnings],
+            "warnings": [one.as_data() for one in self.warnings], "iso17025": [one.data for one in self.clauses],
         }  # fmt: skip
 
     def __repr__(self) -> str:
@@ -132,7 +135,8 @@ def check_job(folder: Path) -> Checked:
         _parts_by_themselves(path, wrong)
     else:
         warnings = _of_a_job(job, path, wrong)
-    return Checked(str(folder), _once(Problem.of(_placed(error, path)) for error in wrong.problems), _once(warnings))
+    problems = _once(Problem.of(_placed(error, path)) for error in wrong.problems)
+    return Checked(str(folder), problems, _once(warnings), _clauses(job))
 
 
 @naming_package()
@@ -141,7 +145,11 @@ def check_read(job: Job) -> Checked:
     wrong, path = Gathered(), job.folder / "job.toml"
     warnings = _of_a_job(job, path, wrong)
     problems = _once(Problem.of(_placed(error, path)) for error in wrong.problems)
-    return Checked(job.facts.job.id, problems, _once(warnings))
+    return Checked(job.facts.job.id, problems, _once(warnings), _clauses(job))
+
+
+def _clauses(job: Job | None) -> tuple[Clause, ...]:
+    return clauses(job.facts) if job is not None and certifies(job) else ()
 
 
 def _of_a_job(job: Job, path: Path, wrong: Gathered) -> list[Problem]:
@@ -187,17 +195,17 @@ def _to_be_known(job: Job, path: Path) -> list[Problem]:
         said = f"the recording is {job.origin}, and all that is made of it says so"
         return [Problem(said, str(path), key="[job] origin", fix="Put in your own readings for a certificate")]
     content = job.inputs["job.toml"].decode("utf-8-sig")
-    missing = [
+    unstated = [
         Problem(
-            f"not stated: {what}, which ISO/IEC 17025:2017 asks for",
+            f"not stated: {one.asks} ({one.clause}), which ISO/IEC 17025:2017 asks for",
             str(path),
-            _line_of(key, content),
-            key,
-            f"Give {key}",
+            _line_of(one.key, content),
+            one.key,
+            f"Give {one.key}",
         )
-        for what, key in unstated(job.facts)
+        for one in (missing(job.facts) if certifies(job) else ())
     ]
-    return [*(Problem(str(text), str(path)) for text in contradictions(job)), *missing]
+    return [*(Problem(str(text), str(path)) for text in contradictions(job)), *unstated]
 
 
 def _parts_by_themselves(path: Path, wrong: Gathered) -> None:

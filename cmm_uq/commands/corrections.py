@@ -46,9 +46,20 @@ class Correction:
         certificate : as recorded.
         inputs : of its job; ``None`` where they cannot be read, so that they are no reason to pass it over.
         """
-        if self.commands and certificate.command not in self.commands:
+        return self.concerns(certificate.command, certificate.kind, inputs)
+
+    def concerns(self, command: str, kind: str, inputs: Inputs | None) -> bool:
+        """Whether it may touch what a command made.
+
+        Parameters
+        ----------
+        command : report or diagnose.
+        kind : of measurement; empty where it is not known.
+        inputs : of the job; ``None`` where they cannot be read, so that they are no reason to pass it over.
+        """
+        if self.commands and command not in self.commands:
             return False
-        if self.kinds and certificate.kind and certificate.kind not in self.kinds:
+        if self.kinds and kind and kind not in self.kinds:
             return False
         if inputs is None:
             return True

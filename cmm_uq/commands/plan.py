@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.reading import in_language, read_job
 from cmm_uq.commands.written import Form, Stage, Written, silent
+from cmm_uq.documents.lettering import lettered_in
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
+from cmm_uq.languages.language import Code
 from cmm_uq.planning.placing import joined
 from cmm_uq.plugins import naming_package
 
@@ -41,7 +43,8 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
     from cmm_uq.commands.plan_summary import plan_summary
 
     stage("Drawing the placings", 0.95)
-    document = plan_document(plan)
+    with lettered_in(job.facts.job.language):
+        document = plan_document(plan)
     return Outcome(
         plan, lambda: document, plan_results(plan), plan_summary(plan), document.warnings,
         {TO_FILL_IN: recording_to_be(plan)} if plan.to_measure else {},
@@ -57,6 +60,7 @@ def write_plan(
     seed: int = 0,
     force: bool = False,
     stage: Stage | None = None,
+    language: Code | None = None,
 ) -> Written:
     """Plan a job and write ``plan.csv``, ``plan.html`` and ``results.json``, all or none.
 
@@ -71,13 +75,14 @@ def write_plan(
     seed : of the recordings drawn for that.
     force : keep what stands in the way as ``NAME.previous`` instead of refusing.
     stage : told of progress.
+    language : of the page, instead of the job's.
 
     Raises
     ------
     CmmUqError : the plan is impossible, or something in the folder that this command did not write for this job.
     OutputError : the folder cannot be written to.
     """
-    read, tell = read_job(job, recorded=False), stage or silent
+    read, tell = in_language(read_job(job, recorded=False), language), stage or silent
     return PLAN.write(
         read, lambda: plan_outcome(read, power=power, seed=seed, stage=tell), out, force=force, stage=tell
     )

@@ -25,14 +25,14 @@ _PRIOR = say("not known: averaged over the prior")
 def noise_facts(plan: Plan) -> tuple[tuple[Text, Text], ...]:
     """Reading noise, set-up offset and growth, and where each is from."""
     setting = plan.setting
-    source: Text = say(" (assumed: the job states none)")
+    source: Text = say("assumed: the job states none")
     if setting.plan.noise_from is not None:
-        source = say(" (from {file})", file=Verbatim(setting.plan.noise_from))
+        source = say("from {file}", file=Verbatim(setting.plan.noise_from))
     elif setting.stated is not None:
         source = NOTHING
     elif plan.name == RECORDED:
-        source = say(" (from the recording's residuals)")
-    reading = say("{sigma:.2g} µm{stated}", sigma=setting.sigma / MICROMETRE, stated=source)
+        source = say("from the recording's residuals")
+    reading = _size(setting.sigma, source)
     if setting.noise is None:
         return ((say("Noise of a coordinate"), reading), (say("Set-up offset"), say("taken as none")))
     known = NOTHING if setting.plan.noise_from is None else source
@@ -46,7 +46,9 @@ def noise_facts(plan: Plan) -> tuple[tuple[Text, Text], ...]:
 def _size(size: float | None, source: Text) -> Text:
     if size is None:
         return _PRIOR
-    return say("{sigma:.2g} µm{stated}", sigma=size / MICROMETRE, stated=source)
+    if not source:
+        return say("{sigma:.2g} µm", sigma=size / MICROMETRE)
+    return say("{sigma:.2g} µm ({source})", sigma=size / MICROMETRE, source=source)
 
 
 def noise_data(plan: Plan) -> dict[str, Any]:

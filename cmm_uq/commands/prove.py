@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.reading import in_language, read_job
 from cmm_uq.commands.written import REPORTS, Form, Stage, Written, silent
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.jobs.job import Job
+from cmm_uq.languages.language import Code
 from cmm_uq.plugins import naming_package
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def _outcome(
 
 def write_proof(
     job: Path, asked: Asked, out: Path | None = None, *, force: bool = False, stage: Stage | None = None,
-    sealed: Sealed | None = None,
+    sealed: Sealed | None = None, language: Code | None = None,
 ) -> Written:  # fmt: skip
     """Prove the diagnosis on a job's set-ups and write page, truth, answers and ``results.json``, all or none.
 
@@ -66,6 +67,7 @@ def write_proof(
     force : keep what stands in the way as ``NAME.previous`` instead of refusing.
     stage : told of progress.
     sealed : told the hash of the truth before the first diagnosis.
+    language : of the page, instead of the job's.
 
     Raises
     ------
@@ -75,7 +77,7 @@ def write_proof(
     """
     tell = stage or silent
     tell("Reading the job", 0.0)
-    read = read_job(job, recorded=False)
+    read = in_language(read_job(job, recorded=False), language)
     folder = (out or REPORTS / read.facts.job.id / PROVE.below) / UNFINISHED
     open_: list[Kept] = []
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -231,7 +232,8 @@ def _noise_found(model: MeasurementModel) -> Noise:
     time = model.artefact.points.columns.get("time_s")
     duration = 0.0 if time is None else float(np.ptp(time))
     slow = float(sizes.slow[0]) if duration > 0 else 0.0
-    forgets = duration / float(sizes.rate[0]) if slow else Noise().slow_time_s
+    rate = float(sizes.rate[0])
+    forgets = (duration / rate if rate else inf) if slow else Noise().slow_time_s
     return Noise(
         (x, y, z), float(sizes.placing[0]), float(sizes.growth[0]), slow, forgets, resolution=components.display
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from cmm_uq.conformity.standards import names as standard_names
@@ -14,6 +15,7 @@ from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import Nameable
 from cmm_uq.kinds import names, table_of
+from cmm_uq.languages.language import Code
 from cmm_uq.plugins import naming_package
 
 NAMEABLE = Nameable(table_of, names, Standards(standard_named, standard_names))
@@ -56,6 +58,14 @@ def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
     CmmUqError : a file is missing, or says something unknown or contradictory.
     """
     return reading.job_of(files, NAMEABLE, recorded=recorded)
+
+
+def in_language(job: Job, language: Code | None) -> Job:
+    """A job whose documents are to be said in a language; without one as job.toml has it."""
+    if language is None:
+        return job
+    told = job.facts.job.model_copy(update={"language": language})
+    return replace(job, facts=job.facts.model_copy(update={"job": told}))
 
 
 def compared_with(job: Job, prediction: Path) -> Job:

@@ -86,6 +86,9 @@ def release(records: Records, name: str, *, by: str, reason: str = "") -> Signed
     if (why := blocked(certificate)) is not None:
         raise CmmUqError(f"{certificate.number} cannot be released: {why}", where=records.shown)
     content = next(records.entries(certificate.entry)).data
+    if missing := content.get("missing"):
+        raise CmmUqError(f"{certificate.number} says DRAFT on every page: it does not state {', '.join(missing)}",
+                         where=records.shown, fix="State it in job.toml and report again")  # fmt: skip
     needed = FOUR_EYES if content.get("four_eyes") else TWO_EYES
     maker = str(content.get("operator") or "")
     if needed == FOUR_EYES and spelled(maker) == spelled(person):

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cmm_uq.commands import analysis, diagnosing
-from cmm_uq.commands.reading import compared_with, read_job
+from cmm_uq.commands.reading import compared_with, in_language, read_job
 from cmm_uq.commands.written import Form, Stage, Told, Written, silent
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.documents.diagnosis_next import TO_FILL_IN
+from cmm_uq.documents.origin import DIGITAL
 from cmm_uq.documents.outcome import Outcome
+from cmm_uq.documents.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job
+from cmm_uq.languages.language import Code
 from cmm_uq.plugins import naming_package
 from cmm_uq.records.place import NONE
 
-CERTIFICATE, DIAGNOSIS = ("certificate.html", "certificate.pdf"), ("diagnosis.html", "diagnosis.pdf")
-REPORT = Form("report", CERTIFICATE, recorded=True)
+if TYPE_CHECKING:
+    from cmm_uq.commands.signing import Signing
+
+CERTIFICATE = ("certificate.html", DIGITAL, "certificate.pdf")
+DIAGNOSIS = ("diagnosis.html", "diagnosis.pdf")
+REPORT = Form("report", CERTIFICATE, further=(PROVENANCE,), recorded=True)
 DIAGNOSE = Form("diagnose", DIAGNOSIS, "diagnosis", (TO_FILL_IN,), recorded=True)
 
 
@@ -46,9 +54,10 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: 
 
 def write_report(
     job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
-    told: Told | None = None, records: str | Path | None = NONE,
+    told: Told | None = None, records: str | Path | None = NONE, language: Code | None = None,
+    signing: Signing | None = None,
 ) -> Written:  # fmt: skip
-    """Analyse a job and write ``certificate.html``, ``certificate.pdf`` and ``results.json``, all or none.
+    """Analyse a job and write its certificate (HTML, PDF, DCC), ``results.json`` and ``provenance.json``, all or none.
 
     A kind may add files of its own. Documents of a recording that was not measured carry its origin in their names.
 
@@ -61,20 +70,23 @@ def write_report(
     stage : told of progress.
     told : of the job, before anything is computed.
     records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
+    language : of the documents, instead of the job's.
+    signing : who signs the certificate; ``None`` for nobody.
 
     Raises
     ------
-    CmmUqError : the job cannot be analysed, or something in the folder that this command did not write for this job.
+    CmmUqError : the job cannot be analysed, the certificate cannot be signed, or something in the folder that this command did
+        not write for this job.
     OutputError : the folder cannot be written to.
     """
     tell = stage or silent
     tell("Reading the job", 0.0)
-    read = read_job(job)
+    read = in_language(read_job(job), language)
     analysis.report_recipe(read)  # refused before anything is made
     if told is not None:
         told(read)
     return REPORT.write(read, lambda: report_outcome(read, seed=seed, stage=tell), out, force=force, stage=tell,
-                        records=records)  # fmt: skip
+                        records=records, signing=signing)  # fmt: skip
 
 
 @naming_package()
@@ -112,6 +124,7 @@ def write_diagnosis(
     stage: Stage | None = None,
     told: Told | None = None,
     records: str | Path | None = NONE,
+    language: Code | None = None,
 ) -> Written:
     """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
 
@@ -128,13 +141,14 @@ def write_diagnosis(
     stage : told of progress.
     told : of the job, before anything is computed.
     records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
+    language : of the documents, instead of the job's.
 
     Raises
     ------
     CmmUqError : the job cannot be diagnosed, or something in the folder that this command did not write for this job.
     OutputError : the folder cannot be written to.
     """
-    read, tell = read_job(job), stage or silent
+    read, tell = in_language(read_job(job), language), stage or silent
     if against is not None:
         read = compared_with(read, against)
     if told is not None:

@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -184,7 +185,7 @@ def _noise(given: NoiseFacts) -> Noise:
     x, y, z = (sd * MICROMETRE for sd in given.coordinates_um)
     return Noise(
         (x, y, z), given.placing_um * MICROMETRE, given.growth_um * MICROMETRE, given.slow_um * MICROMETRE,
-        given.slow_time_s, given.tails_dof or 0.0, given.resolution_um * MICROMETRE,
+        inf if given.slow_time_s == "never" else given.slow_time_s, given.tails_dof or 0.0, given.resolution_um * MICROMETRE,
     )  # fmt: skip
 
 

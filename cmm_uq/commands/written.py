@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cmm_uq.commands.recording import ledger_of, opened
+from cmm_uq.documents.fonts import fonts_of
 from cmm_uq.documents.in_short import Summary
 from cmm_uq.documents.outcome import Found, Outcome
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.languages.saying import said_in
 from cmm_uq.records.place import NONE
 from cmm_uq.writing import Owner, staged
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.signing import Signing
 
 Stage = Callable[[str, float], None]
 """Told what is being done, after a colon what of it is counted, and the part of the whole that is done."""
@@ -21,6 +28,15 @@ Told = Callable[[Job], None]
 """Told of the job as it was read, before anything is computed of it."""
 
 REPORTS, RESULTS = Path("reports"), "results.json"
+
+
+Finished = Callable[[str, bytes], bytes]
+"""What becomes of a document that was made, by its name."""
+
+
+def unchanged(name: str, content: bytes) -> bytes:
+    """A document as it was made."""
+    return content
 
 
 def silent(what: str, part: float) -> None:
@@ -67,7 +83,8 @@ class Form:
     Parameters
     ----------
     command : of ``cmm-uq``.
-    documents : their names; those of a recording that was not measured carry its origin.
+    documents : their names, in the order in which they are made: a digital certificate (``.xml``) carries the page before it,
+        and is attached to the PDF after it; those of a recording that was not measured carry its origin.
     below : folder in ``reports/<job id>`` that is written to by default.
     further : names of files that come with it.
     recorded : whether what it writes is kept in records.
@@ -88,6 +105,7 @@ class Form:
         force: bool = False,
         stage: Stage = silent,
         records: str | Path | None = NONE,
+        signing: Signing | None = None,
     ) -> Written:
         """Make sure of the folder, then compute, render and write, all or none, and record it with that.
 
@@ -99,12 +117,15 @@ class Form:
         force : keep what stands in the way as ``NAME.previous`` instead of refusing.
         stage : told of progress.
         records : file or URL of the records; ``none`` for none, ``None`` for those of the environment, else beside the folder.
+        signing : who signs the documents; ``None`` for nobody.
 
         Raises
         ------
-        CmmUqError : as computing does, or something in the folder that this command did not write for this job.
+        CmmUqError : as computing does, the documents cannot be signed, or something in the folder that this command did not
+            write for this job.
         OutputError : the folder, or the records, cannot be written to.
         """
+        fonts_of(job.facts.job.language)  # refused before anything is computed
         owner = self.owner(job)
         folder = out or REPORTS / owner.job / self.below
         expected = (*self.names(job), RESULTS, *self.further)
@@ -113,7 +134,8 @@ class Form:
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
             found = outcome()
-            contents = self.contents(found, stage)
+            finished = unchanged if signing is None else _signed_by(signing, job)
+            contents = self.contents(found, stage, finished=finished)
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
             files = place.write(contents, ledger=ledger)
@@ -126,35 +148,67 @@ class Form:
         return Owner(self.command, job.facts.job.id, job.origin)
 
     def contents(
-        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False
+        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, finished: Finished = unchanged
     ) -> dict[str, bytes]:  # fmt: skip
-        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
+        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted.
+
+        Parameters
+        ----------
+        outcome : that is written.
+        stage : told of progress.
+        results_only : whether nothing but ``results.json`` is wanted.
+        finished : what becomes of a document before the next is made of it, as of one that is signed.
+        """
         from cmm_uq.documents.results_file import as_json
 
         if results_only:
             return {RESULTS: as_json(outcome.results)}
         from cmm_uq.documents.html import render_html
+        from cmm_uq.documents.in_language import said
         from cmm_uq.documents.origin import marked
         from cmm_uq.documents.pdf import render_pdf
+        from cmm_uq.documents.provenance import FILE, provenance
 
         job, data = outcome.found.job, as_json(outcome.results)
-        document = marked(outcome.document, job)
-        for name in outcome.files.keys() & job.inputs.keys():
+        document = said(marked(outcome.document, job), job.facts.job.language)
+        for name in {*outcome.files, *({FILE} & {*self.further})} & job.inputs.keys():
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
-        rendered = {}
+        rendered: dict[str, bytes] = {}
+        further = {RESULTS: data, **outcome.files}
         for name in self.names(job):
             stage(f"Rendering: {name}", 0.8)
-            pdf = name.endswith(".pdf")
-            rendered[name] = (
-                render_pdf(document, {**job.inputs, RESULTS: data, **outcome.files})
-                if pdf
-                else render_html(document).encode()
-            )
-        return {**rendered, RESULTS: data, **outcome.files}
+            if name.endswith(".html"):
+                made = render_html(document).encode()
+            elif name.endswith(".xml"):
+                made = _digital(job, data, rendered)
+            else:
+                if FILE in self.further:
+                    further[FILE] = finished(FILE, provenance(job, outcome.results, {**rendered, **further}))
+                digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
+                made = render_pdf(document, {**job.inputs, **digital, **further})
+            rendered[name] = finished(name, made)
+        return {**rendered, **further}
 
     def names(self, job: Job) -> list[str]:
         """Of the documents of a job."""
         from cmm_uq.documents.origin import file_name
 
         return [file_name(document, job.origin) for document in self.documents]
+
+
+def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:
+    """The digital certificate, of results.json and the job alone, with the page as its human-readable copy."""
+    from cmm_uq.dcc import written
+    from cmm_uq.documents.digital_certificate import digital_certificate
+
+    page = next((content for name, content in rendered.items() if name.endswith(".html")), None)
+    return written(digital_certificate(json.loads(results), job, html=page))
+
+
+def _signed_by(signing: Signing, job: Job) -> Finished:
+    """What signs the documents of a job, in its language."""
+    language = job.facts.job.language
+    return signing.finished(
+        job.facts.laboratory.model_dump(), language=language, said=lambda text: said_in(text, language)
+    )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.conformity.measurement_lines import position_of
+from cmm_uq.conformity.measurement_lines import PARALLELS, position_of
 from cmm_uq.conformity.plans import BarPlan, Condition
 from cmm_uq.messages import Text, commas, number, plural, say
 from cmm_uq.model.artefact import Artefact
@@ -51,7 +51,7 @@ def _directions(missing: tuple[Text, ...]) -> Text:
 
 
 def _along(position: Text) -> Text:
-    return position if position.startswith("parallel") else say("along {position}", position=position)
+    return position if position in PARALLELS else say("along {position}", position=position)
 
 
 def _one_a_measurement(artefact: Artefact) -> tuple[list[int], Floats]:

@@ -24,7 +24,7 @@ from cmm_uq.jobs.conformity import (
     UncertaintyRatio,
     UnconditionalRisk,
 )
-from cmm_uq.messages import NOTHING, Text, say
+from cmm_uq.messages import Text, say
 
 Outcome = Literal["pass", "conditional pass", "undecided", "conditional fail", "fail"]
 
@@ -266,5 +266,6 @@ def rule_words(rule: Rule, band: float | None = None) -> Text:
         if "non-binary" in rule_name(rule):
             return say("non-binary, guard band U, k = 2 (ILAC-G8:09/2019, 4.2.3)")
         return say("binary, guard band U, k = 2 (ILAC-G8:09/2019, 4.2.2)")
-    told = NOTHING if band is None else say("guard band {band:.3g} u ", band=band)
-    return say("ISO 14253-1:2017, {told}(95 %)", told=told)
+    if band is None:
+        return say("ISO 14253-1:2017 (95 %)")
+    return say("ISO 14253-1:2017, guard band {band:.3g} u (95 %)", band=band)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.conformity.measurement_lines import PARALLELS, SPACE_DIAGONALS, crossed_travel, position_on
 from cmm_uq.conformity.plans import OFFSET_TOLERANCE_MM, Condition, LengthPlan
-from cmm_uq.messages import NOTHING, Text, commas, say
+from cmm_uq.messages import Text, commas, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import AXES, Floats, Ints, Machine, Points
 
@@ -90,7 +90,7 @@ def _both_sides(plan: LengthPlan, artefact: Artefact, places: _Places) -> tuple[
         return (Condition(what, (short,)),)
     counts = {line: sum(bool(one.bidirectional) for one in found) for line, found in places.items()}
     missing = tuple(
-        say("{lengths} bidirectional lengths along {line} ({count})", lengths=plan.lengths, line=line, count=count)
+        say("{lengths} bidirectional lengths ({line}: {count})", lengths=plan.lengths, line=line, count=count)
         for line, count in counts.items()
         if count < min(plan.lengths, len(places[line]))
     )
@@ -157,7 +157,7 @@ def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Conditi
     shares = {line: max((m.share or 0.0 for m in found), default=0.0) for line, found in places.items()}
     missing = tuple(
         say(
-            "length of at least {least} of the travel along {line} ({share:.0f} %)",
+            "length of at least {least} of the travel ({line}: {share:.0f} %)",
             least=least,
             line=line,
             share=100 * share,
@@ -166,20 +166,22 @@ def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Conditi
         if share < plan.least_share
     )
     return Condition(
-        say("{what}: {span}", what=what, span=_span([100 * share for share in shares.values()], say(" %"))), missing
+        say("{what}: {span}", what=what, span=_percents([100 * share for share in shares.values()])), missing
     )
 
 
-def _span(figures: Sequence[float], unit: Text = NOTHING) -> Text:
-    if not figures:
-        return say("none")
-    return say("{low:.0f}{unit} to {high:.0f}{unit}", low=min(figures), high=max(figures), unit=unit)
+def _span(counts: Sequence[int]) -> Text:
+    return say("{low:.0f} to {high:.0f}", low=min(counts), high=max(counts)) if counts else say("none")
+
+
+def _percents(shares: Sequence[float]) -> Text:
+    return say("{low:.0f} % to {high:.0f} %", low=min(shares), high=max(shares)) if shares else say("none")
 
 
 def _different(plan: LengthPlan, places: _Places) -> Condition:
     counts = {line: len(found) for line, found in places.items()}
     missing = tuple(
-        say("{lengths} different lengths along {line} ({count})", lengths=plan.lengths, line=line, count=count)
+        say("{lengths} different lengths ({line}: {count})", lengths=plan.lengths, line=line, count=count)
         for line, count in counts.items()
         if count < plan.lengths
     )
@@ -192,7 +194,7 @@ def _shortest(plan: LengthPlan, places: _Places) -> Condition:
     shortest = {line: min(m.length for m in found) for line, found in places.items()}
     missing = tuple(
         say(
-            "length of at most {shortest_mm:g} mm along {line} ({length:.4g} mm)",
+            "length of at most {shortest_mm:g} mm ({line}: {length:.4g} mm)",
             shortest_mm=plan.shortest_mm,
             line=line,
             length=length,
@@ -216,7 +218,7 @@ def _repeated(plan: LengthPlan, places: _Places) -> Condition:
         lost = (say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total),)
     missing = tuple(
         say(
-            "{repeats} repetitions of each length along {line} ({counts})",
+            "{repeats} repetitions of each length ({line}: {counts})",
             repeats=plan.repeats,
             line=line,
             counts=counts[: plan.lengths][-1],

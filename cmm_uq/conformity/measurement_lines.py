@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.messages import Message, Text, Verbatim, say
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.points import AXES, Floats, Machine
 
 ALIGNED = np.sin(np.radians(10.0))
@@ -27,7 +27,7 @@ FACE_DIAGONALS = tuple(
 )
 
 
-def position_of(direction: Floats) -> Message:
+def position_of(direction: Floats) -> Text:
     """Position of a line in words, from its direction (3,), either way along it."""
     u = direction / np.linalg.norm(direction)
     counts = np.abs(u) > ALIGNED
@@ -58,8 +58,8 @@ def _position_on(ends: tuple[float, ...], place: tuple[float, ...], direction: t
         return named
     if np.all(crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(travel, axis=1)):
         return say("space diagonal {axes}", axes=_signed(u, np.ones(3, dtype=bool)))
-    if named.startswith("space diagonal"):
-        return say("oblique {axes}", axes=named.arguments["axes"])
+    if np.all(counts := np.abs(u) > ALIGNED):
+        return say("oblique {axes}", axes=_signed(u, counts))
     return named
 
 

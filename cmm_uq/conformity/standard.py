@@ -24,7 +24,7 @@ from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, needed
 from cmm_uq.jobs.short_gauge import ShortGauge
-from cmm_uq.messages import Text, say
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.budget import Budget, Line
@@ -40,7 +40,7 @@ RAISED = say(
     "([laboratory.cmc], k = 2)."
 )
 
-CMC = say("[laboratory.cmc]")
+CMC = Verbatim("[laboratory.cmc]")
 
 BY_MEASUREMENT_ALONE = say(
     "Probabilities are what the measurement alone says, with nothing known of such machines beforehand: where the limit is "

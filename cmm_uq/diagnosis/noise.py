@@ -74,7 +74,7 @@ def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probabil
     Slow noise that is too quick for the cosines has its covariance in full: what they leave out would look like physics.
     """
     variances, slow = components.variances(sizes)
-    columns = components.slow * np.sqrt(slow[0]) if np.any(slow) else np.zeros((0, 0))
+    columns = components.waves(sizes) if np.any(slow) else np.zeros((0, 0))
     if components.time.size and components.quick(sizes)[0] > NEGLIGIBLE:
         variances, _ = components.variances(replace(sizes, slow=np.zeros(1)))
         columns = components.exact(sizes)

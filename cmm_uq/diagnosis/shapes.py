@@ -18,7 +18,7 @@ from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.inference.marginal import Marginal
 from cmm_uq.inference.noise import NEGLIGIBLE, SLOW, Components, Sizes
-from cmm_uq.inference.proposals import tempered
+from cmm_uq.inference.presence import beginning, present
 from cmm_uq.points import Floats
 from cmm_uq.units import unit
 
@@ -28,6 +28,8 @@ SHAPES, KEPT = 512, 7
 _MORE, _ENOUGH = 256, 32
 """Drawn from what the recording says, with and without something missing; how many draws must matter for none of these."""
 
+_TRIED = 600
+"""Draws by which it is found what the recording says of them, in each round."""
 
 _NANOMETRE = 1e-6
 """mm: noise is not taken for less."""
@@ -71,7 +73,7 @@ def kinds(
         told = few
         if quick >= NEGLIGIBLE:
             told = [_Density.of(*each, components) for each in zip(either, taken, strict=True)]
-        shapes = _more(shapes, told)
+        shapes = _more(shapes, few, told)
         shares = [density.share(shapes) for density in told]
     kept, weight = _representative(components.sizes(shapes.latent), shapes.weight, np.mean(shares, axis=0))
     scale = linear.noise_scale
@@ -164,17 +166,29 @@ def _latent(components: Components, numbers: Floats) -> Floats:
     return found
 
 
-def _more(shapes: Shapes, densities: Sequence[_Density]) -> Shapes:
-    """With draws from what is proposed for the densities; all together count as drawn from the mixture of what drew them."""
+def _more(shapes: Shapes, few: Sequence[_Density], told: Sequence[_Density]) -> Shapes:
+    """With draws from what is proposed for the densities; all together count as drawn from the mixture of what drew them.
+
+    Parameters
+    ----------
+    shapes : drawn from the prior.
+    few : the densities with few cosines, by which to find where the others are.
+    told : those that are meant.
+    """
     n, d = shapes.latent.shape
-    proposals = [tempered(density, np.zeros(d - 1), np.eye(d - 1), seed) for seed, density in enumerate(densities)]
+    components = told[0].marginal.noise
+    near = present(few[0], beginning(components.names[1:]), 0, tried=_TRIED)
+    proposals = []
+    for seed, density in enumerate(told):  # beside rivals it costs the more, and lies near that without them
+        near = near if density is few[0] else present(density, near, seed, 1, _TRIED)
+        proposals.append(near)
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(len(proposals))))
     drawn = [proposal.parameters(proposal.draws(_MORE, random)) for proposal in proposals]
     numbers = np.vstack([shapes.latent[:, 1:], *drawn])
     prior = -0.5 * np.sum(numbers**2, axis=1) - 0.5 * (d - 1) * np.log(2 * np.pi)
     by_any = [prior + np.log(n), *(proposal.log_probability(numbers) + np.log(_MORE) for proposal in proposals)]
     weight = np.exp(prior - special.logsumexp(by_any, axis=0))
-    return Shapes(_latent(densities[0].marginal.noise, numbers), weight / weight.sum())
+    return Shapes(_latent(components, numbers), weight / weight.sum())
 
 
 def _representative(sizes: Sizes, prior: Floats, share: Floats) -> tuple[list[int], Floats]:
@@ -184,7 +198,7 @@ def _representative(sizes: Sizes, prior: Floats, share: Floats) -> tuple[list[in
     whether there is any is what the evidence of an effect depends on most.
     """
     table = np.column_stack(
-        [np.where(sizes.slow > 0, sizes.rate, 0), sizes.slow, sizes.placing, sizes.growth, sizes.reading]
+        [np.where(sizes.slow > 0, sizes.rate, -1), sizes.slow, sizes.placing, sizes.growth, sizes.reading]
     )
     _, first, index = np.unique(np.round(table, 9), axis=0, return_index=True, return_inverse=True)
     before, part = (np.bincount(index.ravel(), each, len(first)) for each in (prior, share))

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from cmm_uq.documents.clauses import DRAFT, NOT_OURS, STATEMENTS, draft, replaced_certificate
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conditions import conditions
 from cmm_uq.documents.document import Document, Facts, Section, Signature
-from cmm_uq.documents.origin import CERTIFICATE, came_about
+from cmm_uq.documents.origin import CERTIFICATE, DIGITAL, came_about, file_name
+from cmm_uq.documents.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed
-
-STATEMENTS = (
-    say("The results relate only to the item named above, in its condition and place at the time of the measurement."),
-    say(
-        "This certificate shall not be reproduced except in full without the written approval of the "
-        "issuing laboratory."
-    ),
-)
-"""ISO/IEC 17025:2017, 7.8.2.1 l) and the note to 7.8.2.1."""
 
 
 def certificate_of(
@@ -61,13 +54,18 @@ def certificate_of(
         sections=tuple(sorted(
             (replace(first, blocks=(*first.blocks, under)) if under.rows else first, *others), key=lambda one: one.opinion
         )),
-        statements=STATEMENTS,
+        statements=(*STATEMENTS, NOT_OURS) if facts.job.from_customer else STATEMENTS,
         signatures=(Signature(Verbatim(facts.laboratory.signatory), Verbatim(facts.laboratory.signatory_role)),)
         if facts.laboratory.signatory
         else (),
-        attachments=(*names(job.inputs), Verbatim("results.json"), *files),
+        attachments=(
+            *names(job.inputs), Verbatim("results.json"), Verbatim(file_name(DIGITAL, job.origin)), *files,
+            Verbatim(PROVENANCE),
+        ),
         produced_by=produced_by,
         date=facts.job.issued or facts.job.date,
+        banner=DRAFT if draft(job) else NOTHING,
+        draft=draft(job),
     )  # fmt: skip
 
 
@@ -77,10 +75,12 @@ def _particulars(facts: JobFile, decided: Text) -> tuple[Facts, ...]:
     groups = (
         (
             (say("Certificate number") if measured else say("Job"), job.number if measured and job.number else job.id),
+            *(_replacement(job) if measured else ()),
             (say("Customer"), "\n".join(filter(None, (job.customer, job.address)))),
             (say("Order"), job.order),
             (say("Accreditation"), laboratory.accreditation if measured else ""),
             (say("Date of measurement") if job.origin != SIMULATED else say("Date"), day(job.date)),
+            (say("Date of receipt"), day(job.received) if job.received else ""),
             (say("Date of issue"), day(job.issued) if job.issued else ""),
             (say("Next calibration, as agreed with the customer"), _agreed(job)),
         ),
@@ -94,12 +94,27 @@ def _particulars(facts: JobFile, decided: Text) -> tuple[Facts, ...]:
         ),
         (
             (say("Method"), job.procedure),
+            (say("Deviations from the method"), job.deviations),
+            (say("Results of external providers"), job.external),
+            (say("Data from the customer"), job.from_customer),
             (say("Operator"), job.operator),
             (say("Remarks"), job.remarks),
             (say("Conformity"), decided),
         ),
     )
     return tuple(Facts(rows) for group in groups if (rows := tuple((k, foreign(v)) for k, v in group if v)))
+
+
+def _replacement(job: JobFacts) -> tuple[tuple[Text, str], ...]:
+    """Which certificate this one replaces, why, and what changed (7.8.8)."""
+    replaced = job.replaces
+    if replaced is None:
+        return ()
+    return (
+        (say("Replaces certificate"), replaced_certificate(replaced)),
+        (say("Reason for the replacement"), replaced.reason),
+        (say("Changed against it"), replaced.changed),
+    )
 
 
 def _travel(facts: JobFile) -> Text:

@@ -5,14 +5,11 @@ A recording that nobody measured has no certificate, so nothing is asked of it.
 
 from __future__ import annotations
 
-import datetime as dt
-
-from cmm_uq.documents.traceability_section import certified_on_this_machine
-from cmm_uq.jobs.artefact import Traceability
-from cmm_uq.jobs.as_found import KEY
+from cmm_uq.documents.clauses import missing
+from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.messages import Text, Verbatim, day, say, semicolons
+from cmm_uq.messages import Text, Verbatim, foreign, say, semicolons
 
 _INTERIM = say("An interim check ([job] interim): no calibration certificate, whatever the title says.")
 
@@ -28,63 +25,17 @@ def formal_warnings(job: Job) -> tuple[Text, ...]:
 
 def contradictions(job: Job) -> tuple[Text, ...]:
     """Dates out of their order, and an artefact that was certified on the machine which it tests."""
-    found = None if job.as_found is None else job.as_found.job.date
-    return (*_circular(job.facts), *_dates(job.facts, found))
-
-
-def unstated(facts: JobFile) -> list[tuple[Text, str]]:
-    """What the certificate should state and the job does not, each with the key that mends it."""
-    wanted: tuple[tuple[object, Text, str], ...] = (
-        (facts.laboratory.name, say("name of the laboratory (7.8.2.1 b)"), "[laboratory] name"),
-        (facts.laboratory.address, say("address of the laboratory (7.8.2.1 b)"), "[laboratory] address"),
-        (facts.job.place, say("place of the measurement (7.8.2.1 c)"), "[job] place"),
-        (facts.job.customer, say("customer (7.8.2.1 e)"), "[job] customer"),
-        (facts.job.address, say("how to reach the customer (7.8.2.1 e)"), "[job] address"),
-        (facts.job.procedure, say("method (7.8.2.1 f)"), "[job] procedure"),
-        (facts.machine.serial, say("serial number of the machine (7.8.2.1 g)"), "[machine] serial"),
-        (facts.job.issued, say("date of issue (7.8.2.1 j)"), "[job] issued"),
-        (facts.laboratory.signatory, say("who authorises it (7.8.2.1 o)"), "[laboratory] signatory"),
-        (facts.job.conditions, say("conditions (7.8.4.1 b)"), "[job] conditions"),
-        *_of_the_artefact(facts),
-        *_of_the_short_gauge(facts),
-    )
-    return [(what, key) for given, what, key in wanted if not given]
+    return (*_circular(job.facts), *dates_out_of_order(job))
 
 
 def _missing(facts: JobFile) -> list[Text]:
-    missing = [say("{what}: {key}", what=what, key=Verbatim(key)) for what, key in unstated(facts)]
-    if not missing:
+    wanted = [
+        say("{what} ({clause}): {key}", what=foreign(one.asks), clause=Verbatim(one.clause), key=Verbatim(one.key))
+        for one in missing(facts)
+    ]
+    if not wanted:
         return []
-    return [say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=semicolons(missing))]
-
-
-def _of_the_artefact(facts: JobFile) -> tuple[tuple[object, Text, str], ...]:
-    """What makes the results traceable, of an artefact of which something is certified."""
-    if not facts.artefact.traced or facts.recording.earlier:
-        return ()
-    chain = facts.artefact.certificate
-    return (
-        (chain and chain.number, say("certificate of the artefact (7.8.4.1 c)"), "[artefact.certificate] number"),
-        (
-            chain and chain.laboratory, say("who certified the artefact (7.8.4.1 c)"), "[artefact.certificate] laboratory",
-        ),
-    )  # fmt: skip
-
-
-def _of_the_short_gauge(facts: JobFile) -> tuple[tuple[object, Text, str], ...]:
-    """What makes a short gauge beside the artefact traceable."""
-    if facts.short_gauge is None:
-        return ()
-    chain = facts.short_gauge.certificate
-    return (
-        (
-            chain and chain.number, say("certificate of the short gauge (7.8.4.1 c)"), "[short_gauge.certificate] number",
-        ),
-        (
-            chain and chain.laboratory, say("who certified the short gauge (7.8.4.1 c)"),
-            "[short_gauge.certificate] laboratory",
-        ),
-    )  # fmt: skip
+    return [say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=semicolons(wanted))]
 
 
 def _circular(facts: JobFile) -> list[Text]:
@@ -96,25 +47,3 @@ def _circular(facts: JobFile) -> list[Text]:
             "measurements have in common are not seen here."
         )
     ]
-
-
-def _dates(facts: JobFile, found: dt.date | None) -> list[Text]:
-    """Pairs of dates of which the first must not be earlier than the second."""
-    job = facts.job
-    chain = facts.artefact.certificate or Traceability()
-    ordered: tuple[tuple[dt.date | None, dt.date | None, Text, str], ...] = (
-        (job.issued, job.date, say("issued before it was measured"), "[job] issued"),
-        (job.date, chain.date, say("the artefact was certified after it was measured with"), "[artefact.certificate] date"),
-        (chain.due, job.date, say("the artefact was due for calibration before this"), "[artefact.certificate] due"),
-        (chain.due, chain.date, say("the artefact's certificate was due before its date"), "[artefact.certificate] due"),
-        (job.date, found, say("the machine was found as it was after it was left"), KEY),
-        (
-            job.recalibration_agreed, job.date, say("the next calibration is agreed for a day before this one"),
-            "[job] recalibration_agreed",
-        ),
-    )  # fmt: skip
-    return [
-        say("Dates out of order: {what}, {first} against {second} ({key}).", what=what, first=day(first), second=day(second),
-            key=Verbatim(key))
-        for first, second, what, key in ordered if first and second and first < second
-    ]  # fmt: skip

@@ -8,6 +8,7 @@ from cmm_uq.documents import tolerance_section
 from cmm_uq.documents.as_found_section import as_found_data, as_found_section, quantities_left
 from cmm_uq.documents.capability import with_capability
 from cmm_uq.documents.certificate import certificate_of
+from cmm_uq.documents.clauses import clauses_data
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conformity_section import conformity_section
 from cmm_uq.documents.diagnosis_page import diagnosis_sections
@@ -40,6 +41,7 @@ def certified(result: Result, page: Page) -> Outcome:
     data = (
         results(result)
         | as_found_data(result.job)
+        | clauses_data(result.job)
         | stating.data()
         | ({} if draws is None else {"posterior": draws.entry})
     )

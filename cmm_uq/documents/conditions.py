@@ -10,7 +10,7 @@ from cmm_uq.messages import Text, Verbatim, commas, say, signed
 from cmm_uq.points import Points
 from cmm_uq.units import unit
 
-_TEMPERATURES: Mapping[str, Text] = {
+TEMPERATURES: Mapping[str, Text] = {
     "temp_artefact_c": say("artefact"), "temp_x_c": say("scale of X"), "temp_y_c": say("scale of Y"),
     "temp_z_c": say("scale of Z"), "temp_air_c": say("air"), "temp_table_top_c": say("table, top"),
     "temp_table_bottom_c": say("table, bottom"),
@@ -31,5 +31,5 @@ def _recorded(points: Points) -> Text:
     return commas(
         say("{what} {low} to {high} {unit}", what=what, low=signed(float(points.columns[name].min()), ".2f"),
             high=signed(float(points.columns[name].max()), ".2f"), unit=unit("°C"))
-        for name, what in _TEMPERATURES.items() if name in points.columns
+        for name, what in TEMPERATURES.items() if name in points.columns
     )  # fmt: skip

@@ -11,7 +11,7 @@ from cmm_uq.documents.conformity_plot import trumpet
 from cmm_uq.documents.document import Block, Column, Decision, Section, Table
 from cmm_uq.documents.wording import OUTCOME_WORDS, measured, probability
 from cmm_uq.jobs.conformity import ConformityFacts
-from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, number, plural, say, sentences, signed
+from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, in_a_row, number, plural, say, sentences, signed
 from cmm_uq.uncertainty.rounding import significant
 from cmm_uq.units import unit
 
@@ -200,7 +200,7 @@ def _together(errors: Sequence[Decided]) -> list[list[Decided]]:
 def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: bool) -> tuple[Text, ...]:
     worst = least_favourable([replace(item, standing="counts") for item in row])
     chance, standing = worst.decision.probability_conforming, _STANDING[row[0].standing]
-    values = commas(signed(item.error_um, "+.2f") if signed_values else number(item.error_um, ".2f") for item in row)
+    values = in_a_row(signed(item.error_um, "+.2f") if signed_values else number(item.error_um, ".2f") for item in row)
     decision = OUTCOME_WORDS[worst.decision.outcome]
     return (
         DASH if worst.measurement is None else number(worst.measurement),

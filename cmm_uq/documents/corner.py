@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cmm_uq.documents.document import Plot
+from cmm_uq.documents.lettering import lettered
+from cmm_uq.documents.measured import width_mm
 from cmm_uq.documents.plot_style import (
     ACCENT,
     INK,
@@ -41,7 +43,6 @@ _MASSES = (0.95, 0.5)  # probability inside the outer and the inner contour
 _SCALE = 0.9  # part of a panel's place that it fills
 _HEADROOM = 0.92  # part of a panel's height that its density fills
 _LEFT, _BELOW, _ABOVE = 14.0, 11.0, 4.5  # least room for figures and names, mm
-_MM = 25.4 / 72  # of a point
 _SLANT = 40  # of the figures under the panels, degrees
 
 
@@ -149,7 +150,7 @@ class _Panels:
         self.ticks = [
             _ticks(low, high, most=1 if self.count > 8 else 2 if self.count > 5 else 4) for low, high in ranges
         ]
-        longest = max(_width_mm(text, TINY) for _, texts in self.ticks for text in texts)
+        longest = max(width_mm(text, TINY) for _, texts in self.ticks for text in texts)
         self.left = max(_LEFT, longest + 3.0)
         below = max(_BELOW, longest * np.sin(np.radians(_SLANT)) + 4.0)
         self.panel_mm = min(42.0, (WIDTH_MM - self.left - 1) / self.count, 120.0 / self.count)
@@ -256,35 +257,13 @@ class _Panels:
             size = SMALL if self.count <= 8 else TINY
             room = WIDTH_MM - self.left - k * self.panel_mm - 1
             self.ax.text(k, self.count - k - 0.04, label, ha="left", va="bottom", fontweight="bold",
-                         fontsize=size * min(1.0, room / _width_mm(label, size, "bold")))  # fmt: skip
+                         fontsize=size * min(1.0, room / width_mm(lettered(label), size, "bold")))  # fmt: skip
 
     def strokes(self, x0: Floats, x1: Floats, y0: Floats, y1: Floats, colour: str) -> None:
         """Straight hairlines from (x0, y0) to (x1, y1), all in one path."""
         gap = np.full(len(x0), np.nan)
         x, y = np.column_stack([x0, x1, gap]), np.column_stack([y0, y1, gap])
         self.ax.plot(x.ravel(), y.ravel(), color=colour, lw=0.6, solid_capstyle="butt")
-
-
-def _width_mm(text: str, size: float, weight: str = "normal") -> float:
-    """Width of a text in the measuring font."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import TextPath
-
-    font = FontProperties(family="DejaVu Sans", weight=weight)
-    return _MM * max(_farthest_right(TextPath((0, 0), str.__str__(text), size=size, prop=font)), size)
-
-
-def _farthest_right(path: Path) -> float:
-    """Largest x of a path of lines and quadratic curves, in the steps of its ``get_extents`` but for all curves at once."""
-    x, codes = np.asarray(path.vertices)[:, 0], np.asarray(path.codes)
-    controls = np.flatnonzero(codes == path.CURVE3)[::2]
-    begin, control, end = x[controls - 1], x[controls], x[controls + 1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (begin - control) / (begin - 2 * control + end)
-    t = np.where((t > 0) & (t < 1), t, 0.0)
-    turns = (1 - t) ** 2 * begin + 2 * t * (1 - t) * control + t**2 * end
-    corners = x[np.isin(codes, (path.MOVETO, path.LINETO))]
-    return float(max(part.max(initial=-np.inf) for part in (corners, turns, end)))
 
 
 def _ticks(low: float, high: float, most: int) -> tuple[Floats, list[str]]:

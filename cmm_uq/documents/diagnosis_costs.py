@@ -12,7 +12,7 @@ from cmm_uq.documents.effect_words import parameter_title, titles
 from cmm_uq.documents.quantity_data import quantity_data
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, plural, say
+from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, plural, say
 from cmm_uq.uncertainty.quantity import Quantity
 
 _SHOWN = 4
@@ -41,16 +41,15 @@ def costs_section(found: Diagnosed) -> Section:
     ]
     told = sum(one.probability for one in rivals)
     more = max(len(rivals) - _SHOWN, 0)
-    notes.append(
-        say(
-            "{more}The averages are over explanations with {told} of the probability together; each of the rest has less.",
-            more=plural(
-                more, one=say("One further explanation is in results.json. "),
-                many=say("{count} further explanations are in results.json. ", count=more),
-            ) if more else NOTHING,
-            told=probability(told),
-        )
-    )  # fmt: skip
+    share = say(
+        "The averages are over explanations with {told} of the probability together; each of the rest has less.",
+        told=probability(told),
+    )
+    left = plural(
+        more, one=say("One further explanation is in results.json."),
+        many=say("{count} further explanations are in results.json.", count=more),
+    ) if more else NOTHING  # fmt: skip
+    notes.append(after(left, share))
     return Section(title, (Table(say("What follows from each explanation that remains"), heads, rows, tuple(notes)),))
 
 

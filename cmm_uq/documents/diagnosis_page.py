@@ -27,6 +27,7 @@ from cmm_uq.documents.diagnosis_words import (
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.effect_words import effect_of, parameter_title, size_of, title_of, titles
 from cmm_uq.documents.improvement_table import improvement_table
+from cmm_uq.documents.lettering import lettered_in
 from cmm_uq.documents.origin import came_about
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.documents.plots import length_plot, residual_plot
@@ -324,6 +325,7 @@ def _rivals(found: Diagnosed) -> Table:
 def diagnosed_outcome(found: Diagnosed) -> Outcome:
     """What there is to write of a diagnosis."""
     short = summary_of(found.job.facts, found.diagnosis.verdict, lines(found), found.findings)
-    document = diagnosis_document(found)
+    with lettered_in(found.job.facts.job.language):
+        document = diagnosis_document(found)
     consistent = found.diagnosis.verdict == "consistent"
     return Outcome(found, lambda: document, diagnosis_results(found), short, document.warnings, conforming=consistent)

@@ -18,7 +18,7 @@ from cmm_uq.documents.withheld import other_periods
 from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import probability
 from cmm_uq.jobs.job import JobFile
-from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, day, say
+from cmm_uq.messages import Text, Verbatim, after, commas, day, say
 from cmm_uq.physics.effect import Effect
 from cmm_uq.screening.finding import Finding
 
@@ -96,19 +96,18 @@ def sentence(item: LeftOut, gain: Improvement, own: Iterable[Effect] = ()) -> Te
 def sure(item: LeftOut) -> Text:
     """How probable an effect is, and how much of the misfit it explains."""
     alike = item.together > item.probability + _SAME
-    together = (
-        say(" ({probability} of it or one that cannot be told from it)", probability=probability(item.together))
-        if alike
-        else NOTHING
-    )
+    share = probability(item.probability)
     if item.probability < ASSERTED:
-        together = say(
-            ", {probability} that it is this or one that this recording cannot tell from it: {group}",
-            probability=probability(item.together), group=commas(title_of(name) for name in item.group),
+        share = say(
+            "{share}, {together} that it is this or one that this recording cannot tell from it: {group}",
+            share=share, together=probability(item.together), group=commas(title_of(name) for name in item.group),
         )  # fmt: skip
+    elif alike:
+        share = say("{share} ({together} of it or one that cannot be told from it)",
+                    share=share, together=probability(item.together))  # fmt: skip
     return say(
-        "probability {probability}{together}; explains {explained:.0f}\u00a0% of the misfit",
-        probability=probability(item.probability), together=together, explained=100 * item.explained,
+        "probability {probability}; explains {explained:.0f}\u00a0% of the misfit",
+        probability=share, explained=100 * item.explained,
     )  # fmt: skip
 
 

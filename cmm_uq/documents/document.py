@@ -15,6 +15,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
 from cmm_uq.documents.view_words import label
+from cmm_uq.languages.language import ENGLISH, code_of
+from cmm_uq.languages.saying import said_in
 from cmm_uq.messages import NOTHING, Text, say
 
 Outcome = Literal["pass", "conditional pass", "incomplete", "undecided", "conditional fail", "remeasure", "fail"]
@@ -144,6 +146,7 @@ class Document:
     end : the mark after the last line.
     banner : what every page must say at its head, such as that nothing was measured.
     overview : what comes before everything else.
+    draft : whether the banner says only that something is still to be stated.
     """
 
     title: Text
@@ -162,6 +165,7 @@ class Document:
     end: Text = say("End of certificate")
     banner: Text = NOTHING
     overview: Overview | None = None
+    draft: bool = False
 
     def as_data(self) -> dict[str, Any]:
         """The document as plain dicts and lists of printable text, ready for JSON.
@@ -172,48 +176,68 @@ class Document:
         data: dict[str, Any] = _printable(asdict(self))
         data["date"] = self.date.isoformat() if self.date else None
         counted: Counter[str] = Counter()
+        language = code_of(self.language)
         for section, plain in zip(self.sections, data["sections"], strict=True):
             for block, plain_block in zip(section.blocks, plain["blocks"], strict=True):
                 plain_block["kind"] = block.kind
                 plain_block.pop("lettering", None)
                 if block.kind in _NUMBERED:
                     counted[block.kind] += 1
-                    plain_block["label"] = str.__str__(label(block.kind, counted[block.kind]))
+                    plain_block["label"] = str.__str__(said_in(label(block.kind, counted[block.kind]), language))
                 if block.kind == "table":
-                    _measure(plain_block)
+                    _measure(plain_block, english=language == ENGLISH)
         return data
 
 
 _NUMBERED = ("table", "plot")
 
 
-def _measure(table: dict[str, Any]) -> None:
+def _measure(table: dict[str, Any], *, english: bool) -> None:
     """What the views must know to lay a table out.
 
     Every column is given its longest line in characters (``need``), and the texts that are likely to be its widest: a line
     (``longest``), a word of its cells (``word``) and one of its heading (``heading_word``). What is longer than any figure is
-    set as text. The table is given the characters of its narrowest line (``least``): figures whole, texts broken at words.
+    set as text; figures stay figures below the longer headings of languages other than English. The table is given the
+    characters of its narrowest line (``least``): figures whole, texts broken at words.
     """
     for index, column in enumerate(table["columns"]):
         cells = [line for row in table["rows"] for line in row[index].split("\n")]
         head = [column["heading"], column["unit"]]
-        column["need"] = max(4, *map(len, head), *(len(line) for line in cells), 0)
-        column["numeric"] = column["numeric"] and column["need"] <= _LONGEST_FIGURE
+        column["need"] = max(4, *map(_letters, head), *map(_letters, cells), 0)
+        longest = column["need"] if english else max(map(_letters, cells), default=0)
+        column["numeric"] = column["numeric"] and longest <= _LONGEST_FIGURE
         column["longest"] = max(cells, key=_width, default="")
-        column["word"] = max((word for line in cells for word in line.split(" ")), key=_width, default="")
-        column["heading_word"] = max((word for line in head for word in line.split()), key=_width, default="")
-    kept = [max(len(c["longest"] if c["numeric"] else c["word"]), len(c["heading_word"])) for c in table["columns"]]
+        column["word"] = max((part for line in cells for part in _parts(line, " ")), key=_width, default="")
+        column["heading_word"] = max((part for line in head for part in _parts(line, None)), key=_width, default="")
+    kept = [
+        max(_letters(c["longest"] if c["numeric"] else c["word"]), _letters(c["heading_word"]))
+        for c in table["columns"]
+    ]
     table["least"] = sum(kept) + 2 * len(kept)
+
+
+def _letters(line: str) -> int:
+    """Of a line, in letters; a Chinese or Japanese character has the room of two."""
+    return len(line) + len(_WIDE.findall(line))
+
+
+def _parts(line: str, separator: str | None) -> list[str]:
+    """What a line is not broken within: words; Japanese, which is written without spaces, a few characters at a time."""
+    words = line.split(separator)
+    return [part for word in words for part in (_WIDE_PARTS.findall(word) if _WIDE.search(word) else [word])]
 
 
 def _width(line: str) -> float:
     """Of a line, roughly, in widths of a small letter."""
-    return sum(
+    return len(_WIDE.findall(line)) + sum(
         1.5 if c in "mwMW%—" else 0.6 if c in "fijlrtI.,:;'|()[] −-" else 1.2 if c.isupper() else 1.0 for c in line
     )
 
 
 _LONGEST_FIGURE = 28
+_CHARACTERS = "\u2e80-\ua4cf\uac00-\ud7a3\uf900-\ufaff\uff00-\uff60"
+"""Of Chinese, Japanese and Korean."""
+_WIDE, _WIDE_PARTS = re.compile(f"[{_CHARACTERS}]"), re.compile(f"[{_CHARACTERS}]{{1,6}}|[^{_CHARACTERS}]+")
 
 _LEFT_OUT = re.compile("[\u202a-\u202e\u2066-\u2069\ufeff]")
 _UNPRINTABLE = re.compile(

@@ -84,11 +84,11 @@ def _verdict(found: FleetFound) -> tuple[Text, Standing]:
     if not unlike:
         due = _beyond(found) or _soon(found)
         return say("No machine drifts unlike its fleet"), "open" if due else "good"
-    one, many = (
-        say("One machine drifts unlike its fleet"),
-        say("{count} machines drift unlike their fleet", count=unlike),
-    )
-    return plural(unlike, one=one, many=many), "open"
+    told = plural(
+        unlike, one=say("One machine drifts unlike its fleet"),
+        many=say("{count} machines drift unlike their fleet", count=unlike),
+    )  # fmt: skip
+    return told, "open"
 
 
 def _compared(found: FleetFound) -> Text:
@@ -103,13 +103,12 @@ def _compared(found: FleetFound) -> Text:
 
 def _due(found: FleetFound) -> tuple[Text, ...]:
     beyond, soon = len(_beyond(found)), len(_soon(found))
-    one, many = (
-        say("One machine is beyond a limit"),
-        say("{count} machines are beyond a limit", count=beyond),
+    are = plural(
+        beyond, one=say("One machine is beyond a limit"), many=say("{count} machines are beyond a limit", count=beyond)
     )
     will = say("{machines:capital} will probably be beyond a limit by {day}", machines=counted(soon),
                day=date_of(found.in_a_year))  # fmt: skip
-    return (*((plural(beyond, one=one, many=many),) if beyond else ()), *((will,) if soon else ()))
+    return (*((are,) if beyond else ()), *((will,) if soon else ()))
 
 
 def _group(of: OfValue) -> Text:
@@ -148,9 +147,12 @@ def _warnings(of: OfValue) -> list[Text]:
         told.append(say("{value}: the sampling did not converge (R-hat {rhat}); take its figures as rough",
                         value=called(of), rhat=number(of.fleet.chains.rhat_max, ".3f")))  # fmt: skip
     if of.left_out:
-        one, many = say("One certificate states"), say("{count} certificates state", count=of.left_out)
-        told.append(say("{value}: {certificates:small} no uncertainty and cannot be weighed", value=called(of),
-                        certificates=plural(of.left_out, one=one, many=many)))  # fmt: skip
+        told.append(plural(
+            of.left_out,
+            one=say("{value}: one certificate states no uncertainty and cannot be weighed", value=called(of)),
+            many=say("{value}: {count} certificates state no uncertainty and cannot be weighed", value=called(of),
+                     count=of.left_out),
+        ))  # fmt: skip
     if len(of.members) == 1:
         told.append(say("{value}: one machine is no fleet; what machines have in common is assumed, not learnt",
                         value=called(of)))  # fmt: skip

@@ -81,11 +81,10 @@ def usual_table(of: OfValue) -> Table:
     notes: list[Text] = [say("A model at the fleet's average place; a place for the fleet's average machine.")]
     left = len(of.fleet.usual) - len(shown)
     if left:
-        one, many = (
-            say("One more model or place has fewer machines; fleet.json has all."),
-            say("{count} more models and places have fewer machines; fleet.json has all.", count=left),
-        )
-        notes.append(plural(left, one=one, many=many))
+        notes.append(plural(
+            left, one=say("One more model or place has fewer machines; fleet.json has all."),
+            many=say("{count} more models and places have fewer machines; fleet.json has all.", count=left),
+        ))  # fmt: skip
     return Table(say("Usual drift"), columns, rows, tuple(notes))
 
 

@@ -14,6 +14,7 @@ from cmm_uq.documents import plot_style
 from cmm_uq.documents.document import Document
 from cmm_uq.documents.templates import template_folder
 from cmm_uq.documents.view_words import view_words
+from cmm_uq.languages.language import code_of
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -24,8 +25,23 @@ def render_html(document: Document) -> str:
     return (
         _environment()
         .get_template("document.html")
-        .render(document=document.as_data(), words=view_words(), colour=plot_style.COLOURS)
+        .render(document=document.as_data(), words=view_words(code_of(document.language)), colour=plot_style.COLOURS)
     )
+
+
+def style_sheet(heading: str, banner: str, language: str) -> str:
+    """The style sheet of a page, which says what stands at head and foot of its printed pages.
+
+    Parameters
+    ----------
+    heading : title and number of the document, with a space between.
+    banner : at the head of every page, if any.
+    language : of the document.
+    """
+    title, _, number = heading.partition(" ")
+    document = {"title": title, "number": number, "banner": banner, "language": language}
+    words = view_words(code_of(language))
+    return _environment().get_template("document.css").render(document=document, words=words, colour=plot_style.COLOURS)
 
 
 @cache

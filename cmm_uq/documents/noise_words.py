@@ -28,7 +28,7 @@ def noise_found(noise: Noise) -> Text:
     if "placing" not in noise.components:
         hidden.append(say("set-up offsets (no repeats)"))
     hidden.append(
-        say("a drift that ended with the first readings")
+        say("what had drifted before the first reading")
         if "slow" in noise.components
         else say("slow noise (no time_s)")
     )

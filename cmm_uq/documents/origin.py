@@ -46,12 +46,16 @@ def marked(document: Document, job: Job) -> Document:
         title=TITLES[job.origin] if is_certificate else _of_such(document.title, job.origin),
         number=Verbatim(job.facts.job.id),
         banner=BANNERS[job.origin],
+        draft=False,
         warnings=warnings,
         statements=(),
         signatures=(),
         end=say("End of evaluation") if is_certificate else document.end,
     )
 
+
+DIGITAL = "certificate.xml"
+"""The digital certificate."""
 
 CERTIFICATE = say("Calibration certificate")
 """Title of a document that certifies."""

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from cmm_uq.documents.document import Document, Section
 from cmm_uq.documents.in_short import Summary
+from cmm_uq.documents.lettering import lettered_in
 from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
@@ -54,7 +55,8 @@ class Outcome:
     @cached_property
     def document(self) -> Document:
         """Certificate, or page of a diagnosis; composed when it is first asked for."""
-        return self.composed()
+        with lettered_in(self.found.job.facts.job.language):
+            return self.composed()
 
     @property
     def origin(self) -> Origin:

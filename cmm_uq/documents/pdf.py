@@ -10,15 +10,22 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import PurePosixPath
 from typing import Any
 
 from cmm_uq.documents.document import Document
+from cmm_uq.documents.fonts import JAPANESE, fonts_of
 from cmm_uq.documents.plot_style import COLOURS
 from cmm_uq.documents.templates import template_folder
 from cmm_uq.documents.view_words import described, view_words
 from cmm_uq.errors import CmmUqError
+from cmm_uq.languages.language import Code, code_of
+from cmm_uq.languages.saying import said_in
+
+FACE = "Libertinus Serif"
+"""Of the text; what it lacks, as Japanese, is set in the font of the language."""
 
 EPOCH = "1970-01-01"
 """Date of a PDF whose document has none: the clock is never read, so the same document gives the same bytes."""
@@ -47,18 +54,38 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     ------
     CmmUqError : Typst refuses the document, and what it says.
     """
+    language = code_of(document.language)
     content = {
         "document": document.as_data(),
-        "words": view_words(),
+        "words": view_words(language),
+        "fonts": [FACE, JAPANESE] if language == "ja" else [FACE],
         "colour": COLOURS,
         "date": document.date.isoformat() if document.date else EPOCH,
-        "attachments": [_attachment(name, data) for name, data in attachments.items()],
+        "attachments": [_attachment(name, data, language) for name, data in attachments.items()],
         "missing": "",
     }
-    return _with_fallback(content)
+    return _with_fallback(content, [str(file.parent) for file in fonts_of(language)])
 
 
-def _attachment(name: str, data: bytes) -> dict[str, Any]:
+def picture(template: str, content: Mapping[str, Any], language: Code = "en") -> bytes:
+    """A template alone as a PDF page without tags, to be shown inside another.
+
+    Parameters
+    ----------
+    template : its file name.
+    content : what it shows, as ``document``; characters that no font has become □.
+    language : of it.
+
+    Raises
+    ------
+    CmmUqError : Typst refuses it, and what it says.
+    """
+    compiled = partial(_compile, template=template, standards=("a-3b",), tagged=False)
+    shown = {"document": content, "colour": COLOURS, "fonts": [FACE, JAPANESE] if language == "ja" else [FACE]}
+    return _with_fallback(shown, [str(file.parent) for file in fonts_of(language)], compiled)
+
+
+def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
     suffix = PurePosixPath(name).suffix.lower()
     outcome = suffix in {".json", ".npz", ".xml"}
     try:
@@ -70,40 +97,45 @@ def _attachment(name: str, data: bytes) -> dict[str, Any]:
         "data": body,
         "relationship": "data" if outcome else "source",
         "type": _TYPES.get(suffix, "application/octet-stream"),
-        "description": described(name, outcome=outcome),
+        "description": str.__str__(said_in(described(name, outcome=outcome), language)),
     }
 
 
-def _with_fallback(content: dict[str, Any]) -> bytes:
+def _with_fallback(content: dict[str, Any], folders: list[str], compiled: Callable[..., bytes] | None = None) -> bytes:
     """Compile with the embedded fonts; then with the machine's too; then without the characters that both lack."""
     from typst import TypstError
 
+    made = compiled or _compile
     try:
-        return _compile(content, system_fonts=False)
+        return made(content, folders, system_fonts=False)
     except TypstError as error:
         if not _missing(error):
             raise _refused(error) from error
     try:
-        return _compile(content, system_fonts=True)
+        return made(content, folders, system_fonts=True)
     except TypstError as error:
         missing = _missing(error)
         if not missing:
             raise _refused(error) from error
     try:
-        return _compile(_without(content, missing), system_fonts=True)
+        return made(_without(content, missing), folders, system_fonts=True)
     except TypstError as error:
         raise _refused(error) from error
 
 
-def _compile(content: Mapping[str, Any], *, system_fonts: bool) -> bytes:
+def _compile(
+    content: Mapping[str, Any], folders: list[str], *, system_fonts: bool, template: str = "document.typ",
+    standards: Sequence[Any] = ("a-3a", "ua-1"), tagged: bool = True,
+) -> bytes:  # fmt: skip
     import typst
 
     return typst.compile(
-        (template_folder() / "document.typ").read_bytes(),
-        font_paths=typst.Fonts(include_system_fonts=system_fonts),
+        (template_folder() / template).read_bytes(),
+        font_paths=typst.Fonts(include_system_fonts=system_fonts, font_paths=folders),
         ignore_system_fonts=not system_fonts,
         sys_inputs={"input": json.dumps(content)},
-        pdf_standards=["a-3a", "ua-1"],
+        pdf_standards=list(standards),
+        pdf_tags=tagged,
         timestamp=0,
     )
 

@@ -9,7 +9,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmm_uq.documents.document import Plot
-from cmm_uq.documents.plot_style import ACCENT, INK, MUTED, RULE, TINY, WIDTH_MM, dots, drawn, house_style, new_figure
+from cmm_uq.documents.lettering import lettered
+from cmm_uq.documents.measured import width_mm
+from cmm_uq.documents.plot_style import (
+    ACCENT,
+    INK,
+    MUTED,
+    RULE,
+    SMALL,
+    TINY,
+    WIDTH_MM,
+    dots,
+    drawn,
+    house_style,
+    new_figure,
+)
 from cmm_uq.messages import Text, number, say, semicolons
 from cmm_uq.planning.placing import Placing
 from cmm_uq.points import AXES, Floats
@@ -66,7 +80,14 @@ def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
             ax.axis("off")
             left = i / A_ROW + 0.008
             figure.text(left, 1 - 4.5 / height, f"{first + i}", fontsize=10, color=ACCENT, fontweight="bold")
-            figure.text(left + 0.035, 1 - 4.5 / height, placing.title, fontsize=7.5, color=INK, fontweight="bold")
+            figure.text(
+                left + 0.035,
+                1 - 4.5 / height,
+                placing.title,
+                fontsize=_size(placing.title),
+                color=INK,
+                fontweight="bold",
+            )
             figure.text(left, 1 - 9.5 / height, placing.ends, fontsize=TINY, color=MUTED)
         last = first + len(placings) - 1
         numbers = (
@@ -162,7 +183,7 @@ def gain_plot(
     whole = np.where(finite_best > 0, finite_best, 1.0)
     ratio = pairs / whole[:, None]
     shown = np.where(np.isfinite(ratio), ratio, 1.3)
-    height = 20.0 + 5.2 * len(labels)
+    height, never = 20.0 + 5.2 * len(labels), say("not at all")
     with house_style():
         figure = new_figure(height)
         ax = figure.subplots()
@@ -173,8 +194,8 @@ def gain_plot(
         dots(ax, shown[:, 0], y, 5.0, MUTED, hollow=True)
         dots(ax, shown[:, 1], y, 5.0, ACCENT, zorder=4)
         ax.set_yticks(y, labels)
-        ax.set(xlim=(0.0, 1.38), ylim=(-0.7, len(labels) - 0.3))
-        ax.set_xticks([0, 0.25, 0.5, 0.75, 1.0, 1.3], ["0", "¼", "½", "¾", "1", say("not at all")])
+        ax.set(xlim=(0.0, _edge(never)), ylim=(-0.7, len(labels) - 0.3))
+        ax.set_xticks([0, 0.25, 0.5, 0.75, 1.0, 1.3], ["0", "¼", "½", "¾", "1", never])
         ax.grid(axis="x")
         ax.set_xlabel(say("{quantity}, over the larger of the two", quantity=quantity))
         figure.text(0.36, 1 - 4.5 / height, say("○ {plan}", plan=names[0]), color=MUTED, fontsize=8)
@@ -185,6 +206,19 @@ def gain_plot(
         )
         both = say("{quantity} with {one} and with {other}.", quantity=quantity, one=names[0], other=names[1])
         return drawn(figure, both, told)
+
+
+def _size(title: Text) -> float:
+    """Of the letters of a placing's title, smaller where it is longer than its picture is wide."""
+    said, room = lettered(title), WIDTH_MM * (1 / A_ROW - 0.05)
+    return SMALL if said is title else SMALL * min(1.0, room / width_mm(said, SMALL, "bold"))
+
+
+def _edge(last: Text) -> float:
+    """Right end of the axis, so that the text of its last tick, at 1.3, has room."""
+    axis, margin = 0.62 * WIDTH_MM, 0.02 * WIDTH_MM
+    beside = width_mm(lettered(last), SMALL) / 2 - margin
+    return max(1.38, 1.3 * axis / (axis - beside))
 
 
 def _figure(value: float | None) -> Text:

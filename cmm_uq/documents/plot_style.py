@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.documents.document import Plot
+from cmm_uq.documents.lettering import letter, measuring_fonts
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text
 from cmm_uq.points import Floats
@@ -61,7 +62,6 @@ _SETTINGS = {
     "path.simplify": False,
     "text.parse_math": False,  # a dollar sign in a customer's column name is a dollar sign
     "axes.unicode_minus": True,
-    "font.family": "DejaVu Sans",
     "font.size": SMALL,
     "text.color": INK,
     "axes.edgecolor": MUTED,
@@ -97,7 +97,7 @@ def house_style() -> Iterator[None]:
     """
     import matplotlib as mpl
 
-    with mpl.rc_context(_SETTINGS), warnings.catch_warnings():
+    with mpl.rc_context({**_SETTINGS, "font.family": measuring_fonts()}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
 
@@ -151,10 +151,10 @@ def drawn(figure: Figure, caption: Text, alternative: Text) -> Plot:
     """The figure as a block of a document, with the texts that are lettered in it."""
     from matplotlib.text import Text as Lettering
 
+    letter(figure)
+    svg = as_svg(figure)
     lettering = (found.get_text() for found in figure.findobj(Lettering))
-    return Plot(
-        caption, alternative, as_svg(figure), tuple(text for text in lettering if isinstance(text, Text) and text)
-    )
+    return Plot(caption, alternative, svg, tuple(text for text in lettering if isinstance(text, Text) and text))
 
 
 def finite(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Floats:

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.documents.document import Plot
+from cmm_uq.documents.lettering import lettered
+from cmm_uq.documents.measured import width_mm
 from cmm_uq.documents.plot_style import (
     ACCENT,
     BAND,
@@ -20,6 +22,7 @@ from cmm_uq.documents.plot_style import (
     INK,
     MUTED,
     RULE,
+    SMALL,
     TINY,
     WIDTH_MM,
     bars,
@@ -31,6 +34,7 @@ from cmm_uq.documents.plot_style import (
 )
 from cmm_uq.documents.shown import shown, told
 from cmm_uq.errors import CmmUqError
+from cmm_uq.languages.saying import Said
 from cmm_uq.messages import Text, Verbatim, say, semicolons, signed
 from cmm_uq.points import Floats
 
@@ -137,8 +141,14 @@ def _panels(
         _whole_numbers(axes[-1], x)
         figure.align_ylabels(axes)
         note = _legend(reference, reference_expanded_um, flagged=bool(marked.any()))
+        if width_mm(lettered(note), TINY) > _NOTE_MM:
+            figure.subplots_adjust(top=0.905 if two else 0.86)  # the note has a line of its own
         figure.text(0.995, 0.985, note, ha="right", va="top", fontsize=TINY, color=MUTED)
         return drawn(figure, caption, alternative)
+
+
+_NOTE_MM = 128.0
+"""Room of the note beside a title of thirty letters."""
 
 
 def _legend(reference: Text, band_um: float, *, flagged: bool) -> Text:
@@ -330,5 +340,15 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
         return drawn(figure, caption, alternative)
 
 
+_NAMES_MM = 54.0
+"""Room of the names beside the bars of a budget."""
+
+
 def _cut(text: Text, length: int) -> Text:
+    said = lettered(text)
+    if said is not text:  # longer or wider letters than English ones
+        kept = str.__str__(said)
+        while width_mm(kept, SMALL) > _NAMES_MM:
+            kept = kept.removesuffix("…")[:-1].rstrip(" ,") + "…"
+        return Said(kept, text)
     return text if len(text) <= length else Verbatim(text[: length - 1] + "…")

@@ -28,6 +28,7 @@ NOISE_WORDS: Mapping[str, Text] = MappingProxyType(
         cases.AXIS: say("one axis three times noisier"),
         cases.GROWING: say("growing with length"),
         cases.SLOWLY: say("with slow noise in time"),
+        cases.WALKING: say("walking at random in time"),
         cases.TAILS: say("heavy tails"),
         cases.RESOLUTION: say("coarse display"),
     }

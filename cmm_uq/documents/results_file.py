@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,9 +9,10 @@ import numpy as np
 
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.statement import Decided, Statement
-from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
+from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import corrections
+from cmm_uq.documents.as_json import as_json as as_json
 from cmm_uq.documents.diagnosis_costs import costs_data
 from cmm_uq.documents.diagnosis_next import next_data
 from cmm_uq.documents.diagnosis_unseen import unseen_data
@@ -22,9 +22,9 @@ from cmm_uq.documents.quantity_data import quantity_data as quantity_data
 from cmm_uq.documents.result import Diagnosed, Result
 from cmm_uq.documents.simulated import Simulated
 from cmm_uq.documents.withheld import periods_data, withheld_data
-from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.languages.language import ENGLISH
 from cmm_uq.screening.screened import Finding
 from cmm_uq.uncertainty.budget_results import budget_data
 from cmm_uq.uncertainty.covariance import Covariance
@@ -55,7 +55,9 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
             "machine": job.facts.machine.name,
             **({"serial": job.facts.machine.serial} if job.facts.machine.serial else {}),
             **({"derived_from": derived.model_dump()} if derived else {}),
+            **({"replaces": facts.replaces.model_dump(mode="json")} if facts.replaces else {}),
             **({"altered": list(job.altered)} if job.altered else {}),
+            **({"language": facts.language} if facts.language != ENGLISH else {}),
             "inputs_sha256": sha256(job.inputs),
         },
         **({"acquisition": job.acquired.data} if job.acquired else {}),
@@ -111,6 +113,7 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
         **({} if found.simulated is None else {"simulation": _simulation(found.simulated, d)}),
         "verdict": d.verdict,
         "p_value": d.p_value,
+        **false_alarms(d.alpha),
         "where": [
             {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,
              "amplitude_um": place.amplitude_um, "what": place.what, "direction": place.along, "also": list(place.also)}
@@ -145,6 +148,11 @@ def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def false_alarms(alpha: float) -> dict[str, float]:
+    """The rate of false alarms that was asked for, where it is not the usual one: without it nothing can be made again."""
+    return {} if alpha == FALSE_ALARMS else {"false_alarms": alpha}
+
+
 def _simulation(simulated: Simulated, diagnosis: Diagnosis) -> dict[str, Any]:
     """What the recording was compared with, and what of it was estimated anew."""
     found = corrections(simulated, diagnosis.after, diagnosis.posterior)
@@ -168,15 +176,6 @@ def improvement_data(gain: Improvement) -> dict[str, Any]:
         "heldout_rms_before_um": gain.heldout_rms_before_um, "heldout_rms_after_um": gain.heldout_rms_after_um,
         "elpd_gain": gain.elpd_gain, "elpd_gain_se": gain.elpd_gain_se,
     }  # fmt: skip
-
-
-def as_json(data: Mapping[str, Any]) -> bytes:
-    """Plain data as UTF-8 JSON with finite numbers of ten digits, so that the last bits of rounding do not show."""
-    try:
-        return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
-    except ValueError as error:
-        raise CmmUqError(f"a figure is not finite: {error}", where="results.json",
-                         fix="Look for a number in the input that no measurement gives") from error  # fmt: skip
 
 
 def covariance_data(covariance: Covariance) -> dict[str, Any]:
@@ -265,11 +264,3 @@ def finding_data(finding: Finding, file: str) -> dict[str, Any]:
         "kind": finding.kind, "rows": [str(m) for m in finding.measurements], "lines": list(finding.lines),
         "file": file, "why": finding.why, "set_aside": finding.set_aside,
     }  # fmt: skip
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_rounded(item) for item in value]
-    return float(f"{value:.10g}") if isinstance(value, float) else value

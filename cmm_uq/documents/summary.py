@@ -9,7 +9,7 @@ from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.document import Standing
 from cmm_uq.documents.in_short import Summary, Verdict, figure_row
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import OUTCOME_WORDS, measured, probability, title_of
+from cmm_uq.documents.wording import CERTAIN, OUTCOME_WORDS, measured, probability, title_of
 from cmm_uq.messages import Text, Verbatim, commas, day, lines, number, say, semicolons
 from cmm_uq.uncertainty.rounding import significant
 
@@ -70,4 +70,8 @@ def _remarks(statement: Statement) -> list[Text]:
 
 
 def _chance(p: float) -> Text:
-    return Verbatim(probability(p).replace("<", "less than").replace(">", "more than"))
+    if p < CERTAIN:
+        return say("less than\u00a0{p}\u00a0%", p=number(100 * CERTAIN, "g"))
+    if p > 1 - CERTAIN:
+        return say("more than\u00a0{p}\u00a0%", p=number(100 * (1 - CERTAIN), "g"))
+    return probability(p)

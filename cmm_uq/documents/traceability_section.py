@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from cmm_uq.documents.document import Block, Facts, Paragraph, Section
-from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import expanded
 from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.chain import certified_on_this_machine
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.short_gauge import ShortGaugeFacts
@@ -13,6 +15,9 @@ from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, se
 from cmm_uq.model.artefact import Size
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE
+
+if TYPE_CHECKING:
+    from cmm_uq.documents.result import Result
 
 _NO_CERTIFICATE = say(
     "No certificate of the artefact is stated, so the results are not shown to be traceable to the International System of "
@@ -83,13 +88,6 @@ def certificate_rows(chain: Traceability | None) -> list[tuple[Text, Text]]:
     ]
 
 
-def certified_on_this_machine(facts: JobFile) -> bool:
-    """Whether the artefact's certificate comes from the machine that the artefact now tests."""
-    chain, machine = facts.artefact.certificate, facts.machine
-    own = {name.strip().casefold() for name in (machine.name, machine.serial) if name.strip()}
-    return chain is not None and chain.machine.strip().casefold() in own
-
-
 def statement_of_traceability(facts: JobFile) -> Text:
     """To what the results are traceable, and through which certificate; or that they are not."""
     chain = facts.artefact.certificate
@@ -108,6 +106,11 @@ def statement_of_traceability(facts: JobFile) -> Text:
         "artefact: {certificate}.",
         certificate=commas(certificate),
     )
+
+
+def traceable(facts: JobFile) -> bool:
+    """Whether the results are said to be traceable to the metre."""
+    return statement_of_traceability(facts) not in (_CHANGES, _UNCALIBRATED, _OWN_MACHINE, _NO_CERTIFICATE)
 
 
 def traceability(result: Result) -> Section:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from cmm_uq.languages.language import Code
+from cmm_uq.languages.saying import said_in
 from cmm_uq.messages import Text, Verbatim, say
 
 _BREAK = Verbatim("\x1f")
@@ -30,11 +32,10 @@ WORDS: Mapping[str, Text] = {
 """By the names that the templates use."""
 
 
-def view_words() -> dict[str, Any]:
-    """The same as plain text; what a view fills in parts it into a list."""
-    return {
-        name: str.__str__(text).split(_BREAK) if _BREAK in text else str.__str__(text) for name, text in WORDS.items()
-    }
+def view_words(language: Code) -> dict[str, Any]:
+    """The same as plain text in a language; what a view fills in parts it into a list."""
+    said = {name: str.__str__(said_in(text, language)) for name, text in WORDS.items()}
+    return {name: text.split(_BREAK) if _BREAK in text else text for name, text in said.items()}
 
 
 def label(kind: str, number: int) -> Text:

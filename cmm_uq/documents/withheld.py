@@ -20,8 +20,8 @@ def sentences(withheld: Sequence[Withheld]) -> list[Text]:
     """A sentence on each."""
     return [
         say(
-            "{title} (probability {probability}) is not asserted: {why}{periods}.",
-            title=item.title, probability=probability(item.probability), why=item.why, periods=_told(item.modes),
+            "{title} (probability {probability}) is not asserted: {why}.",
+            title=item.title, probability=probability(item.probability), why=_told(item.why, item.modes),
         )
         for item in withheld
     ]  # fmt: skip
@@ -62,8 +62,8 @@ def periods_data(modes: Sequence[Mode]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _told(modes: Sequence[Mode]) -> Text:
-    return say(" ({periods})", periods=_listed(modes)) if modes else NOTHING
+def _told(why: Text, modes: Sequence[Mode]) -> Text:
+    return say("{why} ({periods})", why=why, periods=_listed(modes)) if modes else why
 
 
 def _listed(modes: Sequence[Mode]) -> Text:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-from cmm_uq.conformity.statement import Statement
-from cmm_uq.documents.result import Result
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import NOTHING, Text, Verbatim, foreign, number, say
 from cmm_uq.model.measurement import ARTEFACT
-from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
+
+if TYPE_CHECKING:
+    from cmm_uq.conformity.statement import Statement
+    from cmm_uq.documents.result import Result
+    from cmm_uq.physics.effect import Effect
 
 OUTCOME_WORDS: Mapping[str, Text] = {
     "pass": say("pass"), "fail": say("fail"), "undecided": say("undecided"), "incomplete": say("incomplete"),
@@ -38,12 +41,16 @@ def expanded(quantity: Quantity) -> tuple[Text, Text, Text]:
     return (value, uncertainty, (NO_FACTOR if k is None or k < _ONE_HILL else number(k, ".2f")))
 
 
+CERTAIN = 1e-4
+"""A probability nearer to 0 or 1 than this is printed as less or more than it."""
+
+
 def probability(p: float) -> Text:
     """A probability in per cent that never claims certainty."""
-    if p < 1e-4:
-        return say("<\u00a00.01\u00a0%")
-    if p > 1 - 1e-4:
-        return say(">\u00a099.99\u00a0%")
+    if p < CERTAIN:
+        return say("<\u00a0{p}\u00a0%", p=number(100 * CERTAIN, "g"))
+    if p > 1 - CERTAIN:
+        return say(">\u00a0{p}\u00a0%", p=number(100 * (1 - CERTAIN), "g"))
     digits = 2 if p < 0.5 else 3 if p < 0.999 else 4
     return say("{p}\u00a0%", p=number(100 * p, f".{digits}g"))
 
@@ -91,14 +98,19 @@ def deviating(what: Text, reference: Text, before_um: Floats, after_um: Floats, 
     Parameters
     ----------
     what : deviates, with a verb: ``12 lengths: as recorded they deviate``.
-    reference : from what, with a space before it; or nothing.
+    reference : from what; or nothing.
     before_um, after_um : deviations, µm.
     spec : of the figures.
     """
     low, high, low_after, high_after = (
         number(float(end), spec) for end in (before_um.min(), before_um.max(), after_um.min(), after_um.max())
     )
+    if reference:
+        return say(
+            "{what} by {low} to {high} µm {reference}; after the fitted model {low_after} to {high_after} µm remain.",
+            what=what, reference=reference, low=low, high=high, low_after=low_after, high_after=high_after,
+        )  # fmt: skip
     return say(
-        "{what} by {low} to {high} µm{reference}; after the fitted model {low_after} to {high_after} µm remain.",
-        what=what, reference=reference, low=low, high=high, low_after=low_after, high_after=high_after,
+        "{what} by {low} to {high} µm; after the fitted model {low_after} to {high_after} µm remain.",
+        what=what, low=low, high=high, low_after=low_after, high_after=high_after,
     )  # fmt: skip

@@ -31,7 +31,14 @@ MODEL_BYTES = Limit(4_000_000, "bytes", "model file of a budget", "holds 250 000
 TABLE_BYTES = Limit(64_000_000, "bytes", "recording, temperature log", "100 000 rows of 30 columns take half of it")
 UNPACKED = Limit(400_000_000, "bytes", "workbook once it is unpacked", "200 000 rows of 30 columns take half of it")
 MAP_BYTES = Limit(4_000_000, "bytes", "error map", "30 000 positions")
+DCC_BYTES = Limit(
+    64_000_000, "bytes", "digital certificate", "attached files and its human-readable copy take a few of them"
+)
 SECRET_BYTES = Limit(4_096, "bytes", "file with a secret", "a password is one line")
+KEY_BYTES = Limit(
+    1_000_000, "bytes", "file with a key, certificates or revocations", "a key with its chain takes ten thousand"
+)
+SIGNED_BYTES = Limit(64_000_000, "bytes", "signed PDF or XML", "a certificate with its inputs takes a few million")
 
 ROWS = Limit(200_000, "rows", "CSV file", "a scanned surface; larger ones are point clouds")
 MAP_ROWS = Limit(30_000, "rows", "error map", "10 m of each axis by the millimetre")
@@ -49,6 +56,9 @@ NUMERAL = Limit(
     100, "characters", "number, date or bare key", "a double has 17 digits; longer integers take Python minutes"
 )
 
+XML_ELEMENTS = Limit(500_000, "elements", "XML file", "a certificate with 10 000 lengths has a tenth")
+XML_DEPTH = Limit(60, "levels of elements", "XML file", "a certificate has 15")
+XML_ATTRIBUTES = Limit(50, "attributes of an element", "XML file", "a certificate has 4")
 DEPTH = Limit(20, "levels", "brackets in TOML, parts of a dotted key", "the deepest key of a job is at 4")
 TOML_KEY = Limit(100, "characters", "key in TOML", "it stands in messages")
 TEXT = Limit(10_000, "characters", "text in TOML", "three pages of remarks; the longest expression")
@@ -64,9 +74,25 @@ LISTED = Limit(10_000, "entries", "other lists of a job", "measurements to set a
 DRAWS = Limit(250_000, "entries", "samples of an input", "draws of an earlier Monte Carlo")
 INPUTS = Limit(500, "entries", "inputs, outputs or correlations of a budget", "its matrix of correlations is square")
 
+PDF_BYTES = Limit(
+    100_000_000, "bytes", "PDF that is verified", "a certificate with a large recording inside has ten million"
+)
+PDF_OBJECTS = Limit(200_000, "objects", "PDF that is verified", "ten thousand rows of a table make 100 000")
+PDF_PAGES = Limit(2_000, "pages", "PDF that is verified", "a certificate has a dozen")
+PDF_UNPACKED = Limit(
+    400_000_000, "bytes", "PDF that is verified, once it is unpacked", "ten times the largest certificate"
+)
+PDF_DRAWN = Limit(20_000_000, "bytes", "page of a PDF that is verified, once drawn", "a crowded picture has 2 000 000")
+HTML_BYTES = Limit(64_000_000, "bytes", "HTML that is verified", "a certificate with crowded pictures has ten million")
+HTML_DEPTH = Limit(100, "levels", "tags in HTML that is verified", "a cell of a table is at 10")
+JSON_BYTES = Limit(64_000_000, "bytes", "results.json", "the figures of the largest recording take half of it")
+JSON_DEPTH = Limit(40, "levels", "brackets in results.json", "the deepest figure is at 8")
+GIVEN = Limit(1_000, "files", "files that are verified together", "a job names a few dozen")
+
 LIMITS = (
-    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, SECRET_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS,
-    FREEDOMS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY,
-    LISTED, DRAWS, INPUTS,
+    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, DCC_BYTES, SECRET_BYTES, KEY_BYTES, SIGNED_BYTES, ROWS, MAP_ROWS,
+    COLUMNS, CELLS, OBSERVATIONS, FREEDOMS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME,
+    EFFECTS, MAPS, CONFORMITY, LISTED, DRAWS, INPUTS, PDF_BYTES, PDF_OBJECTS, PDF_PAGES, PDF_UNPACKED, PDF_DRAWN, HTML_BYTES,
+    HTML_DEPTH, JSON_BYTES, JSON_DEPTH, GIVEN, XML_ELEMENTS, XML_DEPTH, XML_ATTRIBUTES,
 )  # fmt: skip
 """All of them, in the order of docs/limits.md."""

@@ -26,9 +26,9 @@ def uncertainty_of_sum(
     weights : (m,) of the observations.
     beside : standard uncertainty of a normal contribution that is no noise, in the unit of the sum.
     """
-    variances, slow = components.variances(sizes)
+    variances, _ = components.variances(sizes)
     squares = components.shares.T @ np.asarray(components.turn @ weights) ** 2
-    variance = variances @ squares + slow @ (components.slow.T @ weights) ** 2 + beside**2
+    variance = variances @ squares + components.slow_along(weights, sizes) + beside**2
     u, sd = float(np.sqrt(variance.mean())), np.sqrt(variance)
     if not u:
         return 0.0, 0.0

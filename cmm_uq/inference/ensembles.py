@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from cmm_uq.inference.proposals import LogDensity, Proposal
+from cmm_uq.inference.proposals import LogDensity, Proposes
 from cmm_uq.inference.side_by_side import SideBySide
 from cmm_uq.points import Floats
 
@@ -75,13 +75,14 @@ def converged(ess_min: float, rhat_max: float, steps: int, autocorrelation_time:
 
 def run_ensembles(
     density: LogDensity,
-    proposal: Proposal,
+    proposal: Proposes,
     seed: int,
     progress: Progress | None = None,
     *,
     effective_samples: int = EFFECTIVE_SAMPLES,
     steps_at_once: int = STEPS_AT_ONCE,
     walkers: int | None = None,
+    burn_in: int = BURN_IN,
 ) -> Chains:
     """Sample a density with emcee.
 
@@ -94,6 +95,7 @@ def run_ensembles(
     effective_samples : to reach in every parameter.
     steps_at_once : between two looks at how many there are.
     walkers : in each ensemble; by default 32, or four for each dimension.
+    burn_in : steps that are left out.
     """
     import emcee
 
@@ -106,7 +108,7 @@ def run_ensembles(
     begin = np.vstack([_start(whitened, proposal, walkers, random) for random in _randoms(seed)])
     move = SideBySide(proposal, _randoms(seed))
     sampler = emcee.EnsembleSampler(len(begin), d, whitened, vectorize=True, moves=[move])
-    state, steps = sampler.run_mcmc(begin, BURN_IN, store=False), 0
+    state, steps = sampler.run_mcmc(begin, burn_in, store=False), 0
     while True:
         state = sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
         steps += steps_at_once
@@ -125,7 +127,7 @@ def _randoms(seed: int) -> list[Any]:
     return [np.random.RandomState(np.random.MT19937(child)) for child in np.random.SeedSequence(seed).spawn(ENSEMBLES)]
 
 
-def _start(density: LogDensity, proposal: Proposal, walkers: int, random: Any) -> Floats:
+def _start(density: LogDensity, proposal: Proposes, walkers: int, random: Any) -> Floats:
     """Where the walkers begin: draws that the density does not forbid."""
     z = proposal.draws(walkers, random)
     for _ in range(100):

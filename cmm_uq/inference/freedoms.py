@@ -72,6 +72,26 @@ class Freedoms:
             found[rows, : basis.shape[1]] = basis
         return Freedoms(found, self.index, self.blocks)
 
+    def apart(self, group: Ints) -> Freedoms:
+        """The same span by orthogonal columns of the same length, as many as can be zero outside one group (m,) each.
+
+        Columns are orthogonal and of one length, or zero; those that are zero stay where they are.
+        """
+        found = np.zeros_like(self.columns)
+        for rows in self.rows:
+            columns = self.columns[rows]
+            kept = np.flatnonzero(np.any(columns, axis=0))
+            basis, taken, span = columns[:, kept], [], np.zeros((0, len(kept)))
+            for number in np.unique(group[rows]):
+                outside = group[rows] != number
+                _, s, Vt = np.linalg.svd(basis[outside], full_matrices=True)
+                within = Vt[np.sum(s > _DEPENDENT * np.linalg.norm(basis)) :]
+                taken.append(np.where(outside[:, None], 0.0, basis @ within.T))
+                span = np.vstack([span, within])
+            rest = np.linalg.svd(span, full_matrices=True)[2][len(span) :]
+            found[np.ix_(rows, kept)] = np.hstack([*taken, basis @ rest.T])
+        return Freedoms(found, self.index, self.blocks)
+
     @cached_property
     def rank(self) -> int:
         """How many of the columns are independent."""

@@ -15,8 +15,8 @@ import numpy as np
 from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel
-from cmm_uq.inference.noise import Components, Sizes
-from cmm_uq.inference.slow import SlowFirst, products
+from cmm_uq.inference.noise import Components, Sizes, slow_variances
+from cmm_uq.inference.slow import SlowFirst, groups, products
 from cmm_uq.points import Floats, Ints
 
 SIGMA_BOUNDS = (1e-6, 10.0)
@@ -139,22 +139,53 @@ class Marginal:
         c = self.noise.slow.shape[1]
         if not c or self._freedoms.count > _MOST_FREE:
             return None
-        others = np.hstack([self._freedoms.dense(), self._turned[:, c:]])
-        return SlowFirst(self._turned[:, :c], others, self.noise.classes[0], len(self._counts))
+        cosines, group = self._turned[:, :c], np.full(len(self._turned), -1)
+        for number, (_, rows) in enumerate(groups(cosines)):
+            group[rows] = number
+        others = np.hstack([self._freedoms.apart(group).dense(), self._turned[:, c:]])
+        index, shares = self.noise.classes
+        return SlowFirst(cosines, others, index, shares[:, -1], self._walk)
 
-    def _without_slow_noise(self, slow: SlowFirst, v: Floats, variances: Floats) -> tuple[Floats, Floats]:
-        """As :meth:`_factors`, slow noise with variances (w, c) eliminated ahead of the placings."""
-        c, free = variances.shape[1], self._freedoms.count
-        least = np.maximum(variances, (1e-6 * self._scale) ** 2)
+    def _without_slow_noise(self, slow: SlowFirst, v: Floats, sizes: Sizes) -> tuple[Floats, Floats]:
+        """As :meth:`_factors`, slow noise eliminated ahead of the placings."""
+        precision, walks, log = self._of_slow(sizes)
+        c, free = precision.shape[1], self._freedoms.count
         P = len(self._length)
         prior = np.zeros((free + P - c, free + P - c))
         prior[free:, free:] = self._prior[c:, c:]
         at = np.arange(free)
         prior[at, at] = self._absent.ravel()
-        left, logs = slow.precision(v, prior.ravel(), 1 / (least * self._length[:c] ** 2))
+        left, logs = slow.precision(v, prior.ravel(), precision, walks)
         diagonal = np.arange(left.shape[1])
         left[:, diagonal, diagonal] *= 1 + _JITTER
-        return _cholesky(left), -0.5 * np.log(v) @ self._counts - 0.5 * np.log(least).sum(axis=1) - logs
+        return _cholesky(left), log - 0.5 * np.log(v) @ self._counts - logs
+
+    def _of_slow(self, sizes: Sizes) -> tuple[Floats, Floats, Floats]:
+        """What is known beforehand of slow noise' coefficients.
+
+        Returns
+        -------
+        Precision (w, c) of all but walks; by what that of a walk is multiplied (w,), zero of what is none; half the
+        logarithm of the determinant (w,).
+        """
+        variances = np.maximum(self.noise.variances(sizes)[1], (1e-6 * self._scale) ** 2)
+        walks, constant = sizes.rate == 0, variances[:, 0]
+        variances[walks] = constant[walks, None] * self._walked
+        own = self._length[: variances.shape[1]]
+        precision = np.where(walks[:, None], 0.0, 1 / (variances * own**2))
+        return precision, np.where(walks, 1 / constant, 0.0), -0.5 * np.log(variances).sum(axis=1)
+
+    @cached_property
+    def _walked(self) -> Floats:
+        """(c,) variances of the coefficients of a walk, over that of its first, which is a constant."""
+        variances = slow_variances(np.ones(1), np.zeros(1), self.noise.frequency)[0][0]
+        return np.asarray(variances / variances[0])
+
+    @cached_property
+    def _walk(self) -> Floats:
+        """(c, c) precision of the coefficients of a walk whose constants have the variance one, but for what ties them."""
+        own = self._length[: self.noise.slow.shape[1]]
+        return np.asarray((np.diag(1 / self._walked) + self.noise.tied) / own / own[:, None])
 
     def _factors(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Lower factors (w, P, P) of precision and observations together, and the logarithm of what stands before them.
@@ -162,24 +193,23 @@ class Marginal:
         What each placing leaves free is eliminated first, by itself; slow noise has no rows and columns where it is absent in
         all of the sizes, and comes first where there are few placings.
         """
-        variances, slow = self.noise.variances(sizes)
-        v = variances @ self.noise.classes[1].T
+        v = self.noise.variances(sizes)[0] @ self.noise.classes[1].T
         absent = not np.any(sizes.slow)
         if not absent and self._slow_first is not None:
-            return self._without_slow_noise(self._slow_first, v, slow)
+            return self._without_slow_noise(self._slow_first, v, sizes)
         products, prior, blocks = self._without_slow if absent else (self._products, self._prior.ravel(), self._blocks)
-        P = len(self._length) - absent * slow.shape[1]
+        c = self.noise.slow.shape[1]
+        P = len(self._length) - absent * c
         whole = ((1 / v) @ products).reshape(-1, P, P)
         whole += prior.reshape(P, P)
         log = -0.5 * np.log(v) @ self._counts
-        c = slow.shape[1]
         if absent:  # what is left of slow noise whose variance goes to zero
             log += np.log(self._length[:c]).sum()
         else:
-            at = np.arange(c)
-            least = np.maximum(slow, (1e-6 * self._scale) ** 2)
-            whole[:, at, at] += 1 / (least * self._length[at] ** 2)
-            log -= 0.5 * np.log(least).sum(axis=1)
+            precision, walks, own = self._of_slow(sizes)
+            whole[:, :c, :c] += walks[:, None, None] * self._walk
+            whole.reshape(len(whole), -1)[:, : c * P : P + 1] += precision
+            log += own
         whole.reshape(len(whole), -1)[:, :: P + 1] *= 1 + _JITTER
         if self._freedoms.count:
             lost, own = self._eliminated(v, blocks)
@@ -207,8 +237,13 @@ class Marginal:
     def _batches(self, sizes: Sizes) -> Iterator[Ints]:
         """Which sizes to reckon with at once: those without slow noise, which need smaller matrices, apart."""
         j, c = self._freedoms.columns.shape[1], self.noise.slow.shape[1]
-        for chosen, P in ((sizes.slow == 0, len(self._length) - c), (sizes.slow > 0, len(self._length))):
-            size = max(1, _NUMBERS // (P**2 + self._freedoms.count * (j + P) + 3 * len(self._counts)))
+        without, whole = (
+            (sizes.slow == 0, len(self._length) - c, None),
+            (sizes.slow > 0, len(self._length), self._slow_first),
+        )
+        for chosen, P, first in (without, whole):
+            numbers = first.numbers if first else P**2 + self._freedoms.count * (j + P)
+            size = max(1, _NUMBERS // (numbers + 3 * len(self._counts)))
             at = np.flatnonzero(chosen)
             yield from (at[i : i + size] for i in range(0, len(at), size))
 
@@ -239,20 +274,26 @@ class Marginal:
         return max(10_000, _NUMBERS_DRAWN // len(self._length) ** 2)
 
     def draw(self, sizes: Sizes, random: np.random.Generator) -> Floats:
-        """One exact draw (w, k) of the parameters for each of w sizes."""
+        """One exact draw (w, k) of the parameters for each of w sizes; sizes that come again are reckoned with once."""
         count, k = len(sizes.placing), len(self.model.unknowns)
         if not k:
             return np.zeros((count, 0))
         found = np.empty((count, k))
-        for part in self._batches(sizes):
-            factors, _ = self._factors(sizes.at(part))
+        first, index = sizes.different if np.any(sizes.slow) else (np.arange(count), np.arange(count))
+        once = sizes.at(first)
+        for part in self._batches(once):
+            factors, _ = self._factors(once.at(part))
             # the parameters stand last before the observations: the lower right of the factor is all that they need
-            own, mean = factors[:, -1 - k : -1, -1 - k : -1], factors[:, -1, -1 - k : -1]
+            lower, place = factors[:, -1 - k :, -1 - k : -1], np.full(len(first), -1)
+            place[part] = np.arange(len(part))
+            which = place[index]
+            drawn = np.flatnonzero(which >= 0)
+            own, mean = lower[which[drawn], :-1], lower[which[drawn], -1]
             normal = mean + random.standard_normal(mean.shape)
             for i in reversed(range(k)):  # back substitution
                 normal[:, i] /= own[:, i, i]
                 normal[:, :i] -= own[:, i, :i] * normal[:, i : i + 1]
-            found[part] = normal
+            found[drawn] = normal
         return np.asarray(self.estimate.value + found / self._length[-1 - k : -1])
 
 

@@ -13,7 +13,8 @@ and absence without changing dimension.
 Why the priors: an axis rarely scatters more than three times as much as another; a set-up offset and slow noise are as
 large as the reading noise within some factor, but may be ten times as large (a half-Cauchy distribution forgives that, a
 half-normal one does not: its intervals hold too seldom, Gelman 2006, Bayesian Analysis 1(3)); slow noise may change within
-a few readings or not at all during the recording, and no rate between is preferred.
+a few readings or hardly during the recording, and no rate between is preferred; as probably it has no mean that it comes back
+to, but walks on from where it was at the first reading.
 """
 
 from __future__ import annotations
@@ -55,6 +56,13 @@ NEGLIGIBLE = 0.05
 FASTEST = 200.0
 """Largest rate of slow noise, over the duration of the recording."""
 
+WALK = 0.5
+"""Probability, beforehand, that slow noise is a random walk; its rate is then zero.
+
+A process that returns to its mean within the recording, of which a walk of few readings cannot be told, leaves a constant
+behind that is up to four times too small.
+"""
+
 _CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]).T / np.sqrt([6.0, 2.0])
 _FARTHEST = 5.0
 """Largest logarithm of an axis' noise over the mean of all."""
@@ -73,7 +81,8 @@ class Sizes:
     reading : (w, 3) standard deviation of a reading along each axis.
     placing : (w,) of a set-up offset.
     growth : (w,) of the growing part, at the longest length.
-    slow : (w,) of slow noise; ``rate`` (w,), in units of one over the duration of the recording.
+    slow : (w,) of slow noise, root mean square over the recording.
+    rate : (w,) at which it returns to its mean, in units of one over the duration of the recording; 0 of a random walk.
     """
 
     reading: Floats
@@ -94,6 +103,13 @@ class Sizes:
         return Sizes(
             np.median(self.reading, axis=0, keepdims=True), *(np.median(part, keepdims=True) for part in others)
         )
+
+    @property
+    def different(self) -> tuple[Ints, Ints]:
+        """The first (u,) of each of the different draws, and which of those each draw (w,) is."""
+        table = np.column_stack([self.reading, self.placing, self.growth, self.slow, self.rate])
+        _, first, index = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        return np.asarray(first), np.asarray(index.ravel())
 
     def at(self, chosen: Ints | slice) -> Sizes:
         """Some of the draws."""
@@ -180,7 +196,8 @@ class Components:
         column = {name: latent[:, i] for i, name in enumerate(self.names)}
         square = np.ones(len(latent))
         if SLOW in self.possible:
-            changed = -np.expm1(-self.gap * _rate(column["rate"]))
+            rate = _rate(column["rate"])
+            changed = np.where(rate > 0, -np.expm1(-self.gap * rate), self.gap)
             square += changed * _half_cauchy(column[SLOW], ABSENT[SLOW], RATIO[SLOW]) ** 2
         if GROWTH in self.possible:
             square += self._growth * _half_cauchy(column[GROWTH], ABSENT[GROWTH], RATIO[GROWTH]) ** 2
@@ -214,6 +231,43 @@ class Components:
         """With as many cosines as do where slow noise is not quick."""
         return self.slowest(FEWER * self.most // FREQUENCIES) if self.most > FEWER else self
 
+    @cached_property
+    def tied(self) -> Floats:
+        """(c, c) what ties the coefficients of a random walk, over the variance that its constants have besides.
+
+        The walk is zero at the first reading: of each axis the constant is −√2 times the sum of the cosines' coefficients.
+        """
+        c, constant = len(self.frequency), self.frequency == 0
+        tie = np.where(constant[:, None], 1.0, np.sqrt(2.0)) * (self._axis[:, None] == np.arange(np.sum(constant)))
+        return np.asarray(tie @ tie.T - np.diag(constant.astype(np.float64))) if c else np.zeros((0, 0))
+
+    @cached_property
+    def _axis(self) -> Ints:
+        """(c,) number of the constant that stands before each cosine."""
+        return np.asarray(np.cumsum(self.frequency == 0) - 1)
+
+    @cached_property
+    def _anchored(self) -> Floats:
+        """Columns (m, c) of a random walk: cosines less what they are at the first reading."""
+        constants = self.slow[:, self.frequency == 0]
+        return np.asarray(self.slow - np.sqrt(2.0) * np.where(self.frequency == 0, 0.0, constants[:, self._axis]))
+
+    def waves(self, sizes: Sizes) -> Floats:
+        """Columns (m, c), mm, of slow noise as far as the cosines go, with standard normal coefficients.
+
+        Parameters
+        ----------
+        sizes : of a single draw.
+        """
+        columns = self.slow if sizes.rate[0] else self._anchored
+        return np.asarray(columns * np.sqrt(self.variances(sizes)[1][0]))
+
+    def slow_along(self, weights: Floats, sizes: Sizes) -> Floats:
+        """Variance (w,), mm², of slow noise in a weighted sum (m,) of the observations, as far as the cosines go."""
+        slow, walks = self.variances(sizes)[1], sizes.rate == 0
+        found = slow @ (self.slow.T @ weights) ** 2
+        return np.where(walks, slow @ (self._anchored.T @ weights) ** 2, found) if np.any(walks) else found
+
     def quick(self, sizes: Sizes) -> Floats:
         """(w,) part that is faster than the cosines of what no other reading shares."""
         fast = slow_variances(sizes.slow, sizes.rate, self.frequency)[1]
@@ -227,7 +281,8 @@ class Components:
         sizes : of a single draw.
         """
         times, index = np.unique(self.time, return_inverse=True)
-        covariance = np.exp(-sizes.rate[0] * np.abs(times[:, None] - times))
+        rate = sizes.rate[0]
+        covariance = np.exp(-rate * np.abs(times[:, None] - times)) if rate else 2 * np.minimum(times[:, None], times)
         factor = sizes.slow[0] * np.linalg.cholesky(covariance + 1e-12 * np.eye(len(times)))
         seen = self.slow[:, self.frequency == 0]
         return np.hstack([each[:, None] * factor[index.ravel()] for each in seen.T])
@@ -254,7 +309,10 @@ class Components:
         found = np.asarray((self.turn.T @ turned.reshape(-1, m).T).T, dtype=np.float64).reshape(turned.shape)
         if self.slow.shape[1] and np.any(slow):
             waves = np.sqrt(slow)[:, None, :] * random.standard_normal((w, repetitions, slow.shape[1]))
-            found = found + waves @ self.slow.T
+            walks = sizes.rate == 0
+            for chosen, columns in ((~walks, self.slow), (walks, self._anchored)):
+                if np.any(chosen):
+                    found[chosen] += waves[chosen] @ columns.T
         return found
 
     def white(self, sizes: Sizes) -> Callable[[Floats], Floats]:
@@ -264,9 +322,9 @@ class Components:
         ----------
         sizes : of a single draw.
         """
-        variances, slow = self.variances(sizes)
+        variances, _ = self.variances(sizes)
         scale = float(sizes.coordinate[0]) / np.sqrt((variances @ self.shares.T)[0])[:, None]
-        waves = scale * np.asarray(self.turn @ (self.slow * np.sqrt(slow[0]))) / float(sizes.coordinate[0])
+        waves = scale * np.asarray(self.turn @ self.waves(sizes)) / float(sizes.coordinate[0])
         U, s, _ = np.linalg.svd(waves, full_matrices=False)
 
         def whitened(columns: Floats) -> Floats:
@@ -300,16 +358,24 @@ def slow_variances(sd: Floats, rate: Floats, frequency: Floats) -> tuple[Floats,
 
     An Ornstein–Uhlenbeck process of standard deviation ``sd`` (w,) and ``rate`` (w,), over the duration, has the spectral
     density 2·rate·sd²/(rate² + ω²), of which Σ over all half turns is coth(rate) − 1/rate; the constant has the rest of sd².
+
+    A random walk (rate 0) of variance 2·sd²·t at the time t has 2·sd²/ω² (its steps are those of the process at the rate 1,
+    its mean square over the recording is sd²). Its constant, beside that which ties it to zero at the first reading
+    (:attr:`Components.tied`), has what the cosines left out are there.
     """
     if not len(frequency):
         return np.zeros((len(sd), 0)), np.zeros_like(sd)
-    rate = rate[:, None]
+    rate, constant = rate[:, None], frequency == 0
+    square = (np.pi * frequency) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
-        cosine = 2 * rate / (rate**2 + (np.pi * frequency) ** 2)
+        cosine = np.where(rate > 0, 2 * rate / (rate**2 + square), 2 / square)
         mean = 1 - 1 / np.tanh(rate) + 1 / rate
-    each = np.where(frequency == 0, mean, cosine)
-    shown = each[:, np.unique(frequency, return_index=True)[1]].sum(axis=1)
-    return sd[:, None] ** 2 * each, sd**2 * np.maximum(1 - shown, 0.0)
+    each = np.where(constant, 0.0, cosine)
+    once = np.unique(frequency, return_index=True)[1]
+    walked = 1 / 3 - each[:, once].sum(axis=1, keepdims=True)  # Σ 2/(πk)² = 1/3
+    each = np.where(constant, np.where(rate > 0, mean, 2 * walked), each)
+    fast = np.where(rate > 0, 1 - each[:, once].sum(axis=1, keepdims=True), walked)[:, 0]
+    return sd[:, None] ** 2 * each, sd**2 * np.maximum(fast, 0.0)
 
 
 def display_shared(sigma: Floats, step: float) -> Floats:
@@ -327,8 +393,9 @@ def display_shared(sigma: Floats, step: float) -> Floats:
 
 
 def _rate(latent: Floats) -> Floats:
-    """Standard normal numbers as rates whose logarithm is uniform, in units of one over the duration."""
-    return np.asarray(np.exp(special.ndtr(latent) * np.log(FASTEST)))
+    """Standard normal numbers as rates, in units of one over the duration: zero, or of uniform logarithm."""
+    part = (special.ndtr(latent) - WALK) / (1 - WALK)
+    return np.where(part > 0, np.exp(part * np.log(FASTEST)), 0.0)
 
 
 def _present(latent: Floats, absent: float) -> Floats:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy import special
@@ -35,6 +35,23 @@ _PARTS, _WIDE, _NARROWER = 8, 0.1, 0.3
 _REFITS, _RECALLED, _LEAST_ENOUGH = 5, 3, 0.02
 _FITS = 8
 """Mixtures fitted to the density itself from which the best is taken."""
+
+
+class Proposes(Protocol):
+    """What a sampler takes its steps from: draws in coordinates z, their density, and the parameters that they mean."""
+
+    @property
+    def centre(self) -> Floats:
+        """(d,) the parameters where z is zero."""
+
+    def parameters(self, z: Floats) -> Floats:
+        """(w, d) for coordinates z."""
+
+    def draws(self, count: int, random: Any) -> Floats:
+        """Coordinates (count, d)."""
+
+    def log_density(self, z: Floats) -> Floats:
+        """(w,) up to a constant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,14 +169,14 @@ def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> 
         from_begin = -0.5 * np.sum(((theta - begin) @ back.T) ** 2, axis=1)
         gain = np.maximum(density(theta) - from_begin, _NEVER)
         known = from_begin - proposal.log_density(z)
-        before, power = power, _highest_power(gain, known, power, _ENOUGH * count)
+        before, power = power, highest_power(gain, known, power, _ENOUGH * count)
         if power < min(1.0, _STUCK * before):
             return _mixture(density, begin, first, random)
         mean, covariance = moments(theta, weights(power * gain + known))
         centre, factor = mean, np.linalg.cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(d))
         left -= power == 1.0
         if not left:
-            single = _worth(gain + known) > 0.5 * _ENOUGH * count
+            single = worth(gain + known) > 0.5 * _ENOUGH * count
             return Proposal.single(centre, factor) if single else _mixture(density, begin, first, random)
     return _mixture(density, begin, first, random)
 
@@ -182,13 +199,13 @@ def _mixture(density: LogDensity, centre: Floats, factor: Floats, random: Any) -
         gains = [*gains, gain][-_RECALLED:]
         if power == 1.0:
             own = -0.5 * np.sum(z**2, axis=1) - proposals[-1].log_density(z)
-            tried.append((_worth(gain + own), len(proposals) - 1))
+            tried.append((worth(gain + own), len(proposals) - 1))
             if len(tried) == _FITS or tried[-1][0] > _ENOUGH * count:
                 break
         every, gain = np.vstack(draws), np.concatenate(gains)
         from_any = np.stack([proposal.log_density(every) for proposal in proposals[-_RECALLED:]])
         known = -0.5 * np.sum(every**2, axis=1) - special.logsumexp(from_any, axis=0)
-        before, power = power, _highest_power(gain, known, power, enough * len(every))
+        before, power = power, highest_power(gain, known, power, enough * len(every))
         enough = max(0.5 * enough, _LEAST_ENOUGH) if power < min(1.0, _STUCK * before) else enough
         proposals.append(_fitted(proposals[-1], every, weights(power * gain + known), random))
     return proposals[max(tried)[1]] if tried else proposals[-1]
@@ -199,7 +216,7 @@ def _fitted(proposal: Proposal, z: Floats, weight: Floats, random: Any) -> Propo
     d = z.shape[1]
     mean, covariance = moments(z, weight)
     covariance = covariance + 1e-9 * np.trace(covariance) * np.eye(d)
-    worth = 1 / np.sum(weight**2)
+    many = 1 / np.sum(weight**2)
     narrow = np.linalg.cholesky(_NARROWER * covariance)
     found = Proposal(
         proposal.centre, proposal.factor, np.full(_PARTS, 1 / _PARTS), z[random.choice(len(z), _PARTS, p=weight)],
@@ -210,14 +227,14 @@ def _fitted(proposal: Proposal, z: Floats, weight: Floats, random: Any) -> Propo
         share = weight[:, None] * np.exp(log - special.logsumexp(log, axis=1, keepdims=True))
         part = share.sum(axis=0)
         pull = share * (_DOF + d) / (_DOF + squares)
-        kept = part * worth > min(
-            d / 2, 0.5 * part.max() * worth
+        kept = part * many > min(
+            d / 2, 0.5 * part.max() * many
         )  # fewer draws say nothing about a distribution of its own
         share, pull, part = share[:, kept], pull[:, kept], part[kept]
         centres = (pull.T @ z) / pull.sum(axis=0)[:, None]
         about = z[:, None] - centres
         own = np.einsum("wk,wki,wkj->kij", pull, about, about) / part[:, None, None]
-        prior = (2 * d / (2 * d + part * worth))[:, None, None]
+        prior = (2 * d / (2 * d + part * many))[:, None, None]
         factors = np.linalg.cholesky((1 - prior) * own + prior * _NARROWER * covariance)
         found = Proposal(proposal.centre, proposal.factor, part / part.sum(), centres, factors)
     return Proposal(
@@ -237,14 +254,14 @@ def moments(values: Floats, weight: Floats) -> tuple[Floats, Floats]:
     return mean, (about * weight[:, None]).T @ about
 
 
-def _highest_power(gain: Floats, known: Floats, least: float, enough: float) -> float:
+def highest_power(gain: Floats, known: Floats, least: float, enough: float) -> float:
     """Largest power of a gain in density, not below ``least``, at which the draws are worth enough, by bisection."""
     low, high = least, 1.0
-    if _worth(gain + known) >= enough:
+    if worth(gain + known) >= enough:
         return 1.0
     for _ in range(20):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _worth(middle * gain + known) >= enough else (low, middle)
+        low, high = (middle, high) if worth(middle * gain + known) >= enough else (low, middle)
     return low
 
 
@@ -254,5 +271,6 @@ def weights(log: Floats) -> Floats:
     return np.asarray(weight / weight.sum())
 
 
-def _worth(log: Floats) -> float:
+def worth(log: Floats) -> float:
+    """How many draws those are worth whose density over that proposed has the logarithm (w,)."""
     return float(1 / np.sum(weights(log) ** 2))

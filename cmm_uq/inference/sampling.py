@@ -6,19 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Progress, run_ensembles
+from cmm_uq.inference.ensembles import BURN_IN, LEAST_EFFECTIVE_SAMPLES, Progress, run_ensembles
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.marginal import Marginal
-from cmm_uq.inference.noise import NEGLIGIBLE, Components
+from cmm_uq.inference.noise import NEGLIGIBLE, SLOW, Components
 from cmm_uq.inference.posterior import NoisyPosterior
-from cmm_uq.inference.proposals import Proposal, moments, tempered, weights
+from cmm_uq.inference.presence import beginning, present
+from cmm_uq.inference.proposals import Proposes, tempered, weights
 from cmm_uq.points import Floats
 
-_LOOKED_AT = 400
+_LOOKED_AT = 2000
 """Draws by which it is judged whether slow noise is quicker than a few cosines."""
-_WIDER = 2.0
-"""Times the spread under a few cosines in which to look for that under all."""
+
+_BURN_IN = 30
+"""Steps that are left out where what is proposed knows which components are present: about every other one is taken."""
 
 
 def sample_with_noise(
@@ -44,6 +46,7 @@ def sample_with_noise(
         effective_samples=LEAST_EFFECTIVE_SAMPLES,
         steps_at_once=100,
         walkers=max(16, (2 if noise.most else 4) * noise.dimension + 2 * bool(noise.most)),
+        burn_in=_BURN_IN if noise.most else BURN_IN,
     )  # everything but the noise is drawn independently, given it
     every = chains.thinning(marginal.affordable_draws)
     sizes = noise.sizes(chains.thinned(every))
@@ -55,7 +58,7 @@ def sample_with_noise(
     )  # fmt: skip
 
 
-def sufficient(marginal: Marginal, seed: int) -> tuple[Marginal, Proposal]:
+def sufficient(marginal: Marginal, seed: int) -> tuple[Marginal, Proposes]:
     """The density with as many cosines as slow noise of this recording takes, and what to propose for it.
 
     Parameters
@@ -63,19 +66,19 @@ def sufficient(marginal: Marginal, seed: int) -> tuple[Marginal, Proposal]:
     marginal : with all cosines.
     seed : of the draws.
     """
+    centre, factor = start(marginal)
+    if SLOW not in marginal.noise.possible:
+        return marginal, tempered(marginal.log_density, centre, factor, seed)
     fewer = replace(marginal, noise=marginal.noise.fewer)
-    proposal = tempered(fewer.log_density, *start(fewer), seed)
+    proposal = present(fewer.log_density, beginning(marginal.noise.names, centre[0], factor[0, 0]), seed)
     if fewer.noise is marginal.noise:
         return marginal, proposal
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(13,))))
-    z = proposal.draws(_LOOKED_AT, random)
-    latent = proposal.parameters(z)
-    weight = weights(fewer.log_density(latent) - proposal.log_density(z))
+    latent = proposal.draws(_LOOKED_AT, random)
+    weight = weights(fewer.log_density(latent) - proposal.log_density(latent))
     if weight @ fewer.noise.quick(fewer.noise.sizes(latent)) < NEGLIGIBLE:
         return fewer, proposal
-    mean, covariance = moments(latent, weight)
-    wide = np.linalg.cholesky(covariance + 1e-4 * np.eye(len(mean)))
-    return marginal, tempered(marginal.log_density, mean, np.asarray(_WIDER * wide, dtype=np.float64), seed)
+    return marginal, present(marginal.log_density, proposal, seed, looks=1)
 
 
 def start(marginal: Marginal) -> tuple[Floats, Floats]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.inference.proposals import Proposal
+from cmm_uq.inference.proposals import Proposes
 from cmm_uq.points import Floats
 
 SHARES = (0.9, 0.1)
@@ -59,7 +59,7 @@ class SideBySide:
     randoms : random numbers of each ensemble, of which the walkers follow one another.
     """
 
-    def __init__(self, proposal: Proposal, randoms: Sequence[Any]) -> None:
+    def __init__(self, proposal: Proposes, randoms: Sequence[Any]) -> None:
         from emcee.moves import DEMove, MHMove
 
         self._proposal, self._randoms = proposal, randoms

@@ -2,6 +2,9 @@
 
 Observations that see one axis of the machine each share no cosine with those of another. The precision of the cosines is then
 made of blocks, and what is left of all other columns once they are eliminated is a small matrix.
+
+Where the noise beside a random walk is alike in all observations of an axis, the cosines are turned once into what they and
+that noise make independent of each other, and at new sizes there is nothing to factorise.
 """
 
 from __future__ import annotations
@@ -16,6 +19,12 @@ from cmm_uq.points import Floats, Ints
 _NOTHING = 1e-9
 """Part of the largest below which a cosine is zero for an observation."""
 
+_NONE = 1e-13
+"""Part of the largest below which another column's value is zero."""
+
+_ALIKE = 1e-12
+"""Relative difference up to which variances are the same."""
+
 _LARGEST = 2.0
 """Times the largest product of the other columns: what makes a bordered matrix positive definite; its value has no effect."""
 
@@ -29,25 +38,31 @@ class SlowFirst:
     cosines : (m, c), turned.
     others : (m, R), turned.
     classes : (m,) the class of each observation, 0 to ``count`` − 1.
+    base : (count,) variance of each class, of any size, where the noise is alike in all observations.
+    walk : (c, c) precision beforehand of the cosines of a random walk of some size.
     """
 
     cosines: Floats
     others: Floats
     classes: Ints
-    count: int
+    base: Floats
+    walk: Floats
+
+    @property
+    def count(self) -> int:
+        """Of the classes."""
+        return len(self.base)
 
     @cached_property
     def groups(self) -> tuple[tuple[Ints, Ints], ...]:
         """Columns and rows of cosines that share an observation, directly or through others."""
-        seen = np.abs(self.cosines) > _NOTHING * np.abs(self.cosines).max(initial=0.0)
-        reached = seen.T.astype(np.float64) @ seen > 0
-        while np.any(further := (reached.astype(np.float64) @ reached > 0) & ~reached):
-            reached |= further
-        found = []
-        for first in np.unique(reached.argmax(axis=1)):
-            columns = np.flatnonzero(reached[first])
-            found.append((columns, np.flatnonzero(seen[:, columns].any(axis=1))))
-        return tuple(found)
+        return groups(self.cosines)
+
+    @cached_property
+    def _near(self) -> list[Ints]:
+        """Of each group: which of the other columns its observations see."""
+        seen = np.abs(self.others) > _NONE * np.abs(self.others).max(axis=0, initial=0.0)
+        return [np.flatnonzero(seen[rows].any(axis=0)) for _, rows in self.groups]
 
     @cached_property
     def _others(self) -> Floats:
@@ -56,42 +71,127 @@ class SlowFirst:
 
     @cached_property
     def _bordered(self) -> list[tuple[Ints, Ints, Floats]]:
-        """Of each group: its columns, its classes, and the products (classes, c·(c + R)) of its cosines with everything."""
+        """Of each group: its columns, its classes, and the products (classes, (c + r)²) of its cosines with what is near.
+
+        Those of the other columns with each other stay zero.
+        """
         found = []
-        for columns, rows in self.groups:
+        for (columns, rows), near in zip(self.groups, self._near, strict=True):
             own, index = np.unique(self.classes[rows], return_inverse=True)
-            cosines = self.cosines[np.ix_(rows, columns)]
-            whole = np.hstack([cosines, self.others[rows]])
-            found.append((columns, own, products(cosines, whole, index, len(own))))
+            cosines, size = self.cosines[np.ix_(rows, columns)], len(columns) + len(near)
+            whole = np.zeros((len(own), size, size))
+            every = np.hstack([cosines, self.others[np.ix_(rows, near)]])
+            whole[:, :, : len(columns)] = products(every, cosines, index, len(own)).reshape(len(own), size, -1)
+            found.append((columns, own, whole.reshape(len(own), -1)))
         return found
 
-    def precision(self, v: Floats, prior: Floats, of_cosines: Floats) -> tuple[Floats, Floats]:
+    @cached_property
+    def numbers(self) -> int:
+        """In the largest matrices that one of the densities takes."""
+        each = [len(columns) + len(near) for (columns, _), near in zip(self.groups, self._near, strict=True)]
+        return int(max(*each, self.others.shape[1])) ** 2
+
+    @cached_property
+    def _turned(self) -> list[_Turned]:
+        """Of each group."""
+        return [
+            _Turned.of(self._of_base(of_classes, own, len(columns)), self.walk[np.ix_(columns, columns)])
+            for columns, own, of_classes in self._bordered
+        ]
+
+    def _of_base(self, of_classes: Floats, own: Ints, c: int) -> Floats:
+        """Products (c + r, c) of cosines with what is near where the noise is alike."""
+        whole = (1 / self.base[own]) @ of_classes
+        return np.asarray(whole.reshape(int(np.sqrt(len(whole))), -1)[:, :c])
+
+    def precision(self, v: Floats, prior: Floats, of_cosines: Floats, walks: Floats) -> tuple[Floats, Floats]:
         """What is left of the other columns' precision (w, R, R), and half the logarithm of the cosines' determinant (w,).
 
         Parameters
         ----------
         v : (w, classes) variance of the observations of each class.
         prior : (R²,) precision of the other columns beforehand.
-        of_cosines : (w, c) precision of the cosines beforehand.
+        of_cosines : (w, c) precision of the cosines beforehand, but for walks.
+        walks : (w,) by what that of a walk is to be multiplied; zero of what is none.
         """
         w, R = len(v), self.others.shape[1]
         left = ((1 / v) @ self._others + prior).reshape(w, R, R)
         most = _LARGEST * np.einsum("wii->wi", left).sum(axis=1)
         logs = np.zeros(w)
-        for columns, own, of_classes in self._bordered:
-            c = len(columns)
-            bordered = np.zeros((w, c + R, c + R))
-            now = ((1 / v[:, own]) @ of_classes).reshape(w, c, c + R)
-            bordered[:, :c] = now
-            bordered[:, c:, :c] = now[:, :, c:].transpose(0, 2, 1)
-            at, beyond = np.arange(c), np.arange(c, c + R)
-            bordered[:, at, at] += of_cosines[:, columns]
-            bordered[:, beyond, beyond] = most[:, None]
+        for (columns, own, of_classes), near, turned in zip(self._bordered, self._near, self._turned, strict=True):
+            times = v[:, own] / self.base[own]
+            alike = (walks > 0) & (np.ptp(times, axis=1) <= _ALIKE * times[:, 0])
+            if alike.any():
+                lost, log = turned.lost(times[alike, 0], walks[alike])
+                left[np.ix_(alike, near, near)] -= lost
+                logs[alike] += log
+            at = np.flatnonzero(~alike)
+            if not len(at):
+                continue
+            c, size, walking = len(columns), len(columns) + len(near), np.flatnonzero(walks[at])
+            bordered = ((1 / v[np.ix_(at, own)]) @ of_classes).reshape(len(at), size, size)
+            if len(walking):
+                bordered[walking, :c, :c] += walks[at][walking, None, None] * self.walk[np.ix_(columns, columns)]
+            diagonal = bordered.reshape(len(at), -1)[:, :: size + 1]
+            diagonal[:, :c] += of_cosines[np.ix_(at, columns)]
+            diagonal[:, c:] = most[at, None]
             factor = np.linalg.cholesky(bordered)
             rows = factor[:, c:, :c]
-            left -= rows @ rows.transpose(0, 2, 1)
-            logs += np.log(factor[:, at, at]).sum(axis=1)
+            left[np.ix_(at, near, near)] -= rows @ rows.transpose(0, 2, 1)
+            logs[at] += np.log(np.einsum("wii->wi", factor)[:, :c]).sum(axis=1)
         return left, logs
+
+
+@dataclass(frozen=True, eq=False)
+class _Turned:
+    """Cosines of a walk in coordinates in which they are independent of each other, before and after noise that is alike.
+
+    Parameters
+    ----------
+    known : (c,) precision that noise of variance one leaves of each, where that beforehand is one.
+    taken : (c, r²) what each takes from the precision of the other columns.
+    log : half the logarithm of the determinant of the walk's precision.
+    """
+
+    known: Floats
+    taken: Floats
+    log: float
+
+    @classmethod
+    def of(cls, products: Floats, walk: Floats) -> _Turned:
+        """From inner products (c + r, c) of cosines with all columns, and the precision of a walk (c, c)."""
+        c, factor = len(walk), np.linalg.cholesky(walk)
+        own = np.linalg.solve(factor, np.linalg.solve(factor, products[:c].T).T)
+        known, axes = np.linalg.eigh(0.5 * (own + own.T))
+        across = axes.T @ np.linalg.solve(factor, products[c:].T)
+        taken = (across[:, :, None] * across[:, None, :]).reshape(c, -1)
+        return cls(np.maximum(known, 0.0), taken, float(np.log(np.diag(factor)).sum()))
+
+    def lost(self, variance: Floats, times: Floats) -> tuple[Floats, Floats]:
+        """What other columns' precision loses (w, r, r), and half the logarithm of the cosines' determinant (w,).
+
+        Parameters
+        ----------
+        variance : (w,) of the noise.
+        times : (w,) by what the precision of the walk is multiplied.
+        """
+        each = self.known / variance[:, None] + times[:, None]
+        size = int(np.sqrt(self.taken.shape[1]))
+        lost = (1 / (each * variance[:, None] ** 2)) @ self.taken
+        return lost.reshape(-1, size, size), self.log + 0.5 * np.log(each).sum(axis=1)
+
+
+def groups(cosines: Floats) -> tuple[tuple[Ints, Ints], ...]:
+    """Columns and rows of cosines (m, c) that share an observation, directly or through others."""
+    seen = np.abs(cosines) > _NOTHING * np.abs(cosines).max(initial=0.0)
+    reached = seen.T.astype(np.float64) @ seen > 0
+    while np.any(further := (reached.astype(np.float64) @ reached > 0) & ~reached):
+        reached |= further
+    found = []
+    for first in np.unique(reached.argmax(axis=1)):
+        columns = np.flatnonzero(reached[first])
+        found.append((columns, np.flatnonzero(seen[:, columns].any(axis=1))))
+    return tuple(found)
 
 
 def products(first: Floats, second: Floats, classes: Ints, count: int) -> Floats:

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import model_validator
 
+from cmm_uq.jobs.certified_value import LENGTH, CertifiedValue
 from cmm_uq.jobs.expanded import ExpandedUncertainty, with_standard_uncertainty
 from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.table import AnyFloat, Length, Table, Uncertainty
@@ -37,8 +38,8 @@ class CertificateFile(FileKeys, Traceability):
     """The artefact's own certificate, and the file that its certified values are read from."""
 
     file: str | None = None
-    """File of the certified distances or places, a CSV, a workbook or a DCC, by the number of their point; the recording
-    then has none."""
+    """File of what is certified. A DCC (XML) gives number, laboratory, dates and certified values with their uncertainty, of
+    every kind; a CSV or a workbook the distances or places of points by their number, which the recording then has not."""
 
 
 class ArtefactFacts(Table):
@@ -54,6 +55,7 @@ class ArtefactFacts(Table):
     with_earlier : whether two recordings of it at two dates can be compared.
     carries_probe : whether its recording itself says how far from the end of the ram each point was, as tip offsets do.
     form_key : key of the form deviation by its certificate, for a kind that has a form to be compared.
+    certified_values : that the artefact's digital certificate may state, where they do not stand in the recording.
     instead : tables whose keys may stand in place of others.
     """
 
@@ -63,6 +65,7 @@ class ArtefactFacts(Table):
     with_earlier: ClassVar[bool] = False
     carries_probe: ClassVar[bool] = False
     form_key: ClassVar[str | None] = None
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = (LENGTH,)
 
     kind: str
     """What kind of measurement it is; the further keys of the table depend on it."""
@@ -84,15 +87,6 @@ class ArtefactFacts(Table):
     @classmethod
     def _expanded(cls, data: Any) -> Any:
         return with_standard_uncertainty(data)
-
-    @model_validator(mode="after")
-    def _certified_values_of_a_kind_that_has_some(self) -> Self:
-        if self.certificate is not None and self.certificate.file is not None and not self.with_references:
-            raise ValueError(
-                f"certificate.file: a recording of kind {self.kind!r} has no certified values of single points; "
-                "give length_mm and u_um"
-            )
-        return self
 
     @model_validator(mode="after")
     def _uncertainty_of_something(self) -> Self:

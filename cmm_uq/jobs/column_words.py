@@ -36,8 +36,8 @@ WORDS: Mapping[str, Text] = MappingProxyType({
 """By name of the column."""
 
 _UNITS: Mapping[str, Text] = MappingProxyType({
-    "_mm_s": say("mm/s"), "_mm": unit("mm"), "_um": unit("µm"), "_c": unit("°C"), "_s": unit("s"),
-    "_hpa": say("hPa"), "_pct": unit("%"), "_deg": unit("°"),
+    "_mm_s": Verbatim("mm/s"), "_mm": unit("mm"), "_um": unit("µm"), "_c": unit("°C"), "_s": unit("s"),
+    "_hpa": Verbatim("hPa"), "_pct": unit("%"), "_deg": unit("°"),
 })  # fmt: skip
 """By the end of the name; of several that fit, the first."""
 

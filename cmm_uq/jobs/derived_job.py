@@ -23,7 +23,7 @@ from cmm_uq.jobs.reference_file import reference_file
 
 PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100
-OF_THE_CERTIFICATE = ("number", "issued", "recalibration_agreed", "as_found", "interim")
+OF_THE_CERTIFICATE = ("number", "replaces", "received", "issued", "recalibration_agreed", "as_found", "interim")
 """Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
 OF_THE_RECORDED_MACHINE = ("short_gauge", "simulation")
 """Tables that speak of the machine as it was recorded, not of one simulated or compensated."""
@@ -84,9 +84,9 @@ def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tupl
         },
     }  # fmt: skip
     file = recording_name(job) if _was_imported(job) else None
-    wanted = _changed(tomllib.loads(text), changes, without, file)
+    wanted = _changed(tomllib.loads(text), changes, without, file, job.certified)
     try:
-        document = _changed(tomlkit.parse(text), changes, without, file)
+        document = _changed(tomlkit.parse(text), changes, without, file, job.certified)
         kept = tomlkit.dumps(document)
         if tomllib.loads(kept) == wanted:
             return kept.encode()
@@ -101,7 +101,9 @@ def _was_imported(job: Job) -> bool:
     return any(recognised.file == name for recognised in job.imported)
 
 
-def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...], file: str | None) -> Any:
+def _changed(
+    document: Any, changes: Mapping[str, Any], without: tuple[str, ...], file: str | None, certified: Mapping[str, Any]
+) -> Any:  # fmt: skip
     table = document["job"]
     for key in (*OF_THE_CERTIFICATE, *changes):
         if key in table:
@@ -115,6 +117,7 @@ def _changed(document: Any, changes: Mapping[str, Any], without: tuple[str, ...]
         if key in document["machine"]:
             del document["machine"][key]
     _without_reference_file(document["artefact"])
+    _state(document["artefact"], certified)
     if file is not None:
         _name_recording(document["recording"], file)
     return document
@@ -126,6 +129,15 @@ def _without_reference_file(table: Any) -> None:
         for key in ("file", *FileKeys.model_fields):
             if key in table["certificate"]:
                 del table["certificate"][key]
+
+
+def _state(table: Any, certified: Mapping[str, Any]) -> None:
+    """What the digital certificate said, which the derived job does not have."""
+    for key, value in certified.items():
+        if isinstance(value, Mapping) and key in table:
+            _state(table[key], value)
+        else:
+            table[key] = deepcopy(value)
 
 
 def _name_recording(table: Any, file: str) -> None:

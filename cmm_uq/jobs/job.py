@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -28,6 +28,7 @@ from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.jobs.prediction import Prediction
 from cmm_uq.jobs.prove import ProveFacts
+from cmm_uq.jobs.replaced import Replaced
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.simulation import SimulationFacts
 from cmm_uq.jobs.table import (
@@ -37,6 +38,7 @@ from cmm_uq.jobs.table import (
     Table,
     at_least,
 )
+from cmm_uq.languages.language import ENGLISH, Code
 from cmm_uq.notebook import html_table
 from cmm_uq.points import Points
 from cmm_uq.writing import Owner, staged
@@ -60,6 +62,8 @@ class JobFacts(Table):
     """Date of the measurement."""
     number: str = ""
     """Number of the certificate; the id where it is left out."""
+    replaces: Replaced | None = None
+    """The certificate that this one replaces (7.8.8), in a table of its own."""
     issued: dt.date | None = None
     """Date on which the certificate is issued (ISO/IEC 17025:2017, 7.8.2.1 j)."""
     customer: str = ""
@@ -76,8 +80,18 @@ class JobFacts(Table):
     """Number of the customer's order."""
     conditions: str = ""
     """Conditions that influence the results, in words (7.8.4.1 b)."""
+    received: dt.date | None = None
+    """Day on which the item was received, where that matters for the results (7.8.2.1 h)."""
+    deviations: str = ""
+    """Additions to, deviations from and exclusions from the method (7.8.2.1 n)."""
+    external: str = ""
+    """Results that external providers gave, and who they are (7.8.2.1 p)."""
+    from_customer: str = ""
+    """Data that the customer gave and the results may rest on; the certificate says that they are the customer's (7.8.2.2)."""
     remarks: str = ""
     """Free text of the certificate."""
+    language: Code = ENGLISH
+    """Language of the documents: `en`, `de`, `fr` or `ja`; files for programs stay English."""
     diagnosis_on_certificate: bool = False
     """Whether the whole diagnosis is printed in the certificate's annex."""
     recalibration_agreed: dt.date | None = None
@@ -107,6 +121,15 @@ class JobFacts(Table):
             raise ValueError(
                 f"adjusted_since = {self.adjusted_since} is after the measurement of {self.date}: give the last day of an "
                 "adjustment before it"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _numbered_anew(self) -> Self:
+        if self.replaces is not None and self.replaces.number == (self.number or self.id):
+            raise ValueError(
+                f"replaces.number = {self.replaces.number!r} is the number of this certificate itself: give the new one "
+                "a number of its own"
             )
         return self
 
@@ -273,6 +296,7 @@ class Job:
     beside : files that it was read from and that lie outside its folder.
     imported : how files in another format than the project's own were read.
     acquired : how the recording was taken live, where it was.
+    certified : keys of ``[artefact]`` that its digital certificate says, and job.toml does not.
     """
 
     folder: Path
@@ -287,6 +311,7 @@ class Job:
     beside: tuple[Path, ...] = ()
     imported: tuple[Recognised, ...] = ()
     acquired: Provenance | None = None
+    certified: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def circumstances(self) -> Circumstances:

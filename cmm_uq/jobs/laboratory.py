@@ -63,6 +63,8 @@ class Laboratory(Table):
     """Name of the laboratory (7.8.2.1 b)."""
     address: str = ""
     """Address of the laboratory (7.8.2.1 b)."""
+    country: Annotated[str, Field(pattern=r"^([A-Z]{2})?$")] = ""
+    """Country of the laboratory, two capital letters of ISO 3166-1; the digital certificate asks for it."""
     accreditation: str = ""
     """Accreditation as it is printed, with its number."""
     signatory: str = ""

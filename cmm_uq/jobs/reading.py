@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import create_model
@@ -21,6 +21,9 @@ from cmm_uq.jobs.digitizer_calibration import calibration_file
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.earlier_noise import noise_file
 from cmm_uq.jobs.file_names import check_distinct
+from cmm_uq.jobs.importing.dcc import ROOT as DCC
+from cmm_uq.jobs.importing.format import HEAD
+from cmm_uq.jobs.importing.xml_files import begins_with
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.machine import MachineFacts
@@ -35,6 +38,9 @@ from cmm_uq.jobs.source import InFolder, InMemory, Source
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
 from cmm_uq.writing import finish_interrupted
+
+if TYPE_CHECKING:
+    from cmm_uq.jobs.certified import Read
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,7 @@ def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = T
 
 def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     path, folder = source.toml, source.toml.parent
-    content, facts = _facts(source, nameable)
+    content, facts, says = _facts(source, nameable)
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
     if earlier is not None and not facts.artefact.with_earlier:
@@ -103,6 +109,8 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     before = results_named(facts.job.as_found)
     others = calibrations if before is None else [*calibrations, before]
     inputs |= _contents(source, others, TABLE_BYTES, written=True)
+    if says is not None:
+        inputs |= _contents(source, certificate, TABLE_BYTES)
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
         check_examples(content, facts.job.origin, str(path))
@@ -125,8 +133,8 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     points, recognised = read_recording_file(
         inputs[facts.recording.file], where, machine, facts.recording, acquired.without if acquired else ()
     )
-    told = [recognised]
-    if certificate:
+    told = [recognised, None if says is None else says.recognised]
+    if certificate and facts.artefact.with_references:
         points, recognised = with_references(points, facts.artefact, inputs, folder, where)
         told.append(recognised)
     planned = is_planned(inputs[facts.recording.file])
@@ -141,7 +149,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     prediction = prediction_of(facts.simulation, inputs, folder)
     how = tuple(filter(None, told))
     return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, imported=how,
-               acquired=acquired)  # fmt: skip
+               acquired=acquired, certified={} if says is None else says.table)  # fmt: skip
 
 
 def _acquired(facts: JobFile, source: Source, inputs: dict[str, bytes]) -> Provenance | None:
@@ -185,7 +193,7 @@ def read_machine(folder: Path, nameable: Nameable) -> Job:
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
     source = InFolder(path)
-    content, facts = _facts(source, nameable)
+    content, facts, _ = _facts(source, nameable)
     maps, logs, calibrations = _of_the_machine(facts.machine)
     check_distinct([*maps, *logs, *calibrations], str(path))
     inputs = {"job.toml": content} | _contents(source, maps, MAP_BYTES) | _contents(source, logs, TABLE_BYTES)
@@ -193,10 +201,45 @@ def read_machine(folder: Path, nameable: Nameable) -> Job:
     return Job(path.parent, facts, _no_points(_machine(facts.machine)), inputs)
 
 
-def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile]:
-    """job.toml: its bytes, and what it says."""
+def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile, Read | None]:
+    """job.toml: its bytes, what it says with the digital certificate of its artefact, and what that says alone."""
     content = source.job_file(JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
-    return content, checked(content, source.toml, lambda data: _model_for(data, nameable), nameable.standards)
+    says: list[Read] = []
+
+    def beside(data: dict[str, Any]) -> dict[str, Any]:
+        found = _certified(data, source, nameable)
+        if found is None:
+            return data
+        says.append(found)
+        return {**data, "artefact": found.beside(data["artefact"])}
+
+    facts = checked(
+        content, source.toml, lambda data: _model_for(data, nameable), nameable.standards, beside=beside
+    )  # fmt: skip
+    return content, facts, says[0] if says else None
+
+
+def _certified(data: dict[str, Any], source: Source, nameable: Nameable) -> Read | None:
+    """What the digital certificate of the artefact says, where the job names one."""
+    artefact = data.get("artefact")
+    if not isinstance(artefact, dict) or not isinstance(artefact.get("certificate"), dict):
+        return None
+    name, kind = artefact["certificate"].get("file"), artefact.get("kind")
+    table = nameable.tables(kind) if isinstance(kind, str) else None
+    if not isinstance(name, str) or table is None:
+        return None
+    content = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {source.toml}")
+    if begins_with(content[:HEAD], DCC):
+        from cmm_uq.jobs.certified import certified  # the model of a certificate is made for who has one
+
+        return certified(content, str(source.toml.parent / name), artefact, table)
+    if table.with_references:
+        return None
+    raise CmmUqError(
+        f"a recording of kind {kind!r} has no certified values of single points",
+        where=f"{source.toml}: [artefact] certificate.file",
+        fix="Name a digital certificate (DCC), or leave file out and give the keys of [artefact]",
+    )
 
 
 def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str]]:

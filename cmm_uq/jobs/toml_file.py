@@ -33,7 +33,7 @@ _SHOWN = 60
 
 def checked(
     content: bytes, path: Path, model: type[Facts] | Callable[[dict[str, Any]], type[Facts]], context: object = None,
-    *, most_word: int = WORD.most,
+    *, most_word: int = WORD.most, beside: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
 ) -> Facts:  # fmt: skip
     """The contents of a TOML file as a checked object.
 
@@ -44,6 +44,7 @@ def checked(
     model : what it must say, or what that is for a file that says this.
     context : what its checks go by beside the file.
     most_word : characters without a blank between them.
+    beside : the same with what other files say beside.
 
     Raises
     ------
@@ -55,6 +56,7 @@ def checked(
     except tomllib.TOMLDecodeError as error:
         raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
                          fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip
+    data = data if beside is None else beside(data)
     wanted = cast("type[Facts]", model if isinstance(model, type) else model(data))
     try:
         return wanted.model_validate(data, context=context)

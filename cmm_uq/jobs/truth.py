@@ -13,7 +13,7 @@ temp_x_c = 22.5
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
@@ -38,7 +38,8 @@ class NoiseFacts(Table):
 
     ``coordinate_um`` is that of each reading, of every coordinate or ``{ x = …, y = …, z = … }``; ``placing_um`` that of each
     point of each placing, which its repeats share; ``growth_um`` what is added at the longest distance in a placing, in
-    proportion to it; ``slow_um`` that of slow noise, which forgets over ``slow_time_s`` and needs ``time_s`` in the recording.
+    proportion to it; ``slow_um`` that of slow noise, which forgets over ``slow_time_s`` and needs ``time_s`` in the recording;
+    with ``"never"`` it walks at random from the first reading on, and ``slow_um`` is its root mean square over the recording.
     ``tails_dof`` makes the readings Student's t of the same standard deviation; ``resolution_um`` are the display's steps.
     """
 
@@ -50,8 +51,9 @@ class NoiseFacts(Table):
     """Standard deviation of what is added at the longest distance in a placing, in proportion to the distance."""
     slow_um: Uncertainty = 0.0
     """Standard deviation of slow noise; needs `time_s` in the recording."""
-    slow_time_s: Annotated[float, Field(gt=0, le=1e9)] = 600.0
-    """Time over which slow noise forgets."""
+    slow_time_s: Annotated[float, Field(gt=0, le=1e9)] | Literal["never"] = 600.0
+    """Time over which slow noise forgets; `"never"` for a random walk from the first reading on, of which `slow_um` is
+    then the root mean square over the recording."""
     tails_dof: Annotated[float, Field(gt=2, le=1000)] | None = None
     """Degrees of freedom of readings with Student's t distribution of the same standard deviation; normal by
     default."""

@@ -19,7 +19,8 @@ class Noise:
     coordinate : of each reading, of every coordinate or along x, y, z.
     placing : of each point of each placing, which its repeats share.
     growth : of what grows with the distance from the first point of the placing, at the longest.
-    slow, slow_time_s : of an Ornstein–Uhlenbeck process of each coordinate, and the time over which it forgets.
+    slow, slow_time_s : of an Ornstein–Uhlenbeck process of each coordinate, and the time over which it forgets; what never
+        does (infinity) is a random walk from the first reading on, whose root mean square over the recording ``slow`` is.
     tails : degrees of freedom of Student's t for the readings, above 2 (their standard deviation stays); 0 for a normal.
     resolution : steps in which coordinates are displayed; 0 for none.
     """
@@ -50,7 +51,10 @@ class Noise:
             if "time_s" not in points.columns:
                 raise CmmUqError("slow noise needs the column time_s, which the recording has not", where="truth.toml [noise]",
                                  fix="Record time_s, or leave slow_um out")  # fmt: skip
-            found = found + self.slow * _ornstein_uhlenbeck(points.columns["time_s"] / self.slow_time_s, random)
+            path, time = _random_walk, points.columns["time_s"]
+            if np.isfinite(self.slow_time_s):
+                path, time = _ornstein_uhlenbeck, time / self.slow_time_s
+            found = found + self.slow * path(time, random)
         return np.asarray(found, dtype=np.float64)
 
     def displayed(self, xyz: Floats) -> Floats:
@@ -70,6 +74,15 @@ def distances_in_placing(xyz: Floats, points: Points) -> Floats:
     first = np.empty(len(order), dtype=np.int64)
     first[order] = order[starts][index.ravel()]
     return np.asarray(np.linalg.norm(xyz - xyz[first], axis=1))
+
+
+def _random_walk(time: Floats, random: np.random.Generator) -> Floats:
+    """(n, 3) from zero at the first of times (n,), with the root mean square one over all their duration."""
+    order = np.argsort(time, kind="stable")
+    steps = np.diff(time[order], prepend=time[order[0]]) / max(float(np.ptp(time)), 1e-9)
+    found = np.empty((len(time), 3))
+    found[order] = np.cumsum(np.sqrt(2 * steps)[:, None] * random.standard_normal((len(time), 3)), axis=0)
+    return found
 
 
 def _ornstein_uhlenbeck(time: Floats, random: np.random.Generator) -> Floats:

@@ -66,7 +66,7 @@ def noise_of(
         abs(helmert).power(2) @ (artefact.noise_scale[chosen] ** 2 * (length / max(length.max(), 1e-9)) ** 2)
     )
     shares = np.column_stack([axes, reading * count, growth, reading])
-    slow, frequency, gap, part = _slow(model, chosen, sensitivity, along)
+    slow, frequency, gap, part = _slow(model, chosen, sensitivity, along, block)
     possible = {
         AXES: _axes_differ(axes), PLACING: bool(np.any(np.bincount(block) > 1)),
         GROWTH: _lengths_differ(length), SLOW: slow.shape[1] > 0,
@@ -224,7 +224,7 @@ def growing_lengths(model: MeasurementModel, xyz: Floats) -> Floats:
 
 
 def _slow(
-    model: MeasurementModel, chosen: np.ndarray, sensitivity: Floats, along: Floats
+    model: MeasurementModel, chosen: np.ndarray, sensitivity: Floats, along: Floats, quantity: Ints
 ) -> tuple[Floats, Floats, float, Floats]:
     """Columns (m, c) of slow noise as cosines of the time, their frequencies, the typical part between readings, the time.
 
@@ -237,7 +237,7 @@ def _slow(
         return np.zeros((int(np.sum(chosen)), 0)), np.zeros(0), 0.0, np.zeros(0)
     seconds = time[artefact.rows].mean(axis=1)[chosen]
     part = (seconds - seconds.min()) / max(float(np.ptp(seconds)), 1e-9)
-    by_axis = artefact.rows.shape[1] == 1 and _turning(sensitivity[:, 0], artefact.measurement[chosen])
+    by_axis = artefact.rows.shape[1] == 1 and _turning(sensitivity[:, 0], artefact.measurement[chosen], quantity)
     several = 3 if by_axis and np.any(np.sum(np.abs(along[:, 0]) > _ALONG, axis=1) > 1) else 1
     most = min(FREQUENCIES // several, len(np.unique(seconds)) - 1)
     gap = float(np.median(np.diff(np.unique(part))))
@@ -251,7 +251,13 @@ def _slow(
     return artefact.noise_scale[chosen, None] * cosines, frequency, gap, part
 
 
-def _turning(seen: Floats, measurement: Ints) -> bool:
-    """Whether observations (m, 3) of one placing look along different directions."""
+def _turning(seen: Floats, measurement: Ints, quantity: Ints) -> bool:
+    """Whether observations (m, 3) of one placing look along different directions.
+
+    Where each placing is a single quantity, all are one: a bar swept about a ball is seen from the machine, which drifts,
+    along ever other directions.
+    """
+    if len(np.unique(quantity)) == len(np.unique(measurement)):
+        measurement = np.zeros_like(measurement)
     _, first, index = np.unique(measurement, return_index=True, return_inverse=True)
     return bool(np.abs(seen - seen[first][index.ravel()]).max() > 1e-3)

@@ -245,7 +245,7 @@ EFFECTS: tuple[Effect, ...] = (
         say("bridge"),
         "y",
         "x",
-        (say("temp_bridge_top_c"), say("temp_bridge_bottom_c")),
+        ("temp_bridge_top_c", "temp_bridge_bottom_c"),
         say(
             "the bridge bends: its upper and lower side differ in temperature, look for warm air, lamps or a draught above it"
         ),
@@ -255,7 +255,7 @@ EFFECTS: tuple[Effect, ...] = (
         say("ram"),
         "z",
         "y",
-        (say("temp_ram_front_c"), say("temp_ram_back_c")),
+        ("temp_ram_front_c", "temp_ram_back_c"),
         say(
             "the ram bends: its front and back differ in temperature, look for a motor, a lamp, sun or a draught at one side"
         ),

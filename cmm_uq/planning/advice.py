@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from cmm_uq.messages import Text, Verbatim, number, say, semicolons
+from cmm_uq.messages import Text, Verbatim, number, plural, say, semicolons
 from cmm_uq.physics.catalogue import every
 from cmm_uq.planning.placing import Placing, joined
 from cmm_uq.planning.repeats import repeated
@@ -127,7 +127,7 @@ def suggestions(plan: NextPlan | None, title: Text) -> tuple[Suggestion, ...]:
     """
     if plan is None:
         return ()
-    times = say("once") if plan.repeats == 1 else say("{repetitions} times", repetitions=plan.repeats)
+    times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))
     ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
     return tuple(
         Suggestion(

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import Message, Text, commas, say, signed
+from cmm_uq.messages import Message, Text, in_a_row, say, signed
 from cmm_uq.points import AXES, Floats, Ints, Machine, Points
 
 VECTORS: Mapping[str, str] = {"approach": "approach_{}", "normal": "n{}"}
@@ -47,7 +47,7 @@ class Placing:
         """Scale readings of the first point and of the farthest from it, mm: ``(250, 0, −40) → (650, 0, −40)``."""
         readings = self.points.machine_xyz
         far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
-        first, last = (commas(signed(value, ".0f") for value in readings[row]) for row in (0, far))
+        first, last = (in_a_row(signed(value, ".0f") for value in readings[row]) for row in (0, far))
         return say("({first}) → ({last})", first=first, last=last) if far else say("({first})", first=first)
 
 

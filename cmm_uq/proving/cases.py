@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,8 @@ KINDS = (NOTHING, ONE, TWO, OUTSIDE, ARTEFACT)
 CYCLE = (NOTHING, ONE, TWO, NOTHING, OUTSIDE, ONE, NOTHING, ONE, ARTEFACT, TWO)
 """What each case of ten hides."""
 
-OWN, WHITE, SET_UP, AXIS, GROWING, SLOWLY, TAILS, RESOLUTION = (
-    "own", "white", "set-up", "axis", "growing", "slow", "tails", "resolution",
+OWN, WHITE, SET_UP, AXIS, GROWING, SLOWLY, WALKING, TAILS, RESOLUTION = (
+    "own", "white", "set-up", "axis", "growing", "slow", "walk", "tails", "resolution",
 )  # fmt: skip
 
 WEAKEST, STRONGEST = 3.0, 15.0
@@ -94,12 +95,17 @@ class Case:
         return {**asdict(self), "noise": micrometres(self.noise)}
 
 
+def _told(forgets_s: float) -> float | str:
+    """As truth.toml has it."""
+    return forgets_s if isfinite(forgets_s) else "never"
+
+
 def micrometres(noise: Noise) -> dict[str, Any]:
     """A noise for results.json."""
     x, y, z = (float(each) / MICROMETRE for each in np.broadcast_to(np.asarray(noise.coordinate), 3))
     return {
         **dict(zip((f"{axis}_um" for axis in AXES), (x, y, z), strict=True)),
         "placing_um": noise.placing / MICROMETRE, "growth_um": noise.growth / MICROMETRE,
-        "slow_um": noise.slow / MICROMETRE, "slow_time_s": noise.slow_time_s if noise.slow else None,
+        "slow_um": noise.slow / MICROMETRE, "slow_time_s": _told(noise.slow_time_s) if noise.slow else None,
         "tails_dof": noise.tails or None, "resolution_um": noise.resolution / MICROMETRE,
     }  # fmt: skip

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from cmm_uq.proving.cases import (
     STRONGEST,
     TAILS,
     TWO,
+    WALKING,
     WEAKEST,
     WHITE,
     Case,
@@ -49,7 +51,7 @@ _SHORTEST_PERIOD_MM = 6.0
 """As the diagnosis tries them; beyond the range of the readings a wave is no wave."""
 
 _ATTEMPTS = 40
-_AXIS_TIMES, _GROWN_TIMES, _DOF, _STEP_TIMES, _SLOW_PART = 3.0, 2.0, 4.0, 3.0, 0.125
+_AXIS_TIMES, _GROWN_TIMES, _DOF, _STEP_TIMES, _SLOW_PART, _WALKED_TIMES = 3.0, 2.0, 4.0, 3.0, 0.125, 2.0
 """How the kinds of noise differ from the job's own, in units of its reading noise; forgetting over a part of the duration."""
 
 
@@ -90,7 +92,7 @@ class Design:
     def noises(self) -> tuple[str, ...]:
         """Kinds of noise that these set-ups could show, in the order of cases: every other one the job's own."""
         possible = noise_of(self.model, values=self.values).possible
-        asked = ((SET_UP, PLACING), (AXIS, AXIS_NOISE), (GROWING, GROWTH), (SLOWLY, SLOW))
+        asked = ((SET_UP, PLACING), (AXIS, AXIS_NOISE), (GROWING, GROWTH), (SLOWLY, SLOW), (WALKING, SLOW))
         kinds = (WHITE, *(kind for kind, component in asked if component in possible), TAILS, RESOLUTION)
         return tuple(each for kind in kinds for each in (OWN, kind))
 
@@ -131,6 +133,7 @@ class Design:
             OWN: own, WHITE: white, SET_UP: replace(white, placing=sigma),
             GROWING: replace(white, growth=_GROWN_TIMES * sigma),
             SLOWLY: replace(white, slow=sigma, slow_time_s=max(_SLOW_PART * float(np.ptp(time)), 1e-6)),
+            WALKING: replace(white, slow=_WALKED_TIMES * sigma, slow_time_s=inf),
             TAILS: replace(white, tails=_DOF), RESOLUTION: replace(white, resolution=_STEP_TIMES * sigma),
         }[kind]  # fmt: skip
 

@@ -129,7 +129,7 @@ def _sizes(components: Components, model: MeasurementModel, noise: Noise) -> Siz
     time = model.artefact.points.columns.get("time_s")
     slow = noise.slow if components.slow.shape[1] else 0.0
     duration = 0.0 if time is None else float(np.ptp(time))
-    rate = min(FASTEST, max(duration / noise.slow_time_s, 1e-3))
+    rate = min(FASTEST, max(duration / noise.slow_time_s, 1e-3)) if np.isfinite(noise.slow_time_s) else 0.0
     return Sizes(reading[None, :], *(np.array([size]) for size in (noise.placing, noise.growth, slow, rate)))
 
 

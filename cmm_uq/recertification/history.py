@@ -114,13 +114,12 @@ def machine_history(
         remarks.append(say("The machine has no serial number and is recognised by its name alone."))
     late = len(certificates) - len(known)
     if late:
-        one = say("One certificate is dated after {on} and does not count: a clock or a date is wrong.", on=day(on))
-        many = say(
-            "{count} certificates are dated after {on} and do not count: a clock or a date is wrong.",
-            count=late,
-            on=day(on),
-        )
-        remarks.append(plural(late, one=one, many=many))
+        remarks.append(plural(
+            late,
+            one=say("One certificate is dated after {on} and does not count: a clock or a date is wrong.", on=day(on)),
+            many=say("{count} certificates are dated after {on} and do not count: a clock or a date is wrong.",
+                     count=late, on=day(on)),
+        ))  # fmt: skip
     cut = (_until(one, on) for one in series.values())
     adjusted = max((one.toordinal() for one in machine.adjusted if one <= on), default=None)
     values = tuple(

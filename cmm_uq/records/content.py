@@ -64,7 +64,7 @@ def certificate_content(
             "decision": decision(data), "diagnosis": str((data.get("diagnosis") or {}).get("verdict") or ""),
             "version": str((data.get("software") or {}).get("version") or ""), "folder": folder,
             "results_sha256": results_sha256, "files": dict(files), "inputs": dict(job.get("inputs_sha256") or {}),
-            "values": values(data, named), "covariance": covariance(data),
+            "values": values(data, named), "covariance": covariance(data), **_unstated(data),
         }  # fmt: skip
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise CmmUqError(f"is no results.json of a job: {error!r}", where=folder) from error
@@ -103,6 +103,12 @@ def covariance(data: Mapping[str, Any]) -> dict[str, Any] | None:
     if not lower or not all(_finite(element) for element in lower):
         return None
     return {"names": list(given["parameters"]), "lower": lower}
+
+
+def _unstated(data: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Keys of what ISO/IEC 17025:2017, 7.8 asks for and the certificate does not state, where there are any."""
+    missing = [str(one["key"]) for one in data.get("iso17025") or () if one["status"] == "missing"]
+    return {"missing": missing} if missing else {}
 
 
 def unit_of(name: str) -> str:

@@ -17,7 +17,7 @@ from cmm_uq.errors import CmmUqError
 
 KINDS = (
     "machine", "artefact", "report", "release", "withdrawal", "replacement", "adjustment", "check", "imported",
-    "retained", "sent",
+    "retained", "sent", "signed",
 )  # fmt: skip
 """What an entry may be of."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sqlite3
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 PATIENCE_S = 15.0
 """How long to wait for another process that writes."""
+_TURNS = 150
 
 REVISION = "0002"
 """Newest revision of the tables; see :mod:`cmm_uq.records.migrations`."""
@@ -201,7 +203,7 @@ def _make(records: Records) -> None:
                 raw = connection.connection.driver_connection
                 connection.rollback()
                 if isinstance(raw, sqlite3.Connection):
-                    raw.execute("PRAGMA journal_mode = WAL")  # not possible inside a transaction
+                    _write_ahead(raw)  # not possible inside a transaction
         with engine.connect().execution_options(writing=True) as connection, connection.begin():
             if engine.dialect.name == "postgresql":
                 connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": APPLICATION})
@@ -225,3 +227,15 @@ def where_of(connection: Connection) -> str:
         rows = connection.exec_driver_sql("PRAGMA database_list").all()
         return str(rows[0][2]) if rows else "records"
     return str(connection.engine.url.render_as_string(hide_password=True))
+
+
+def _write_ahead(raw: sqlite3.Connection) -> None:
+    """Journal in WAL mode; who makes the same file at the same moment is waited for, which SQLite does not do here."""
+    for turn in range(_TURNS):
+        try:
+            raw.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if "locked" not in str(error) or turn == _TURNS - 1:
+                raise
+        time.sleep(PATIENCE_S / _TURNS)

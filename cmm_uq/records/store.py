@@ -198,6 +198,19 @@ class Records:
         """Who released, withdrew or replaced a certificate, in order."""
         return self._read(lambda connection: queries.signatures_of(connection, certificate))
 
+    def signed(self, certificate: int) -> dict[str, str]:
+        """SHA-256 by name of the files of a certificate that were signed since, as they are now.
+
+        Parameters
+        ----------
+        certificate : number of its entry.
+        """
+        found: dict[str, str] = {}
+        for entry in self.entries(certificate, kind="signed"):
+            if entry.data.get("certificate") == certificate:
+                found.update(entry.data.get("files") or {})
+        return found
+
     def has_results(self, results_sha256: str) -> int | None:
         """Number of the entry that recorded these very results; ``None`` where none did."""
         return self._read(lambda connection: queries.entry_of_results(connection, results_sha256))

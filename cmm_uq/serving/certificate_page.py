@@ -31,7 +31,7 @@ def certificate_page(view: View, asked: Asked) -> Page:
     asked.only(("entry",))
     one, entry = _named(view, asked)
     folder = Path(one.folder)
-    files = files_of(entry, folder)
+    files = files_of(entry, folder, view.records.signed(one.entry))
     number = Verbatim(one.number)
     if one.command != "report":
         title = say("Diagnosis {number}", number=number)
@@ -71,7 +71,7 @@ def recorded_file(view: View, asked: Asked) -> Answer:
     asked.only(("entry", "name", "keep"))
     keep, name = asked.one_of("keep", ("yes",)) == "yes", asked.text("name")
     one, entry = _named(view, asked)
-    for file in files_of(entry, Path(one.folder)):
+    for file in files_of(entry, Path(one.folder), view.records.signed(one.entry)):
         if file.name == name:
             return sent(file, content_of(file, Path(one.folder)), keep=keep)
     raise Refused(

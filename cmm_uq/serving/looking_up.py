@@ -59,7 +59,9 @@ def look_up(records: Records, dropped: Dropped) -> Known:
     candidates = records.named(says)[-MOST:] if says else []
     for certificate in reversed(candidates):
         found = entry_of(records, certificate.entry)
-        for file in files_of(found, Path(certificate.folder)) if found is not None else ():
+        folder, signed = Path(certificate.folder), records.signed(certificate.entry)
+        known = (*files_of(found, folder), *files_of(found, folder, signed)) if found is not None else ()
+        for file in known:  # as it was written, and as it was signed since
             if file.sha256 == dropped.sha256:
                 return Known("recorded", certificate, file.name, says)
     if candidates:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from http import HTTPStatus
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
@@ -47,10 +48,16 @@ class RecordedFile:
         return Path(self.name).suffix.lower() in MEDIA
 
 
-def files_of(entry: Entry, folder: Path) -> tuple[RecordedFile, ...]:
+def files_of(entry: Entry, folder: Path, signed: Mapping[str, str] = MappingProxyType({})) -> tuple[RecordedFile, ...]:
     """What an entry names, by name; of an entry that names none, what the manifest in the folder does.
 
     A manifest is believed only where it names the results.json that the entry does.
+
+    Parameters
+    ----------
+    entry : of the certificate.
+    folder : of its files.
+    signed : SHA-256 of the files that were signed since, by name.
     """
     data = entry.data
     named = hashes(data)
@@ -59,6 +66,7 @@ def files_of(entry: Entry, folder: Path) -> tuple[RecordedFile, ...]:
         manifest = read_manifest(folder)
         there = dict(manifest.files) if manifest is not None else {}
         named = there if results and there.get("results.json") == results else {}
+    named = {**named, **{name: signed[name] for name in named if name in signed}}
     return tuple(RecordedFile(name, named[name]) for name in sorted(named) if plain_name(name))
 
 

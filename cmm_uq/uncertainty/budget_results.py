@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import NOTHING, Number, Text, Verbatim, commas, number, say
+from cmm_uq.messages import NOTHING, Number, Text, Verbatim, in_a_row, number, say
 from cmm_uq.uncertainty.budget import Budget
 from cmm_uq.uncertainty.evaluation import Evaluation, Stated
 from cmm_uq.uncertainty.monte_carlo import Simulated
@@ -166,7 +166,7 @@ def comparison_rows(evaluation: Evaluation, output: str) -> list[tuple[Text, ...
         if found := told[method]:
             value, u = rounded(found["value"], found["u"])
             ends = [rounded(end, found["u"])[0] for end in found["interval"] or ()]
-            interval = say("[{ends}]", ends=commas(ends)) if ends else NOTHING
+            interval = say("[{ends}]", ends=in_a_row(ends)) if ends else NOTHING
             rows.append((say("{name:capital}", name=name), value, u, interval, number(found.get("trials", ""))))
     return rows
 
@@ -175,33 +175,27 @@ def statement(evaluation: Evaluation, output: str) -> Text:
     """The result of one output as a sentence that a certificate could carry (JCGM 100:2008 7.2.4)."""
     stated, coverage = evaluation.stated[output], evaluation.request.coverage
     unit = stated.budget.unit
-    end = NOTHING if unit in ("", "1") else say(" {unit}", unit=unit)
     percent = figure(100 * coverage)
     if stated.method == "monte_carlo":
         low, high = (rounded(e, stated.u)[0] for e in stated.interval)
         value, u = rounded(stated.value, stated.u)
         return say(
-            "{output} = {value}{end} with standard uncertainty {u}{end}; the shortest {percent} % "
-            "coverage interval is [{low}, {high}]{end}.",
-            output=Verbatim(output),
-            value=value,
-            end=end,
-            u=u,
-            percent=percent,
-            low=low,
-            high=high,
-        )
+            "{output} = {value} with standard uncertainty {u}; the shortest {percent} % coverage interval is {interval}.",
+            output=Verbatim(output), value=_in(unit, value), u=_in(unit, u), percent=percent,
+            interval=_in(unit, say("[{low}, {high}]", low=low, high=high)),
+        )  # fmt: skip
     value, expanded = rounded(stated.value, stated.coverage_factor * stated.u)
-    known = say(" for ν = {figure}", figure=figure(np.floor(stated.dof), 4)) if isfinite(stated.dof) else NOTHING
+    factor: Text = figure(stated.coverage_factor, 3)
+    if isfinite(stated.dof):
+        factor = say("{k} for ν = {dof}", k=factor, dof=figure(np.floor(stated.dof), 4))
     return say(
-        "{output} = {value}{end} ± {expanded}{end}, the expanded uncertainty U = k u with u = "
-        "{u}{end} and k = {figure}{known}, coverage probability {percent} %.",
-        output=Verbatim(output),
-        value=value,
-        end=end,
-        expanded=expanded,
-        u=significant(stated.u),
-        figure=figure(stated.coverage_factor, 3),
-        known=known,
-        percent=percent,
-    )
+        "{output} = {value} ± {expanded}, the expanded uncertainty U = k u with u = {u} and k = {k}, "
+        "coverage probability {percent} %.",
+        output=Verbatim(output), value=_in(unit, value), expanded=_in(unit, expanded), u=_in(unit, significant(stated.u)),
+        k=factor, percent=percent,
+    )  # fmt: skip
+
+
+def _in(unit: Text, value: Text) -> Text:
+    """With its unit, where it has one."""
+    return value if unit in ("", "1") else say("{value} {unit}", value=value, unit=unit)

@@ -17,12 +17,31 @@ PLACE = Path("reports") / "records.db"
 """Of the records, in the laboratory's folder."""
 
 
+STATED = """\
+place = "Hall 3"
+customer = "Works"
+address = "Street 1"
+conditions = "20 °C"
+issued = 2026-01-02
+
+[laboratory]
+name = "Laboratory"
+address = "Street 2"
+signatory = "A. Huber"
+
+"""
+CHAIN = '[artefact.certificate]\nnumber = "4711"\nlaboratory = "NMI"\n\n'
+"""What ISO/IEC 17025:2017, 7.8 asks for; without it a certificate is a draft that nobody releases."""
+
+
 def reported(folder: Path) -> Path:
     """The folder of a laboratory with one certificate, K-1 of the machine 77: a digitizer, the cheapest kind."""
     job = Path(shutil.copytree(ROOT / "examples" / "digitizer-simulated", folder / "job"))
     toml = (job / "job.toml").read_text(encoding="utf-8")
     toml = toml.replace('id = "digitizer-simulated"', 'id = "mount"').replace('origin = "simulated"', 'number = "K-1"')
-    toml = toml.replace("[machine]\n", '[machine]\nserial = "77"\n')
+    toml = toml.replace("[machine]\n", f'{STATED}[machine]\nserial = "77"\n').replace(
+        "[recording]\n", f"{CHAIN}[recording]\n"
+    )
     (job / "job.toml").write_text(toml, encoding="utf-8")
     done = run("report", job, "--out", folder / "reports" / "mount", "--records", folder / PLACE, "--quiet")
     assert done.returncode == 0, done.stderr

@@ -53,6 +53,13 @@ def test_a_report_is_released_and_withdrawn_by_a_named_person_for_a_reason(labor
     assert "K-1 is withdrawn already" in again.stderr
 
 
+def test_a_certificate_that_says_draft_on_its_pages_is_not_released(place: Path) -> None:
+    kept(place, numbered("K-1", missing=["[job] issued", "[laboratory] name"]))
+    done = run("release", "K-1", "--by", "A. Huber", "--records", place)
+    assert done.returncode == 2
+    assert "K-1 says DRAFT on every page: it does not state [job] issued, [laboratory] name" in done.stderr
+
+
 def test_four_eyes_are_two_persons_and_neither_is_the_operator(place: Path) -> None:
     kept(place, numbered("K-1", four_eyes=True, operator="J. Harris"))
     for by, code, words in (

@@ -14,10 +14,14 @@ from pathlib import Path
 import pikepdf
 import pytest
 
+from cmm_uq.dcc import read
 from tests.cli.process import COMMAND, run, run_apart
 from tests.cli.terminal import everything, on_terminal, until
 
-FILES = ["certificate.html", "certificate.pdf", "manifest.json", "posterior.npz", "results.json"]
+FILES = [
+    "certificate.html", "certificate.pdf", "certificate.xml", "manifest.json", "posterior.npz", "provenance.json",
+    "results.json",
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +37,15 @@ def test_it_writes_its_files_and_their_manifest_below_reports(
     folder, process = done
     assert process.returncode == 0, process.stderr
     assert sorted(path.name for path in (folder / "reports" / "iota-1102-20C").iterdir()) == FILES
+
+
+def test_the_digital_certificate_carries_the_page(done: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
+    folder, _ = done
+    report = folder / "reports" / "iota-1102-20C"
+    found = read((report / "certificate.xml").read_bytes(), "certificate.xml")
+    assert found.document is not None
+    assert found.document.data == (report / "certificate.html").read_bytes()
+    assert b"certificate.xml" in found.document.data
 
 
 def test_it_ends_with_a_summary_in_plain_lines(done: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
@@ -53,7 +66,9 @@ def test_the_pdf_carries_the_job_and_the_results(
     with pikepdf.open(report / "certificate.pdf") as pdf:
         attached = {name: pdf.attachments[name].get_file().read_bytes() for name in pdf.attachments}
     assert attached["results.json"] == (report / "results.json").read_bytes()
+    assert attached["certificate.xml"] == (report / "certificate.xml").read_bytes()
     assert attached["posterior.npz"] == (report / "posterior.npz").read_bytes()
+    assert attached["provenance.json"] == (report / "provenance.json").read_bytes()
     assert attached["job.toml"] == (iota / "job.toml").read_bytes()
     assert attached["ballbar.csv"] == (iota / "ballbar.csv").read_bytes()
 

@@ -29,8 +29,8 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_report_has_its_correction_table_also_inside_the_pdf(report: Path) -> None:
     names = [
-        "certificate-simulated.html", "certificate-simulated.pdf", "correction_table-simulated.csv", "manifest.json",
-        "posterior-simulated.npz", "results.json",
+        "certificate-simulated.html", "certificate-simulated.pdf", "certificate-simulated.xml",
+        "correction_table-simulated.csv", "manifest.json", "posterior-simulated.npz", "provenance.json", "results.json",
     ]  # fmt: skip
     assert sorted(path.name for path in report.iterdir()) == names
     with pikepdf.open(report / "certificate-simulated.pdf") as pdf:

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from cmm_uq.commands import batch_asked as module
-from cmm_uq.commands import batch_run
+from cmm_uq.commands import batch_jobs, batch_run
 from cmm_uq.commands.batch import Asked, Batch, write_batch
 from cmm_uq.commands.batch_job import reported
 from cmm_uq.commands.batch_jobs import conforming
@@ -101,11 +101,27 @@ def test_resumed_it_does_what_is_missing_or_changed_and_nothing_else(tmp_path: P
     (out / "b" / "results.json").unlink()
     (out / "b" / "certificate-simulated.html").unlink()
     (out / "b" / "certificate-simulated.pdf").unlink()
+    (out / "b" / "certificate-simulated.xml").unlink()
     found = done(jobs, out, resume=True)
     assert (found.written, found.already) == (2, 2)
     after = contents(out)
     assert {name for name in after if after[name] != before[name]} == {"a/results.json", "a/manifest.json"}
     assert done(jobs, out, resume=True, seed=1).already == 0
+
+
+@pytest.mark.usefixtures("canned")
+def test_a_report_that_was_asked_for_in_another_language_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    jobs, out = tmp_path / "jobs", tmp_path / "out"
+    small_job(jobs, "a")
+    done(jobs, out)
+    found = batch_jobs.results_of(out / "a")
+    assert found is not None
+    assert done(jobs, out, resume=True).already == 1
+    german = {**found, "job": {**found["job"], "language": "de"}}
+    monkeypatch.setattr(batch_jobs, "results_of", lambda folder: german)
+    assert done(jobs, out, resume=True).already == 0
 
 
 @pytest.mark.usefixtures("canned")

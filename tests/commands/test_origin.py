@@ -71,8 +71,13 @@ def report(simulated: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_its_documents_say_so_in_their_names_titles_and_on_every_page(report: Path) -> None:
     names = sorted(path.name for path in report.iterdir())
-    documents = ["certificate-simulated.html", "certificate-simulated.pdf", "manifest.json"]
-    assert names == [*documents, "posterior-simulated.npz", "results.json"]
+    documents = [
+        "certificate-simulated.html",
+        "certificate-simulated.pdf",
+        "certificate-simulated.xml",
+        "manifest.json",
+    ]
+    assert names == [*documents, "posterior-simulated.npz", "provenance.json", "results.json"]
     with pikepdf.open(report / "certificate-simulated.pdf") as pdf:
         assert "simulated recording" in str(pdf.docinfo["/Title"])
         assert {"truth.toml", "job.toml", "ballbar.csv"} <= set(pdf.attachments)

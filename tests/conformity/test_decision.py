@@ -133,7 +133,7 @@ def test_a_rule_in_the_words_of_the_job_and_of_the_certificate(rule: Rule, name:
 
 
 def test_the_words_name_no_guard_band_where_no_value_is_accepted() -> None:
-    assert decide(0.0, 2.0, 3.9, "ISO 14253-1", signed=True).rule == "ISO 14253-1:2017, (95 %)"
+    assert decide(0.0, 2.0, 3.9, "ISO 14253-1", signed=True).rule == "ISO 14253-1:2017 (95 %)"
 
 
 def test_a_value_inside_its_limits_never_proves_nonconformity() -> None:

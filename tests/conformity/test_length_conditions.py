@@ -57,9 +57,9 @@ def test_a_plan_that_is_not_kept_says_what_is_missing() -> None:
         ],
         [
             "parallel to X",
-            "length of at least 66 % of the travel along parallel to Y (15 %)",
-            "length of at most 30 mm along parallel to Y (30.13 mm)",
-            "2 repetitions of each length along parallel to Y (1)",
+            "length of at least 66 % of the travel (parallel to Y: 15 %)",
+            "length of at most 30 mm (parallel to Y: 30.13 mm)",
+            "2 repetitions of each length (parallel to Y: 1)",
             "6 of 8 lengths",
         ],
     )
@@ -81,13 +81,13 @@ def test_of_lengths_of_one_nominal_length_the_longest_is_compared_with_the_trave
         _, missing = said(along((X, [25.0, 720.0]), *((Y, [25.0, length]) for length in lengths)))
         assert not any("of the travel" in text for text in missing)
     _, missing = said(along((X, [25.0, 720.0]), (Y, [25.0, 364.6])))
-    assert "length of at least 66 % of the travel along parallel to Y (66 %)" in missing
+    assert "length of at least 66 % of the travel (parallel to Y: 66 %)" in missing
 
 
 def test_a_line_outside_the_travel_has_no_share_of_it() -> None:
     beside = Machine("m", "XYZ", TRAVEL + np.array([[0.0], [2000.0], [0.0]]))
     _, missing = said(along((X, [25.0, 720.0]), machine=beside))
-    assert "length of at least 66 % of the travel along parallel to X (0 %)" in missing
+    assert "length of at least 66 % of the travel (parallel to X: 0 %)" in missing
 
 
 @pytest.mark.parametrize("unknown", [0, 2])
@@ -104,7 +104,7 @@ def test_as_many_lengths_as_the_plan_asks_for_are_to_be_repeated_and_no_more() -
     _, missing = said(along(*x, (Y, [25.0, 400.0]), (Y, [25.0, 400.0]), (Y, [100.0])))
     assert missing == []
     _, missing = said(along(*x, (Y, [25.0, 400.0]), (Y, [25.0])))
-    assert missing == ["2 repetitions of each length along parallel to Y (1)", "1 of 8 lengths"]
+    assert missing == ["2 repetitions of each length (parallel to Y: 1)", "1 of 8 lengths"]
 
 
 def test_lengths_up_to_a_millimetre_apart_are_one_nominal_length() -> None:

@@ -76,7 +76,7 @@ def test_a_position_without_it_is_named(absent: int) -> None:
     named = {1: "space diagonal +X +Y +Z", 4: "space diagonal +X +Y −Z", 7: "parallel to Z"}
     assert found.outcome == "incomplete"
     assert len(found.missing) == 1
-    assert "5 bidirectional lengths along" in found.missing[0]
+    assert "5 bidirectional lengths (" in found.missing[0]
     assert named[absent] in found.missing[0] or absent in (1, 4)
 
 

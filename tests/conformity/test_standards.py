@@ -163,7 +163,7 @@ def test_four_lengths_in_two_positions_are_twenty_four_of_a_hundred_and_five() -
     found = judged(gauge(list(np.eye(3)[:2]), [[20.0, 200.0, 300.0, 600.0], [20.0, 200.0, 300.0, 400.0]]))
     assert found.outcome == "incomplete"
     assert len(found.errors) == 24
-    assert "5 different lengths along parallel to X (4)" in found.missing
+    assert "5 different lengths (parallel to X: 4)" in found.missing
     assert "81 of 105 lengths" in found.missing
     assert [text for text in found.missing if text.startswith("space")] == [
         f"space diagonal {a}X {b}Y +Z" for a in "+−" for b in "+−"
@@ -174,7 +174,7 @@ def test_five_faces_on_a_line_of_80_mm_are_no_test() -> None:
     found = judged(gauge([np.eye(3)[1]], [[16.0, 32.0, 48.0, 64.0, 80.0]]))
     assert found.outcome == "incomplete"
     # 80 of 550 mm
-    assert "length of at least 66 % of the travel along parallel to Y (15 %)" in found.missing
+    assert "length of at least 66 % of the travel (parallel to Y: 15 %)" in found.missing
 
 
 def test_a_share_of_exactly_two_thirds_is_enough_and_a_millimetre_less_is_not() -> None:
@@ -192,7 +192,7 @@ def test_the_shortest_length_is_at_most_thirty_millimetres() -> None:
 
 def test_lengths_a_millimetre_apart_are_not_different() -> None:
     found = judged(gauge([np.eye(3)[1]], [[20.0, 20.9, 200.0, 300.0, 400.0]]))
-    assert "5 different lengths along parallel to Y (4)" in found.missing
+    assert "5 different lengths (parallel to Y: 4)" in found.missing
 
 
 def test_without_travel_the_share_cannot_be_shown() -> None:
@@ -224,20 +224,20 @@ def test_where_a_face_is_touched_does_not_move_its_length_to_another_line() -> N
 def test_two_repeats_are_not_three() -> None:
     found = judged(gauge(repeats=2))
     assert found.outcome == "incomplete"
-    assert "3 repetitions of each length along parallel to Z (2)" in found.missing
+    assert "3 repetitions of each length (parallel to Z: 2)" in found.missing
     assert "35 of 105 lengths" in found.missing
 
 
 def test_the_way_back_along_a_gauge_is_no_repeat() -> None:
     there_and_back = [20.0, 100.0, 200.0, 300.0, 400.0, 300.0, 200.0, 100.0, 20.0]
     found = judged(gauge([np.eye(3)[1]], [[*there_and_back, 400.0]], repeats=2))
-    assert "3 repetitions of each length along parallel to Y (2)" in found.missing
+    assert "3 repetitions of each length (parallel to Y: 2)" in found.missing
 
 
 def test_a_copied_repeat_does_not_count_and_is_not_decided() -> None:
     found = judged(copied_runs(gauge(), {(6, 3): (6, 1)}))
     assert found.outcome == "incomplete"
-    assert found.missing == ("3 repetitions of each length along parallel to Y (2)", "5 of 105 lengths")
+    assert found.missing == ("3 repetitions of each length (parallel to Y: 2)", "5 of 105 lengths")
     assert len(found.errors) == 100
     assert any("measurement 6, repeat 3 of measurement 6, repeat 1" in text for text in found.remarks)
 
@@ -245,7 +245,7 @@ def test_a_copied_repeat_does_not_count_and_is_not_decided() -> None:
 def test_a_bar_has_one_length_and_is_no_test_of_iso_10360_2() -> None:
     found = judged(bars())
     assert found.outcome == "incomplete"
-    assert "5 different lengths along parallel to X (1)" in found.missing
+    assert "5 different lengths (parallel to X: 1)" in found.missing
 
 
 def test_what_is_missing_neither_mends_a_fail_nor_an_undecided_test() -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import html
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any
 
 from cmm_uq.documents.document import Document, Plot
-from cmm_uq.messages import Day, Message, Number, Text, Verbatim
+from cmm_uq.languages.catalogue import Catalogue, catalogue
+from cmm_uq.languages.language import Code
+from cmm_uq.messages import Day, Message, Number, Plural, Text, Verbatim
 from cmm_uq.units import Unit
 
 NO_TEXT = {"language", "svg", "tone", "outcome", "standing", "date", "lettering"}
@@ -43,6 +46,44 @@ def leaves(value: Any) -> Iterator[str]:
     elif isinstance(value, (list, tuple)):
         for item in value:
             yield from leaves(item)
+
+
+def untranslated(value: Any, code: Code) -> set[str]:
+    """Patterns of a document, those lettered in its pictures too, that the catalogue of a language lacks."""
+    every = (message for text in (*leaves(value), *lettering(value)) for message in messages(text))
+    return {message.pattern for message in every if not _known(message, catalogue(code))}
+
+
+def _known(message: Message, known: Catalogue) -> bool:
+    if isinstance(message, Plural) and (message.one.pattern, message.many.pattern) in known.plural:
+        return True
+    return message.pattern in known.single
+
+
+def lettering(value: Any) -> Iterator[Text]:
+    """Texts that pictures were lettered with."""
+    for section in value.sections:
+        for block in section.blocks:
+            if isinstance(block, Plot):
+                yield from block.lettering
+
+
+def messages(text: object) -> Iterator[Message]:
+    """A message and all that stand in it."""
+    if isinstance(text, Message):
+        yield text
+        parts = (text.one, text.many) if isinstance(text, Plural) else (text,)
+        for argument in (argument for part in parts for argument in part.arguments.values()):
+            yield from messages(argument)
+
+
+_DATES = re.compile(r"\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4}|\d\d/\d\d/\d{4}|\d{4}年\d+月\d+日")
+
+
+def figures(text: str) -> Counter[str]:
+    """Numbers of a text with a decimal point or comma, dates left out."""
+    plain = _DATES.sub(" ", str.__str__(text))
+    return Counter(found.replace(",", ".") for found in re.findall(r"\d+(?:[.,]\d+)?", plain))
 
 
 def lettered(plot: Plot) -> Iterator[str]:

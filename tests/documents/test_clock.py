@@ -33,11 +33,12 @@ READ = {
     "cmm_uq/scheduling/run.py": {"now"}, "cmm_uq/scheduling/outbox.py": {"now", "time"},
     "cmm_uq/scheduling/work.py": {"monotonic"}, "cmm_uq/scheduling/locks.py": {"monotonic"},
     "cmm_uq/scheduling/cluster.py": {"monotonic"},
-    "cmm_uq/serving/checking.py": {"now"}, "cmm_uq/serving/server.py": {"monotonic"},
+    "cmm_uq/signing/clock.py": {"now"}, "cmm_uq/serving/checking.py": {"now"}, "cmm_uq/serving/server.py": {"monotonic"},
 }  # fmt: skip
 """How long a command waits for another one's lock; the date that a new job begins with, for its reader to change; when a
 reading came, and when a simulated instrument sends one; when something was recorded or sent, on which day something is due,
-and how long a job, a lock, a cluster or a browser is waited for. No certificate and no results.json has any of these."""
+when something was signed, and how long a job, a lock, a cluster or a browser is waited for. No certificate and no
+results.json has any of these."""
 
 
 def clocks(source: str) -> set[str]:

@@ -149,9 +149,9 @@ def test_the_conditions_are_those_stated_and_the_least_and_largest_recorded_temp
     assert conditions(changed(job, job={"conditions": ""})).rows == ()
 
 
-def test_the_page_on_certificates_tells_of_every_clause_once_and_of_every_key_that_is_warned_of() -> None:
+def test_the_page_on_the_standard_tells_of_every_clause_once_and_of_every_key_that_is_warned_of() -> None:
     """ISO/IEC 17025:2017, 7.8.2.1 a to p and 7.8.4.1 a to f; rows marked as warned name exactly the keys of the warnings."""
-    page = (ROOT / "docs" / "certificate.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "iso17025.md").read_text(encoding="utf-8")
     table = page.split("| clause | asks for |")[1].split("\n\n")[0].splitlines()[2:]
     cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in table]
     letters = [cell[0].removeprefix("7.8.2.1 ").removeprefix("7.8.4.1 ") for cell in cells]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.commands.analysis import Result, analyse, outcome_of
-from cmm_uq.documents.certificate import STATEMENTS
+from cmm_uq.documents.clauses import STATEMENTS
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.document import Decision, Document, Facts, Table
 from cmm_uq.documents.html import render_html

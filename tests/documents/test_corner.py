@@ -7,7 +7,8 @@ import pytest
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
-from cmm_uq.documents.corner import _farthest_right, corner_plot
+from cmm_uq.documents.corner import corner_plot
+from cmm_uq.documents.measured import farthest_right
 from cmm_uq.documents.plot_style import ACCENT, INK, MUTED
 from cmm_uq.errors import CmmUqError
 from tests.documents.svg import Drawing, area, outlines, strokes
@@ -42,7 +43,7 @@ def test_the_interval_is_shaded_about_the_estimate() -> None:
 @pytest.mark.parametrize("weight", ["normal", "bold"])
 def test_words_are_as_wide_as_matplotlib_measures_them(text: str, weight: str) -> None:
     path = TextPath((0, 0), text, size=6.8, prop=FontProperties(family="DejaVu Sans", weight=weight))
-    assert _farthest_right(path) == pytest.approx(path.get_extents().x1, rel=1e-12)
+    assert farthest_right(path) == pytest.approx(path.get_extents().x1, rel=1e-12)
 
 
 def test_a_prior_is_drawn_to_the_posteriors_scale() -> None:

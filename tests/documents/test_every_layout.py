@@ -18,7 +18,7 @@ from pypdf import PdfReader
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.documents.budget_page import budget_document
-from cmm_uq.documents.certificate import STATEMENTS
+from cmm_uq.documents.clauses import STATEMENTS
 from cmm_uq.documents.document import Block, Document, Facts, Plot, Section, Table
 from cmm_uq.documents.html import render_html
 from cmm_uq.documents.origin import marked

@@ -38,7 +38,7 @@ def test_with_times_too_it_says_which_drift_it_cannot_have_seen() -> None:
     """Under a walk that has gone most of its way at the beginning intervals hold too seldom: docs/coverage-study.md."""
     said = noise_found(noise({"placing": size(0.1, 0.1), "slow": size(0.1, 0.1)}))
     assert said == (
-        "independent readings, nothing else; not to be seen in this recording: a drift that ended with the first readings"
+        "independent readings, nothing else; not to be seen in this recording: what had drifted before the first reading"
     )
 
 

@@ -20,14 +20,17 @@ from cmm_uq.jobs.artefact import Traceability
 from cmm_uq.jobs.job import JobFacts
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
-from cmm_uq.messages import Message, Number, Verbatim, say
+from cmm_uq.jobs.replaced import Replaced
+from cmm_uq.languages.saying import said_in
+from cmm_uq.messages import Message, Number, Text, Verbatim, say
 from cmm_uq.physics.catalogue import every
 from cmm_uq.uncertainty.budgets.tables import TABLES
 from cmm_uq.uncertainty.model_file import ModelFile, read_model_file
 from cmm_uq.uncertainty.ready_model import READY as MODELS
 from cmm_uq.units import Unit, unit
+from tests.catalogues import TRANSLATED
 from tests.conftest import ROOT
-from tests.documents.saying import leaves, strangers
+from tests.documents.saying import figures, leaves, strangers, untranslated
 from tests.kinds.simulated import diagnosed, document, planned
 from tests.uncertainty.test_ready_budget import BALLBAR, LENGTH, PROBING, SIMULATED, SPHERE, USE, ready
 
@@ -35,7 +38,7 @@ EXAMPLES = sorted(path.name for path in (ROOT / "examples").iterdir() if (path /
 KEYS = [
     f"[{table}] {key}"
     for table, keys in (("job", JobFacts), ("laboratory", Laboratory), ("machine", MachineFacts),
-                        ("artefact.certificate", Traceability))
+                        ("artefact.certificate", Traceability), ("job.replaces", Replaced))
     for key in keys.model_fields
 ]  # fmt: skip
 """Of job.toml, as warnings name them."""
@@ -80,6 +83,18 @@ def test_every_text_of_every_document_is_a_message_or_the_user_s(name: str) -> N
     }
     assert [text for document in made for text in units(document) if not isinstance(text, Unit) and text] == []
     assert all(sum(isinstance(text, Message) for text in leaves(document)) > 5 for document in made)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_document_is_translated_whole_with_the_same_figures(name: str) -> None:
+    """Where English counts in words, Japanese may write a digit, and no language leaves a figure out."""
+    for made in documents(name):
+        assert [untranslated(made, code) for code in TRANSLATED] == [set()] * len(TRANSLATED)
+        for text in (text for text in leaves(made) if isinstance(text, Text)):
+            said = {code: figures(said_in(text, code)) for code in TRANSLATED}
+            assert said["de"] == said["fr"] == figures(text), text
+            assert not figures(text) - said["ja"], text
+            assert set(said["ja"] - figures(text)) <= set("123456789"), text
 
 
 def test_the_page_of_a_model_file_is_translatable_too(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tracemalloc
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg, sparse
@@ -107,3 +108,22 @@ def test_least_squares_of_many_placings_holds_no_more_than_some_columns() -> Non
     tracemalloc.stop()
     assert found.degrees_of_freedom == m - OWN * m // 5 - 1  # one of the two parameters is certified
     assert peak < 60 * 8 * m
+
+
+def test_what_is_free_is_told_apart_by_groups_as_far_as_that_goes() -> None:
+    """Offsets along three axes and a turn about the third, mixed at random, in two placings, the second without the turn."""
+    random, axis, place = np.random.default_rng(2), np.tile(np.arange(3), 8), np.repeat([0, 1], 12)
+    x, y = np.repeat(random.standard_normal((2, 8)), 3, axis=1)
+    offsets = np.eye(3)[axis]
+    columns = np.column_stack([offsets, np.where(axis == 0, -y, np.where(axis == 1, x, 0.0))])
+    columns[place == 1, 3] = 0.0
+    freedoms = Freedoms(columns @ random.standard_normal((4, 4)), place, 2).reached
+    apart = freedoms.apart(axis)
+    assert apart.rank == freedoms.rank == 7
+    for number, groups in ((0, [1, 1, 1, 2]), (1, [0, 1, 1, 1])):
+        own = apart.columns[place == number]
+        was = freedoms.columns[place == number]
+        assert own @ own.T == pytest.approx(was @ was.T, abs=1e-12)
+        assert own.T @ own == pytest.approx(np.diag(np.any(own, axis=0).astype(float)), abs=1e-12)
+        seen = [len(np.unique(axis[place == number][np.abs(column) > 1e-12])) for column in own.T]
+        assert sorted(seen) == groups

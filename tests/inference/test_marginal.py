@@ -36,6 +36,9 @@ def test_the_density_is_that_of_a_normal_distribution_with_everything_linear_in_
     linear = model(noise, placing=placing)
     marginal = Marginal(linear, noise, solve(linear))
     latent = 0.8 * np.random.default_rng(6).standard_normal((6, noise.dimension))
+    latent[:3, noise.names.index("rate")] *= np.sign(latent[:3, noise.names.index("rate")]) * [1, -1, 1]
+    walks = noise.sizes(latent).rate == 0
+    assert set(walks) == {False, True}
     huge = 1e4
     wanted = []
     for row in latent:

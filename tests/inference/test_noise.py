@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from cmm_uq.inference.noise import ABSENT, AXES, AXES_SPREAD, GROWTH, PLACING, SLOW, Components, Sizes, slow_variances
+from cmm_uq.inference.noise import (
+    ABSENT,
+    AXES,
+    AXES_SPREAD,
+    GROWTH,
+    PLACING,
+    SLOW,
+    WALK,
+    Components,
+    Sizes,
+    slow_variances,
+)
 
 M = 12
 
@@ -34,6 +45,7 @@ def covariance(noise: Components, sizes: Sizes) -> np.ndarray[tuple[int, int], n
     found += sizes.placing[0] ** 2 * np.kron(np.eye(6), np.ones((2, 2)))
     for k, variance in zip(noise.frequency, slow[0], strict=True):
         wave = (np.sqrt(2) if k else 1.0) * np.cos(np.pi * k * time)
+        wave = wave if sizes.rate[0] or not k else wave - wave[0]  # a walk begins at zero
         found += variance * np.outer(wave, wave)
     return np.asarray(found)
 
@@ -41,20 +53,36 @@ def covariance(noise: Components, sizes: Sizes) -> np.ndarray[tuple[int, int], n
 SIZES = Sizes(np.array([[1.0, 2.0, 0.5]]), np.array([1.5]), np.array([0.7]), np.array([1.2]), np.array([4.0]))
 
 
-def test_noise_made_anew_has_the_covariance_of_its_components() -> None:
+WALKING = replace(SIZES, rate=np.zeros(1))
+EITHER = pytest.mark.parametrize("sizes", [SIZES, WALKING], ids=["returning", "walking"])
+
+
+@EITHER
+def test_noise_made_anew_has_the_covariance_of_its_components(sizes: Sizes) -> None:
     noise = components()
-    drawn = noise.repeated(SIZES, 200_000, np.random.default_rng(2))[0]
-    wanted = covariance(noise, SIZES)
+    drawn = noise.repeated(sizes, 200_000, np.random.default_rng(2))[0]
+    wanted = covariance(noise, sizes)
     scale = np.sqrt(np.diag(wanted))
     assert np.abs((np.cov(drawn, rowvar=False) - wanted) / np.outer(scale, scale)).max() < 0.015  # 6/√200 000
 
 
-def test_what_whitens_the_noise_leaves_the_unit_covariance_of_one_reading() -> None:
+@EITHER
+def test_what_whitens_the_noise_leaves_the_unit_covariance_of_one_reading(sizes: Sizes) -> None:
     noise = components()
-    white = noise.white(SIZES)
+    white = noise.white(sizes)
     turned = white(np.eye(M))
-    sigma2 = np.mean(SIZES.reading**2)
-    assert np.allclose(turned @ covariance(noise, SIZES) @ turned.T, sigma2 * np.eye(M), atol=1e-9)
+    sigma2 = np.mean(sizes.reading**2)
+    assert np.allclose(turned @ covariance(noise, sizes) @ turned.T, sigma2 * np.eye(M), atol=1e-9)
+
+
+@EITHER
+def test_the_variance_of_a_weighted_sum_is_that_of_the_slow_part_of_the_covariance(sizes: Sizes) -> None:
+    noise, weights = components(), np.random.default_rng(9).standard_normal(M)
+    waves = noise.waves(sizes)
+    assert noise.slow_along(weights, sizes)[0] == pytest.approx(weights @ waves @ waves.T @ weights)
+    _, fast = slow_variances(sizes.slow, sizes.rate, noise.frequency)
+    without = covariance(noise, replace(sizes, slow=np.zeros(1))) + fast[0] * np.eye(M)
+    assert waves @ waves.T + without == pytest.approx(covariance(noise, sizes))
 
 
 @pytest.mark.parametrize("name", [PLACING, GROWTH, SLOW])
@@ -88,7 +116,8 @@ def test_the_first_number_says_how_far_neighbouring_readings_scatter_about_each_
     latent = np.random.default_rng(5).standard_normal((1000, noise.dimension))
     sizes = noise.sizes(latent)
     growth = np.mean(np.linspace(0.0, 1.0, 6) ** 2)
-    half = sizes.reading[:, 0] ** 2 + growth * sizes.growth**2 + sizes.slow**2 * (1 - np.exp(-0.05 * sizes.rate))
+    changed = np.where(sizes.rate > 0, 1 - np.exp(-0.05 * sizes.rate), 0.05)  # of a walk, half of 2·s²·gap
+    half = sizes.reading[:, 0] ** 2 + growth * sizes.growth**2 + sizes.slow**2 * changed
     assert np.any(sizes.slow > sizes.reading[:, 0])
     assert np.allclose(half, np.exp(2 * latent[:, 0]))
 
@@ -105,6 +134,25 @@ def test_slow_noise_is_an_ornstein_uhlenbeck_process(rate: float) -> None:
     differences = found[np.diag_indices(9)][:, None] + found.diagonal() - 2 * found
     assert np.allclose(differences, 2 * 4 * (1 - np.exp(-rate * apart)), atol=0.12 * 4)
     assert variances.sum() + fast[0] == pytest.approx(4.0, rel=1e-3)
+
+
+def test_a_walk_begins_at_zero_and_varies_in_proportion_to_time() -> None:
+    """Brownian motion: covariance 2·s²·min(t, t'), whose mean square over the recording is s²."""
+    frequency, t = np.arange(400.0), np.linspace(0.0, 1.0, 9)
+    variances, fast = slow_variances(np.array([3.0]), np.zeros(1), frequency)
+    waves = np.where(frequency > 0, np.sqrt(2) * (np.cos(np.pi * frequency * t[:, None]) - 1), 1.0)
+    found = (waves * variances) @ waves.T + fast[0] * np.eye(9)
+    assert np.allclose(found, 2 * 9 * np.minimum(t[:, None], t), atol=0.025)
+
+
+def test_slow_noise_walks_as_often_as_it_returns() -> None:
+    latent = np.random.default_rng(6).standard_normal((40_000, components((SLOW,)).dimension))
+    rate = components((SLOW,)).sizes(latent).rate
+    assert np.mean(rate == 0) == pytest.approx(WALK, abs=0.01)  # four standard errors
+    returning = np.log(rate[rate > 0])
+    assert np.quantile(returning, [0.25, 0.5, 0.75]) == pytest.approx(
+        np.log(200) * np.array([0.25, 0.5, 0.75]), abs=0.1
+    )
 
 
 def test_a_stated_noise_is_good_to_a_fifth_or_now_and_then_wrong() -> None:

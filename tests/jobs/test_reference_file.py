@@ -39,7 +39,10 @@ PLATE = "measurement,point,x_mm,y_mm,z_mm\n" + "".join(
 
 
 def job(recording: str, name: str, content: bytes | str, kind: str = "step_gauge") -> Job:
-    files = {"job.toml": TOML.format(kind=kind, file=name), "recording.csv": recording, name: content}
+    toml = TOML.format(kind=kind, file=name)
+    if name.endswith(".xml"):  # which says its number itself
+        toml = toml.replace('number = "7"\n', "").replace("u_um = 0.2\n", "")
+    files = {"job.toml": toml, "recording.csv": recording, name: content}
     return job_of({name: text.encode() if isinstance(text, str) else text for name, text in files.items()})
 
 

@@ -43,6 +43,10 @@ def test_components_are_drawn_in_their_sizes(ballbar_points) -> None:  # type: i
     assert np.median(np.abs(heavy)) == pytest.approx(1e-3 * 0.7649 / np.sqrt(3), rel=0.02)  # quartile of t with three
     slow = np.stack([Noise(slow=1e-3, slow_time_s=30.0).drawn(timed, random) for _ in range(4000)])
     assert np.mean(slow[:, 1] * slow[:, 2]) / 1e-6 == pytest.approx(np.exp(-1 / 3), abs=0.04)
+    walked = np.stack([Noise(slow=1e-3, slow_time_s=np.inf).drawn(timed, random) for _ in range(4000)])
+    part = timed.columns["time_s"] / timed.columns["time_s"].max()
+    assert walked.std(axis=(0, 2)) == pytest.approx(1e-3 * np.sqrt(2 * part), rel=0.03, abs=1e-12)
+    assert np.mean(walked[:, 1] * walked[:, -1]) == pytest.approx(2e-6 * part[1], rel=0.15)  # min(t, t')
     grown = np.stack([Noise(growth=1e-3).drawn(timed, random) for _ in range(4000)])
     away = distances_in_placing(timed.xyz, timed)
     assert grown.std(axis=(0, 2)) == pytest.approx(1e-3 * away / away.max(), abs=5e-5)

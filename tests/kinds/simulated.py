@@ -5,11 +5,13 @@ Their documents are made once for all processes of a run of the tests, in its te
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from cmm_uq.commands.analysis import Result, analyse, outcome_of
 from cmm_uq.commands.plan import plan_outcome
@@ -17,6 +19,7 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.report import diagnosis_outcome
 from cmm_uq.documents.document import Block, Document, Table
 from cmm_uq.documents.outcome import Outcome
+from cmm_uq.documents.results_file import as_json
 from tests.conftest import ROOT
 
 SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}
@@ -55,7 +58,25 @@ def outcome(job: str) -> Outcome:
 
 @kept
 def document(job: str) -> Document:
+    results(job)
     return outcome(job).document
+
+
+@cache
+def results(job: str) -> dict[str, Any]:
+    """Data of results.json, as any process of this run may have made them already."""
+    folder = os.environ.get("CMM_UQ_TESTS_SHARE")
+    if folder is None:
+        data = as_json(outcome(job).results)
+    else:
+        path = Path(folder) / f"results-{job}.json"
+        if not path.exists():
+            own = path.with_suffix(f".{os.getpid()}")
+            own.write_bytes(as_json(outcome(job).results))
+            own.replace(path)
+        data = path.read_bytes()
+    found: dict[str, Any] = json.loads(data)
+    return found
 
 
 @kept

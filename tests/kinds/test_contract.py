@@ -18,6 +18,7 @@ from cmm_uq.commands.plan import write_plan
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.report import CERTIFICATE, write_diagnosis, write_report
 from cmm_uq.commands.simulate import write_simulation
+from cmm_uq.dcc import read as read_dcc
 from cmm_uq.documents.origin import file_name
 from cmm_uq.documents.outcome import OwnAnalysis, Page
 from cmm_uq.errors import CmmUqError
@@ -132,8 +133,11 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, 
         report = write_report(job, out)
         results = json.loads(report.results)
         assert results["schema"] == "cmm-uq/results/1"
-        page, pdf = (file_name(document, read_job(job).origin) for document in CERTIFICATE)
-        assert {page, pdf, "results.json"} <= set(report.files)
+        page, digital, pdf = (file_name(document, read_job(job).origin) for document in CERTIFICATE)
+        whole = read_dcc((out / digital).read_bytes(), digital)
+        assert whole.document is not None
+        assert whole.document.data == (out / page).read_bytes()
+        assert {page, digital, pdf, "results.json"} <= set(report.files)
         assert report.summary.rows[0][0] == "Measured"
         assert results["software"].get("plugins", {}) == PLUGINS.get(name, {})
         assert ("with outside-kinds 0.1.0" in report.files[page].read_text(encoding="utf-8")) == (name == OUTSIDE)

@@ -185,6 +185,16 @@ def test_writers_at_the_same_time_make_one_chain(tmp_path: Path) -> None:
         assert records.verify() == []
 
 
+def test_a_file_that_another_process_is_making_is_waited_for(tmp_path: Path) -> None:
+    """A reader and a writer of the same empty file: SQLite refuses to change its journal at once, whatever its time limit."""
+    place = tmp_path / "records.db"
+    other = sqlite3.connect(place, isolation_level=None, check_same_thread=False)
+    other.execute("BEGIN EXCLUSIVE")
+    threading.Timer(0.4, other.execute, ("ROLLBACK",)).start()
+    with open_records(place, create=True) as records:
+        assert records.append("sent", {"turn": 1}).number == 1
+
+
 def test_checking_a_job_does_not_import_the_database(iota: Path) -> None:
     code = (
         "import sys; from cmm_uq.api.beginning import check; from pathlib import Path; "

@@ -28,17 +28,27 @@ BAR_MM, BAR_U_UM = 404.2357, 5.0
 """Of the example's job.toml."""
 
 
+LABORATORY = """
+[laboratory]
+name = "L"
+address = "A"
+signatory = "S"
+four_eyes = true
+"""
+
+
 @pytest.fixture(scope="module")
 def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The twenty bars reported into records, with a serial number and two keys for them."""
+    """The twenty bars reported into records in French, with a serial number and two keys for them."""
     folder = tmp_path_factory.mktemp("reported")
     job = Path(shutil.copytree(ROOT / "examples" / "iota-1102-20C", folder / "job"))
     toml = (job / "job.toml").read_text(encoding="utf-8")
     toml = toml.replace('manufacturer = "DEA"', 'manufacturer = "DEA"\nserial = "1102"')
-    toml = toml.replace("[job]\n", '[job]\nadjusted_since = 2004-03-01\noperator = "J. Harris"\n')
+    stated = 'issued = 2004-09-02\ncustomer = "C"\naddress = "D"\n'  # what a certificate must state to be released
+    toml = toml.replace("[job]\n", f'[job]\nadjusted_since = 2004-03-01\noperator = "J. Harris"\n{stated}')
     toml = toml.replace("[recording]", "due = 2005-01-01\n\n[recording]")
-    (job / "job.toml").write_text(toml + "\n[laboratory]\nfour_eyes = true\n", encoding="utf-8")
-    write_report(job, folder / "reports" / "iota", records=folder / "reports" / "records.db")
+    (job / "job.toml").write_text(toml + LABORATORY, encoding="utf-8")
+    write_report(job, folder / "reports" / "iota", records=folder / "reports" / "records.db", language="fr")
     return folder / "reports"
 
 
@@ -214,6 +224,7 @@ def test_a_correction_is_found_computed_again_and_replaced_by_a_draft(
     draft = records.certificates()[-1]
     assert (draft.folder, draft.state) == (str(found.written), "draft")
     assert draft.results_sha256 == records.certificate(1).results_sha256
+    assert '<html lang="fr">' in (Path(draft.folder) / "certificate.html").read_text(encoding="utf-8")
 
 
 def test_a_version_that_is_not_installed_cannot_compute(records: Records) -> None:

@@ -38,11 +38,12 @@ def answer(task: tuple[str, dict[str, bytes]], seed: int, results_only: bool) ->
         case ["slow"]:
             time.sleep(0.3)
     contents = {"results.json": json.dumps(results(job, files, seed), indent=2).encode()}
-    return (
-        contents
-        if results_only
-        else contents | {"certificate-simulated.html": b"<p>", "certificate-simulated.pdf": b"%"}
-    )
+    documents = {
+        "certificate-simulated.html": b"<p>",
+        "certificate-simulated.pdf": b"%",
+        "certificate-simulated.xml": b"<a/>",
+    }
+    return contents if results_only else contents | documents
 
 
 def results(job: dict[str, Any], files: dict[str, bytes], seed: int) -> dict[str, Any]:

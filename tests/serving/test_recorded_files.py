@@ -39,6 +39,15 @@ def test_a_file_is_read_while_it_is_the_recorded_one(folder: Path) -> None:
     assert results_of((file,), folder) == {}
 
 
+def test_a_file_that_was_signed_since_is_handed_out_as_it_was_signed(folder: Path) -> None:
+    (folder / "results.json").write_bytes(b"signed")
+    said = entry(files={"results.json": HASH, "posterior.npz": HASH})
+    signed = {"results.json": sha256(b"signed").hexdigest(), "other": HASH}
+    posterior, results = files_of(said, folder, signed)
+    assert (posterior.name, posterior.sha256) == ("posterior.npz", HASH)
+    assert content_of(results, folder) == b"signed"
+
+
 @pytest.mark.parametrize("name", ["../secret", "/etc/passwd", "..", "", "a/../../secret", "C:secret", "a\\b", "x\0"])
 def test_no_name_leads_out_of_the_folder(folder: Path, name: str) -> None:
     assert files_of(entry(files={name: HASH}), folder) == ()

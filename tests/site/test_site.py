@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 ELSEWHERE = {
     "arxiv.org", "docs.hexagonmi.com", "doi.org", "github.com", "openturns.github.io", "pradyunsg.me", "pypi.org",
-    "python.arviz.org", "uncertainty.nist.gov", "www.scielo.br", "www.sphinx-doc.org",
+    "python.arviz.org", "uncertainty.nist.gov", "www.scielo.br", "www.sphinx-doc.org", "www.w3.org",
 }  # fmt: skip
 """Where links of the documentation lead outside; looked at by eye when one is added, since tests fetch nothing."""
 

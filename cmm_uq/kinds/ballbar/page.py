@@ -40,7 +40,7 @@ def sections(result: Result) -> list[Section]:
         ),
         alternative=deviating(
             say("{count} lengths: as recorded they deviate", count=len(deviations)),
-            say(" from the {name}", name=name), deviations, residuals, ".0f",
+            say("from the {name}", name=name), deviations, residuals, ".0f",
         ),
     )  # fmt: skip
     volume = residual_volume(result, say("bars"))

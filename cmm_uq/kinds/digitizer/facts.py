@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.certified_value import DIAMETER, CertifiedValue
 from cmm_uq.jobs.table import Triple, Uncertainty
 
 Uncertainties = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]
@@ -25,6 +26,7 @@ class AlignmentFacts(ArtefactFacts):
     """
 
     carries_probe: ClassVar[bool] = True
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = (DIAMETER,)
 
     offset_mm: Triple | None = None
     """[U1, V1, W1] by the drawing, to hold the result against and to plan by; it is not taken as known."""

@@ -39,7 +39,7 @@ def _adjustments(settings: tuple[Setting, ...]) -> list[Block]:
         return []
     columns = (
         Column(say("Adjustment"), numeric=False),
-        Column(say("Figure")),
+        Column(say("Value")),
         Column(say("U")),
         Column(say("Unit"), numeric=False),
         Column(say("Over the travel"), unit("µm")),

@@ -12,7 +12,7 @@ import numpy as np
 
 from cmm_uq.kinds.error_maps.copies import copies
 from cmm_uq.kinds.error_maps.spikes import DAMAGED, spikes
-from cmm_uq.messages import Text, Verbatim, commas, listed, number, say
+from cmm_uq.messages import Text, Verbatim, commas, listed, number, say, signed
 from cmm_uq.physics.error_map import COLUMNS, ErrorMap
 from cmm_uq.points import AXES, Floats
 from cmm_uq.screening.finding import Finding
@@ -170,12 +170,12 @@ def _shared(positions: Sequence[Floats]) -> Floats:
 
 def _stray(title: Text, position: float, error_map: ErrorMap, value: float, column: str) -> Finding:
     why = say(
-        "the {title} at {position:g} mm in the map at {temperature:g} °C, {value:.4g}, jumps off its neighbours and off the "
+        "the {title} at {position} mm in the map at {temperature:g} °C, {value}, jumps off its neighbours and off the "
         "other maps; the position is left out. Measure it again",
         title=title,
-        position=position,
+        position=signed(position, "g"),
         temperature=error_map.temperature,
-        value=value,
+        value=signed(value, ".4g"),
     )
     return Finding("outlier", (), (), why, column=column, set_aside=True)
 

@@ -40,6 +40,7 @@ class Difference:
     rival : the explanation in words, with the map that differs if one does.
     probability : of it.
     instead : others that could stand in its place.
+    maps : numbers of the maps that it, or one of those, has differ from the others, from 0 as their temperatures.
     region : of the position, mm, where it exceeds half its largest value and its band does not hold zero.
     p_value : of "these maps differ by noise alone", corrected for all errors that were compared.
     amplitude : largest value, in the column's unit.
@@ -51,6 +52,7 @@ class Difference:
     rival: Rival
     probability: float
     instead: tuple[Text, ...]
+    maps: frozenset[int]
     region: tuple[float, float]
     p_value: float
     amplitude: float
@@ -170,9 +172,11 @@ def _difference(compared: ColumnComparison, index: int, p_value: float) -> Diffe
     probability = compared.combinations.of(index)
     others = compared.instead(_NAMED) if probability < _WELL_KNOWN else ()
     sure = np.abs(value) > _BAND * u
-    instead = tuple(compared.rivals[i].name for i in others)
+    instead = tuple(compared.rivals[i] for i in others)
     return Difference(
-        column, rival, probability, instead, region_of(column.positions, value, sure if sure.any() else None), p_value,
+        column, rival, probability, tuple(one.name for one in instead),
+        frozenset(one.map for one in (rival, *instead) if one.map is not None),
+        region_of(column.positions, value, sure if sure.any() else None), p_value,
         float(np.abs(value).max()) / unit, (column.positions, value / unit, u / unit),
         rival.map is not None and turned(column, rival.map),
     )  # fmt: skip

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import ClassVar
 
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.certified_value import CertifiedValue
 
 
 class ErrorMapFacts(ArtefactFacts):
     """The maps are named under ``[machine]``."""
 
     with_recording: ClassVar[bool] = False
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.documents.diagnosis_words import summary_of
+from cmm_uq.documents.lettering import lettered_in
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed, diagnose_error_maps
 from cmm_uq.kinds.error_maps.overview import told
@@ -13,7 +14,8 @@ def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
     """What there is to write of it."""
     verdict = found.diagnosis.verdict
     short = summary_of(found.job.facts, verdict, told(found), found.findings)
-    document = maps_document(found, seed)
+    with lettered_in(found.job.facts.job.language):
+        document = maps_document(found, seed)
     consistent = verdict == "consistent"
     return Outcome(found, lambda: document, maps_results(found, seed), short, document.warnings, conforming=consistent)
 

@@ -11,7 +11,7 @@ from cmm_uq.documents.wording import probability
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.kinds.error_maps.diagnosis import Difference, MapsDiagnosis
 from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
-from cmm_uq.messages import NOTHING, Text, Verbatim, lines, plural, say, semicolons
+from cmm_uq.messages import NOTHING, Text, Verbatim, lines, plural, say, semicolons, signed
 
 VERDICT_TITLES: Mapping[str, Text] = {
     "consistent": say("Consistent: the maps agree"),
@@ -53,8 +53,10 @@ def _found(d: MapsDiagnosis) -> Text:
     ]
     said += [_difference(difference) for difference in d.differences[:_SHOWN]]
     if (more := len(d.differences) - _SHOWN) > 0:
-        many = say("{more} more differences are told below.", more=more)
-        said.append(plural(more, one=say("One more difference is told below."), many=many))
+        said.append(plural(
+            more, one=say("One more difference is told below."),
+            many=say("{more} more differences are told below.", more=more),
+        ))  # fmt: skip
     return lines(said)
 
 
@@ -67,8 +69,8 @@ def _difference(item: Difference) -> Text:
 
 def _where(d: MapsDiagnosis) -> Text:
     places = [
-        say("{what} from {axis} = {low:g} to {high:g}\u00a0mm", what=item.column.title,
-            axis=Verbatim(item.column.axis.upper()), low=item.region[0], high=item.region[1])
+        say("{what} from {axis} = {low} to {high}\u00a0mm", what=item.column.title,
+            axis=Verbatim(item.column.axis.upper()), low=signed(item.region[0], "g"), high=signed(item.region[1], "g"))
         for item in d.differences[:_SHOWN]
     ]  # fmt: skip
     return say("{places:capital}.", places=semicolons(places)) if places else NOTHING

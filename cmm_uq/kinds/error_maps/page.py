@@ -10,7 +10,7 @@ from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph,
 from cmm_uq.documents.effect_words import effect_of, size_of, titles
 from cmm_uq.documents.improvement_table import improvement_table
 from cmm_uq.documents.plots import curve_with_band
-from cmm_uq.documents.results_file import effect_data, finding_data, head, improvement_data, quantity_data
+from cmm_uq.documents.results_file import effect_data, false_alarms, finding_data, head, improvement_data, quantity_data
 from cmm_uq.documents.wording import probability
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
@@ -41,6 +41,7 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
         "diagnosis": {
             "verdict": d.verdict,
             "p_value": d.p_value,
+            **false_alarms(d.alpha),
             "where": [
                 {
                     "covariate": f"{item.column.axis}_mm",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.documents.document import Column, Section, Table
-from cmm_uq.messages import Text, Verbatim, commas, number, say
+from cmm_uq.messages import Text, Verbatim, commas, number, say, signed
 from cmm_uq.physics.error_map import ErrorMap
 from cmm_uq.screening.finding import Finding
 from cmm_uq.units import ARCSECOND
@@ -50,7 +50,7 @@ def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
     ordered = _by_temperature(maps)
     figures = np.array([m.squareness for m in ordered]) / ARCSECOND
     rows: list[tuple[Text, ...]] = [
-        (say("{temperature:g}\u00a0°C", temperature=m.temperature), *(number(value, ".5g") for value in row))
+        (say("{temperature:g}\u00a0°C", temperature=m.temperature), *(signed(value, ".5g") for value in row))
         for m, row in zip(ordered, figures, strict=True)
     ]
     rows.append((say("Largest less smallest"), *(number(value, ".5g") for value in np.ptp(figures, axis=0))))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from cmm_uq.documents.effect_words import title_of
 from cmm_uq.documents.wording import probability
 from cmm_uq.kinds.error_maps.diagnosis import Difference, MapsDiagnosis
-from cmm_uq.messages import Text, Verbatim, listed, number, say, semicolons, sentences
+from cmm_uq.messages import Text, Verbatim, listed, number, say, semicolons, sentences, signed
 
 VERDICTS: Mapping[str, Text] = {
     "consistent": say("The maps agree with each other within their noise."),
@@ -24,9 +24,9 @@ def difference_words(difference: Difference) -> Text:
     rival = difference.rival
     low, high = difference.region
     size = say(
-        "by up to {amplitude:.2g}\u00a0{unit}, most of all from {axis} = {low:g} to {high:g}\u00a0mm",
+        "by up to {amplitude:.2g}\u00a0{unit}, most of all from {axis} = {low} to {high}\u00a0mm",
         amplitude=difference.amplitude, unit=difference.column.unit[0], axis=Verbatim(difference.column.axis.upper()),
-        low=low, high=high,
+        low=signed(low, "g"), high=signed(high, "g"),
     )  # fmt: skip
     chance = probability(difference.probability)
     if rival.map is not None:
@@ -77,7 +77,7 @@ def next_words(d: MapsDiagnosis) -> list[tuple[tuple[Text, ...], Text]]:
         if len(temperatures) == 2:
             what = say("Map the {title} a third time: with two maps nothing says which of them is off.", title=title)
         else:
-            chosen = [t for t in temperatures if any(name.endswith(f" {t:g} °C") for name in names)]
+            chosen = [t for k, t in enumerate(temperatures) if any(k in one.maps for one in some)]
             shown = [number(t, "g") for t in (chosen if len(chosen) == 1 else temperatures)]
             what = say("Measure the {title} again at {temperatures} °C.", title=title, temperatures=listed(shown))
         found.append((names, what))

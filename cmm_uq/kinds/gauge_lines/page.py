@@ -52,7 +52,7 @@ def _plot(result: Result, gauge: StepGauge) -> Block:
         alternative=deviating(
             say("{faces} faces on {lines} lines: as recorded they deviate", faces=len(deviations),
                 lines=len(set(gauge.measurement.tolist()))),
-            say(" from the mean of their line"), deviations, residuals,
+            say("from the mean of their line"), deviations, residuals,
         ),
     )  # fmt: skip
 

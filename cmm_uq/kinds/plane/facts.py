@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.certified_value import CertifiedValue
 from cmm_uq.jobs.table import Length, Uncertainty
 
 
@@ -15,6 +16,8 @@ class PlaneFacts(ArtefactFacts):
 
     ``acceptance_deg`` is the largest angle between the normal and the direction of approach at which that is believed.
     """
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
 
     probe_offset_mm: Length | None = None
     """Effective radius of the probe, by which the plane of its centres is moved to the surface."""

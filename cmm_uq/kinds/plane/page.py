@@ -11,7 +11,7 @@ from cmm_uq.documents.residual_volume import residual_volume
 from cmm_uq.documents.result import Result
 from cmm_uq.kinds.plane.analysis import PlaneFigures, figures, off_plane_um, results
 from cmm_uq.kinds.plane.observe import PlaneSurface
-from cmm_uq.messages import Text, commas, number, say
+from cmm_uq.messages import Text, in_a_row, number, say
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import MICROMETRE, unit
 
@@ -47,8 +47,8 @@ def _surfaces(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
         if (found := one.surface) is None:
             continue
         across, surface = found.expanded_across, found.surface
-        place = commas(rounded(float(v), across)[0] for v in surface.point)
-        normal = commas(rounded(float(v), max(found.expanded_normal, 2e-9))[0] for v in surface.normal)
+        place = in_a_row(rounded(float(v), across)[0] for v in surface.point)
+        normal = in_a_row(rounded(float(v), max(found.expanded_normal, 2e-9))[0] for v in surface.normal)
         U = rounded(0.0, across / MICROMETRE)[1]
         rows.append((number(one.probed.measurement), place, normal, U, number(found.angle_deg, ".0f")))
     columns = (

@@ -13,7 +13,7 @@ from cmm_uq.documents.vector_plot import vector_plot
 from cmm_uq.documents.wording import expanded
 from cmm_uq.kinds.plate.analysis import Arrows, PlateFigures, arrows, compared, figures, results
 from cmm_uq.kinds.plate.observe import Plate
-from cmm_uq.messages import NOTHING, Text, Verbatim, day, number, say, sentences
+from cmm_uq.messages import Text, Verbatim, day, number, say, sentences
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import PPM, unit
 
@@ -37,13 +37,14 @@ def _confounded(result: Result, found: PlateFigures) -> list[Block]:
     if not compared(result):
         return []
     facts = result.job.facts
-    since = say(" of {date}", date=day(facts.recording.earlier_date)) if facts.recording.earlier_date else NOTHING
+    earlier = facts.recording.earlier_date
+    recording = say("the earlier recording of {date}", date=day(earlier)) if earlier else say("the earlier recording")
     texts: list[Text] = [
         say(
-            "References are the positions found by the earlier recording{since}; the error factors of "
+            "References are the positions found by {recording}; the error factors of "
             "this certificate are what changed since. Errors of machine and plate that were there on "
             "both dates cancel, as long as the plate stood in the same places.",
-            since=since,
+            recording=recording,
         )
     ]
     if found.common is not None:

@@ -9,7 +9,7 @@ from cmm_uq.documents.plots import curve_with_band, length_plot
 from cmm_uq.documents.stated import SIGN
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shifting.page import table_file
-from cmm_uq.messages import Number, Verbatim, number, say
+from cmm_uq.messages import Number, Verbatim, number, say, signed
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.uncertainty.rounding import rounded
@@ -35,9 +35,9 @@ def curve_section(result: ShiftResult) -> Section:
             axis=Verbatim(result.axis),
         ),
         alternative=say(
-            "The error runs from {low:.1f} to {high:.1f} µm; the band is at most {k:.1f} µm to each side.",
-            low=fine.error.min() / MICROMETRE,
-            high=fine.error.max() / MICROMETRE,
+            "The error runs from {low} to {high} µm; the band is at most {k:.1f} µm to each side.",
+            low=signed(fine.error.min() / MICROMETRE, ".1f"),
+            high=signed(fine.error.max() / MICROMETRE, ".1f"),
             k=k * fine.u.max() / MICROMETRE,
         ),
     )

@@ -13,7 +13,7 @@ from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shift_axis.curve_page import MOST_ROWS, beside_integrations, curve_section, residuals_section
 from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.kinds.shifting.page import artefact_section, figures_section, method_section, summary_of
-from cmm_uq.messages import Number, Text, Verbatim, commas, number, plural, say
+from cmm_uq.messages import Number, Text, Verbatim, in_a_row, number, plural, say
 from cmm_uq.physics.rigid_body import SCALE
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import unit
@@ -149,7 +149,7 @@ def _open(result: ShiftResult) -> Section:
 
 def _artefact(result: ShiftResult) -> Section:
     facts, estimate = shift_facts(result.job), result.estimate
-    shifts = commas(number(s, "g") for s in facts.shifts_mm)
+    shifts = in_a_row(number(s, "g") for s in facts.shifts_mm)
     rows = ((say("Shifts"), say("{shifts} mm, u = {u:g} µm", shifts=shifts, u=facts.u_shift_um)),)
     blocks: list[Block] = []
     if result.distances is not None:

@@ -10,7 +10,7 @@ from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.kinds.shift_plate.undetermined import title
 from cmm_uq.kinds.shifting.page import table_file
-from cmm_uq.messages import NOTHING, Number, Text, Verbatim, number, say
+from cmm_uq.messages import NOTHING, Number, Text, Verbatim, after, number, say, signed
 from cmm_uq.points import AXES
 from cmm_uq.uncertainty.rounding import rounded
 from cmm_uq.units import ARCSECOND, MICROMETRE, Unit, unit
@@ -33,24 +33,21 @@ def curves_section(result: PlaneShiftResult) -> Section:
 def _picture(name: str, curve: Curve, size: float, text: Unit, result: PlaneShiftResult) -> Plot:
     axis = name.split("_")[1]
     words = title(name)
-    free = say(" These placings do not determine it.") if name in result.estimate.free.names else NOTHING
+    free = say("These placings do not determine it.") if name in result.estimate.free.names else NOTHING
     return curve_with_band(
         curve.position,
         curve.error / size,
         curve.band / size,
         x_label=say("Scale reading {axis} / mm", axis=Verbatim(axis)),
         y_label=say("Error / {unit}", unit=text),
-        caption=say(
-            "{words:capital}, with the band that holds the whole curve with 95 % probability.{free}",
-            words=words,
-            free=free,
+        caption=after(
+            say("{words:capital}, with the band that holds the whole curve with 95 % probability.", words=words), free
         ),
         alternative=say(
-            "{words:capital} runs from {low:.1f} to {high:.1f} {unit}; the band is at most {band:.1f} "
-            "{unit} to each side.",
+            "{words:capital} runs from {low} to {high} {unit}; the band is at most {band:.1f} {unit} to each side.",
             words=words,
-            low=curve.error.min() / size,
-            high=curve.error.max() / size,
+            low=signed(curve.error.min() / size, ".1f"),
+            high=signed(curve.error.max() / size, ".1f"),
             unit=text,
             band=curve.band.max() / size,
         ),

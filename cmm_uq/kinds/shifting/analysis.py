@@ -5,6 +5,7 @@ from __future__ import annotations
 from cmm_uq import __version__
 from cmm_uq.documents.as_found_section import as_found_data, as_found_section
 from cmm_uq.documents.certificate import certificate_of
+from cmm_uq.documents.clauses import clauses_data
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.document import Document
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
@@ -45,7 +46,7 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
     warned = (*told, *formal_warnings(found.job))
     short = axis_page.summary(found, warned) if isinstance(found, ShiftResult) else plane_page.summary(found, warned)
     draws, table = posterior_file(found.draws, found.job.origin), table_file(found.job)
-    results |= as_found_data(found.job) | found.stating.data() | {"posterior": draws.entry}
+    results |= as_found_data(found.job) | clauses_data(found.job) | found.stating.data() | {"posterior": draws.entry}
     files = {table: table_text(found.table), draws.name: draws.content}
     return Outcome(
         found, lambda: _certificate(found, told, tuple(files)), results, short, warned, files,

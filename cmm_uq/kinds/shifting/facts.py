@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self, cast
+from typing import Annotated, ClassVar, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
 from cmm_uq.files.limits import LISTED
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.certified_value import LENGTH_WORDS, CertifiedValue
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.table import Length, Number, Position, Table, Uncertainty
 
@@ -27,6 +28,10 @@ class KnownLength(Table):
 
 class ShiftFacts(ArtefactFacts):
     """A shifted artefact lies along an ``axis`` or, a plate, in a ``plane``."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = (
+        CertifiedValue("known.length_mm", "known.u_um", LENGTH_WORDS),
+    )
 
     axis: Literal["x", "y", "z"] | None = None
     """Axis along which the artefact is shifted."""

@@ -74,7 +74,7 @@ def _by_point(result: Result, sphere: Sphere) -> Plot:
         ),
         alternative=deviating(
             say("{count} points: as recorded they deviate", count=len(deviations)),
-            say(" from the {name}", name=name), deviations, residuals,
+            say("from the {name}", name=name), deviations, residuals,
         ),
     )  # fmt: skip
 

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.certified_value import DIAMETER_WORDS, LENGTH_WORDS, CertifiedValue
 from cmm_uq.jobs.table import Triple, Uncertainty
 
 
 class TriangleFacts(ArtefactFacts):
     """``blocks_mm`` (1–2, 2–3, 3–1) and the diameters ``cylinders_mm`` (1, 2, 3), with the standard uncertainty of each."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = (
+        CertifiedValue("blocks_mm", "u_blocks_um", LENGTH_WORDS, count=3),
+        CertifiedValue("cylinders_mm", "u_cylinders_um", DIAMETER_WORDS, count=3),
+    )
 
     blocks_mm: Triple
     """Lengths of the gauge blocks 1–2, 2–3 and 3–1."""

@@ -34,7 +34,7 @@ def _standard(standard: Standard) -> Table:
         rows.append((say("Angle at {i}", i=i), shown, say("{U}″", U=rounded(0.0, spread / ARCSECOND)[1]), unit("°")))
     rows.append((say("Height over side 1–2"), *rounded(*standard.height), unit("mm")))
     columns = (
-        Column(say("Figure"), numeric=False),
+        Column(say("Quantity"), numeric=False),
         Column(say("Value")),
         Column(say("U")),
         Column(say("Unit"), numeric=False),

@@ -125,8 +125,8 @@ def test_the_spikes_of_the_real_maps_are_those_that_a_reader_sees(real: list[Err
     30 °C rises by 4.9 ± 0.6 µm a step, but by 1.9 and 7.7 to and from 25 mm."""
     told = [f.why for f in columns_of(real)[1] if f.kind == "outlier"]
     places = [
-        ("scale error of Y at 25 mm", "30 °C, 1.9"), ("scale error of Z at -125 mm", "30 °C, -0.9"),
-        ("scale error of Z at -100 mm", "30 °C, -0.6"), ("scale error of Z at -50 mm", "30 °C, 9.2"),
+        ("scale error of Y at 25 mm", "30 °C, 1.9"), ("scale error of Z at −125 mm", "30 °C, −0.9"),
+        ("scale error of Z at −100 mm", "30 °C, −0.6"), ("scale error of Z at −50 mm", "30 °C, 9.2"),
     ]  # fmt: skip
     assert len(told) == len(places)
     for why, (where, what) in zip(told, places, strict=True):

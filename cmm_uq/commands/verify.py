@@ -1,0 +1,316 @@
+"""Is a certificate what it says? Its files are compared with each other, and with what its inputs give when computed again.
+
+Nothing of a given file is run. Inputs are read from memory as the PDF has them, so that a path in them leads nowhere; what
+takes part in the computation is installed here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from cmm_uq import __version__
+from cmm_uq.errors import CmmUqError
+from cmm_uq.languages.language import ENGLISH, Code
+from cmm_uq.verification.digital import check_schema, open_digital
+from cmm_uq.verification.found import Inquiry
+from cmm_uq.verification.given import RESULTS, RESULTS_SCHEMA, Given, check_files, read_given
+from cmm_uq.verification.signed import check_signatures
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.written import Stage
+    from cmm_uq.jobs.job import Job
+    from cmm_uq.verification.again import Again
+
+
+Compute = Callable[["Given", "Job"], "Again"]
+"""The second computation: of the job that is inside a certificate."""
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What was verified, and what came out.
+
+    Parameters
+    ----------
+    given : the forms of the certificate.
+    inquiry : what was found.
+    """
+
+    given: Given
+    inquiry: Inquiry
+
+    @property
+    def subject(self) -> str:
+        """The document that was verified, by title and number; the job where there is none."""
+        if self.given.html is not None:
+            return " ".join(self.given.html[1].title.split())
+        if self.given.pdf is not None and (title := self.given.pdf[1].information.get("/Title")):
+            return " ".join(title.split())
+        return str(self.given.results[1]["job"]["id"]) if self.given.results is not None else ""
+
+
+def verify(
+    paths: Iterable[Path], *, rerun: bool = True, trust: Iterable[Path] | None = None, schema: Path | None = None,
+    compute: Compute | None = None, stage: Stage = lambda what, part: None,
+) -> Verification:  # fmt: skip
+    """Verify the files of one certificate.
+
+    Parameters
+    ----------
+    paths : PDF, XML, HTML, ``results.json`` and what belongs to them, or the folder of a report.
+    rerun : whether everything is computed again from the inputs.
+    trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
+    schema : folder with PTB's schemas, that the digital certificate is held to as well.
+    compute : the second computation; :func:`again` where none is given.
+    stage : told of progress.
+
+    Raises
+    ------
+    CmmUqError : a file cannot be read, is hostile, or nothing of a certificate.
+    """
+    stage("Opening the files", 0.0)
+    given, inquiry = read_given(tuple(paths)), Inquiry()
+    _check_schema(inquiry, given)
+    open_digital(inquiry, given)
+    check_files(inquiry, given)
+    stage("Comparing the forms", 0.1)
+    trusted = None
+    if trust is not None:
+        from cmm_uq.signing import trust_of
+
+        trusted = trust_of(tuple(trust))
+    job = _compare(inquiry, given)
+    check_signatures(inquiry, given, trusted)
+    if schema is not None:
+        check_schema(inquiry, given, schema)
+    alike = False
+    if not rerun:
+        inquiry.left("computing again", "not asked for (--no-rerun)")
+    elif job is not None:
+        alike = _compute_again(inquiry, given, job, compute or (lambda given, job: again(given, job, stage)))
+    if given.pdf is not None and given.html is not None and not alike:
+        from cmm_uq.verification.views_agree import compare_views
+
+        compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
+    if given.html is not None and not alike and _version(given) == __version__:
+        from cmm_uq.verification.views_agree import check_style
+
+        check_style(inquiry, given.html[1], given.html[0])
+    stage("Done", 1.0)
+    return Verification(given, inquiry)
+
+
+def _version(given: Given) -> str:
+    """Of the package that made a certificate; empty where nothing says it."""
+    return "" if given.results is None else str(given.results[1]["software"]["version"])
+
+
+def _check_schema(inquiry: Inquiry, given: Given) -> None:
+    """Refuse what is no results.json of a job before anything takes it for one."""
+    if given.results is None:
+        inquiry.left("figures", f"no {RESULTS} is given, and no PDF that has it inside")
+        return
+    name, data, _ = given.results
+    job = data.get("job")
+    hashes = job.get("inputs_sha256") if isinstance(job, dict) else None
+    software = data.get("software")
+    if (
+        data.get("schema") != RESULTS_SCHEMA
+        or not isinstance(hashes, dict)
+        or not all(isinstance(one, str) for one in hashes.values())
+        or not isinstance(software, dict)
+        or not isinstance(software.get("version"), str)
+    ):
+        raise CmmUqError(
+            f"is no {RESULTS_SCHEMA}, with a job, the hashes of its inputs and the program", where=name,
+            fix="Give the results.json of cmm-uq report or cmm-uq diagnose",
+        )  # fmt: skip
+
+
+def _compare(inquiry: Inquiry, given: Given) -> Job | None:
+    """The forms with each other, and figures, decisions, inputs and dates; the job, where its inputs are sound."""
+    if given.results is None:
+        return None
+    from cmm_uq.verification.consistent import check_figures
+    from cmm_uq.verification.decided_again import check_decisions
+    from cmm_uq.verification.inputs import check_dates, check_job, check_results, inputs_of
+    from cmm_uq.verification.stated import check_stated
+
+    name, data, _ = given.results
+    try:
+        check_results(inquiry, given)
+        check_figures(inquiry, data, name)
+        check_decisions(inquiry, data, name)
+        if given.html is not None:
+            check_stated(inquiry, data, given.html[1], files=(given.html[0], name))
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, CmmUqError) as error:
+        inquiry.wrong("figures", name, "", f"has not the parts that cmm-uq writes ({type(error).__name__}: {error})")
+    inputs = inputs_of(inquiry, given)
+    if inputs is None:
+        inquiry.left("dates and computing again", "the inputs are not there as results.json names them")
+        return None
+    try:
+        job = _job(inputs, data)
+    except CmmUqError as error:
+        inquiry.wrong("inputs", "inputs", "", f"are no job that this version reads: {error}")
+        return None
+    check_job(inquiry, job, data, name)
+    check_dates(inquiry, job)
+    _check_digital(inquiry, given, job)
+    return job
+
+
+def _check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
+    """The digital certificate made again of results.json and the job, by the version that made it."""
+    if given.xml is None:
+        return
+    if (made := _version(given)) != __version__:
+        inquiry.left(f"{given.xml[0]} element by element", f"made by version {made}, and this is {__version__}")
+        return
+    from cmm_uq.verification.digital import check_digital
+
+    check_digital(inquiry, given, job)
+
+
+def _job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> Job:
+    """The job of the inputs; a prediction that the job itself does not name was given with the command."""
+    from cmm_uq.commands.reading import in_language, job_of
+
+    language = data["job"].get("language", ENGLISH)
+    if language not in get_args(Code):
+        raise CmmUqError(f"{language!r} is no language of documents", where=f"{RESULTS}: job.language")
+    job = in_language(job_of(inputs), language)
+    beside = [name for name in inputs if name not in job.inputs]
+    if len(beside) == 1 and (data.get("diagnosis") or {}).get("simulation"):
+        from cmm_uq.jobs.predicted import against
+
+        return against(job, inputs[beside[0]], beside[0])
+    return job
+
+
+def _compute_again(inquiry: Inquiry, given: Given, job: Job, compute: Compute) -> bool:
+    """Everything from the inputs, by this version; whether the documents are the same to the byte."""
+    if given.results is None:
+        return False
+    data = given.results[1]
+    made, here = str(data["software"]["version"]), __version__
+    if _plugins_missing(inquiry, data):
+        return False
+    if made != here:
+        _by_another_version(inquiry, given, job, made)
+        return False
+    from cmm_uq.verification.again import compare_again
+
+    try:
+        return compare_again(inquiry, given, compute(given, job))
+    except CmmUqError as error:
+        inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
+        return False
+
+
+def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Again:
+    """What the inputs of a certificate give.
+
+    Raises
+    ------
+    CmmUqError : nothing.
+    """
+    from cmm_uq.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
+    from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
+    from cmm_uq.verification.again import Again
+
+    data = given.results[1] if given.results else {}
+    seed = _seed(data)
+    if "estimates" in data:
+        form, outcome = REPORT, report_outcome(job, seed=seed, stage=stage)
+    else:
+        alpha = _alpha(data, FALSE_ALARMS)
+        form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, alpha=alpha, stage=stage)
+    kept: list[str] = []
+    written = form.contents(outcome, stage, finished=partial(_as_attached, given, kept))
+    pdf = next((content for name, content in written.items() if name.endswith(".pdf")), None)
+    files = {name: content for name, content in written.items() if not name.endswith(".pdf")}
+    if given.pdf is None or pdf is None:
+        return Again(files, kept=tuple(kept))
+    made, here = given.pdf[1].information.get("/Creator", ""), _creator(pdf)
+    if made != here:
+        return Again(files, None, f"they were set by {made or 'another program'}, and here is {here}", tuple(kept))
+    return Again(files, pdf, kept=tuple(kept))
+
+
+def _as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
+    """A file as it is attached where it is the same but for a signature, or for the platform, which is then kept in mind."""
+    from cmm_uq.documents.provenance import FILE, same_but_for_the_platform
+    from cmm_uq.verification.digital import same_unsigned
+
+    attached = given.files.get(name)
+    if attached is None or attached == content or not (name == FILE or name.endswith(".xml")):
+        return content
+    try:
+        if name.endswith(".xml"):
+            return attached if same_unsigned(attached, content, name) else content
+        if not same_but_for_the_platform(attached, content):
+            return content
+    except (CmmUqError, ValueError):
+        return content
+    kept.append(name)
+    return attached
+
+
+def _seed(data: Mapping[str, Any]) -> int:
+    seed = (data.get("sampling") or {}).get("seed") or 0
+    if not isinstance(seed, int) or seed < 0:
+        raise CmmUqError(f"{seed!r} is no seed", where=f"{RESULTS}: sampling.seed")
+    return seed
+
+
+def _alpha(data: Mapping[str, Any], usual: float) -> float:
+    alpha = (data.get("diagnosis") or {}).get("false_alarms", usual)
+    if not isinstance(alpha, float) or not 0.0 < alpha < 1.0:
+        raise CmmUqError(f"{alpha!r} is no rate of false alarms", where=f"{RESULTS}: diagnosis.false_alarms")
+    return alpha
+
+
+def _creator(pdf: bytes) -> str:
+    import re
+
+    found = re.search(rb"/Creator ?\(([^()]*)\)", pdf)
+    return found[1].decode("latin-1") if found else ""
+
+
+def _plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
+    """Packages that took part and are not here as they were then."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    missing = False
+    for package, wanted in (data["software"].get("plugins") or {}).items():
+        try:
+            here = version(str(package))
+        except PackageNotFoundError:
+            here = ""
+        if here != wanted:
+            missing = True
+            told = f"version {here} is installed" if here else "it is not installed"
+            inquiry.left("computing again", f"{package} {wanted} took part, and {told}")
+    return missing
+
+
+def _by_another_version(inquiry: Inquiry, given: Given, job: Job, made: str) -> None:
+    """Say which corrections touch a certificate of another version, and compute its figures as they are now."""
+    from cmm_uq.commands.corrections import Inputs, between, order, said
+
+    if said(made) >= order(__version__):
+        inquiry.left("computing again", f"made by version {made}, and this is {__version__}: install that")
+        return
+    command = "report" if given.results and "estimates" in given.results[1] else "diagnose"
+    kind = job.facts.artefact.kind
+    inputs = Inputs.of(job.inputs)
+    touching = [one for one in between(made, __version__) if one.concerns(command, kind, inputs)]
+    for one in touching:
+        inquiry.notes.append(f"Version {one.version} corrects: {one.what}")
+    told = "1 correction since then touches" if len(touching) == 1 else f"{len(touching)} corrections since then touch"
+    inquiry.left("computing again", f"made by version {made}, and this is {__version__}; {told} this certificate")
