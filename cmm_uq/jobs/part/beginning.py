@@ -9,7 +9,9 @@ from typing import Any
 _GRID = {"pattern": "grid", "rows": 3, "columns": 4, "margin_mm": 5.0}
 
 
-def _plane(name: str, point: list[float], direction: list[float], along: list[float], length: float, width: float) -> Any:
+def _plane(
+    name: str, point: list[float], direction: list[float], along: list[float], length: float, width: float
+) -> Any:
     return {
         "name": name, "kind": "plane", "point_mm": point, "direction": direction, "along": along, "length_mm": length,
         "width_mm": width, "strategy": _GRID,

@@ -60,9 +60,10 @@ ASKS: Mapping[What, Asks] = {
 }  # fmt: skip
 """Of each kind of characteristic (ISO 1101, ISO 5459, ISO 14405-1)."""
 
-_LIMITS: Mapping[str, tuple[str, ...]] = {
+LIMITS: Mapping[str, tuple[str, ...]] = {
     "zone": ("tolerance_mm",), "lengths": ("lower_mm", "upper_mm"), "angles": ("lower_deg", "upper_deg"),
 }  # fmt: skip
+"""Keys of a characteristic's limits, by how the drawing limits it."""
 
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 
@@ -117,8 +118,8 @@ class CharacteristicFacts(Table):
 
     @model_validator(mode="after")
     def _limits_of_its_kind(self) -> Self:
-        own = _LIMITS[self.asks.limits]
-        for key in (key for keys in _LIMITS.values() for key in keys):
+        own = LIMITS[self.asks.limits]
+        for key in (key for keys in LIMITS.values() for key in keys):
             if getattr(self, key) is not None and key not in own:
                 raise ValueError(f"a {self.what} has no {key}: its limits are {' and '.join(own)}")
         for low, high in ((self.lower_mm, self.upper_mm), (self.lower_deg, self.upper_deg)):
