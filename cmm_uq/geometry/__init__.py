@@ -1,11 +1,14 @@
-"""Least-squares features: line, plane, circle, sphere, cylinder and cone through measured points.
+"""Features of measured points: line, plane, circle, sphere, cylinder and cone.
 
-Every fit minimises the sum of squared orthogonal distances, as ISO 10360-6 tests it, and returns the feature with its
-full covariance, its residuals and its form deviation. This room knows points and nothing of machines.
+The fits minimise the sum of squared orthogonal distances, as ISO 10360-6 tests it, and return the feature with its
+full covariance, its residuals and its form deviation. :func:`associate` asks for a feature as drawings do, by minimum zone,
+inscribed, circumscribed or tangent too; :class:`Repeated` does least squares and minimum zones of many measurements at
+the same nominal points at once. This room knows points and nothing of machines.
 """
 
 from __future__ import annotations
 
+from cmm_uq.geometry.association import Associated, Association, associate
 from cmm_uq.geometry.ball_form import BallForm
 from cmm_uq.geometry.circle import Circle, fit_circle
 from cmm_uq.geometry.cone import Cone, fit_cone
@@ -13,18 +16,26 @@ from cmm_uq.geometry.cylinder import Cylinder, fit_cylinder
 from cmm_uq.geometry.directions import cap_directions
 from cmm_uq.geometry.feature import Feature
 from cmm_uq.geometry.line import Line, fit_line
+from cmm_uq.geometry.placed import FeatureKind
 from cmm_uq.geometry.plane import Plane, fit_plane
+from cmm_uq.geometry.repeated import Drawn, Repeated
 from cmm_uq.geometry.sphere import Sphere, fit_sphere
 
 __all__ = [
+    "Associated",
+    "Association",
     "BallForm",
     "Circle",
     "Cone",
     "Cylinder",
+    "Drawn",
     "Feature",
+    "FeatureKind",
     "Line",
     "Plane",
+    "Repeated",
     "Sphere",
+    "associate",
     "cap_directions",
     "fit_circle",
     "fit_cone",

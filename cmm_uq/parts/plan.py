@@ -9,17 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.geometry.association import ASSOCIATIONS, Association
 from cmm_uq.points import Floats, Ints
 
 FeatureKind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
-Association = Literal["least_squares", "minimum_zone", "maximum_inscribed", "minimum_circumscribed", "tangent"]
-"""How a feature is made of its points (ISO 5459, ISO 14405-1, ISO 1101)."""
-
 FEWEST: dict[FeatureKind, int] = {
     "point": 1, "line": 2, "plane": 3, "circle": 3, "sphere": 4, "cylinder": 5, "cone": 6,
 }  # fmt: skip
@@ -56,6 +54,8 @@ class Stylus:
     u_diameter_um : of the effective diameter.
     u_offset_um : (3,) of the tip's offset against the tip to which the others are referred; zero of that tip itself.
     lobing_um : standard deviation of the pre-travel over directions of probing, once size and offset are taken out of it.
+    qualified_at_mm : (3,) coordinates of the machine where the reference sphere stood: what the machine's errors do there they
+        do not do to the part again. ``None`` where that is not known.
     """
 
     name: str
@@ -64,6 +64,7 @@ class Stylus:
     u_diameter_um: float = 0.0
     u_offset_um: Floats = field(default_factory=lambda: np.zeros(3))
     lobing_um: float = 0.0
+    qualified_at_mm: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +121,8 @@ class Feature:
         where = f"feature {self.name!r}"
         if self.kind not in FEWEST:
             raise CmmUqError(f"{self.kind!r} is no kind of feature", where=where, fix=suggestion(self.kind, FEWEST))
-        if self.association not in get_args(Association):
-            fix = suggestion(self.association, get_args(Association))
+        if self.association not in ASSOCIATIONS:
+            fix = suggestion(self.association, ASSOCIATIONS)
             raise CmmUqError(f"{self.association!r} is no association", where=where, fix=fix)
         for points, normals in ((self.points, self.normals), (self.surface, self.surface_normals)):
             _refuse_ill_shaped(points, normals, where)

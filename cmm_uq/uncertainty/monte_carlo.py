@@ -31,6 +31,20 @@ _BINS = 200
 
 
 @dataclass(frozen=True, eq=False)
+class Source:
+    """Where trials come from: a measurement model with its inputs, or any other way to draw outputs.
+
+    Parameters
+    ----------
+    outputs : p names.
+    draw : outputs (p, n) of n trials.
+    """
+
+    outputs: Sequence[str]
+    draw: Callable[[np.random.Generator, int], Floats]
+
+
+@dataclass(frozen=True, eq=False)
 class Simulated:
     """Outputs of a measurement model by Monte Carlo.
 
@@ -82,13 +96,23 @@ def simulate(model: MeasurementModel, trials: int, coverage: float = 0.95, seed:
     CmmUqError : too few trials for the coverage probability, an input without standard deviation (t with ν ≤ 2), or a
         model that gives no finite value for some trials.
     """
+    return from_source(_source(model), trials, coverage, seed)
+
+
+def from_source(source: Source, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
+    """Make a given number of trials of any source.
+
+    Raises
+    ------
+    CmmUqError : too few trials for the coverage probability, or outputs beyond what floating-point numbers hold.
+    """
     check_coverage(coverage)
     fewest = int(np.ceil(2 / (1 - coverage)))
     if trials < fewest:
         raise CmmUqError(
             f"{trials} trials cannot give a {coverage:.4g} coverage interval", fix=f"Make at least {fewest}"
         )
-    run = _Run(model, coverage, seed)
+    run = _Run(source, coverage, seed)
     while run.trials < trials:
         run.advance(min(BLOCK, trials - run.trials))
     return run.result(None)
@@ -117,13 +141,25 @@ def simulate_adaptively(
     ------
     CmmUqError : as for :func:`simulate`.
     """
+    return settled_source(_source(model), coverage, digits, seed, largest, settled)
+
+
+def settled_source(
+    source: Source,
+    coverage: float = 0.95,
+    digits: int = 2,
+    seed: int = 0,
+    largest: int = LARGEST,
+    settled: Callable[[Floats, Floats], bool] = lambda figures, errors: True,
+) -> Simulated:
+    """The same of any source: see :func:`simulate_adaptively`."""
     check_coverage(coverage)
     if coverage > HIGHEST_COVERAGE:
         raise CmmUqError(
             f"a coverage probability of {coverage} needs {100 / (1 - coverage):.2g} trials for one look at the tails",
             fix=f"Ask for at most {HIGHEST_COVERAGE}, or use the law of propagation",
         )
-    run = _Run(model, coverage, seed)
+    run = _Run(source, coverage, seed)
     block = max(BLOCK, int(np.ceil(100 / (1 - coverage))))
     most = max(largest // block, _FEWEST_BLOCKS)
     fewest = min(max(_FEWEST_TRIALS // block, _FEWEST_BLOCKS), most)
@@ -151,8 +187,8 @@ def draw_outputs(model: MeasurementModel, trials: int, seed: int = 0) -> Floats:
     ------
     CmmUqError : as for :func:`simulate`.
     """
-    run = _Run(model, 0.95, seed)
-    return np.concatenate([run.evaluate(min(BLOCK, trials - k)) for k in range(0, trials, BLOCK)], axis=1)
+    source, rng = _source(model), np.random.default_rng(seed)
+    return np.concatenate([source.draw(rng, min(BLOCK, trials - k)) for k in range(0, trials, BLOCK)], axis=1)
 
 
 def numerical_tolerance(u: Floats, digits: int) -> Floats:
@@ -165,21 +201,44 @@ def numerical_tolerance(u: Floats, digits: int) -> Floats:
     return tolerance
 
 
+def _source(model: MeasurementModel) -> Source:
+    """Outputs of a model, of joint draws of its inputs."""
+    model.must_be_at_one_point()
+    for name, given in model.inputs.items():
+        if not np.isfinite(given.standard_deviation):
+            raise CmmUqError(
+                f"{name} has {given.dof:g} degrees of freedom, and so no standard deviation to draw with",
+                fix="Repeat the readings (JCGM 101 6.4.9.5 needs four or more), or use the law of propagation",
+            )
+    draw: Draw = joint_draws(model.inputs, model.correlation_matrix)
+
+    def outputs(rng: np.random.Generator, n: int) -> Floats:
+        inputs = draw(rng, n)
+        with np.errstate(all="ignore"):
+            given = model(*inputs)
+        stacked = np.stack([np.broadcast_to(np.asarray(y, dtype=np.float64), (n,)) for y in given])
+        finite = np.isfinite(stacked)
+        if not finite.all():
+            row = int(np.argmin(finite.all(axis=1)))
+            first = int(np.argmin(finite[row]))
+            example = ", ".join(f"{name} = {x[first]:.6g}" for name, x in zip(model.names, inputs, strict=True))
+            raise CmmUqError(
+                f"the model gives no finite {model.outputs[row]} in {n - int(finite[row].sum())} of {n} trials, "
+                f"such as {example}",
+                fix="Give the inputs distributions that stay within the range of the model",
+            )
+        return stacked
+
+    return Source(model.outputs, outputs)
+
+
 class _Run:
     """Trials made so far, and what must be remembered of them."""
 
-    def __init__(self, model: MeasurementModel, coverage: float, seed: int) -> None:
-        model.must_be_at_one_point()
-        for name, given in model.inputs.items():
-            if not np.isfinite(given.standard_deviation):
-                raise CmmUqError(
-                    f"{name} has {given.dof:g} degrees of freedom, and so no standard deviation to draw with",
-                    fix="Repeat the readings (JCGM 101 6.4.9.5 needs four or more), or use the law of propagation",
-                )
-        self.model, self.coverage, self.seed = model, coverage, seed
-        self._draw: Draw = joint_draws(model.inputs, model.correlation_matrix)
+    def __init__(self, source: Source, coverage: float, seed: int) -> None:
+        self.source, self.coverage, self.seed = source, coverage, seed
         self._rng = np.random.default_rng(seed)
-        p = len(model.outputs)
+        p = len(source.outputs)
         self.trials = 0
         self._mean, self._comoment = np.zeros(p), np.zeros((p, p))
         self._tails = [Tails(coverage) for _ in range(p)]
@@ -190,7 +249,7 @@ class _Run:
 
     def advance(self, n: int) -> None:
         """Make n more trials."""
-        outputs = self.evaluate(n)
+        outputs = self.source.draw(self._rng, n)
         total = self.trials + n
         with np.errstate(all="ignore"):  # what overflows is told by result()
             mean = outputs.mean(axis=1)
@@ -216,24 +275,6 @@ class _Run:
             step = figures - self._block_mean
             self._block_mean = self._block_mean + step / self.blocks
             self._block_squares = self._block_squares + step * (figures - self._block_mean)
-
-    def evaluate(self, n: int) -> Floats:
-        """Outputs (p, n) of n new draws of the inputs."""
-        inputs = self._draw(self._rng, n)
-        with np.errstate(all="ignore"):
-            outputs = self.model(*inputs)
-        stacked = np.stack([np.broadcast_to(np.asarray(y, dtype=np.float64), (n,)) for y in outputs])
-        finite = np.isfinite(stacked)
-        if not finite.all():
-            row = int(np.argmin(finite.all(axis=1)))
-            first = int(np.argmin(finite[row]))
-            example = ", ".join(f"{name} = {x[first]:.6g}" for name, x in zip(self.model.names, inputs, strict=True))
-            raise CmmUqError(
-                f"the model gives no finite {self.model.outputs[row]} in {n - int(finite[row].sum())} of "
-                f"{self.trials + n} trials, such as {example}",
-                fix="Give the inputs distributions that stay within the range of the model",
-            )
-        return stacked
 
     def _count(self, ordered: Floats) -> None:
         """Add to the histogram; its bins are laid about the first block."""
@@ -274,7 +315,7 @@ class _Run:
         """What the trials say."""
         ends = np.array([tails.intervals() for tails in self._tails])
         for name, variance, length in zip(
-            self.model.outputs, np.diagonal(self._comoment), ends[:, 3] - ends[:, 2], strict=True
+            self.source.outputs, np.diagonal(self._comoment), ends[:, 3] - ends[:, 2], strict=True
         ):
             if not np.isfinite(variance) or (variance == 0 and length > 0):
                 raise CmmUqError(
@@ -283,7 +324,7 @@ class _Run:
                 )
         start, width = self._bins or (np.zeros(0), np.zeros(0))
         return Simulated(
-            list(self.model.outputs),
+            list(self.source.outputs),
             self.trials,
             self.coverage,
             self.seed,

@@ -1,0 +1,189 @@
+"""A feature measured again and again at the same nominal points: what each measurement gives, all of them together.
+
+A virtual measurement draws errors of the points, a million times. All draws share nominal points, so they share the
+inverse of the normal equations; each step takes exact distances and derivatives at where a draw has come to, so that the
+steps end at the least-squares feature itself and not at its linearisation. Errors of a thousandth of the feature settle
+in three or four steps. Blocks that fit the processor's cache keep the memory at that of the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.geometry.exchange import least_zones
+from cmm_uq.geometry.extremes import least_zone
+from cmm_uq.geometry.placed import FeatureKind, Placed, placed
+from cmm_uq.geometry.shapes import LINE
+from cmm_uq.points import Floats
+
+SETTLED = 1e-9
+"""Steps, mm, below which a draw is at its minimum: what is left is smaller by the ratio of error to feature."""
+
+MOST_STEPS = 60
+BLOCK = 12_000
+"""Points worked on together: a dozen arrays of them stay in the cache of a core."""
+
+CONDITION = 1e7
+"""Condition of nominal points from which they do not determine the feature with errors of micrometres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A feature of N measurements.
+
+    Parameters
+    ----------
+    position : (N, d) centre, or point of axis, line or plane over the centroid of the nominal points, mm.
+    direction : (N, d) unit direction of the axis, of a plane its normal; None where there is none.
+    size : (N,) diameter, mm, of a cone at its position; None where there is none.
+    half_angle : (N,) of a cone, rad; else None.
+    form : (N,) form deviation, mm: range of the distances, of a line in space the diameter of the cylinder that holds all.
+    """
+
+    position: Floats
+    direction: Floats | None
+    size: Floats | None
+    half_angle: Floats | None
+    form: Floats
+
+
+class Repeated:
+    """A feature and its nominal points, to be measured many times.
+
+    Parameters
+    ----------
+    kind : ``"line"``, ``"plane"``, ``"circle"``, ``"sphere"``, ``"cylinder"`` or ``"cone"``.
+    points : (n, 3) nominal points on the feature, mm; (n, 2) of a line or circle in a plane. A circle of points in space
+        is the circle of their projections along the nominal normal.
+
+    Raises
+    ------
+    CmmUqError : points that do not determine the feature.
+    """
+
+    def __init__(self, kind: FeatureKind, points: ArrayLike) -> None:
+        self.points = np.asarray(points, dtype=np.float64)
+        self.placed: Placed = placed(kind, self.points)
+        if self.placed.condition > CONDITION:
+            raise CmmUqError(
+                f"{kind}: the nominal points hardly determine it (condition {self.placed.condition:.1e})",
+                fix=f"Cover more of the {kind}",
+            )
+        self.nominal = self.placed.local(self.points)
+        units = self.placed.units()
+        matrix = self.placed.shape.normal_matrix(self.placed.state, self.nominal) / np.outer(units, units)
+        self._inverse = np.linalg.inv(matrix) / np.outer(units, units)
+        self._units = units
+        self._response = self._first_order()
+
+    def least_squares(self, displacements: ArrayLike) -> Drawn:
+        """The least-squares feature of each draw, to 1e-9 mm.
+
+        Parameters
+        ----------
+        displacements : (N, n, d) errors of the points, mm, small against the feature.
+
+        Raises
+        ------
+        CmmUqError : the wrong shape, a number missing, or errors so large that a draw does not settle.
+        """
+        errors = self._checked(displacements)
+        state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
+        for rows in self._blocks(len(errors)):
+            state[rows], d = self._descended(self._local(errors[rows], rows.start), errors[rows], rows.start)
+            form[rows] = 2 * d.max(axis=1) if self.placed.shape is LINE else np.ptp(d, axis=1)
+        return self._drawn(state, form)
+
+    def minimum_zone(self, displacements: ArrayLike) -> Drawn:
+        """The minimum zone of each draw: straightness in a plane, flatness, roundness, sphericity, cylindricity, conicity.
+
+        Each ends where contact points prove a local minimum. Position and size are those of the middle of the zone.
+
+        Parameters
+        ----------
+        displacements : (N, n, d) errors of the points, mm.
+
+        Raises
+        ------
+        CmmUqError : as for least squares, and of a line in space, whose zone is round: see :func:`associate`.
+        """
+        if self.placed.shape is LINE:
+            raise CmmUqError("line: the minimum zone of lines in space is not found for many draws at once",
+                             fix="Associate them one by one, or take lines in a plane")  # fmt: skip
+        if len(self.points) <= len(self.placed.state):
+            return self.least_squares(
+                displacements
+            )  # as many points as parameters: the feature goes through all of them
+        errors = self._checked(displacements)
+        state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
+        for rows in self._blocks(len(errors), 20 * BLOCK):
+            local = self._local(errors[rows], rows.start)
+            start, _ = self._descended(local, errors[rows], rows.start)
+            state[rows], form[rows], left = least_zones(self.placed.shape, start, local, self._units)
+            for i in left:
+                state[rows.start + i] = least_zone(self.placed, local[:, i]).state
+                form[rows.start + i] = self._range(state[rows.start + i], local[:, i])
+        return self._drawn(state, form)
+
+    def _range(self, state: Floats, local: Floats) -> float:
+        return float(np.ptp(self.placed.shape.distances(state[None], local[:, None])[0]))
+
+    def _checked(self, displacements: ArrayLike) -> Floats:
+        errors = np.asarray(displacements, dtype=np.float64)
+        if errors.ndim != 3 or errors.shape[1:] != self.points.shape:
+            n, d = self.points.shape
+            raise CmmUqError(f"displacements have the shape {errors.shape}", fix=f"Give them as (N, {n}, {d}) in mm")
+        return errors
+
+    def _blocks(self, draws: int, points: int = BLOCK) -> Iterator[slice]:
+        step = max(1, points // len(self.points))
+        return (slice(i, min(i + step, draws)) for i in range(0, draws, step))
+
+    def _local(self, errors: Floats, first: int) -> Floats:
+        """(m, B, n) coordinates in the frame."""
+        local = self.nominal[:, None, :] + np.tensordot(self.placed.frame, errors, axes=(1, 2))
+        finite = np.isfinite(local).all(axis=(0, 2))
+        if not finite.all():
+            draw = first + int(np.argmin(finite)) + 1
+            raise CmmUqError(f"draw {draw} has a displacement that is no finite number", fix="Correct or leave it out")
+        return local
+
+    def _step(self, state: Floats, local: Floats) -> tuple[Floats, Floats, Floats]:
+        """Steps (B, k) towards the least-squares features, distances and derivatives before them."""
+        d, J = self.placed.shape.distances(state, local)
+        return np.einsum("kbn,bn->bk", J, d) @ self._inverse, d, J
+
+    def _first_order(self) -> Floats:
+        """(n·d, k) by which the state follows each coordinate, by a step of a millionth of the extent: where to begin."""
+        n, d = self.points.shape
+        small = 1e-6 * self.placed.extent
+        local = self._local(small * np.eye(n * d).reshape(n * d, n, d), 0)
+        return np.asarray(-self._step(np.tile(self.placed.state, (n * d, 1)), local)[0] / small)
+
+    def _descended(self, local: Floats, errors: Floats, first: int) -> tuple[Floats, Floats]:
+        """States (B, k) of the least-squares features, and distances (B, n)."""
+        state = self.placed.state + errors.reshape(len(errors), -1) @ self._response
+        for _ in range(MOST_STEPS):
+            step, d, J = self._step(state, local)
+            state -= step
+            largest = np.abs(step * self._units).max(axis=1)
+            if largest.max() <= SETTLED:
+                for j, derivative in enumerate(J):
+                    d -= derivative * step[:, j, None]
+                return state, d
+            if not np.isfinite(largest).all():
+                break
+        draw = first + int(np.argmax(np.where(np.isfinite(largest), largest, np.inf))) + 1
+        raise CmmUqError(
+            f"{self.placed.shape.name}: draw {draw} does not settle",
+            fix="Draw errors that are small against the feature, or cover more of it",
+        )
+
+    def _drawn(self, state: Floats, form: Floats) -> Drawn:
+        of = self.placed
+        return Drawn(of.position(state), of.direction(state), of.size(state), of.half_angle(state), form)

@@ -1,0 +1,176 @@
+"""Features of virtual measurements: of drawn points exactly, or to first order where only values are asked for.
+
+To first order means: by the exact derivative of the association about the measurement without errors of its own. How far that
+is from the association itself is looked at in every run (:mod:`cmm_uq.parts.virtual`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.geometry.association import Association, associate
+from cmm_uq.geometry.repeated import Drawn, Repeated
+from cmm_uq.parts.plan import DIRECTED, Feature
+from cmm_uq.points import Floats
+
+_STEP = 1e-3
+"""mm: of central differences, whose error is the square of step over radius."""
+
+VALUES = 8
+"""Numbers that a feature is told by: position (3), direction (3), diameter, half angle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """A feature of N measurements, in the frame of the points.
+
+    Parameters
+    ----------
+    values : (N, 8) position, direction, diameter, half angle; zero where there is none.
+    form : (N,) form deviation, mm; (0,) where it was not asked for.
+    points : (N, n, 3) measured; (0, 0, 3) where they were not asked for.
+    """
+
+    values: Floats
+    form: Floats = field(default_factory=lambda: np.zeros(0))
+    points: Floats = field(default_factory=lambda: np.zeros((0, 0, 3)))
+
+    @property
+    def position(self) -> Floats:
+        """(N, 3) mm."""
+        return self.values[:, :3]
+
+    @property
+    def direction(self) -> Floats:
+        """(N, 3) unit vectors, in the sense of the nominal one."""
+        return self.values[:, 3:6]
+
+    @property
+    def diameter(self) -> Floats:
+        """(N,) mm."""
+        return self.values[:, 6]
+
+
+class ProbedFeature:
+    """A feature to be associated many times.
+
+    Parameters
+    ----------
+    feature : of the plan.
+    points : (n, 3) its points as they are measured without any draw, mm.
+    association : how.
+
+    Raises
+    ------
+    CmmUqError : points that do not determine it.
+    """
+
+    def __init__(self, feature: Feature, points: Floats, association: Association) -> None:
+        self.feature, self.points, self.association = feature, points, association
+        self.n = len(points)
+        if feature.kind == "point":
+            return
+        try:
+            self._repeated = Repeated(feature.kind, self._in_own_plane(points))
+        except CmmUqError as error:
+            raise CmmUqError(error.problem, where=f"feature {feature.name!r}", fix=error.fix) from error
+
+    @cached_property
+    def _plane(self) -> Floats:
+        """(2, 3) of a line on a surface: along it, and out of the material."""
+        along = np.asarray(self.feature.nominal.direction)
+        out = self.feature.normals.mean(axis=0)
+        out = out - (out @ along) * along
+        return np.array([along, out / np.linalg.norm(out)])
+
+    def _in_own_plane(self, points: Floats) -> Floats:
+        """Of a line on a surface the coordinates (…, 2) in its plane, else the points."""
+        return np.asarray(points @ self._plane.T) if self.feature.kind == "line" else points
+
+    def of(self, displacements: Floats, *, with_points: bool = False) -> Features:
+        """Features of displacements (N, n, 3) from ``points``, mm, by the association itself.
+
+        Raises
+        ------
+        CmmUqError : displacements that are large against the feature.
+        """
+        points = self.points + displacements if with_points else np.zeros((0, 0, 3))
+        if self.feature.kind == "point":
+            values = np.zeros((len(displacements), VALUES))
+            values[:, :3] = (self.points + displacements).mean(axis=1)
+            return Features(values, np.zeros(len(displacements)), points)
+        drawn = self._associated(self._in_own_plane(displacements))
+        return Features(self._values(drawn), drawn.form, points)
+
+    def _associated(self, displacements: Floats) -> Drawn:
+        if self.association == "least_squares":
+            return self._repeated.least_squares(displacements)
+        if self.association in ("minimum_zone", "tangent"):
+            drawn = self._repeated.minimum_zone(displacements)
+            return self._outside(drawn) if self.association == "tangent" else drawn
+        return self._one_by_one(displacements)
+
+    def _outside(self, drawn: Drawn) -> Drawn:
+        """The side of a minimum zone that looks out of the material."""
+        if self.feature.kind == "line":
+            across = self._plane @ self.feature.normals.mean(axis=0)
+        elif self.feature.kind == "plane":
+            across = self.feature.normals.mean(axis=0)
+        else:
+            raise CmmUqError(f"a {self.feature.kind} has no tangent feature", where=f"feature {self.feature.name!r}",
+                             fix="Use maximum_inscribed or minimum_circumscribed")  # fmt: skip
+        return replace(drawn, position=drawn.position + 0.5 * drawn.form[:, None] * across / np.linalg.norm(across))
+
+    def _one_by_one(self, displacements: Floats) -> Drawn:
+        points = self._in_own_plane(self.points) + displacements
+        found = [associate(self.feature.kind, each, self.association) for each in points]  # type: ignore[arg-type]
+        directed = found[0].direction is not None
+        return Drawn(
+            np.array([one.position for one in found]),
+            np.array([one.direction for one in found]) if directed else None,
+            np.array([one.size for one in found]),
+            None,
+            np.array([one.form for one in found]),
+        )
+
+    def _values(self, drawn: Drawn) -> Floats:
+        values = np.zeros((len(drawn.position), VALUES))
+        position, direction = drawn.position, drawn.direction
+        if self.feature.kind == "line":
+            middle = self.points.mean(axis=0)
+            middle = middle - (self._plane @ middle) @ self._plane
+            position = position @ self._plane + middle
+            direction = None if direction is None else direction @ self._plane
+        values[:, :3] = position
+        nominal = self.feature.nominal.direction
+        if self.feature.kind in DIRECTED and nominal is not None:
+            sensed = np.broadcast_to(nominal, position.shape) if direction is None else direction
+            values[:, 3:6] = sensed * np.sign(sensed @ nominal)[:, None]
+        if drawn.size is not None:
+            values[:, 6] = drawn.size
+        if drawn.half_angle is not None:
+            values[:, 7] = drawn.half_angle
+        return values
+
+    @cached_property
+    def base(self) -> Floats:
+        """(8,) values without any draw."""
+        return np.asarray(self.of(np.zeros((1, self.n, 3))).values[0])
+
+    @cached_property
+    def derivative(self) -> Floats:
+        """(8, n, 3) of the values by the coordinates of each point."""
+        steps = _STEP * np.eye(3 * self.n).reshape(-1, self.n, 3)
+        change: Floats = (self.of(steps).values - self.of(-steps).values) / (2 * _STEP)
+        return np.asarray(change.T, dtype=np.float64).reshape(VALUES, self.n, 3)
+
+    def to_first_order(self, change: Floats) -> Features:
+        """Features of first-order changes (N, 8) of the values."""
+        values = self.base + change
+        if self.feature.kind in DIRECTED:
+            values[:, 3:6] /= np.linalg.norm(values[:, 3:6], axis=1, keepdims=True)
+        return Features(values)

@@ -1,0 +1,116 @@
+"""Where the uncertainty of a part's characteristics comes from: shares of the variance by cause, and within the machine.
+
+Shares by cause are Sobol's, by drawing one cause anew and keeping the others: *first* is what knowing the cause alone would
+take away (Saltelli et al. 2010, Comput. Phys. Commun. 181, table 2 b), *total* what would remain if all else were known
+(Jansen 1999, table 2 f). They are equal where causes only add up; of a position or a form, which do not, they differ.
+
+Errors of a machine hang together, so that no variance of one of them alone is a part of the whole. Their shares are
+covariances with the error of the characteristic (Xu and Gertner 2008, Reliab. Eng. Syst. Saf. 93), of its linear part; they
+may be negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.parts.causes import Cause
+from cmm_uq.parts.virtual import AtPose, Virtual
+from cmm_uq.points import Floats
+
+DRAWS = 2**13
+"""Of each of the two samples; shares are then known to about one in a hundred."""
+
+PLACE = "place on the table"
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """Shares of the variance of c characteristics.
+
+    Attributes
+    ----------
+    characteristics : c names.
+    causes : g names; independent of each other.
+    first, total : (g, c) shares of the variance.
+    factors : f names of the machine's errors that its certificate states together.
+    within : (f, c) shares of each.
+    u : (c,) standard uncertainties in this sample, mm and rad.
+    """
+
+    characteristics: tuple[str, ...]
+    causes: tuple[str, ...]
+    first: Floats
+    total: Floats
+    factors: tuple[str, ...]
+    within: Floats
+    u: Floats
+
+    def worst(self, characteristic: str) -> str:
+        """The cause, or the factor where it is the machine's, of the largest part of a variance."""
+        column = self.characteristics.index(characteristic)
+        shares = dict(zip(self.causes, self.total[:, column], strict=True))
+        cause = max(shares, key=lambda name: shares[name])
+        own = [i for i, name in enumerate(self.factors) if name.startswith(f"{cause}: ")]
+        return self.factors[max(own, key=lambda i: self.within[i, column])] if own else cause
+
+
+def line_of(cause: Cause) -> str:
+    """The line of the budget by cause that a cause belongs to."""
+    names = set(cause.factors)
+    return f"{cause.name}: {names.pop()}" if len(names) == 1 else cause.name
+
+
+def budget(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Budget:
+    """Shares of the variance of each characteristic."""
+    random, places = np.random.default_rng(seed), virtual.places
+    each = max(2, draws // len(places))
+    causes = places[0].causes
+    lines = list(dict.fromkeys(line_of(cause) for cause in causes if cause.factors))
+    # the second sample stands in other places, so that nothing of it is that of the first
+    elsewhere = [places[i] for i in random.permutation(len(places))]
+    A = [place.drawn(random, each) for place in places]
+    B = [place.drawn(random, each) for place in places]
+    yA, yB = _errors(places, A, virtual.exact), _errors(elsewhere, B, virtual.exact)
+    mixed = {line: _errors(places, [_exchanged(a, b, causes, line) for a, b in zip(A, B, strict=True)], virtual.exact)
+             for line in lines}  # fmt: skip
+    if len(places) > 1:
+        mixed[PLACE] = _errors(elsewhere, A, virtual.exact)
+    both = np.vstack([yA, yB])
+    variance = np.maximum(both.var(axis=0), np.finfo(np.float64).tiny)
+    centred = yB - both.mean(axis=0)
+    first = [np.mean(centred * (y - yA), axis=0) / variance for y in mixed.values()]
+    total = [0.5 * np.mean((y - yA) ** 2, axis=0) / variance for y in mixed.values()]
+    factors, within = _within(causes, [np.concatenate(parts) for parts in zip(*A, strict=True)], yA)
+    return Budget(
+        tuple(virtual.names), tuple(mixed), np.array(first), np.array(total), factors, within, np.sqrt(variance)
+    )
+
+
+def _errors(places: Sequence[AtPose], coefficients: Sequence[Sequence[Floats]], exact: bool) -> Floats:
+    return np.concatenate([place.errors(given, exact=exact) for place, given in zip(places, coefficients, strict=True)])
+
+
+def _exchanged(A: Sequence[Floats], B: Sequence[Floats], causes: Sequence[Cause], line: str) -> list[Floats]:
+    """The first coefficients with those of one line from the second."""
+    return [b if line_of(cause) == line else a for a, b, cause in zip(A, B, causes, strict=True)]
+
+
+def _within(causes: Sequence[Cause], drawn: Sequence[Floats], y: Floats) -> tuple[tuple[str, ...], Floats]:
+    """Names of factors of causes that have several, and their shares (f, c)."""
+    names, shares = list[str](), list[Floats]()
+    centred = y - y.mean(axis=0)
+    variance = np.maximum(y.var(axis=0), np.finfo(np.float64).tiny)
+    for cause, coefficients in zip(causes, drawn, strict=True):
+        factors = list(dict.fromkeys(cause.factors))
+        if len(factors) < 2:
+            continue
+        X = coefficients - coefficients.mean(axis=0)
+        slopes = np.linalg.lstsq(X, centred, rcond=None)[0]
+        for factor in factors:
+            own = [i for i, name in enumerate(cause.factors) if name == factor]
+            names.append(f"{cause.name}: {factor}")
+            shares.append(np.mean((X[:, own] @ slopes[own]) * centred, axis=0) / variance)
+    return tuple(names), np.array(shares).reshape(len(names), y.shape[1])

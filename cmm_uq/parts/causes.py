@@ -1,0 +1,130 @@
+"""What moves the points of a measured part: each cause with its draws, linear in them, and its name in the budget.
+
+A cause is displacements of all points for one unit of each of its coefficients, and draws of these together. What points have
+in common (a tip, a temperature, the machine) is one coefficient, so that it is as common in every characteristic. A
+coefficient may be any function of what is not known, such as the product of an expansion coefficient and a temperature.
+
+Displacements are of measured points in the frame of the part, about their mean: *indicated = true − e*.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cmm_uq.points import Floats
+
+Draw = Callable[[np.random.Generator, int], Floats]
+"""Coefficients (N, K) of so many draws."""
+
+_NOTHING = 1e-12
+"""Part of the largest variance below which a component of a random field is rounding."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Cause(ABC):
+    """What moves points in proportion to coefficients.
+
+    Parameters
+    ----------
+    name : of the cause: ``machine``, ``stylus``, ….
+    factors : K names in the budget, one a coefficient; those that share a name are one line of it.
+    draw : of the coefficients, together.
+    named : by factor, why it should be told beside the result.
+    """
+
+    name: str
+    factors: tuple[str, ...]
+    draw: Draw
+    named: Mapping[str, str] = field(default_factory=dict)
+
+    @abstractmethod
+    def through(self, derivative: Floats) -> Floats:
+        """(K, p) change of p values for one unit of each coefficient, of their derivative (p, n, 3) by the points."""
+
+    @abstractmethod
+    def moved(self, coefficients: Floats, rows: slice) -> Floats:
+        """(N, m, 3) displacements of m points for coefficients (N, K), mm."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Common(Cause):
+    """What points have in common.
+
+    Parameters
+    ----------
+    basis : (K, n, 3) displacements of the points for one unit of each coefficient, mm.
+    """
+
+    basis: Floats
+
+    def through(self, derivative: Floats) -> Floats:
+        """See :meth:`Cause.through`."""
+        K, n, _ = self.basis.shape
+        return np.asarray(self.basis.reshape(K, 3 * n) @ derivative.reshape(len(derivative), 3 * n).T)
+
+    def moved(self, coefficients: Floats, rows: slice) -> Floats:
+        """See :meth:`Cause.moved`."""
+        part = self.basis[:, rows]
+        K, m, _ = part.shape
+        return np.asarray((coefficients @ part.reshape(K, 3 * m)).reshape(len(coefficients), m, 3))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scatter(Cause):
+    """What moves each coordinate of each point on its own: a coefficient a coordinate, in standard deviations.
+
+    Parameters
+    ----------
+    size : (n, 3) standard deviations along three axes, mm.
+    turn : (3, 3) unit vectors of these axes in the frame of the part, a row each.
+    """
+
+    size: Floats
+    turn: Floats = field(default_factory=lambda: np.eye(3))
+
+    @classmethod
+    def of(cls, name: str, factor: str, size: Floats, turn: Floats | None = None, scale: Draw | None = None) -> Scatter:
+        """A normal one; with draws (N, 3) of a factor on the size along each axis, common to all points, a mixture."""
+
+        def draw(random: np.random.Generator, n: int) -> Floats:
+            drawn = random.standard_normal((n, *size.shape))
+            if scale is not None:
+                drawn *= scale(random, n)[:, None, :]
+            return drawn.reshape(n, -1)
+
+        axes = np.eye(3) if turn is None else turn
+        return cls(name=name, factors=(factor,) * size.size, draw=draw, size=size, turn=axes)
+
+    def through(self, derivative: Floats) -> Floats:
+        """See :meth:`Cause.through`."""
+        return np.asarray(((derivative @ self.turn.T) * self.size).reshape(len(derivative), -1).T)
+
+    def moved(self, coefficients: Floats, rows: slice) -> Floats:
+        """See :meth:`Cause.moved`."""
+        along = coefficients.reshape(len(coefficients), -1, 3)[:, rows] * self.size[rows]
+        return np.asarray(along @ self.turn)
+
+
+def normal(sd: ArrayLike) -> Draw:
+    """Independent normal coefficients about zero of standard deviations (K,)."""
+    each = np.asarray(sd, dtype=np.float64)
+    return lambda random, n: random.standard_normal((n, len(each))) * each
+
+
+def components(kernel: Floats) -> Floats:
+    """(K, n) of a random field of covariance (n, n): times independent standard normal numbers they add up to it."""
+    values, vectors = np.linalg.eigh(kernel)
+    kept = values > _NOTHING * max(float(values[-1]), np.finfo(np.float64).tiny)
+    return np.asarray((vectors[:, kept] * np.sqrt(values[kept])).T)
+
+
+def field_along(name: str, factor: str, kernel: Floats, along: Floats) -> Common:
+    """A random field on the points along one direction (n, 3) of each, of covariance (n, n), mm²."""
+    shapes = components(kernel)
+    draw = normal(np.ones(len(shapes)))
+    return Common(name=name, factors=(factor,) * len(shapes), draw=draw, basis=shapes[:, :, None] * along)

@@ -1,0 +1,130 @@
+"""From drawn coefficients of causes to characteristics: what is linear in one product, everything else on the points.
+
+Features of which only values are asked follow to first order, by the exact derivative of their association; forms, zones,
+minimum zones and what is of points follow from the points that were drawn. Frames and characteristics are exact functions of
+features in both: a position is not linear where it is small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.geometry.association import Association
+from cmm_uq.parts.associating import VALUES, Features, ProbedFeature
+from cmm_uq.parts.causes import Cause
+from cmm_uq.parts.characteristics import Evaluation, Key, Measured
+from cmm_uq.parts.datums import DatumSystem
+from cmm_uq.parts.plan import Plan
+from cmm_uq.points import Floats
+
+EXACT: Association = "least_squares"
+"""The association whose values have a derivative everywhere."""
+
+
+class Evaluator:
+    """Characteristics of a plan as functions of the coefficients of its causes.
+
+    Parameters
+    ----------
+    plan : with nominal points.
+    base : (n, 3) displacements without any draw, mm.
+    causes : that move the points besides; ``None`` for one that does not.
+
+    Raises
+    ------
+    CmmUqError : points that do not determine a feature, datums that do not fix the frame, characteristics that do not exist.
+    """
+
+    def __init__(self, plan: Plan, base: Floats, causes: Sequence[Cause | None]) -> None:
+        self.plan, self.base, self.causes = plan, base, causes
+        asked = {one.features[0]: () for one in plan.characteristics}
+        for one in plan.characteristics:
+            asked |= dict.fromkeys((*one.features, *one.datums, *(plan.alignment.datums if not one.datums else ())), ())
+        self.nominal = {name: self._nominal(name) for name in asked}
+        self.evaluations = [Evaluation(one, plan, self.nominal) for one in plan.characteristics]
+        self.keys = list(dict.fromkeys(key for one in self.evaluations for key in (*one.keys, *one.datums)))
+        self.of_points = {one.keys[0] for one in self.evaluations if one.of_points}
+        self.associated = {(name, how): self._associated(name, how) for name, how in self.keys}
+        self.frames = {
+            one.frame_of: DatumSystem(
+                [plan.feature(name) for name in one.frame_of],
+                [self.nominal[name].values[0] for name in one.frame_of],
+            )
+            for one in self.evaluations
+            if one.frame_of
+        }
+
+    def _nominal(self, name: str) -> Features:
+        feature = self.plan.feature(name)
+        return Features(ProbedFeature(feature, feature.points, EXACT).base[None])
+
+    def _associated(self, name: str, how: Association) -> ProbedFeature:
+        feature, rows = self.plan.feature(name), self.plan.rows[name]
+        return ProbedFeature(feature, feature.points + self.base[rows], how)
+
+    def to_first_order(self, key: Key) -> bool:
+        """Whether a feature is taken to first order."""
+        return key[1] == EXACT and key not in self.of_points
+
+    @cached_property
+    def linear(self) -> list[Key]:
+        """Features that are taken to first order."""
+        return [key for key in self.keys if self.to_first_order(key)]
+
+    @cached_property
+    def transfer(self) -> Floats:
+        """(K, 8f) change of the values of ``linear`` features for one unit of each coefficient of all causes."""
+        count = len(self.plan.points)
+        whole = np.zeros((VALUES * len(self.linear), count, 3))
+        for i, key in enumerate(self.linear):
+            whole[VALUES * i : VALUES * (i + 1), self.plan.rows[key[0]]] = self.associated[key].derivative
+        parts = [cause.through(whole) for cause in self.causes if cause is not None]
+        return np.concatenate([np.zeros((0, len(whole))), *parts])
+
+    def __call__(self, coefficients: Sequence[Floats], *, exact: bool = False) -> Floats:
+        """Characteristics (N, c), mm and rad, for coefficients (N, K) of each cause; one row where there is none.
+
+        Parameters
+        ----------
+        exact : all features on their points, none to first order.
+        """
+        linear, count = [] if exact else self.linear, _count(coefficients)
+        features: dict[Key, Features] = {}
+        if linear:
+            acting = [c for c, cause in zip(coefficients, self.causes, strict=True) if cause is not None]
+            change = np.hstack([np.zeros((count, 0)), *acting]) @ self.transfer
+            for i, key in enumerate(linear):
+                features[key] = self.associated[key].to_first_order(change[:, VALUES * i : VALUES * (i + 1)])
+        for key in self.keys:
+            if key not in features:
+                moved = self.moved(coefficients, self.plan.rows[key[0]])
+                features[key] = self.associated[key].of(moved, with_points=key in self.of_points)
+        frames = {
+            names: system.frames([features[name, self.plan.feature(name).association] for name in names])
+            for names, system in self.frames.items()
+        }
+        measured = Measured(features, frames)
+        return np.column_stack([one(measured) for one in self.evaluations])
+
+    def moved(self, coefficients: Sequence[Floats], rows: slice) -> Floats:
+        """(N, m, 3) displacements of some points by all causes, beyond ``base``, mm."""
+        found = np.zeros((_count(coefficients), rows.stop - rows.start, 3))
+        for cause, drawn in zip(self.causes, coefficients, strict=True):
+            if cause is not None:
+                found += cause.moved(drawn, rows)
+        return found
+
+    @cached_property
+    def at_nominal(self) -> Floats:
+        """(c,) characteristics of the nominal points."""
+        bare = self if not self.base.any() else Evaluator(self.plan, np.zeros_like(self.base), self.causes)
+        none = [np.zeros((1, len(cause.factors) if cause else 0)) for cause in self.causes]
+        return np.asarray(bare(none, exact=True)[0])
+
+
+def _count(coefficients: Sequence[Floats]) -> int:
+    """Of draws; one where nothing is drawn."""
+    return len(coefficients[0]) if coefficients else 1

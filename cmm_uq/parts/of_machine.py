@@ -1,0 +1,118 @@
+"""The machine among the causes: its errors as drawn by its certificate, errors nobody modelled, noise of its readings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.parts.causes import Cause, Common, Scatter, field_along
+from cmm_uq.parts.machine import MachineState, Unmodelled
+from cmm_uq.parts.placing import Pose
+from cmm_uq.parts.qualifying import Qualified
+from cmm_uq.physics.superposition import About, Superposition
+from cmm_uq.points import Floats, Points
+
+MACHINE, NOISE = "machine", "noise"
+
+_SETTLED = 1e-9
+"""mm."""
+
+_ROUNDS = 12
+
+
+def mean_errors(state: MachineState, qualified: Qualified, pose: Pose) -> Floats:
+    """(n, 3) by how much the machine displaces points without any draw, in the frame of the part, mm.
+
+    Zero where it corrects what was found. Solves indicated + e(indicated) = true.
+    """
+    if state.corrected:
+        return np.zeros_like(qualified.part.xyz)
+    points = qualified.both
+    indicated = points.xyz.copy()
+    acting = Superposition(state.effects, state.shapes)
+    for _ in range(_ROUNDS):
+        change = points.xyz - acting.errors(points.at(indicated), state.mean) - indicated
+        indicated += change
+        if np.abs(change).max(initial=0.0) < _SETTLED:
+            break
+    return pose.back(qualified.left((indicated - points.xyz)[:, :, None])[:, :, 0])
+
+
+def modelled(state: MachineState, qualified: Qualified, pose: Pose) -> Common:
+    """What the calibration modelled: differences of whole draws of its posterior from their mean, and drift since then.
+
+    The columns are those of small changes about the mean (:meth:`Superposition.about`), axes leaning as they do.
+    """
+    acting = Superposition(state.effects, state.shapes)
+    columns = acting.derivatives(acting.about(qualified.both, state.mean))
+    factors = tuple(effect.name for effect in state.effects for _ in effect.coefficients)
+    deviations = state.draws - state.mean
+
+    def draw(random: np.random.Generator, n: int) -> Floats:
+        drawn = deviations[random.integers(len(deviations), size=n)]
+        return drawn + random.standard_normal(drawn.shape) * state.drift if state.drift.any() else drawn
+
+    why = dict.fromkeys(state.free, "the calibration left it to what physics allows")
+    return Common(name=MACHINE, factors=factors, draw=draw, named=why, basis=-_in_part(qualified.left(columns), pose))
+
+
+def not_modelled(state: MachineState, qualified: Qualified, pose: Pose) -> tuple[list[Cause], dict[str, str]]:
+    """What the calibration did not model, an independent cause each; and what cannot be drawn, with the column it lacks.
+
+    Of an effect with a period, draws have one of its trial periods each, as its prior has them: evenly in their logarithm.
+    """
+    causes, lacking = list[Cause](), dict[str, str]()
+    for one in state.unmodelled:
+        missing = [name for name in one.effect.columns if name not in qualified.part.columns]
+        if missing:
+            lacking[one.effect.name] = missing[0]
+            continue
+        causes.append(_unmodelled(one, qualified, pose))
+    return causes, lacking
+
+
+def _unmodelled(one: Unmodelled, qualified: Qualified, pose: Pose) -> Common:
+    trials = list(one.effect.trials())
+    columns = np.concatenate([About(qualified.both).columns(one.effect, shape) for shape in trials], axis=2)
+    k, count = len(one.sd), len(trials)
+
+    def draw(random: np.random.Generator, n: int) -> Floats:
+        found = np.zeros((n, count, k))
+        found[np.arange(n), random.integers(count, size=n)] = random.standard_normal((n, k)) * one.sd
+        return found.reshape(n, -1)
+
+    most = "its recording would not have shown" if one.bounded else "physics allows"
+    name = one.effect.name
+    why = {name: f"the calibration did not model it; as large as {most}"}
+    return Common(name=MACHINE, factors=(name,) * (k * count), draw=draw, named=why,
+                  basis=-_in_part(qualified.left(columns), pose))  # fmt: skip
+
+
+def noise(state: MachineState, points: Points, pose: Pose, repeats: int = 1) -> list[Cause]:
+    """Noise of readings, what a set-up adds to each point, and slow noise where times are known.
+
+    Parameters
+    ----------
+    repeats : of each point, of whose readings the mean is taken; they share the set-up and the moment.
+    """
+    stated, n, found = state.noise, len(points), list[Cause]()
+    usual = stated.usual_mm
+    if usual.any():
+        ratio = np.atleast_2d(stated.coordinate_mm) / np.where(usual > 0, usual, 1.0)
+
+        def scale(random: np.random.Generator, count: int) -> Floats:
+            return np.asarray(ratio[random.integers(len(ratio), size=count)])
+
+        size = np.tile(usual / np.sqrt(repeats), (n, 1))
+        found.append(Scatter.of(NOISE, "reading", size, pose.back(np.eye(3)), scale if len(ratio) > 1 else None))
+    if stated.placing_mm:
+        found.append(Scatter.of(NOISE, "set-up", np.full((n, 3), stated.placing_mm)))
+    if stated.slow_mm and "time_s" in points.columns:
+        apart = np.abs(np.subtract.outer(points.column("time_s"), points.column("time_s")))
+        kernel = stated.slow_mm**2 * np.exp(-apart / stated.slow_time_s)
+        found += [field_along(NOISE, "slow", kernel, np.tile(axis, (n, 1))) for axis in np.eye(3)]
+    return found
+
+
+def _in_part(columns: Floats, pose: Pose) -> Floats:
+    """Columns (n, 3, k) of the machine as displacements (k, n, 3) in the frame of the part."""
+    return pose.back(np.moveaxis(columns, 2, 0))

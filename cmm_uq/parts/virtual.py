@@ -1,0 +1,162 @@
+"""Virtual measurements of a part: errors of its characteristics, drawn with every cause at once.
+
+The error is what is measured less what is true: of the nominal part, or, where a form is known on the whole surface, of the
+part with the form that was drawn. A characteristic that was measured as y is then y less the errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.parts.causes import Cause
+from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.machine import MachineState
+from cmm_uq.parts.of_form import Form, forms, whole_surfaces
+from cmm_uq.parts.of_machine import mean_errors, modelled, noise, not_modelled
+from cmm_uq.parts.of_stylus import styli
+from cmm_uq.parts.of_temperature import Surroundings, mean_expansion, temperatures
+from cmm_uq.parts.placing import Pose, placed
+from cmm_uq.parts.plan import Plan
+from cmm_uq.parts.qualifying import Qualified
+from cmm_uq.points import Floats
+from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
+
+CHECKED = 200
+"""Draws that are looked at exactly, beside first order."""
+
+AGREES = 0.01
+"""Of u, by which first order may be off before all is taken exactly: what u is good for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Circumstances:
+    """How and where a part is measured.
+
+    Parameters
+    ----------
+    machine : as its certificate states it.
+    poses : where the part lies; several where nobody knows, each as likely.
+    surroundings : temperatures.
+    forms : what is known of the form of its features.
+    repeats : of each point, of whose readings the mean is taken.
+    further : causes of another kind, of the plan's points.
+    """
+
+    machine: MachineState
+    poses: tuple[Pose, ...] = (Pose(),)
+    surroundings: Surroundings = field(default_factory=Surroundings)
+    forms: tuple[Form, ...] = ()
+    repeats: int = 1
+    further: tuple[Cause, ...] = ()
+
+
+class AtPose:
+    """Virtual measurements of a part in one place.
+
+    Parameters
+    ----------
+    plan : of the measurement.
+    given : its circumstances.
+    pose : the place.
+
+    Raises
+    ------
+    CmmUqError : see :class:`Evaluator`, and an axis beyond its travel.
+    """
+
+    def __init__(self, plan: Plan, given: Circumstances, pose: Pose) -> None:
+        points = placed(plan, pose, given.machine.machine, given.surroundings.columns)
+        qualified = Qualified.on(plan, points, given.machine.machine)
+        unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
+        own, on_surface = forms(given.forms, plan)
+        self.causes: list[Cause] = [
+            modelled(given.machine, qualified, pose),
+            *unmodelled,
+            *noise(given.machine, points, pose, given.repeats),
+            *styli(plan, pose),
+            *temperatures(given.surroundings, plan, points, pose),
+            *given.further,
+            *own,
+        ]
+        base = mean_errors(given.machine, qualified, pose) + mean_expansion(given.surroundings, plan, points, pose)
+        self.measured = Evaluator(plan, base, self.causes)
+        self.true: Evaluator | None = None
+        if any(len(feature.surface) for feature in plan.features):
+            true = whole_surfaces(plan)
+            still: list[Cause | None] = [None] * (len(self.causes) - len(own))
+            self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface])
+
+    def drawn(self, random: np.random.Generator, n: int) -> list[Floats]:
+        """Coefficients (n, K) of each cause."""
+        return [cause.draw(random, n) for cause in self.causes]
+
+    def errors(self, coefficients: Sequence[Floats], *, exact: bool = False) -> Floats:
+        """(n, c) errors of the characteristics."""
+        true = self.measured.at_nominal if self.true is None else self.true(coefficients, exact=exact)
+        return np.asarray(self.measured(coefficients, exact=exact) - true)
+
+    def off(self, seed: int = 0, count: int = CHECKED) -> Floats:
+        """(c,) root mean square difference of first order from exact errors, of their standard deviation."""
+        drawn = self.drawn(np.random.default_rng(seed), count)
+        exact = self.errors(drawn, exact=True)
+        apart = self.errors(drawn) - exact
+        spread = np.maximum(exact.std(axis=0), np.finfo(np.float64).tiny)
+        return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / spread)
+
+
+class Virtual:
+    """Virtual measurements of a part in all of its places, to be drawn in blocks.
+
+    Attributes
+    ----------
+    places : one a pose.
+    exact : whether nothing is taken to first order, because that is off by more than a hundredth of an uncertainty.
+    off : (c,) by how much first order is off, of the standard deviation; the largest of all places.
+    """
+
+    def __init__(self, plan: Plan, given: Circumstances) -> None:
+        self.plan = plan
+        self.places = [AtPose(plan, given, pose) for pose in given.poses]
+        self.off = np.max([place.off() for place in self.places[:1]], axis=0)
+        self.exact = bool(np.any(self.off > AGREES))
+
+    @property
+    def names(self) -> list[str]:
+        """Of the characteristics."""
+        return [one.name for one in self.plan.characteristics]
+
+    def errors(self, random: np.random.Generator, n: int) -> Floats:
+        """(n, c) errors, each place as often as the others."""
+        return self._in_places(random, n)
+
+    def _in_places(self, random: np.random.Generator, n: int) -> Floats:
+        counts = np.full(len(self.places), n // len(self.places))
+        counts[random.permutation(len(counts))[: n - counts.sum()]] += 1
+        found = [
+            place.errors(place.drawn(random, int(count)), exact=self.exact)
+            for place, count in zip(self.places, counts, strict=True)
+            if count
+        ]
+        return np.concatenate(found)
+
+    @cached_property
+    def named(self) -> Mapping[str, str]:
+        """By factor, why it should be told beside the result."""
+        return {name: why for cause in self.places[0].causes for name, why in cause.named.items()}
+
+    @property
+    def source(self) -> Source:
+        """The errors as outputs of a Monte Carlo."""
+        return Source(self.names, lambda random, n: self.errors(random, n).T)
+
+    def simulated(self, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
+        """So many virtual measurements: means, covariance, intervals of the errors."""
+        return from_source(self.source, trials, coverage, seed)
+
+    def settled(self, coverage: float = 0.95, digits: int = 2, seed: int = 0) -> Simulated:
+        """As many as the digits of u that are asked for need (JCGM 101, 7.9)."""
+        return settled_source(self.source, coverage, digits, seed)

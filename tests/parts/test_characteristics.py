@@ -1,0 +1,161 @@
+"""Characteristics of points that were moved by hand have the values that the drawing says, to a nanometre."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.geometry.association import Association
+from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.plan import Characteristic, Feature, Plan
+from cmm_uq.points import Floats
+from tests.parts_drawn import UP, block, bore, circle, plane, ring, spot
+
+NANOMETRE = 1e-6
+Move = Callable[[Floats, Floats], Floats]
+
+
+def measured(features: tuple[Feature, ...], one: Characteristic, moves: dict[str, Move]) -> float:
+    """Value of a characteristic where points p with normals n of some features stand at ``move(p, n)``."""
+    plan = Plan(features, (one,))
+    base = np.zeros_like(plan.points)
+    for name, move in moves.items():
+        rows = plan.rows[name]
+        base[rows] = move(plan.points[rows], plan.normals[rows]) - plan.points[rows]
+    return float(Evaluator(plan, base, [])([], exact=True)[0, 0])
+
+
+def shifted(*by: float) -> Move:
+    return lambda p, n: p + np.array(by)
+
+
+def tilted(angle: float, about: tuple[float, float, float]) -> Move:
+    """About an axis through the origin, by a small angle: turned exactly."""
+    axis = np.array(about)
+    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    turn = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    return lambda p, n: p @ turn.T
+
+
+BLOCK = block()[0]
+ABC = ("A", "B", "C")
+
+
+@pytest.mark.parametrize(("one", "moves", "value"), [
+    # a shaft whose points are all 5 µm farther out
+    (Characteristic("", "size", ("h1",)), {"h1": lambda p, n: p - 0.005 * n}, 20.01),
+    (Characteristic("", "distance", ("h1", "h2")), {"h2": shifted(0.0, 0.02, 0.0)}, np.hypot(140, 20.02)),
+    (Characteristic("", "distance", ("C", "D")), {"D": shifted(0.01, 0.7, 0.3)}, 200.01),
+    (Characteristic("", "distance", ("h1", "B")), {"h1": shifted(0.3, 0.01, 0.0)}, 40.01),
+    (Characteristic("", "x", ("h1",), ABC), {"h1": shifted(0.01, 0.02, 0.0)}, 30.01),
+    (Characteristic("", "y", ("h1",), ABC), {"h1": shifted(0.01, 0.02, 0.0)}, 40.02),
+    # the datum face that moves away takes the coordinate with it
+    (Characteristic("", "x", ("h1",), ABC), {"C": shifted(0.01, 0.0, 0.0)}, 29.99),
+    (Characteristic("", "position", ("h1",), ABC), {"h1": shifted(0.003, 0.004, 0.0)}, 0.01),
+    (Characteristic("", "position", ("D",), ABC), {"D": shifted(0.004, 0.0, 0.0)}, 0.008),
+    # a face of 200 mm that rises by 10 µm from end to end; parallel to the base, and as a tilt of its opposite
+    (Characteristic("", "parallelism", ("D",), ("C",)), {"D": tilted(1e-4, (0.0, 0.0, 1.0))}, 100 * np.sin(1e-4)),
+    (Characteristic("", "perpendicularity", ("D",), ("A",)), {"D": tilted(1e-4, (0.0, 1.0, 0.0))}, 20 * np.sin(1e-4)),
+    # turned about the datum's normal a face stays at right angles to it
+    (Characteristic("", "perpendicularity", ("D",), ("A",)), {"D": tilted(1e-4, (0.0, 0.0, 1.0))}, 0.0),
+    # an axis over 17 mm of measured depth
+    (Characteristic("", "perpendicularity", ("h1",), ("A",)), {"h1": tilted(1e-3, (1.0, 0.0, 0.0))}, 17 * np.sin(1e-3)),
+    (Characteristic("", "parallelism", ("h1",), ("h2",)), {"h1": tilted(1e-3, (1.0, 0.0, 0.0))}, 17 * np.sin(1e-3)),
+    (Characteristic("", "parallelism", ("h1",), ("B",)), {"h1": tilted(1e-3, (1.0, 0.0, 0.0))}, 17 * np.sin(1e-3)),
+    (Characteristic("", "parallelism", ("h1",), ("B",)), {"h1": tilted(1e-3, (0.0, 1.0, 0.0))}, 0.0),
+    # normals −y and −x: a face whose normal turns from −x towards −y
+    (Characteristic("", "angle", ("B", "C")), {"C": tilted(1e-3, (0.0, 0.0, 1.0))}, np.pi / 2 - 1e-3),
+])  # fmt: skip
+def test_moved_features_of_a_block(one: Characteristic, moves: dict[str, Move], value: float) -> None:
+    assert measured(BLOCK, one, moves) == pytest.approx(value, abs=NANOMETRE)
+
+
+def test_an_axis_that_leans_is_off_by_most_at_its_farther_end() -> None:
+    """Held at the depth of 3 mm and leaning by 1 mrad it is 17 µm off at 20 mm, and that counts twice."""
+
+    def lean(p: Floats, n: Floats) -> Floats:
+        return p + 1e-3 * np.outer(p[:, 2] + 3, [1.0, 0, 0])
+
+    value = measured(BLOCK, Characteristic("", "position", ("h1",), ABC), {"h1": lean})
+    assert value == pytest.approx(2 * 17e-3, rel=1e-5)
+
+
+def stepped() -> tuple[Feature, ...]:
+    """A journal, a collar above it, a shoulder."""
+    at = [0.0, 0.0, 0.0]
+    points, _ = ring(at, 30.0, 10.0, 12)
+    shoulder = plane("shoulder", UP, [0, 0, 10], [[1, 0, 0], [0, 1, 0]], (2, 2))
+    shoulder = Feature("shoulder", "plane", points, np.tile(UP, (12, 1)), "stylus", shoulder.nominal)
+    return (
+        bore("journal", at, 10.0, (-40.0, -20.0, 0.0), hole=False),
+        circle("collar", at, 20.0, 12, hole=False),
+        shoulder,
+    )
+
+
+@pytest.mark.parametrize(("one", "moves", "value"), [
+    (Characteristic("", "coaxiality", ("collar",), ("journal",)), {"collar": shifted(0.003, 0.004, 0.0)}, 0.01),
+    # points at a whole number of steps from the direction of the offset: the range is twice the offset
+    (Characteristic("", "circular_runout", ("collar",), ("journal",)), {"collar": shifted(0.005, 0.0, 0.0)}, 0.01),
+    (Characteristic("", "circular_runout", ("shoulder",), ("journal",)), {"shoulder": tilted(1e-4, (0.0, 1.0, 0.0))},
+     60 * np.sin(1e-4)),
+    (Characteristic("", "total_runout", ("journal",), ("journal",)), {"journal": lambda p, n: p * [1, 1, 1]}, 0.0),
+])  # fmt: skip
+def test_a_shaft_that_turns(one: Characteristic, moves: dict[str, Move], value: float) -> None:
+    assert measured(stepped(), one, moves) == pytest.approx(value, abs=2e-6)
+
+
+def test_coaxiality_of_an_axis_counts_its_lean() -> None:
+    features = (bore("journal", [0, 0, 0], 10.0, (-40.0, 0.0)), bore("other", [0, 0, 0], 5.0, (100.0, 150.0)))
+    one = Characteristic("", "coaxiality", ("other",), ("journal",))
+    assert measured(features, one, {"other": tilted(1e-4, (1.0, 0.0, 0.0))}) == pytest.approx(
+        2 * 150 * np.sin(1e-4), rel=1e-6
+    )
+
+
+def wave(count: int, size: float) -> Move:
+    """So many undulations about the part's axis, by ``size`` to either side."""
+    return lambda p, n: p + size * np.cos(count * np.arctan2(p[:, 1], p[:, 0]))[:, None] * n
+
+
+@pytest.mark.parametrize(("how", "size", "form"), [
+    ("least_squares", 20.0, 0.008), ("minimum_zone", 20.0, 0.008), ("maximum_inscribed", 19.992, 0.008),
+    ("minimum_circumscribed", 20.008, 0.008),
+])  # fmt: skip
+def test_three_lobes_by_every_association(how: Association, size: float, form: float) -> None:
+    """±4 µm in three lobes at 12 points: the rims touch three points each, 120° apart."""
+    ringed = (circle("c", [0, 0, 0], 10.0, 12, hole=False),)
+    moves: dict[str, Move] = {"c": wave(3, 0.004)}
+    of_size = measured(ringed, Characteristic("", "size", ("c",), association=how), moves)
+    of_form = measured(ringed, Characteristic("", "roundness", ("c",), association=how), moves)
+    assert [of_size, of_form] == pytest.approx([size, form], abs=NANOMETRE)
+
+
+def test_a_datum_face_may_touch_from_outside() -> None:
+    """One point of a face stands out by 8 µm in its middle: a tangent datum lies on it, least squares below."""
+    face = plane("face", UP, [0, 0, 0], [[100, 0, 0], [0, 100, 0]], (3, 3), association="tangent")
+    features = (face, spot("top", [50.0, 50.0, 30.0]))
+    one = Characteristic("", "distance", ("face", "top"))
+
+    def bumped(p: Floats, n: Floats) -> Floats:
+        return p + np.where(np.all(p[:, :2] == 50, axis=1), 0.008, 0.0)[:, None] * n
+
+    assert measured(features, one, {"face": bumped}) == pytest.approx(30 - 0.008, abs=NANOMETRE)
+    squares = Characteristic("", "distance", ("face", "top"), association="least_squares")
+    assert measured(features, squares, {"face": bumped}) == pytest.approx(30 - 0.008 / 9, abs=NANOMETRE)
+
+
+@pytest.mark.parametrize(("one", "words"), [
+    (Characteristic("c", "flatness", ("h1",)), "a cylinder has no flatness"),
+    (Characteristic("c", "size", ("A",)), "a plane has no size"),
+    (Characteristic("c", "distance", ("A",)), "distance is of 2 features, not 1"),
+    (Characteristic("c", "parallelism", ("A",)), "needs a datum"),
+    (Characteristic("c", "coaxiality", ("h1",), ("A",)), "the datum of coaxiality is a plane"),
+    (Characteristic("c", "position", ("h1",)), "position needs datums"),
+])  # fmt: skip
+def test_what_a_feature_does_not_have_is_refused(one: Characteristic, words: str) -> None:
+    with pytest.raises(CmmUqError, match=words):
+        measured(BLOCK, one, {})

@@ -1,0 +1,225 @@
+"""A virtual measurement errs as the physics says: signs, levers, what is common to several points, what cancels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.of_temperature import Expansion, Surroundings
+from cmm_uq.parts.placing import Pose, placed
+from cmm_uq.parts.plan import Alignment, Characteristic, Plan, Stylus
+from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual
+from cmm_uq.points import Machine
+from cmm_uq.units import ARCSECOND
+from tests.parts_drawn import MACHINE, POSE, block, bore, circle, machine, spot
+
+APART = (Characteristic("apart", "distance", ("one", "other")),)
+
+
+def pair(one: object = (0, 0, 0), other: object = (300, 0, 0)) -> Plan:
+    return Plan((spot("one", one), spot("other", other)), APART)  # type: ignore[arg-type]
+
+
+def errors(plan: Plan, given: Circumstances, pose: Pose = POSE, *, exact: bool = True, n: int = 200) -> np.ndarray:
+    at = AtPose(plan, given, pose)
+    return at.errors(at.drawn(np.random.default_rng(0), n), exact=exact)
+
+
+def test_a_scale_that_reads_short_makes_a_distance_short_by_as_much() -> None:
+    """True = indicated + s·indicated: a machine of 50 ppm that nobody corrects indicates 300 mm/(1 + 50·10⁻⁶)."""
+    given = Circumstances(machine(["scale_x"], [[50.0]], corrected=False))
+    np.testing.assert_allclose(errors(pair(), given, n=2), 300 / (1 + 50e-6) - 300, rtol=1e-9)
+
+
+def test_a_corrected_machine_errs_by_the_difference_of_each_draw_from_the_mean() -> None:
+    draws = np.array([[40.0], [60.0]])
+    found = errors(pair(), Circumstances(machine(["scale_x"], draws)))[:, 0]
+    np.testing.assert_allclose(np.unique(found.round(9)), [-300 * 10e-6, 300 * 10e-6], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("other", "error"), [((100.0, 0, 0), 0.0), ((100.0, 100.0, 0), 0.5 * np.sqrt(2) * 100)])
+def test_squareness_changes_a_diagonal_and_no_edge(other: tuple[float, ...], error: float) -> None:
+    """e_x = −S·y, so the machine indicates x + S·y: a diagonal of 45° over 100 mm is long by S·y/√2."""
+    given = Circumstances(machine(["squareness_xy"], [[10.0]], corrected=False))
+    np.testing.assert_allclose(errors(pair(other=other), given, n=2), error * 10 * ARCSECOND, atol=2e-6)
+
+
+def test_a_turning_carriage_has_its_lever_to_the_tip() -> None:
+    """Carriage x turns about y by ε = r·x, e = ε × (0, y, z + tip): however long the tip, the lever ends where it touches."""
+    lever, r = np.array([0.0, 0.0, -200.0]), 20.0
+    plan = Plan(pair().features, APART, (Stylus("stylus", lever),))
+    given = Circumstances(machine(["rotation_x_y"], [[r]], corrected=False))
+    epsilon = r * ARCSECOND * 1e-3 * np.array([300.0, 600.0])
+    indicated = -np.diff(epsilon * POSE.translation_mm[2])
+    np.testing.assert_allclose(errors(plan, given, n=2)[0], indicated, rtol=1e-3)
+
+
+def test_readings_are_not_coordinates() -> None:
+    """With a tip 150 mm towards +x the scale of x stands 150 mm lower, and an error that goes by it is that of there."""
+    tip = np.array([150.0, 0.0, 0.0])
+    plan = Plan(pair().features, APART, (Stylus("stylus", tip, 6.0),))
+    points = placed(plan, POSE, MACHINE)
+    np.testing.assert_allclose(points.readings["x"], [150.0, 450.0])
+    np.testing.assert_allclose(points.readings["z"], [-297.0, -297.0])  # the centre of a tip of 6 mm on a level face
+    bow = Circumstances(machine(["straightness_x_z"], [[30.0]], corrected=False))
+    plan = Plan(plan.features, (Characteristic("up", "distance", ("one", "other")),), plan.styli)
+    off = AtPose(plan, bow, POSE).measured.base[:, 2]
+    expected = -0.03 * (1 - (2 * np.array([150.0, 450.0]) / 900 - 1) ** 2)
+    np.testing.assert_allclose(off, expected, rtol=1e-9)
+
+
+def test_one_tip_errs_alike_on_both_sides() -> None:
+    """A tip that is larger by δ makes a hole smaller by δ, a length over outer faces longer by δ, and moves no axis."""
+    features, characteristics = block()
+    plan = Plan(features, characteristics, (Stylus("stylus", u_diameter_um=2.0),))
+    virtual = AtPose(plan, Circumstances(machine()), POSE)
+    drawn = virtual.drawn(np.random.default_rng(1), 50)
+    delta = 1e-3 * drawn[1][:, 0]
+    found = dict(zip((one.name for one in characteristics), virtual.errors(drawn, exact=True).T, strict=True))
+    np.testing.assert_allclose(found["d1"], -delta, atol=1e-9)
+    np.testing.assert_allclose(found["length"], delta, atol=1e-9)
+    np.testing.assert_allclose(found["apart"], 0, atol=1e-9)
+
+
+def test_two_tips_move_what_each_of_them_probed() -> None:
+    given = Circumstances(machine())
+    styli = (Stylus("stylus"), Stylus("side", u_offset_um=np.array([3.0, 0.0, 0.0])))
+    plan = Plan((spot("one", [0, 0, 0]), spot("other", [300, 0, 0], stylus="side")), APART, styli)
+    assert errors(plan, given, n=4000).std() == pytest.approx(3e-3, rel=0.05)
+    same = Plan((spot("one", [0, 0, 0], stylus="side"), spot("other", [300, 0, 0], stylus="side")), APART, styli)
+    np.testing.assert_allclose(errors(same, given), 0, atol=1e-9)
+
+
+def test_a_tip_of_which_everything_is_qualified_away_has_no_play() -> None:
+    """Hysteresis along x, y and z alike is a larger tip to a sphere probed on all sides, and is gone from the part."""
+    drawn = np.full((1, 3), 4.0)
+    names = [f"hysteresis_{axis}" for axis in "xyz"]
+    hole = circle("hole", [0, 0, 0], 20.0, 4)
+    plan = Plan((hole,), (Characteristic("d", "size", ("hole",)),))
+    state = machine(names, drawn, corrected=False)
+    raw = errors(plan, Circumstances(state), n=2)[0, 0]
+    assert raw == pytest.approx(-4e-3, rel=1e-6)  # half the gap on each side: the hole is small by all of it
+    qualified = Plan(
+        plan.features, plan.characteristics, (Stylus("stylus", qualified_at_mm=np.array([100.0, 100.0, -300.0])),)
+    )
+    left = errors(qualified, Circumstances(state), n=2)[0, 0]
+    assert abs(left) < 0.4 * abs(raw)
+
+
+def test_part_and_scale_of_one_material_at_one_temperature_expand_together() -> None:
+    """Neither is corrected: the part is longer by α·ΔT and the scale reads shorter by it."""
+    warm = Expansion(11.5e-6, 0.0, 25.0, corrected=False)
+    for scales, expected in (((Expansion(),) * 3, 300 * 11.5e-6 * 5), ((warm,) * 3, 0.0)):
+        given = Circumstances(machine(), surroundings=Surroundings(warm, scales))
+        np.testing.assert_allclose(errors(pair(), given, n=2), expected, atol=1e-9)
+
+
+def test_the_product_of_an_uncertain_coefficient_and_an_uncertain_temperature() -> None:
+    """Var(α·ΔT) of independent factors, exactly: α²u² + ΔT²u² + u²u² (JCGM 100, 5.1.2, note, here all of it)."""
+    cte, u_cte, excess, u_t = 11.5e-6, 2e-6, 3.0, 2.0
+    part = Expansion(cte, u_cte, 20.0 + excess, u_t)
+    found = errors(pair(), Circumstances(machine(), surroundings=Surroundings(part)), n=100_000)[:, 0]
+    expected = 300 * np.sqrt((cte * u_t) ** 2 + (excess * u_cte) ** 2 + (u_cte * u_t) ** 2)
+    assert found.std() == pytest.approx(expected, rel=0.01)
+
+
+def test_a_free_body_in_a_gradient_of_temperature_bends_to_a_circle() -> None:
+    """Of radius 1/(α·g): the middle of a bar of length L stands off its ends by α·g·L²/8."""
+    alpha, gradient, length = 11.5e-6, 2.0, 400.0
+    ends = [spot("a", [0, 0, 0]), spot("middle", [200, 0, 0]), spot("b", [length, 0, 0])]
+    plan = Plan(tuple(ends), (Characteristic("z", "distance", ("a", "b")),))
+    warm = Surroundings(Expansion(alpha), u_gradient_k_per_m=np.array([0.0, 0.0, gradient]))
+    at = AtPose(plan, Circumstances(machine(), surroundings=warm), Pose(np.eye(3), np.array([100.0, 100.0, -100.0])))
+    bent = at.causes[-1].moved(np.array([[0.0, 0.0, gradient]]), slice(None))[0, :, 2]
+    sagitta = bent[1] - 0.5 * (bent[0] + bent[2])
+    assert sagitta == pytest.approx(alpha * gradient * 1e-3 * length**2 / 8, rel=1e-9)
+
+
+@settings(max_examples=15)
+@given(st.lists(st.floats(-1, 1), min_size=6, max_size=6))
+def test_where_the_part_lies_is_no_error_of_it(numbers: list[float]) -> None:
+    """A part moved and turned a little, as a whole, has the characteristics that it had; within 0.1 nm."""
+    features, characteristics = block()
+    plan = Plan(features, characteristics, alignment=Alignment(("A", "B", "C")))
+    still = Evaluator(plan, np.zeros_like(plan.points), [])
+    turn = Rotation.from_rotvec(1e-3 * np.array(numbers[:3])).as_matrix()
+    moved = Evaluator(plan, plan.points @ turn.T + np.array(numbers[3:]) - plan.points, [])
+    off = moved([], exact=True) - still.at_nominal
+    np.testing.assert_allclose(off, 0, atol=1e-7)
+
+
+def test_first_order_is_the_exact_measurement_to_a_hundredth_of_u() -> None:
+    names = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx", "rotation_x_z"]
+    draws = np.random.default_rng(3).standard_normal((2000, 7)) * 5
+    plan = Plan(*block(), styli=(Stylus("stylus", np.array([0, 0, -100.0]), 4.0, 0.5, np.zeros(3), 0.8),))
+    virtual = Virtual(plan, Circumstances(machine(names, draws, 1.0), (POSE,)))
+    assert virtual.off.max() < 0.003
+    assert not virtual.exact
+    given = virtual.places[0].drawn(np.random.default_rng(4), 300)
+    apart = virtual.places[0].errors(given) - virtual.places[0].errors(given, exact=True)
+    assert np.abs(apart).max() < 2e-5  # mm: squares of micrometres over millimetres
+
+
+def test_large_errors_are_not_taken_to_first_order() -> None:
+    draws = np.random.default_rng(5).standard_normal((500, 1)) * 3e3
+    plan = Plan((bore("h1", [0, 0, 0], 2.0),), (Characteristic("d", "size", ("h1",)),))
+    assert Virtual(plan, Circumstances(machine(["squareness_xy"], draws), (POSE,))).exact
+
+
+def test_linear_characteristics_have_the_covariance_of_the_law_of_propagation() -> None:
+    """JCGM 102, 6.2.1: V = J·Vₓ·Jᵀ, with J written down here for distances along x, y and a diagonal."""
+    places = {"o": [0, 0, 0], "x": [400, 0, 0], "y": [0, 250, 0], "xy": [400, 250, 0]}
+    plan = Plan(
+        tuple(spot(name, place) for name, place in places.items()),
+        tuple(Characteristic(name, "distance", ("o", name)) for name in ("x", "y", "xy")),
+    )
+    u = np.array([4.0, 6.0, 5.0])
+    correlated = np.array([[1, 0.6, 0], [0.6, 1, -0.3], [0, -0.3, 1]]) * np.outer(u, u)
+    draws = np.random.default_rng(6).multivariate_normal(np.zeros(3), correlated, 100_000)
+    noise = 1.5e-3
+    state = machine(["scale_x", "scale_y", "squareness_xy"], draws, 1e3 * noise)
+    pose = Pose(np.eye(3), np.array([100.0, 100.0, -300.0]))
+    found = Virtual(plan, Circumstances(state, (pose,))).simulated(200_000, seed=7).covariance
+    diagonal = np.hypot(400.0, 250.0)
+    unit = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "xy": np.array([400, 250, 0]) / diagonal}
+    J = np.array([[-400.0 * 1e-6, 0, 0], [0, -250.0 * 1e-6, 0],
+                  [-(400**2) / diagonal * 1e-6, -(250**2) / diagonal * 1e-6, 400 * 250 / diagonal * ARCSECOND]])  # fmt: skip
+    readings = np.array([[noise**2 * (unit[a] @ unit[b]) * (2 if a == b else 1) for b in unit] for a in unit])
+    expected = J @ correlated @ J.T + readings
+    scale = np.sqrt(np.outer(np.diagonal(expected), np.diagonal(expected)))
+    np.testing.assert_allclose(found / scale, expected / scale, atol=0.01)
+    np.testing.assert_allclose(np.sqrt(np.diagonal(found)), np.sqrt(np.diagonal(expected)), rtol=0.01)
+
+
+def test_a_part_beyond_the_travel_is_refused() -> None:
+    with pytest.raises(
+        CmmUqError, match=r"X would have to read 950.0 mm at feature 'other', beyond its travel of 0 to 900"
+    ):
+        errors(pair(), Circumstances(machine()), Pose(np.eye(3), np.array([650.0, 0, -10])))
+
+
+@pytest.mark.parametrize(("datums", "words"), [
+    (("A",), "free to turn about 'A'"), (("A", "B"), "free to shift"), (("hole",), "do not fix how the part is turned"),
+])  # fmt: skip
+def test_datums_that_do_not_fix_the_frame_are_refused(datums: tuple[str, ...], words: str) -> None:
+    features, _ = block()
+    hole = circle("hole", [100, 50, 0], 5.0)
+    plan = Plan((*features, hole), (Characteristic("x", "x", ("h1",), datums),))
+    with pytest.raises(CmmUqError, match=words):
+        Virtual(plan, Circumstances(machine(), (POSE,)))
+
+
+def test_a_mean_error_of_the_machine_is_that_of_its_place() -> None:
+    """Solved to the end: a scale error of 1000 ppm at 800 mm is 0.8 mm less its own square, wherever the origin is."""
+    state = machine(["scale_x"], [[1000.0]], corrected=False)
+    plan = Plan((spot("one", [0, 0, 0]), spot("other", [100, 0, 0])), APART)
+    far = Machine("m", travel_mm=MACHINE.travel_mm, origin_mm=np.array([50.0, 0, 0]))
+    at = AtPose(plan, Circumstances(replace(state, machine=far)), Pose(np.eye(3), np.array([650.0, 10, -10])))
+    np.testing.assert_allclose(at.measured.base[:, 0], -np.array([700.0, 800.0]) * 1e-3 / 1.001, rtol=1e-9)
