@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cmm_uq.commands.part_plan import refuse_unfit as refuse_unfit_plan
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import refuse_unmeasured
@@ -147,9 +148,14 @@ def _of_a_part(path: Path) -> bool:
 
 def _check_part(folder: Path, path: Path) -> Checked:
     """The job of a part: what its readers refuse, and that its figures are an example's."""
-    wrong, warnings = Gathered(), list[Problem]()
+    wrong, warnings, job = Gathered(), list[Problem](), None
     with wrong.going_on():
-        if (origin := read_part(folder).facts.job.origin) != MEASURED:
+        job = read_part(folder, machine=False)
+        refuse_unfit_plan(job)
+    if job is not None:
+        with wrong.going_on():
+            read_part(folder)  # with the files that state the machine
+        if (origin := job.facts.job.origin) != MEASURED:
             said = f"the figures are {origin}, and all that is made of them says so"
             warnings.append(Problem(said, str(path), key="[job] origin", fix="Put in your own, and take origin away"))
     return Checked(str(folder), _once(Problem.of(error) for error in wrong.problems), tuple(warnings))

@@ -1,13 +1,22 @@
-"""The measurement plan of a part's job, as the virtual measurement takes it."""
+"""The measurement plan of a part's job and its circumstances, as the virtual measurement takes them."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.jobs.part.placing import rotation
 from cmm_uq.jobs.part.probed import Probed
+from cmm_uq.jobs.part.tables import StylusFacts
+from cmm_uq.parts.causes import Cause, Scatter
+from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.of_form import Form
+from cmm_uq.parts.of_temperature import Expansion, Surroundings
+from cmm_uq.parts.placing import Pose, around
 from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan, Stylus
+from cmm_uq.units import MICROMETRE
 
 
 def plan_of(job: PartJob) -> Plan:
@@ -26,14 +35,82 @@ def plan_of(job: PartJob) -> Plan:
         features,
         tuple(_characteristic(one) for one in facts.characteristic),
         tuple(
-            Stylus(one.name, np.array(one.offset_mm), one.diameter_mm, one.u_diameter_um, np.array(one.u_offset_um),
-                   one.lobing_um)
+            _stylus(one)
             for one in facts.stylus
         ),
         Alignment(tuple(facts.alignment.datums), facts.alignment.best_fit),
         rows.astype(np.int64),
         times,
     )  # fmt: skip
+
+
+def refuse_unfit(job: PartJob) -> None:
+    """Refuse what a virtual measurement of the job would refuse of its plan.
+
+    Raises
+    ------
+    CmmUqError : points that do not determine a feature, datums that do not fix a frame.
+    """
+    plan = plan_of(job)
+    try:
+        Evaluator(plan, np.zeros_like(plan.points), ())
+    except CmmUqError as error:
+        raise CmmUqError(
+            error.problem, where=f"{job.folder / 'job.toml'}: {error.where or ''}", fix=error.fix
+        ) from error
+
+
+def poses_of(job: PartJob, count: int) -> tuple[Pose, ...]:
+    """Where the part lies: the one place that is stated, or so many where it may lie.
+
+    Parameters
+    ----------
+    count : of places, where they are not the same each time.
+    """
+    given = job.facts.placing
+    pose = Pose(rotation(given), np.array(given.origin_mm, dtype=np.float64))
+    if not (any(given.u_origin_mm) or any(given.u_rotation_deg)):
+        return (pose,)
+    return around(pose, np.array(given.u_origin_mm), np.radians(given.u_rotation_deg), count)
+
+
+def surroundings_of(job: PartJob) -> Surroundings:
+    """Temperatures of part and scales, and what is known of them."""
+    facts, given = job.facts.part, job.facts.environment
+    part = Expansion(facts.cte_per_k, facts.u_cte_per_k, given.part_c, given.u_part_k, given.compensated)
+    x, y, z = (
+        Expansion(given.scales_cte_per_k, given.u_scales_cte_per_k, celsius, given.u_scales_k, given.compensated)
+        for celsius in given.scales_c
+    )
+    return Surroundings(part, (x, y, z), np.array(given.u_gradient_k_per_m))
+
+
+def forms_of(job: PartJob) -> tuple[Form, ...]:
+    """Form of each feature: its own, else that of all."""
+    found = []
+    for one in job.features:
+        given = one.facts.form or job.facts.form
+        lobed = one.facts.kind in _LOBED
+        harmonics = tuple((int(count), size) for count, size in given.harmonics_um.items()) if lobed else ()
+        form = Form(one.facts.name, harmonics, given.field_um, given.correlation_mm, given.roughness_um)
+        if form.field_um or form.harmonics_um or form.roughness_um:
+            found.append(form)
+    return tuple(found)
+
+
+def clamping_of(job: PartJob, plan: Plan) -> tuple[Cause, ...]:
+    """What clamping does to each point on its own; none where nothing is stated."""
+    size = MICROMETRE * job.facts.placing.u_fixture_um
+    return (Scatter.of("fixture", "fixture", np.full((len(plan.points), 3), size)),) if size else ()
+
+
+_LOBED = ("circle", "cylinder", "cone")
+
+
+def _stylus(one: StylusFacts) -> Stylus:
+    at = None if one.qualified_at_mm is None else np.array(one.qualified_at_mm)
+    return Stylus(one.name, np.array(one.offset_mm), one.diameter_mm, one.u_diameter_um, np.array(one.u_offset_um),
+                  one.lobing_um, at)  # fmt: skip
 
 
 def _feature(one: Probed, stylus: str) -> Feature:

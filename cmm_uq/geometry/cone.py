@@ -111,7 +111,9 @@ def linearised(about: Floats, state: Axis, *, tapered: bool) -> Floats:
     """Derivatives of the distances by shifts along u, v, tilts to u, v, distance and half angle; then the distances."""
     x, y, g = state.frame @ (about - state.point[:, None])
     f = np.hypot(x, y)
-    ex, ey = x / f, y / f
+    # a point on the axis has no direction from it: any is a derivative's
+    away = np.where(f > 0, f, 1.0)
+    ex, ey = np.where(f > 0, x / away, 1.0), y / away
     cos, sin = np.cos(state.half_angle), np.sin(state.half_angle)
     lever = -(g * cos + f * sin)
     rows = [-ex * cos, -ey * cos, lever * ex, lever * ey, np.full(len(f), -1.0)]

@@ -54,3 +54,14 @@ def test_one_ring_does_not():
 def test_five_points_are_the_least():
     with pytest.raises(CmmUqError, match=r"4 points are too few\. Measure at least 5"):
         fit_cylinder(np.eye(4, 3))
+
+
+@pytest.mark.parametrize("height", [12.0, 16.0])
+@pytest.mark.parametrize("count", [4, 8])
+def test_points_in_regular_sections_are_no_trouble(count, height):
+    """A plan's points: some lie on the axis of a direction that is tried."""
+    angle, z = np.meshgrid(np.arange(count) * 2 * np.pi / count, np.linspace(-height / 2, height / 2, 3))
+    points = np.column_stack([15 * np.cos(angle.ravel()), 15 * np.sin(angle.ravel()), z.ravel()]) + [60, 40, -10]
+    found = fit_cylinder(points, u_point=1e-3)
+    assert found.radius == pytest.approx(15, abs=1e-9)
+    assert abs(found.direction[2]) == pytest.approx(1, abs=1e-12)

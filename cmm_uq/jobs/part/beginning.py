@@ -40,7 +40,7 @@ TABLES: Mapping[str, Any] = MappingProxyType({
     "alignment": {"datums": ["A", "B", "C"]},
     "placing": {"origin_mm": [300.0, 450.0, -500.0]},
     "environment": {"u_part_k": 0.1, "u_scales_k": 0.1},
-    "form": {"form_um": 1.0, "roughness_um": 0.2},
+    "form": {"field_um": 1.0, "roughness_um": 0.2},
     "characteristic": [
         {"name": "1", "what": "size", "features": ["bore"], "lower_mm": 29.95, "upper_mm": 30.05},
         {"name": "2", "what": "position", "features": ["bore"], "datums": ["A", "B", "C"], "tolerance_mm": 0.1},

@@ -16,7 +16,10 @@ What = Literal[
     "perpendicularity", "angularity", "position", "coaxiality", "x", "y", "z", "circular_runout", "total_runout",
 ]  # fmt: skip
 
-AXIAL: tuple[Kind, ...] = ("line", "circle", "cylinder", "cone")
+AXIAL: tuple[Kind, ...] = ("line", "cylinder", "cone")
+TURNED: tuple[Kind, ...] = ("line", "plane", "cylinder", "cone")
+"""Kinds whose direction is measured; that of a circle is nominal."""
+
 DIRECTED: tuple[Kind, ...] = ("line", "plane", "circle", "cylinder", "cone")
 EVERY: tuple[Kind, ...] = ("point", "line", "plane", "circle", "sphere", "cylinder", "cone")
 PLACED: tuple[Kind, ...] = ("point", "circle", "sphere", "cylinder", "cone")
@@ -50,13 +53,13 @@ ASKS: Mapping[What, Asks] = {
     "size": Asks(("circle", "sphere", "cylinder"), limits="lengths"),
     "straightness": Asks(("line",)), "flatness": Asks(("plane",)), "roundness": Asks(("circle",)),
     "cylindricity": Asks(("cylinder",)), "sphericity": Asks(("sphere",)),
-    "distance": Asks(EVERY, 2, limits="lengths"), "angle": Asks(DIRECTED, 2, limits="angles"),
-    "parallelism": Asks(DIRECTED, 1, DIRECTED, 1), "perpendicularity": Asks(DIRECTED, 1, DIRECTED, 1),
-    "angularity": Asks(DIRECTED, 1, DIRECTED, 1),
-    "position": Asks(EVERY, 1, EVERY, framed=True), "coaxiality": Asks(AXIAL, 1, AXIAL, 1),
+    "distance": Asks(EVERY, 2, limits="lengths"), "angle": Asks(TURNED, 2, limits="angles"),
+    "parallelism": Asks(TURNED, 1, DIRECTED, 1), "perpendicularity": Asks(TURNED, 1, DIRECTED, 1),
+    "angularity": Asks(TURNED, 1, DIRECTED, 1),
+    "position": Asks(EVERY, 1, EVERY, framed=True), "coaxiality": Asks(("circle", *AXIAL), 1, AXIAL, 1),
     **{axis: Asks(PLACED, 1, EVERY, limits="lengths", framed=True) for axis in ("x", "y", "z")},
-    "circular_runout": Asks(("circle", "cylinder", "cone", "plane"), 1, AXIAL, 1),
-    "total_runout": Asks(("cylinder", "plane"), 1, AXIAL, 1),
+    "circular_runout": Asks(("plane", "circle", "cylinder"), 1, AXIAL, 1),
+    "total_runout": Asks(("plane", "cylinder"), 1, AXIAL, 1),
 }  # fmt: skip
 """Of each kind of characteristic (ISO 1101, ISO 5459, ISO 14405-1)."""
 

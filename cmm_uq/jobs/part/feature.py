@@ -12,6 +12,7 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import Field, field_validator, model_validator
 
 from cmm_uq.files.limits import LISTED
+from cmm_uq.jobs.part.form import FormFacts
 from cmm_uq.jobs.table import Length, Table, Triple
 
 Kind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
@@ -155,8 +156,8 @@ class FeatureFacts(Table):
     """Where it is probed: a pattern of points."""
     points_mm: Annotated[list[Triple], Field(max_length=LISTED.most)] | None = None
     """In place of a pattern, its contact points on the nominal surface; normals follow from it."""
-    form_um: Annotated[float, Field(ge=0, le=1e6)] | None = None
-    """Standard deviation of its form about the nominal surface, where not that of `[form]`."""
+    form: FormFacts | None = None
+    """Its own form and roughness, in place of `[form]`."""
 
     @field_validator("direction", "along", "normal")
     @classmethod

@@ -10,11 +10,11 @@ from cmm_uq.files.limits import INPUTS
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.feature import FeatureFacts
+from cmm_uq.jobs.part.form import FormFacts
 from cmm_uq.jobs.part.tables import (
     AlignmentFacts,
     DecisionFacts,
     EnvironmentFacts,
-    FormFacts,
     MachineStateFacts,
     MeasuredFacts,
     PartFacts,

@@ -57,9 +57,9 @@ def _fixed(one: Probed, centre: Floats, size: float) -> Floats:
     turn = np.hstack([np.zeros((2, 3)), across])
     if one.facts.kind == "plane":
         return np.vstack([w @ place, turn])
-    if one.facts.kind in ("line", "cylinder"):
-        return np.vstack([across @ place, turn])
-    return np.vstack([place, turn])
+    if one.facts.kind == "circle":  # its direction is nominal
+        return np.asarray(across @ place)
+    return np.vstack([across @ place, turn])
 
 
 def _cross(v: Floats) -> Floats:

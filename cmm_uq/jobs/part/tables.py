@@ -12,7 +12,7 @@ from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.machine import Travel
 from cmm_uq.jobs.origin import MEASURED, Origin
 from cmm_uq.jobs.part.feature import Count
-from cmm_uq.jobs.table import Length, Table, Temperature, Triple, Uncertainty
+from cmm_uq.jobs.table import Table, Temperature, Triple, Uncertainty
 
 Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]
 """A coefficient of expansion, 1/K: steel has 11.5e-6."""
@@ -92,6 +92,9 @@ class StylusFacts(Table):
     """Standard uncertainty of the tip's effective diameter, as qualified."""
     u_offset_um: Uncertainties = [0.0, 0.0, 0.0]
     """Standard uncertainties of the tip's offset against the tip to which the others are referred; 0 of that tip."""
+    qualified_at_mm: Triple | None = None
+    """Coordinates of the machine where the reference sphere stood; what the machine's errors do there, they do not do to the
+    part again."""
     lobing_um: Uncertainty = 0.0
     """Standard deviation of the pre-travel over directions of probing, size and offset taken out of it."""
 
@@ -154,19 +157,8 @@ class EnvironmentFacts(Table):
     """Coefficient of expansion of the scales, 1/K."""
     u_scales_cte_per_k: SmallExpansion = 0.0
     """Standard uncertainty of that coefficient, 1/K."""
-    u_gradient_k_per_m: Kelvins = 0.0
-    """Standard deviation of a gradient of the part's temperature, along each axis of the part, K/m."""
-
-
-class FormFacts(Table):
-    """``[form]``: the part's own form and roughness, between the points that are probed."""
-
-    form_um: Annotated[float, Field(ge=0, le=1e6)] = 0.0
-    """Standard deviation of a surface about its nominal form."""
-    correlation_mm: Length = 10.0
-    """Over which length form forgets."""
-    roughness_um: Annotated[float, Field(ge=0, le=1e4)] = 0.0
-    """Standard deviation of a contact point by roughness, from point to point on its own."""
+    u_gradient_k_per_m: Annotated[list[Kelvins], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
+    """Standard uncertainties of the gradient of the part's temperature along the axes of the machine, K/m."""
 
 
 class DecisionFacts(Table):
