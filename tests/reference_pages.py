@@ -20,7 +20,10 @@ from cmm_uq.instruments.library import profile_named, ready
 from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
+from cmm_uq.jobs.part import drawing_dmis, drawing_qif
 from cmm_uq.jobs.part.characteristic import ASKS, LIMITS, Asks
+from cmm_uq.jobs.part.drawing_dmis import PROGRAM as DMIS
+from cmm_uq.jobs.part.drawing_qif import PROGRAM as QIF
 from cmm_uq.jobs.part.feature import FEWEST, PATTERNS
 from cmm_uq.jobs.recording import REQUIRED
 from cmm_uq.jobs.schema import keys_of
@@ -117,6 +120,13 @@ def part() -> str:
         if name == "characteristic":
             rows = [(f"`{what}`", *_asked(asks)) for what, asks in ASKS.items()]
             parts.append(table(("`what`", "of", "about datums", "limits"), rows))
+    parts += [
+        "## Plans of other programs",
+        f"`cmm-uq new part --from FILE` makes these tables of a {QIF} or a {DMIS}. What is not understood is refused by name; "
+        "`--set part.not_measured='[\"NAME\"]'` leaves it out knowingly, `'[\"*\"]'` all of it, and the job says what was left out. "
+        "What such a file leaves open stands in the job as an example.",
+        *(" ".join(text.split("\n\n")[1].split()) for text in (str(drawing_qif.__doc__), str(drawing_dmis.__doc__))),
+    ]
     return page("job.toml of a part, key by key", *parts)
 
 

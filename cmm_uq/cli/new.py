@@ -83,6 +83,10 @@ def command(
         return
     target = folder or Path(kind)
     check_empty(target)
+    if kind == PART and (column or key):
+        raise CmmUqError(
+            "the plan of a part has no columns that an option could name", where="--column", fix="Leave it out"
+        )
     given = _given(machine, serial, settings or [])
     if export is not None and kind != PART:
         files = _of_export(kind, export, target, given, keys_of(column, key), quiet=quiet or json)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from cmm_uq.commands.schemas import shipped
 from cmm_uq.errors import CmmUqError
@@ -109,7 +110,14 @@ def _aligned(drawing: Drawing) -> dict[str, Any]:
 
 
 def _probed(given: Mapping[str, Any]) -> Probed:
-    return probed(FeatureFacts.model_validate(dict(given)), f"feature {given['name']!r}")
+    where = f"feature {given['name']!r}"
+    try:
+        facts = FeatureFacts.model_validate(dict(given))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise CmmUqError(f"{'.'.join(map(str, first['loc']))}: {first['msg'].removeprefix('Value error, ')}", where=where,
+                         fix=f"Leave it out knowingly: --set part.not_measured='[\"{given['name']}\"]'") from None  # fmt: skip
+    return probed(facts, where)
 
 
 def _in_the_middle(tables: Mapping[str, Any]) -> list[float]:

@@ -61,7 +61,7 @@ def test_five_points_are_the_least():
 def test_points_in_regular_sections_are_no_trouble(count, height):
     """A plan's points: some lie on the axis of a direction that is tried."""
     angle, z = np.meshgrid(np.arange(count) * 2 * np.pi / count, np.linspace(-height / 2, height / 2, 3))
-    points = np.column_stack([15 * np.cos(angle.ravel()), 15 * np.sin(angle.ravel()), z.ravel()]) + [60, 40, -10]
-    found = fit_cylinder(points, u_point=1e-3)
+    points = np.column_stack([15 * np.cos(angle.ravel()), 15 * np.sin(angle.ravel()), z.ravel()])
+    found = fit_cylinder(points + np.array([60, 40, -10]), u_point=1e-3)
     assert found.radius == pytest.approx(15, abs=1e-9)
     assert abs(found.direction[2]) == pytest.approx(1, abs=1e-12)

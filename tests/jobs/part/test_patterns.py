@@ -47,7 +47,9 @@ directions = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(
 places = st.tuples(*[st.floats(-1000, 1000)] * 3)
 
 
-def off_and_outward(kind: str, keys: dict[str, Any], w: Floats, local: Floats, normals: Floats) -> tuple[Floats, Floats]:
+def off_and_outward(
+    kind: str, keys: dict[str, Any], w: Floats, local: Floats, normals: Floats
+) -> tuple[Floats, Floats]:
     """(n,) distance from the nominal surface, and cosine between a normal and the way away from the axis, plane or centre."""
     height = local @ w
     radial = local - np.outer(height, w)
@@ -65,7 +67,12 @@ def off_and_outward(kind: str, keys: dict[str, Any], w: Floats, local: Floats, n
 @pytest.mark.parametrize(("kind", "keys", "strategy", "count"), PATTERNS)
 @given(w=directions, place=places)
 def test_points_lie_on_their_surface_wherever_it_is(
-    kind: str, keys: dict[str, Any], strategy: dict[str, Any], count: int, w: tuple[float, ...], place: tuple[float, ...]
+    kind: str,
+    keys: dict[str, Any],
+    strategy: dict[str, Any],
+    count: int,
+    w: tuple[float, ...],
+    place: tuple[float, ...],
 ) -> None:
     unit = np.array(w) / np.linalg.norm(w)
     if kind == "line":  # a normal across the line
@@ -101,7 +108,12 @@ def test_a_cone_widens_along_its_direction_and_its_normals_lean_back() -> None:
 
 
 def test_fits_of_the_points_give_the_nominal_sizes() -> None:
-    common: dict[str, Any] = {"point_mm": [5.0, -3.0, 8.0], "direction": [1.0, 2.0, -2.0], "diameter_mm": 12.0, "inner": True}
+    common: dict[str, Any] = {
+        "point_mm": [5.0, -3.0, 8.0],
+        "direction": [1.0, 2.0, -2.0],
+        "diameter_mm": 12.0,
+        "inner": True,
+    }
     circle = feature("circle", strategy={"pattern": "points", "points": 6}, **common)
     sphere = feature("sphere", strategy={"pattern": "points", "points": 25}, **common)
     cylinder = feature("cylinder", length_mm=9.0, strategy={"pattern": "points", "points": 20}, **common)
@@ -139,6 +151,8 @@ def test_points_spread_over_a_ring_are_even_over_its_area() -> None:
 
 def test_points_that_are_given_get_their_normals_from_the_nominal() -> None:
     points = [[5.0, 0.0, 0.0], [0.0, 5.0, 1.0], [-5.0, 0.0, 2.0], [0.0, -5.0, 3.0], [3.0, 4.0, 4.0]]
-    found = feature("cylinder", point_mm=[0.0, 0.0, 0.0], direction=[0.0, 0.0, 1.0], diameter_mm=10.0, inner=True, points_mm=points)
+    found = feature(
+        "cylinder", point_mm=[0.0, 0.0, 0.0], direction=[0.0, 0.0, 1.0], diameter_mm=10.0, inner=True, points_mm=points
+    )
     np.testing.assert_array_equal(found.points, points)
     np.testing.assert_allclose(found.normals[4], [-0.6, -0.8, 0])
