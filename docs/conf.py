@@ -34,7 +34,7 @@ CONTENTS: dict[str, list[str]] = {
     "How it works": [
         "certificate", "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
-        "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
+        "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features", "machine/parts",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],
     "What it rests on": [

@@ -18,7 +18,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
 from cmm_uq.geometry.repeated import Repeated
 from cmm_uq.parts.associating import Features
-from cmm_uq.parts.datums import Frame
+from cmm_uq.parts.datums import BEST_FIT, Frame
 from cmm_uq.parts.plan import (
     DIRECTED,
     FORMS,
@@ -94,9 +94,8 @@ class Evaluation:
     @property
     def datums(self) -> tuple[Key, ...]:
         """Features of its datums."""
-        return tuple(
-            (name, self.plan.feature(name).association) for name in self.frame_of or self.characteristic.datums
-        )
+        names = self.frame_of or self.characteristic.datums
+        return () if names == BEST_FIT else tuple((name, self.plan.feature(name).association) for name in names)
 
     @property
     def frame_of(self) -> tuple[str, ...]:
@@ -104,6 +103,8 @@ class Evaluation:
         one = self.characteristic
         if one.what not in ("position", *AXES):
             return ()
+        if not one.datums and self.plan.alignment.best_fit:
+            return BEST_FIT
         return one.datums or self.plan.alignment.datums
 
     @property
@@ -272,7 +273,8 @@ def _refuse(one: Characteristic, plan: Plan) -> None:
             raise CmmUqError(f"a {kind} has no {one.what}", where=where, fix=f"It is of {', '.join(allowed)}")
     if one.what in (*ORIENTATIONS, *RUNOUTS, "coaxiality"):
         _refuse_without_datum(one, plan, where)
-    if one.what in LOCATIONS and one.what != "coaxiality" and not (one.datums or plan.alignment.datums):
+    aligned = one.datums or plan.alignment.datums or plan.alignment.best_fit
+    if one.what in LOCATIONS and one.what != "coaxiality" and not aligned:
         raise CmmUqError(f"{one.what} needs datums", where=where, fix="Name datums, or an alignment of the plan")
 
 

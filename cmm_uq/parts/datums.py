@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.associating import Features
@@ -23,6 +24,11 @@ _ACROSS = 0.1
 
 _FREE = 1e-6
 """Length of what a datum fixes, seen in the directions that are still free, below which it fixes none of them."""
+
+_SETTLED = 1e-11
+"""mm and rad."""
+
+_ROUNDS = 20
 
 _TURNING: tuple[FeatureKind, ...] = ("line", "plane", "cylinder", "cone")
 """Datums whose direction is measured; of a circle it is nominal."""
@@ -53,6 +59,58 @@ class Frame:
     def vectors(self, directions: Floats) -> Floats:
         """Directions (N, 3) or (N, n, 3)."""
         return np.asarray(np.einsum("n...i,nij->n...j", directions, self.turn))
+
+
+BEST_FIT = ("(best fit)",)
+"""In place of names of datums: the frame by best fit."""
+
+
+class BestFit:
+    """The frame in which all points lie nearest to the nominal surfaces, by least squares of their distances.
+
+    Distances are those from the tangent plane of each nominal point, which a shift t along a surface of radius R leaves by
+    t²/(2R): a nanometre for 5 µm along 12 mm.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) nominal.
+
+    Raises
+    ------
+    CmmUqError : points that leave the part free to move.
+    """
+
+    def __init__(self, points: Floats, normals: Floats) -> None:
+        self.points, self.normals = points, normals
+        self.middle = points.mean(axis=0)
+        about = points - self.middle
+        size = float(np.sqrt(np.mean(about**2))) or 1.0
+        rows = np.hstack([normals, np.cross(about, normals) / size])
+        if np.linalg.matrix_rank(rows, tol=_FREE * np.sqrt(len(rows))) < rows.shape[1]:
+            raise CmmUqError("the points leave the part free to move by their best fit", where="alignment",
+                             fix="Probe faces in three directions, or name datums")  # fmt: skip
+        self._solve = np.linalg.pinv(rows) / np.repeat([1.0, size], 3)[:, None]
+
+    @property
+    def derivative(self) -> Floats:
+        """(6, n, 3) of shift and rotation of the measured points by their coordinates."""
+        return np.asarray(self._solve[:, :, None] * self.normals)
+
+    def motion(self, displacements: Floats) -> Floats:
+        """(N, 6) shift, mm, and rotation vector, rad, by which points displaced by (N, n, 3) have moved."""
+        motion = np.zeros((len(displacements), 6))
+        for _ in range(_ROUNDS):
+            left = self.frame(motion).points(self.points + displacements) - self.points
+            step = np.einsum("kn,nj,Nnj->Nk", self._solve, self.normals, left, optimize=True)
+            motion += step
+            if np.abs(step).max(initial=0.0) < _SETTLED:
+                break
+        return motion
+
+    def frame(self, motion: Floats) -> Frame:
+        """The frame that takes a motion (N, 6) back."""
+        turn = Rotation.from_rotvec(motion[:, 3:]).as_matrix()
+        return Frame(turn, self.middle + motion[:, :3], self.middle)
 
 
 class DatumSystem:

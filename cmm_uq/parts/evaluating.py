@@ -16,7 +16,7 @@ from cmm_uq.geometry.association import Association
 from cmm_uq.parts.associating import VALUES, Features, ProbedFeature
 from cmm_uq.parts.causes import Cause
 from cmm_uq.parts.characteristics import Evaluation, Key, Measured
-from cmm_uq.parts.datums import DatumSystem
+from cmm_uq.parts.datums import BEST_FIT, BestFit, DatumSystem
 from cmm_uq.parts.plan import Plan
 from cmm_uq.points import Floats
 
@@ -54,8 +54,10 @@ class Evaluator:
                 [self.nominal[name].values[0] for name in one.frame_of],
             )
             for one in self.evaluations
-            if one.frame_of
+            if one.frame_of and one.frame_of != BEST_FIT
         }
+        fitted = any(one.frame_of == BEST_FIT for one in self.evaluations)
+        self.best_fit = BestFit(plan.points, plan.normals) if fitted else None
 
     def _nominal(self, name: str) -> Features:
         feature = self.plan.feature(name)
@@ -81,6 +83,8 @@ class Evaluator:
         whole = np.zeros((VALUES * len(self.linear), count, 3))
         for i, key in enumerate(self.linear):
             whole[VALUES * i : VALUES * (i + 1), self.plan.rows[key[0]]] = self.associated[key].derivative
+        if self.best_fit is not None:
+            whole = np.concatenate([whole, self.best_fit.derivative])
         parts = [cause.through(whole) for cause in self.causes if cause is not None]
         return np.concatenate([np.zeros((0, len(whole))), *parts])
 
@@ -91,13 +95,10 @@ class Evaluator:
         ----------
         exact : all features on their points, none to first order.
         """
-        linear, count = [] if exact else self.linear, _count(coefficients)
         features: dict[Key, Features] = {}
-        if linear:
-            acting = [c for c, cause in zip(coefficients, self.causes, strict=True) if cause is not None]
-            change = np.hstack([np.zeros((count, 0)), *acting]) @ self.transfer
-            for i, key in enumerate(linear):
-                features[key] = self.associated[key].to_first_order(change[:, VALUES * i : VALUES * (i + 1)])
+        change = np.zeros((_count(coefficients), 0)) if exact else self._changes(coefficients)
+        for i, key in enumerate([] if exact else self.linear):
+            features[key] = self.associated[key].to_first_order(change[:, VALUES * i : VALUES * (i + 1)])
         for key in self.keys:
             if key not in features:
                 moved = self.moved(coefficients, self.plan.rows[key[0]])
@@ -106,12 +107,24 @@ class Evaluator:
             names: system.frames([features[name, self.plan.feature(name).association] for name in names])
             for names, system in self.frames.items()
         }
+        if self.best_fit is not None:
+            start = self.best_fit.motion(self.base[None])[0]
+            frames[BEST_FIT] = self.best_fit.frame(
+                self.best_fit.motion(self.base + self.moved(coefficients, slice(None)))
+                if exact
+                else start + change[:, VALUES * len(self.linear) :]
+            )
         measured = Measured(features, frames)
         return np.column_stack([one(measured) for one in self.evaluations])
 
+    def _changes(self, coefficients: Sequence[Floats]) -> Floats:
+        """(N, …) first-order changes of what is taken to first order."""
+        acting = [c for c, cause in zip(coefficients, self.causes, strict=True) if cause is not None]
+        return np.asarray(np.hstack([np.zeros((_count(coefficients), 0)), *acting]) @ self.transfer)
+
     def moved(self, coefficients: Sequence[Floats], rows: slice) -> Floats:
         """(N, m, 3) displacements of some points by all causes, beyond ``base``, mm."""
-        found = np.zeros((_count(coefficients), rows.stop - rows.start, 3))
+        found = np.zeros((_count(coefficients), len(self.plan.points[rows]), 3))
         for cause, drawn in zip(self.causes, coefficients, strict=True):
             if cause is not None:
                 found += cause.moved(drawn, rows)

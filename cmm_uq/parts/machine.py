@@ -92,7 +92,8 @@ class MachineState:
         said nothing.
     unmodelled : errors that it may have besides.
     drift : (k,) standard deviation of each coefficient's change since the calibration.
-    corrected : whether the machine corrects the errors that were found (their means), so that what remains is about zero.
+    corrected : whether the machine corrects errors that were found, so that what remains is about zero.
+    corrections : (k,) coefficients that it then corrects; their means by default.
     calibrated, valid_until : days of its certificate.
     temperature_c : at its calibration.
 
@@ -110,6 +111,7 @@ class MachineState:
     unmodelled: tuple[Unmodelled, ...] = ()
     drift: Floats = field(default_factory=lambda: np.zeros(0))
     corrected: bool = True
+    corrections: Floats = field(default_factory=lambda: np.zeros(0))
     calibrated: date | None = None
     valid_until: date | None = None
     temperature_c: float | None = None
@@ -131,6 +133,13 @@ class MachineState:
     def mean(self) -> Floats:
         """(k,) mean of the modelled coefficients."""
         return np.asarray(self.draws.mean(axis=0))
+
+    @property
+    def corrects(self) -> Floats:
+        """(k,) coefficients that it corrects."""
+        if not self.corrected:
+            return np.zeros(self.draws.shape[1])
+        return self.corrections if len(self.corrections) else self.mean
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -22,9 +22,9 @@ _ROUNDS = 12
 def mean_errors(state: MachineState, qualified: Qualified, pose: Pose) -> Floats:
     """(n, 3) by how much the machine displaces points without any draw, in the frame of the part, mm.
 
-    Zero where it corrects what was found. Solves indicated + e(indicated) = true.
+    Solves indicated + e(indicated) = true for the mean of what is known, and adds what the machine corrects.
     """
-    if state.corrected:
+    if np.array_equal(state.corrects, state.mean):
         return np.zeros_like(qualified.part.xyz)
     points = qualified.both
     indicated = points.xyz.copy()
@@ -34,6 +34,7 @@ def mean_errors(state: MachineState, qualified: Qualified, pose: Pose) -> Floats
         indicated += change
         if np.abs(change).max(initial=0.0) < _SETTLED:
             break
+    indicated = indicated + acting.errors(points.at(indicated), state.corrects)
     return pose.back(qualified.left((indicated - points.xyz)[:, :, None])[:, :, 0])
 
 

@@ -151,8 +151,14 @@ def settled_source(
     seed: int = 0,
     largest: int = LARGEST,
     settled: Callable[[Floats, Floats], bool] = lambda figures, errors: True,
+    fewest_trials: int = _FEWEST_TRIALS,
 ) -> Simulated:
-    """The same of any source: see :func:`simulate_adaptively`."""
+    """The same of any source: see :func:`simulate_adaptively`.
+
+    Parameters
+    ----------
+    fewest_trials : before it may stop; fewer than a million where each costs more than arithmetic.
+    """
     check_coverage(coverage)
     if coverage > HIGHEST_COVERAGE:
         raise CmmUqError(
@@ -162,7 +168,7 @@ def settled_source(
     run = _Run(source, coverage, seed)
     block = max(BLOCK, int(np.ceil(100 / (1 - coverage))))
     most = max(largest // block, _FEWEST_BLOCKS)
-    fewest = min(max(_FEWEST_TRIALS // block, _FEWEST_BLOCKS), most)
+    fewest = min(max(fewest_trials // block, _FEWEST_BLOCKS), most)
     stable = False
     while not stable and run.blocks < most:
         run.advance(block)

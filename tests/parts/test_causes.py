@@ -8,6 +8,7 @@ import pytest
 from cmm_uq.inference.draws import Draws
 from cmm_uq.parts.causes import Scatter, components
 from cmm_uq.parts.machine import StatedNoise, coefficients_of, noise_of_draws, unmodelled_errors
+from cmm_uq.parts.of_fixture import elapsed, moving_part
 from cmm_uq.parts.of_form import Form
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Characteristic, Feature, Plan, Stylus
@@ -138,3 +139,17 @@ def test_the_reference_sphere_is_probed_at_25_points_of_its_upper_half() -> None
     assert len(np.unique(toward.round(9), axis=0)) == 25
     np.testing.assert_allclose(np.linalg.norm(toward, axis=1), 1)
     assert toward[:, 2].min() >= -1e-12
+
+
+@pytest.mark.parametrize(("order", "times", "part"), [
+    ((0, 1, 2), (), 0.5), ((0, 2, 1), (), 1.0), ((), (0.0, 30.0, 120.0), 0.25),
+])  # fmt: skip
+def test_what_is_probed_later_has_moved_farther(order: tuple[int, ...], times: tuple[float, ...], part: float) -> None:
+    """Of three points the second is off by that part of the whole movement which is over when it is probed."""
+    spots = (spot("a", [0, 0, 0]), spot("b", [100, 0, 0]), spot("c", [200, 0, 0]))
+    plan = Plan(spots, (Characteristic("", "distance", ("a", "b")),),
+                order=np.array(order, dtype=np.int64), times_s=np.array(times))  # fmt: skip
+    given = Circumstances(machine(), further=(moving_part(plan, 4.0),))
+    assert drawn(plan, given).std() == pytest.approx(4e-3 * part, rel=0.02)
+    turned = moving_part(plan, 0.0, 1.0).moved(np.array([[0.0, 0, 0, 0, 0, 1.0]]), slice(None))[0]
+    assert turned[-1, 1] == pytest.approx(100 * 4.848e-6 * elapsed(plan)[-1], rel=1e-3)

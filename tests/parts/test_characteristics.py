@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
 from cmm_uq.parts.evaluating import Evaluator
-from cmm_uq.parts.plan import Characteristic, Feature, Plan
+from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Plan
 from cmm_uq.points import Floats
 from tests.parts_drawn import UP, block, bore, circle, plane, ring, spot
 
@@ -146,6 +147,28 @@ def test_a_datum_face_may_touch_from_outside() -> None:
     assert measured(features, one, {"face": bumped}) == pytest.approx(30 - 0.008, abs=NANOMETRE)
     squares = Characteristic("", "distance", ("face", "top"), association="least_squares")
     assert measured(features, squares, {"face": bumped}) == pytest.approx(30 - 0.008 / 9, abs=NANOMETRE)
+
+
+def test_a_best_fit_takes_back_the_motion_of_all_points_and_shares_out_the_rest() -> None:
+    """The block moved as a whole has no error; one of its two end faces, alike, 8 µm out moves it by half of it."""
+    one = Characteristic("", "x", ("h1",))
+    plan = Plan(BLOCK, (one,), alignment=Alignment(best_fit=True))
+    turn = Rotation.from_rotvec([1e-3, -2e-3, 1e-3]).as_matrix()
+    whole = plan.points @ turn.T + [0.3, -0.2, 0.1] - plan.points
+    assert Evaluator(plan, whole, [])([], exact=True)[0, 0] == pytest.approx(30.0, abs=NANOMETRE)
+    ends = Plan(BLOCK[:4], (Characteristic("", "position", ("C",)),), alignment=Alignment(best_fit=True))
+    base = np.zeros_like(ends.points)
+    base[ends.rows["D"], 0] = 0.008
+    assert Evaluator(ends, base, [])([], exact=True)[0, 0] == pytest.approx(2 * 0.004, abs=NANOMETRE)
+
+
+def test_a_best_fit_of_one_face_is_refused() -> None:
+    with pytest.raises(CmmUqError, match="leave the part free to move by their best fit"):
+        Evaluator(
+            Plan(BLOCK[:1], (Characteristic("", "x", ("A",)),), alignment=Alignment(best_fit=True)),
+            np.zeros((16, 3)),
+            [],
+        )
 
 
 @pytest.mark.parametrize(("one", "words"), [

@@ -15,6 +15,7 @@ from cmm_uq.parts.evaluating import Evaluator
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, placed
 from cmm_uq.parts.plan import Alignment, Characteristic, Plan, Stylus
+from cmm_uq.parts.result import conforming, evaluated, stated
 from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual
 from cmm_uq.points import Machine
 from cmm_uq.units import ARCSECOND
@@ -155,10 +156,15 @@ def test_where_the_part_lies_is_no_error_of_it(numbers: list[float]) -> None:
     np.testing.assert_allclose(off, 0, atol=1e-7)
 
 
-def test_first_order_is_the_exact_measurement_to_a_hundredth_of_u() -> None:
+@pytest.mark.parametrize("best_fit", [False, True])
+def test_first_order_is_the_exact_measurement_to_a_hundredth_of_u(best_fit: bool) -> None:
     names = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx", "rotation_x_z"]
     draws = np.random.default_rng(3).standard_normal((2000, 7)) * 5
-    plan = Plan(*block(), styli=(Stylus("stylus", np.array([0, 0, -100.0]), 4.0, 0.5, np.zeros(3), 0.8),))
+    features, characteristics = block()
+    if best_fit:
+        characteristics = tuple(replace(c, datums=()) if len(c.datums) == 3 else c for c in characteristics)
+    styli = (Stylus("stylus", np.array([0, 0, -100.0]), 4.0, 0.5, np.zeros(3), 0.8),)
+    plan = Plan(features, characteristics, styli, Alignment(best_fit=best_fit))
     virtual = Virtual(plan, Circumstances(machine(names, draws, 1.0), (POSE,)))
     assert virtual.off.max() < 0.003
     assert not virtual.exact
@@ -223,3 +229,53 @@ def test_a_mean_error_of_the_machine_is_that_of_its_place() -> None:
     far = Machine("m", travel_mm=MACHINE.travel_mm, origin_mm=np.array([50.0, 0, 0]))
     at = AtPose(plan, Circumstances(replace(state, machine=far)), Pose(np.eye(3), np.array([650.0, 10, -10])))
     np.testing.assert_allclose(at.measured.base[:, 0], -np.array([700.0, 800.0]) * 1e-3 / 1.001, rtol=1e-9)
+
+
+def test_as_many_measurements_are_drawn_as_the_digits_need_and_what_is_measured_is_less_its_mean_error() -> None:
+    """An uncorrected scale of 40 ± 10 ppm, 300 mm: indicated 299.988 mm for what is 300 mm, u = 3 µm."""
+    draws = 40 + 10 * np.random.default_rng(8).standard_normal((20_000, 1))
+    virtual = Virtual(pair(), Circumstances(machine(["scale_x"], draws, corrected=False), (POSE,)))
+    simulated = virtual.settled(digits=1)
+    indicated = pair().points * [1 - 40e-6, 1, 1]
+    one = stated(simulated, evaluated(pair(), indicated))[0]
+    assert simulated.stable
+    assert one.value == pytest.approx(300.0, abs=1e-4)
+    assert one.u == pytest.approx(3e-3, rel=0.02)
+    assert one.k == pytest.approx(1.96, rel=0.02)
+    # the ends of the shortest of many almost equal intervals are known to a tenth of u
+    assert one.interval == pytest.approx((300 - 1.96 * 3e-3, 300 + 1.96 * 3e-3), abs=3e-4)
+    assert stated(simulated)[0].value is None
+    with pytest.raises(CmmUqError, match="1 points were measured, the plan has 2"):
+        evaluated(pair(), indicated[:1])
+
+
+def test_errors_about_large_ones_are_differences_of_whole_machines() -> None:
+    """A draw about a mean of 174″ and 110 ppm is a machine of these errors: to its angle, 0.8 mrad, times the change, 2 µm."""
+    names = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx", "rotation_x_z"]
+    mean = np.array([80.0, 110, 30, -174, -17, 19, 5])
+    change = np.array([3.0, -2, 4, 2, -3, 2, 1])
+    plan = Plan(*block(), styli=(Stylus("stylus", np.array([0, 0, -100.0]), 4.0),))
+
+    def at(*draws: np.ndarray) -> AtPose:
+        return AtPose(plan, Circumstances(machine(names, draws, corrected=False)), POSE)
+
+    apart = [at(mean + way * change).errors([np.zeros((1, 7))], exact=True)[0] for way in (1, -1)]
+    drawn = at(mean + change, mean - change).errors([np.array([change, -change])], exact=True)
+    assert np.abs(apart[0] - apart[1]).max() > 200 * 4e-6
+    np.testing.assert_allclose(drawn[0] - drawn[1], apart[0] - apart[1], atol=4e-6)
+
+
+def test_characteristics_that_err_together_conform_together() -> None:
+    """Two lengths by one scale of 10 ppm, each one standard deviation below its limit: both conform when one does."""
+    draws = 10 * np.random.default_rng(9).standard_normal((50_000, 1))
+    spots = (spot("o", [0, 0, 0]), spot("a", [200, 0, 0]), spot("b", [400, 0, 0]))
+    lengths = (Characteristic("a", "distance", ("o", "a"), upper=200.002),
+               Characteristic("b", "distance", ("o", "b"), upper=400.004),
+               Characteristic("ab", "distance", ("a", "b")))  # fmt: skip
+    plan = Plan(spots, lengths)
+    errors_of = Virtual(plan, Circumstances(machine(["scale_x"], draws), (POSE,))).errors(
+        np.random.default_rng(0), 50_000
+    )
+    each, together = conforming(plan, errors_of, np.array([200.0, 400.0, 200.0]))
+    np.testing.assert_allclose(each, [0.8413, 0.8413, np.nan], atol=0.006)
+    assert together == pytest.approx(each[0], abs=1e-9)
