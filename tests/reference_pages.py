@@ -122,10 +122,14 @@ def part() -> str:
             parts.append(table(("`what`", "of", "about datums", "limits"), rows))
     parts += [
         "## Plans of other programs",
-        f"`cmm-uq new part --from FILE` makes these tables of a {QIF} or a {DMIS}. What is not understood is refused by name; "
-        "`--set part.not_measured='[\"NAME\"]'` leaves it out knowingly, `'[\"*\"]'` all of it, and the job says what was left out. "
-        "What such a file leaves open stands in the job as an example.",
-        *(" ".join(text.split("\n\n")[1].split()) for text in (str(drawing_qif.__doc__), str(drawing_dmis.__doc__))),
+        "`cmm-uq new part --from FILE` makes these tables of a QIF plan or a DMIS program. What is not understood is refused "
+        "by name; `--set part.not_measured='[\"NAME\"]'` leaves it out knowingly, `'[\"*\"]'` all of it, and the job says "
+        "what was left out. What such a file leaves open stands in the job as an example.",
+        *(
+            f"{program}: {text[0].lower()}{text[1:]}"
+            for program, reader in ((QIF, drawing_qif), (DMIS, drawing_dmis))
+            for text in (" ".join(str(reader.__doc__).replace("``", "`").split("\n\n")[1].split()),)
+        ),
     ]
     return page("job.toml of a part, key by key", *parts)
 

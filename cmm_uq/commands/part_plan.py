@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.form import FormFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.placing import rotation
-from cmm_uq.jobs.part.probed import Probed
+from cmm_uq.jobs.part.probed import Probed, whole_surface
 from cmm_uq.jobs.part.tables import StylusFacts
 from cmm_uq.parts.causes import Cause, Scatter
 from cmm_uq.parts.evaluating import Evaluator
@@ -22,7 +25,7 @@ from cmm_uq.units import MICROMETRE
 def plan_of(job: PartJob) -> Plan:
     """The plan of a job that was read: geometry alone, in mm and rad, in the frame of the part."""
     facts, styli = job.facts, [one.name for one in job.facts.stylus]
-    features = tuple(_feature(one, one.facts.stylus or styli[0]) for one in job.features)
+    features = tuple(_feature(one, one.facts.stylus or styli[0], one.facts.form or facts.form) for one in job.features)
     names = [one.name for one in features]
     ends = np.cumsum([0, *(len(one.points) for one in features)])
     order = [names.index(name) for name in facts.probing.order] or list(range(len(names)))
@@ -113,12 +116,14 @@ def _stylus(one: StylusFacts) -> Stylus:
                   one.lobing_um, at)  # fmt: skip
 
 
-def _feature(one: Probed, stylus: str) -> Feature:
+def _feature(one: Probed, stylus: str, form: FormFacts) -> Feature:
     facts = one.facts
     half = None if facts.angle_deg is None else float(np.radians(facts.angle_deg / 2))
     sized = facts.diameter_mm if facts.kind != "plane" else None
     nominal = Nominal(np.array(facts.point_mm), one.direction, sized, half)
-    return Feature(facts.name, facts.kind, one.points, one.normals, stylus, nominal, facts.association)
+    given = Feature(facts.name, facts.kind, one.points, one.normals, stylus, nominal, facts.association)
+    whole = whole_surface(facts, form.surface_points)
+    return given if whole is None else replace(given, surface=whole.points, surface_normals=whole.normals)
 
 
 def _characteristic(one: CharacteristicFacts) -> Characteristic:

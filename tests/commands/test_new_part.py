@@ -182,6 +182,17 @@ def test_circumstances_are_in_the_units_of_the_virtual_measurement() -> None:
     assert np.all(clamped.size == 0.5e-3)  # type: ignore[attr-defined]
 
 
+def test_a_whole_surface_is_probed_from_end_to_end() -> None:
+    """The bore is probed 4 mm from its ends, and its form is true of all of it."""
+    bore = plan_of(plate(form={"field_um": 1.0, "surface_points": 200})).feature("bore")
+    assert len(bore.surface) == 200
+    assert np.ptp(bore.points[:, 2]) == pytest.approx(12)
+    assert np.ptp(bore.surface[:, 2]) == pytest.approx(20, rel=0.01)
+    np.testing.assert_allclose(np.hypot(bore.surface[:, 0] - 60, bore.surface[:, 1] - 40), 15)
+    assert np.all(np.einsum("ni,ni->n", bore.surface - [60, 40, 0], bore.surface_normals) < 0)
+    assert len(plan_of(plate()).feature("bore").surface) == 0
+
+
 def test_a_part_that_is_put_down_anew_each_time_lies_in_many_places() -> None:
     job = plate(placing={"origin_mm": [300.0, 450.0, -500.0], "u_origin_mm": [20.0, 20.0, 0.0]})
     places = np.array([pose.translation_mm for pose in poses_of(job, 50)])

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cmm_uq.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.jobs.part.characteristic import ASKS, What
 
 Facts = dict[str, Any]
 
@@ -111,6 +112,17 @@ def limits(what: str, low: float, high: float) -> Facts:
     """Keys of two limits of a size, distance or coordinate, or of an angle in degrees."""
     unit = "deg" if what == "angle" else "mm"
     return {f"lower_{unit}": round(low, _DIGITS), f"upper_{unit}": round(high, _DIGITS)}
+
+
+def refuse_other_kind(what: What, kind: str) -> None:
+    """Refuse a characteristic of a feature that has none of the kind.
+
+    Raises
+    ------
+    NotUnderstoodError : it has none.
+    """
+    if kind not in ASKS[what].kinds:
+        raise NotUnderstoodError(f"is a {what} of a {kind}, which is not read")
 
 
 def usual_strategy(kind: str, count: int | None = None) -> Facts:

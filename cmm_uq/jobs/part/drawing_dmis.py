@@ -18,9 +18,9 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.importing.dmis import statements
 from cmm_uq.jobs.importing.encodings import decoded, report_lines
-from cmm_uq.jobs.part.characteristic import ASKS, What
 from cmm_uq.jobs.part.dmis_frames import Frame, numbers_of, reference, words_of
-from cmm_uq.jobs.part.drawing import Drawing, Facts, NotUnderstoodError, Unknown, limits, usual_strategy
+from cmm_uq.jobs.part.dmis_tolerances import toleranced
+from cmm_uq.jobs.part.drawing import Drawing, Facts, NotUnderstoodError, Unknown, usual_strategy
 
 PROGRAM = "DMIS program"
 
@@ -37,11 +37,6 @@ _KINDS = {
 _NUMBERS = {"point": 6, "line": 9, "plane": 6, "circle": 7, "sphere": 4, "cylinder": 7}
 """That a feature has at least: its place, its direction, its diameter."""
 
-_TOLERANCES: Mapping[str, What] = {
-    "FLAT": "flatness", "STRGHT": "straightness", "CIRLTY": "roundness", "CYLCTY": "cylindricity", "DIAM": "size",
-    "POS": "position", "PARLEL": "parallelism", "PERP": "perpendicularity", "CONCEN": "coaxiality",
-    "CRNOUT": "circular_runout", "TRNOUT": "total_runout",
-}  # fmt: skip
 _PASSED = (
     "DMISMN", "DMISMD", "DISPLY", "FILNAM", "PRCOMP", "SNSET", "SNSMNT", "OPEN", "CLOSE", "GOTO", "MODE", "TEXT", "SAVE",
     "ENDFIL", "FEDRAT", "ACLRAT", "DECPL", "FINPOS", "RAPID", "FROM", "GOHOME", "CRSLCT", "TECOMP", "WKPLAN", "DEVICE",
@@ -264,47 +259,17 @@ class _Program:
         try:
             if tolerance not in self.tolerances:
                 raise NotUnderstoodError("is a tolerance that is not defined")
-            kinds = {one["name"]: one["kind"] for one in self.drawing.features}
-            if feature not in kinds:
+            features = {one["name"]: one for one in self.drawing.features}
+            if feature not in features:
                 raise NotUnderstoodError(f"is a tolerance of {feature!r}, which is not read")
             place = f"{self.where} line {self.tolerances[tolerance][0]}"
-            found = self._toleranced(feature, kinds[feature], self.tolerances[tolerance][1])
+            datums = {label: name for label, name in self.datums.items() if name in features}
+            found = toleranced(self.tolerances[tolerance][1], features[feature], self.frame.millimetres, datums)
             same = [one["name"] for one in self.drawing.characteristics]
             name = tolerance if tolerance not in same else f"{tolerance} {feature}"
             self.drawing.characteristics.append({"name": name, **found})
         except NotUnderstoodError as error:
             self.drawing.unknown.append(Unknown(tolerance, str(error), place))
-
-    def _toleranced(self, feature: str, kind: str, words: list[str]) -> Facts:
-        sort = words[0].upper() if words else ""
-        if sort not in _TOLERANCES:
-            raise NotUnderstoodError(f"is a tolerance {sort or 'of no kind'}, which is not read")
-        what = _TOLERANCES[sort]
-        plain = [word.upper() for word in words[1:] if not reference(word)[0]]
-        known = ("RFS", "2D", "3D")
-        number = numbers_of([word for word in plain if word not in known])
-        datums = [self._datum_named(name) for of, name in map(reference, words[1:]) if of in ("DAT", "FA")]
-        found: Facts = {"what": what, "features": [feature], **({"datums": datums} if datums else {})}
-        if what == "size":
-            if len(number) < 2:
-                raise NotUnderstoodError("has a diameter without two limits, which is not read")
-            nominal = next(one["diameter_mm"] for one in self.drawing.features if one["name"] == feature)
-            return found | limits(what, *(nominal + self.frame.millimetres * limit for limit in number[:2]))
-        if what == "position" and ("3D" in plain) != (kind in ("point", "sphere")):
-            raise NotUnderstoodError(
-                f"is a position in {'3D' if '3D' in plain else '2D'} of a {kind}, which is not read"
-            )
-        if not number or number[0] <= 0:
-            raise NotUnderstoodError("is a tolerance of 0, which nothing conforms with")
-        if len(datums) < ASKS[what].datums:
-            raise NotUnderstoodError("names no datum")
-        return found | {"tolerance_mm": self.frame.millimetres * number[0]}
-
-    def _datum_named(self, label: str) -> str:
-        name = self.datums.get(label, label)
-        if name not in (one["name"] for one in self.drawing.features):
-            raise NotUnderstoodError(f"is about the datum {label}, which is no feature that is read")
-        return name
 
     def _left_over(self) -> None:
         """Features that are never measured, and tolerances that are never given to a feature."""

@@ -17,7 +17,16 @@ from cmm_uq.jobs.importing.qif import child, length_unit, three
 from cmm_uq.jobs.importing.units import UNITS
 from cmm_uq.jobs.importing.xml_files import local, root_of
 from cmm_uq.jobs.part.characteristic import ASKS, What
-from cmm_uq.jobs.part.drawing import Drawing, Facts, NotUnderstoodError, Unknown, limits, usual_strategy
+from cmm_uq.jobs.part.drawing import (
+    Drawing,
+    Facts,
+    NotUnderstoodError,
+    Unknown,
+    limits,
+    refuse_other_kind,
+    usual_strategy,
+)
+from cmm_uq.jobs.part.qif_elements import direction, inside, is_inner, number_of, radians_of
 
 PROGRAM = "QIF plan"
 
@@ -62,7 +71,7 @@ class _Document:
         name = UNITS[unit.casefold()]
         self.millimetres = name.up / name.down
         try:
-            self.degrees = math.degrees(_radians(root))
+            self.degrees = math.degrees(radians_of(root))
         except NotUnderstoodError as error:
             raise CmmUqError(
                 f"the unit of angle {error}", where=f"{where}: FileUnits", fix="Export the plan again"
@@ -105,7 +114,7 @@ class _Document:
             raise NotUnderstoodError("is constructed of other features, which is not read")
         nominal = self._referred(item, "FeatureNominalId")
         definition = self._referred(nominal, "FeatureDefinitionId")
-        if _inside(nominal, "PointList") is not None:
+        if inside(nominal, "PointList") is not None:
             raise NotUnderstoodError("has a list of points of its own (PointList), which is not read")
         kind = sort.lower()
         found: Facts = {"name": name, "kind": kind}
@@ -116,7 +125,7 @@ class _Document:
         return self._probed(found)
 
     def _association(self, nominal: Element) -> str | None:
-        given = _inside(nominal, "SubstituteFeatureAlgorithm")
+        given = inside(nominal, "SubstituteFeatureAlgorithm")
         if given is None:
             return None
         word = "".join(given.itertext()).strip()
@@ -125,29 +134,29 @@ class _Document:
         return _ASSOCIATIONS[word]
 
     def _nominal(self, kind: str, nominal: Element, definition: Element, place: str) -> Facts:
-        axis = _inside(nominal, "Axis")
+        axis = inside(nominal, "Axis")
         if kind in ("cylinder", "cone"):
             if axis is None:
                 raise NotUnderstoodError("has no axis")
             found: Facts = {"point_mm": self._place(child(axis, "AxisPoint"), place),
-                            "direction": _direction(child(axis, "Direction"), place)}  # fmt: skip
+                            "direction": direction(child(axis, "Direction"), place)}  # fmt: skip
         else:
             found = {"point_mm": self._place(child(nominal, "Location"), place)}
         if kind in ("plane", "circle", "point"):
-            found["direction"] = _direction(child(nominal, "Normal"), place)
+            found["direction"] = direction(child(nominal, "Normal"), place)
         if kind == "line":
-            found |= {"direction": _direction(child(nominal, "Direction"), place),
-                      "normal": _direction(child(nominal, "Normal"), place)}  # fmt: skip
+            found |= {"direction": direction(child(nominal, "Direction"), place),
+                      "normal": direction(child(nominal, "Normal"), place)}  # fmt: skip
         if kind in ("circle", "sphere", "cylinder", "cone"):
-            found |= {"diameter_mm": self._length(definition, "Diameter"), "inner": _inner(definition)}
+            found |= {"diameter_mm": self._length(definition, "Diameter"), "inner": is_inner(definition)}
         if kind == "cone":
             half, whole = child(definition, "HalfAngle"), child(definition, "FullAngle")
             if not (half or whole):
                 raise NotUnderstoodError("does not say its angle")
-            found["angle_deg"] = self.degrees * (2 * _number(half) if half else _number(whole))
+            found["angle_deg"] = self.degrees * (2 * number_of(half) if half else number_of(whole))
         length = child(nominal if kind == "line" else definition, "Length")
         if length and kind in ("line", "cylinder"):
-            found["length_mm"] = self.millimetres * _number(length)
+            found["length_mm"] = self.millimetres * number_of(length)
             # the file's point is the start of the line or axis
             half_way = [0.5 * found["length_mm"] * part for part in found["direction"]]
             found["point_mm"] = [a + b for a, b in zip(found["point_mm"], half_way, strict=True)]
@@ -175,6 +184,8 @@ class _Document:
         definition = self._referred(nominal, "CharacteristicDefinitionId")
         what = self._what(sort, nominal)
         features = self._features(item, what)
+        for kind in (one["kind"] for one in self.drawing_.features if one["name"] in features):
+            refuse_other_kind(what, kind)
         found: Facts = {"name": name, "what": what, "features": features}
         self._refuse_modified(definition, what, features)
         frame = child(definition, "DatumReferenceFrameId")
@@ -201,7 +212,7 @@ class _Document:
         return _WHATS[sort]
 
     def _features(self, item: Element, what: What) -> list[str]:
-        ids = _inside(item, "FeatureItemIds")
+        ids = inside(item, "FeatureItemIds")
         given = [] if ids is None else [(element.text or "").strip() for element in ids]
         if len(given) != ASKS[what].features:
             raise NotUnderstoodError(f"is a {what} of {len(given) or 'no'} features")
@@ -218,7 +229,7 @@ class _Document:
         condition = child(definition, "MaterialCondition")
         if condition not in _PLAIN:
             raise NotUnderstoodError(f"holds at {condition.lower()} material condition, which is not read")
-        zone = _inside(definition, "ZoneShape")
+        zone = inside(definition, "ZoneShape")
         shape = "" if zone is None or not len(zone) else local(zone[0])
         round_feature = any(one["name"] in features and one["kind"] in ("circle", "cylinder", "cone", "line")
                             for one in self.drawing_.features)  # fmt: skip
@@ -232,7 +243,7 @@ class _Document:
         found: list[str] = []
         reference = self.by_id.get(frame)
         for datum in [] if reference is None else [each for each in reference.iter() if local(each) == "Datum"]:
-            simple = _inside(datum, "SimpleDatum")
+            simple = inside(datum, "SimpleDatum")
             if simple is None:
                 raise NotUnderstoodError("has a compound datum, which is not read")
             modifier = child(simple, "MaterialModifier")
@@ -243,7 +254,7 @@ class _Document:
 
     def _datum(self, definition: Element) -> str:
         label = child(definition, "DatumLabel")
-        ids = _inside(definition, "FeatureNominalIds")
+        ids = inside(definition, "FeatureNominalIds")
         named = [] if ids is None else [(element.text or "").strip() for element in ids]
         if len(named) == 1 and named[0] in self.of_nominal:
             return self.of_nominal[named[0]]
@@ -256,10 +267,10 @@ class _Document:
     def _limits(self, what: What, nominal: Element, definition: Element) -> Facts:
         if ASKS[what].limits == "zone":
             width = child(definition, "ToleranceValue")
-            if not width or _number(width) <= 0:
+            if not width or number_of(width) <= 0:
                 raise NotUnderstoodError("has no tolerance above 0")
-            return {"tolerance_mm": self.millimetres * _number(width)}
-        tolerance = _inside(definition, "Tolerance")
+            return {"tolerance_mm": self.millimetres * number_of(width)}
+        tolerance = inside(definition, "Tolerance")
         if tolerance is None:
             return {}
         scale = self.degrees if ASKS[what].limits == "angles" else self.millimetres
@@ -271,51 +282,20 @@ class _Document:
         if child(tolerance, "DefinedAsLimit") != "true":
             if not target:
                 raise NotUnderstoodError("has limits about a value that is not there")
-            about = _number(target)
-        return limits(what, scale * (about + _number(low)), scale * (about + _number(high)))
+            about = number_of(target)
+        return limits(what, scale * (about + number_of(low)), scale * (about + number_of(high)))
 
     def _length(self, element: Element, name: str) -> float:
         text = child(element, name)
         if not text:
             raise NotUnderstoodError(f"does not say its {name}")
-        return self.millimetres * _number(text)
+        return self.millimetres * number_of(text)
 
     def _place(self, text: str, place: str) -> list[float]:
-        return [self.millimetres * _number(word) for word in three(text, place)]
+        return [self.millimetres * number_of(word) for word in three(text, place)]
 
     def _referred(self, element: Element, name: str) -> Element:
         found = self.by_id.get(child(element, name))
         if found is None:
             raise NotUnderstoodError(f"refers by {name} to nothing that is there")
         return found
-
-
-def _radians(root: Element) -> float:
-    """Radians in the unit of angle; QIF's own is the radian."""
-    unit = next((element for element in root.iter() if local(element) == "AngularUnit"), None)
-    text = "" if unit is None else next((e.text or "" for e in unit.iter() if local(e) == "Factor"), "")
-    return _number(text or "1")
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise NotUnderstoodError(f"has {text!r} where a number belongs") from None
-
-
-def _inside(element: Element, name: str) -> Element | None:
-    return next((inner for inner in element if local(inner) == name), None)
-
-
-def _direction(text: str, place: str) -> list[float]:
-    if not text:
-        raise NotUnderstoodError("does not say its direction or normal")
-    return [_number(word) for word in three(text, place)]
-
-
-def _inner(definition: Element) -> bool:
-    said = child(definition, "InternalExternal")
-    if said not in ("INTERNAL", "EXTERNAL"):
-        raise NotUnderstoodError("does not say whether it is a hole or a shaft")
-    return said == "INTERNAL"

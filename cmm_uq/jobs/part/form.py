@@ -25,6 +25,9 @@ class FormFacts(Table):
     harmonics_um: Annotated[dict[str, Uncertainty], Field(max_length=INPUTS.most)] = {}
     """Standard deviations of lobes of any phase about a feature's axis, by their number: `{ 2 = 1.0, 3 = 0.5 }`; heeded by
     circles, cylinders and cones."""
+    surface_points: Annotated[int, Field(ge=0, le=5000)] = 0
+    """Points, spread over the whole surface, by which a feature with its form is true; 0 where it is true by its nominal, and
+    all of its form is an error."""
     roughness_um: Uncertainty = 0.0
     """Standard deviation of a contact point by roughness, from point to point on its own."""
 

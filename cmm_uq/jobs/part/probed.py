@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.part.feature import FEWEST, ROUND, FeatureFacts
+from cmm_uq.jobs.part.feature import FEWEST, ROUND, FeatureFacts, Strategy
 from cmm_uq.jobs.part.patterns import PATTERNS_OF, angle_of, radius_of
 from cmm_uq.points import Floats
 
@@ -68,6 +68,30 @@ def probed(facts: FeatureFacts, where: str) -> Probed:
         points = facts.point_mm + local @ frame.axes
     own = frame.axes[2] if facts.kind not in ("point", "sphere") else None
     return Probed(facts, points, _normals(facts, local, frame), own)
+
+
+def whole_surface(facts: FeatureFacts, count: int) -> Probed | None:
+    """A feature probed evenly from end to end, so closely that it stands for its surface.
+
+    Parameters
+    ----------
+    count : of points.
+
+    Returns
+    -------
+    ``None`` where its extent is not said, or it has none.
+    """
+    sized = {
+        "line": facts.length_mm, "plane": facts.diameter_mm or (facts.length_mm and facts.width_mm), "circle": 1, "sphere": 1,
+        "cylinder": facts.length_mm, "cone": facts.length_mm,
+    }  # fmt: skip
+    if count < FEWEST[facts.kind] or not sized.get(facts.kind):
+        return None
+    own = facts.strategy or Strategy(pattern="points", points=count)
+    evenly = Strategy(
+        pattern="points", points=count, start_deg=own.start_deg, sweep_deg=own.sweep_deg, cap_deg=own.cap_deg
+    )
+    return probed(facts.model_copy(update={"strategy": evenly, "points_mm": None}), facts.name)
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,6 +138,8 @@ def test_a_frame_before_the_first_feature_places_the_part() -> None:
     ("T(X)=TOL/PROFS,0.1\nOUTPUT/FA(TOP),TA(X)\n", "X", "is a tolerance PROFS, which is not read"),
     ("T(X)=TOL/POS,2D,0.1,MMC,DAT(A)\nOUTPUT/FA(BORE),TA(X)\n", "X", "has 'MMC' where numbers belong|which is not read"),
     ("T(X)=TOL/PERP,0.1,DAT(B)\nOUTPUT/FA(BORE),TA(X)\n", "X", "is about the datum B, which is no feature"),
+    ("T(X)=TOL/DIAM,-0.1,0.1\nOUTPUT/FA(TOP),TA(X)\n", "X", "is a size of a plane, which is not read"),
+    ("T(X)=TOL/FLAT,0.1,DAT(A)\nOUTPUT/FA(TOP),TA(X)\n", "X", "is a flatness with a datum, which has none"),
     ("T(X)=TOL/FLAT,0\nOUTPUT/FA(TOP),TA(X)\n", "X", "is a tolerance of 0"),
     ("CONST/LINE,F(L),INTOF,FA(TOP),FA(BORE)\n", "L", "is constructed of other features"),
     ("IF/('A',GT,3)\n", "IF/('A',GT,3)", "is a statement IF, which is not read"),

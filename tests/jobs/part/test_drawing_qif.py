@@ -175,6 +175,7 @@ MAXIMUM = "<MaterialCondition>MAXIMUM</MaterialCondition>"
     ("Asked", characteristic(7, "PointProfile", "8", [4], zone(1.0)), "8", "is a characteristic of kind PointProfile"),
     ("Asked", characteristic(7, "Position", "8", [2], zone(0.5, 4, MAXIMUM)), "8", "holds at maximum material condition"),
     ("Asked", characteristic(7, "Position", "8", [2], zone(0.0, 4)), "8", "has no tolerance above 0"),
+    ("Asked", characteristic(7, "Flatness", "8", [1], zone(0.5)), "8", "is a flatness of a cylinder, which is not read"),
     ("Asked", characteristic(7, "Parallelism", "8", [1], zone(0.5)), "8", "names no datum"),
     ("Asked", characteristic(7, "DistanceBetween", "8", [0], tolerance(-1, 1)), "8", "is a distance of 1 features"),
     ("Asked", characteristic(7, "Flatness", "8", [9], zone(0.5)), "8", "is of the feature '149', which is not read"),
