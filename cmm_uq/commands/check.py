@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cmm_uq.commands.part_plan import refuse_unfit as refuse_unfit_plan
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import refuse_unmeasured
@@ -148,10 +147,12 @@ def _of_a_part(path: Path) -> bool:
 
 def _check_part(folder: Path, path: Path) -> Checked:
     """The job of a part: what its readers refuse, and that its figures are an example's."""
+    from cmm_uq.commands.part_plan import refuse_unfit  # the virtual measurement, which no other job needs
+
     wrong, warnings, job = Gathered(), list[Problem](), None
     with wrong.going_on():
         job = read_part(folder, machine=False)
-        refuse_unfit_plan(job)
+        refuse_unfit(job)
     if job is not None:
         with wrong.going_on():
             read_part(folder)  # with the files that state the machine

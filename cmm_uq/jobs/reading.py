@@ -36,6 +36,9 @@ from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import AXES, Machine, Points
 from cmm_uq.writing import finish_interrupted
 
+PART = "part"
+"""The table by which the job of a part is told from others; see :mod:`cmm_uq.jobs.part`."""
+
 
 @dataclass(frozen=True)
 class Nameable:
@@ -196,7 +199,9 @@ def read_machine(folder: Path, nameable: Nameable) -> Job:
 def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile]:
     """job.toml: its bytes, and what it says."""
     content = source.job_file(JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
-    return content, checked(content, source.toml, lambda data: _model_for(data, nameable), nameable.standards)
+    return content, checked(
+        content, source.toml, lambda data: _model_for(data, nameable, source.toml), nameable.standards
+    )
 
 
 def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str]]:
@@ -208,8 +213,16 @@ def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str
     )  # fmt: skip
 
 
-def _model_for(data: dict[str, Any], nameable: Nameable) -> type[JobFile]:
-    """What a job.toml must say for the kind that it names."""
+def _model_for(data: dict[str, Any], nameable: Nameable, path: Path) -> type[JobFile]:
+    """What a job.toml must say for the kind that it names.
+
+    Raises
+    ------
+    CmmUqError : it is the job of a part.
+    """
+    if PART in data and "artefact" not in data:
+        raise CmmUqError("is the job of a part, not of a machine", where=f"{path}: [{PART}]",
+                         fix="cmm-uq check JOB says what it lacks")  # fmt: skip
     artefact = data.get("artefact")
     kind = artefact.get("kind") if isinstance(artefact, dict) else None
     if not isinstance(kind, str):

@@ -11,6 +11,7 @@ import pytest
 from cmm_uq.commands.check import check_job
 from cmm_uq.commands.new import write_new
 from cmm_uq.commands.part_plan import clamping_of, forms_of, plan_of, poses_of, refuse_unfit, surroundings_of
+from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import ASSOCIATIONS
 from cmm_uq.jobs.part import characteristic, feature
@@ -45,6 +46,12 @@ def test_its_examples_are_refused_once_it_says_that_it_was_measured(tmp_path: Pa
     assert "tolerance_mm is still an example's" in told
     assert "cte_per_k is still an example's" in told
     assert "name is still an example's" not in told
+
+
+def test_it_is_no_job_of_a_machine(tmp_path: Path) -> None:
+    write_new("part", tmp_path / "plate", {})
+    with pytest.raises(CmmUqError, match=r"job\.toml: \[part\]: is the job of a part, not of a machine"):
+        read_job(tmp_path / "plate")
 
 
 def test_what_is_given_is_no_example(tmp_path: Path) -> None:

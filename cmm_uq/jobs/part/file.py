@@ -25,9 +25,6 @@ from cmm_uq.jobs.part.tables import (
 )
 from cmm_uq.jobs.table import Table
 
-TABLE = "part"
-"""The table by which a part's job.toml is told from others."""
-
 
 class PartFile(Table):
     """All of a part's job.toml."""

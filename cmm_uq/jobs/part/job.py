@@ -13,11 +13,12 @@ from cmm_uq.files.toml import toml_of
 from cmm_uq.jobs.file_names import RESULTS
 from cmm_uq.jobs.origin import check_examples, check_mark
 from cmm_uq.jobs.part.checks import check_names, check_plan
-from cmm_uq.jobs.part.file import TABLE, PartFile
+from cmm_uq.jobs.part.file import PartFile
 from cmm_uq.jobs.part.located import Places
 from cmm_uq.jobs.part.measured import measured_points
 from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.tables import MachineStateFacts
+from cmm_uq.jobs.reading import PART
 from cmm_uq.jobs.source import InFolder, InMemory, Source
 from cmm_uq.jobs.toml_file import checked
 from cmm_uq.points import Floats
@@ -58,7 +59,7 @@ class PartJob:
 def is_part(content: bytes) -> bool:
     """Whether a job.toml is of a part."""
     try:
-        return TABLE in toml_of(text_of(content, ""), "")
+        return PART in toml_of(text_of(content, ""), "")
     except (CmmUqError, ValueError):
         return False
 
