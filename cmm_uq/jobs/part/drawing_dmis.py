@@ -179,6 +179,8 @@ class _Program:
         number = numbers_of([word for word in words if not word[:1].isalpha()])
         if len(number) < 5:
             raise NotUnderstoodError("does not give direction, length and diameter of its tip")
+        if any(number[:-5]):
+            raise NotUnderstoodError("is turned by the angles of a wrist, which is not read")
         along, length, diameter = np.array(number[-5:-2]), number[-2], number[-1]
         offset = self.mount + self.frame.millimetres * length * along
         return {"name": name, "diameter_mm": self.frame.millimetres * diameter, "offset_mm": offset.tolist()}

@@ -61,6 +61,10 @@ def drawing_of_qif(content: bytes, where: str) -> Drawing:
     return _Document(root_of(content, where), where).drawing()
 
 
+_LENGTH_MM = 20.0
+"""Of a plane or line whose length is not said: an example."""
+
+
 class _Document:
     """The elements of a document by their numbers."""
 
@@ -119,7 +123,7 @@ class _Document:
         kind = sort.lower()
         found: Facts = {"name": name, "kind": kind}
         found |= {} if (association := self._association(nominal)) is None else {"association": association}
-        found |= self._nominal(kind, nominal, definition, place)
+        found = self._nominal(found, nominal, definition, place)
         self.names[item.get("id", "")] = name
         self.of_nominal[nominal.get("id", "")] = name
         return self._probed(found)
@@ -133,15 +137,15 @@ class _Document:
             raise NotUnderstoodError(f"is to be associated by {word}, which is not read")
         return _ASSOCIATIONS[word]
 
-    def _nominal(self, kind: str, nominal: Element, definition: Element, place: str) -> Facts:
-        axis = inside(nominal, "Axis")
+    def _nominal(self, found: Facts, nominal: Element, definition: Element, place: str) -> Facts:
+        kind, axis = found["kind"], inside(nominal, "Axis")
         if kind in ("cylinder", "cone"):
             if axis is None:
                 raise NotUnderstoodError("has no axis")
-            found: Facts = {"point_mm": self._place(child(axis, "AxisPoint"), place),
-                            "direction": direction(child(axis, "Direction"), place)}  # fmt: skip
+            found |= {"point_mm": self._place(child(axis, "AxisPoint"), place),
+                      "direction": direction(child(axis, "Direction"), place)}  # fmt: skip
         else:
-            found = {"point_mm": self._place(child(nominal, "Location"), place)}
+            found |= {"point_mm": self._place(child(nominal, "Location"), place)}
         if kind in ("plane", "circle", "point"):
             found["direction"] = direction(child(nominal, "Normal"), place)
         if kind == "line":
@@ -154,13 +158,30 @@ class _Document:
             if not (half or whole):
                 raise NotUnderstoodError("does not say its angle")
             found["angle_deg"] = self.degrees * (2 * number_of(half) if half else number_of(whole))
-        length = child(nominal if kind == "line" else definition, "Length")
-        if length and kind in ("line", "cylinder"):
-            found["length_mm"] = self.millimetres * number_of(length)
-            # the file's point is the start of the line or axis
-            half_way = [0.5 * found["length_mm"] * part for part in found["direction"]]
-            found["point_mm"] = [a + b for a, b in zip(found["point_mm"], half_way, strict=True)]
+        if kind in ("line", "cylinder", "cone"):
+            length = child(
+                nominal if kind == "line" else definition, "LargeEndDistance" if kind == "cone" else "Length"
+            )
+            self._between_its_ends(found, length, child(definition, "SmallEndDistance"))
         return found
+
+    def _between_its_ends(self, found: Facts, length: str, small: str) -> None:
+        """Put the point of a line, cylinder or cone from its start, or from anywhere on its axis, to its middle.
+
+        A cone without a small end ends at its tip. A length that is not said is an example.
+        """
+        start = 0.0
+        slope = math.tan(math.radians(found["angle_deg"] / 2)) if found["kind"] == "cone" else 0.0
+        if slope and length:
+            start = self.millimetres * number_of(small) if small else -0.5 * found["diameter_mm"] / slope
+        if not length:
+            self.drawing_.open_keys[found["name"]] = ["length_mm", "point_mm"]
+        end = self.millimetres * number_of(length) if length else found.get("diameter_mm", _LENGTH_MM) / 2
+        middle = 0.5 * (start + end) / (math.hypot(*found["direction"]) or 1.0)
+        found["length_mm"] = end - start
+        found["point_mm"] = [a + middle * b for a, b in zip(found["point_mm"], found["direction"], strict=True)]
+        if slope:
+            found["diameter_mm"] += 2 * slope * middle
 
     def _probed(self, found: Facts) -> Facts:
         """With what the file leaves open."""
@@ -169,13 +190,10 @@ class _Document:
             return found
         opened = ["strategy"]
         if kind == "plane":
-            found |= {"length_mm": 20.0, "width_mm": 20.0}
+            found |= {"length_mm": _LENGTH_MM, "width_mm": _LENGTH_MM}
             opened += ["length_mm", "width_mm"]
-        elif kind in ("line", "cylinder", "cone") and "length_mm" not in found:
-            found["length_mm"] = found.get("diameter_mm", 20.0) / 2
-            opened += ["length_mm", "point_mm"]
         found["strategy"] = usual_strategy(kind)
-        self.drawing_.open_keys[name] = opened
+        self.drawing_.open_keys[name] = [*opened, *self.drawing_.open_keys.get(name, ())]
         return found
 
     def _characteristic(self, item: Element, name: str, place: str) -> Facts:

@@ -124,6 +124,13 @@ def test_what_is_said_in_another_frame_is_the_same_part(name: str) -> None:
         np.testing.assert_allclose(same[key], one[key], atol=1e-9)
 
 
+def test_a_stylus_turned_by_a_wrist_is_not_understood() -> None:
+    program = HEAD.replace("POL,0,0,", "POL,90,0,") + TOP + BORE + "ENDFIL\n"
+    found = drawing_of_dmis(program.encode(), "plate.dmi")
+    assert [one.name for one in found.unknown] == ["P1", "SNSLCT/S(P1)"]
+    assert found.styli == [{"name": "P1", "diameter_mm": 0.0}]
+
+
 def test_a_frame_before_the_first_feature_places_the_part() -> None:
     placed = read("D(P)=TRANS/XORIG,355.0,YORIG,91.0\n", TOP, BORE)
     assert placed.features == read(TOP, BORE).features

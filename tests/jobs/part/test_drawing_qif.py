@@ -5,6 +5,7 @@ Documents as the schema of QIF 3.0 has them, of one plate; its numbers were chos
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from typing import Any
 
@@ -130,6 +131,9 @@ def test_features_are_where_their_nominals_say() -> None:
     assert (one["pin"]["point_mm"], one["pin"]["length_mm"], one["pin"]["inner"]) == ([10, 20, 26], 8, False)
     assert (one["hole"]["diameter_mm"], one["hole"]["inner"]) == (9.5, True)
     assert one["sink"]["angle_deg"] == pytest.approx(82)
+    # no end is said: half of the diameter along the axis, with the point in its middle and the diameter there
+    assert one["sink"]["point_mm"] == pytest.approx([0, 0, 9.5 / 4])
+    assert one["sink"]["diameter_mm"] == pytest.approx(9.5 + 2 * 9.5 / 4 * math.tan(math.radians(41)))
     assert one["stop"] == {"name": "stop", "kind": "point", "point_mm": [7, 8, 9], "direction": [-1, 0, 0]}
     assert one["ring"]["association"] == "maximum_inscribed"
 
@@ -144,6 +148,20 @@ def test_tolerances_datums_and_limits_are_those_that_are_referred_to() -> None:
         {"name": "6", "what": "distance", "features": ["DATUM_A", "stop"], "lower_mm": 5.5, "upper_mm": 6.5},
         {"name": "7", "what": "y", "features": ["stop"]},
     ]
+
+
+@pytest.mark.parametrize(("diameter", "ends", "middle", "length"), [
+    ("0", "<LargeEndDistance>8</LargeEndDistance>", 4, 8),
+    ("10", "<LargeEndDistance>8</LargeEndDistance><SmallEndDistance>2</SmallEndDistance>", 5, 6),
+    ("10", "<LargeEndDistance>5</LargeEndDistance>", 0, 10),  # at 45° its tip lies 5 mm behind its point
+])  # fmt: skip
+def test_a_cone_is_told_between_its_ends(diameter: str, ends: str, middle: float, length: float) -> None:
+    definition = HOLE.replace("9.5", diameter) + "<FullAngle>90</FullAngle>" + ends
+    cone = feature(6, "Cone", "c", "<Axis><AxisPoint>0 0 0</AxisPoint><Direction>0 0 1</Direction></Axis>", definition)
+    found = named(read(cone).features)["c"]
+    assert found["point_mm"][2] == pytest.approx(middle, abs=1e-9)
+    assert found["length_mm"] == pytest.approx(length)
+    assert found["diameter_mm"] == pytest.approx(float(diameter) + 2 * middle)  # at 45° as much wider as farther
 
 
 def test_what_the_plan_leaves_open_is_an_example() -> None:
