@@ -15,10 +15,12 @@ from cmm_uq.jobs.part.probed import Probed, whole_surface
 from cmm_uq.jobs.part.tables import StylusFacts
 from cmm_uq.parts.causes import Cause, Scatter
 from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.of_form import Form
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, around
 from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan, Stylus
+from cmm_uq.parts.virtual import Circumstances
 from cmm_uq.units import MICROMETRE
 
 
@@ -61,6 +63,21 @@ def refuse_unfit(job: PartJob) -> None:
         raise CmmUqError(
             error.problem, where=f"{job.folder / 'job.toml'}: {error.where or ''}", fix=error.fix
         ) from error
+
+
+def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: int) -> Circumstances:
+    """How and where the part is measured.
+
+    Parameters
+    ----------
+    machine : as its certificate states it.
+    plan : of the job.
+    places : where the part may lie, if it does not lie in the same place each time.
+    """
+    return Circumstances(
+        machine, poses_of(job, places), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
+        clamping_of(job, plan),
+    )  # fmt: skip
 
 
 def poses_of(job: PartJob, count: int) -> tuple[Pose, ...]:

@@ -10,14 +10,26 @@ import pytest
 
 from cmm_uq.commands.check import check_job
 from cmm_uq.commands.new import write_new
-from cmm_uq.commands.part_plan import clamping_of, forms_of, plan_of, poses_of, refuse_unfit, surroundings_of
+from cmm_uq.commands.part_plan import (
+    circumstances_of,
+    clamping_of,
+    forms_of,
+    plan_of,
+    poses_of,
+    refuse_unfit,
+    surroundings_of,
+)
 from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import ASSOCIATIONS
 from cmm_uq.jobs.part import characteristic, feature
+from cmm_uq.jobs.part.beginning import TABLES
 from cmm_uq.jobs.part.job import read_part
 from cmm_uq.parts import plan
 from cmm_uq.parts.characteristics import Evaluation
+from cmm_uq.parts.machine import MachineState, StatedNoise
+from cmm_uq.parts.virtual import AtPose
+from cmm_uq.points import Machine
 from tests.jobs.part.parts import feature as probed_feature
 from tests.jobs.part.parts import plate
 from tests.jobs.part.test_drawing_dmis import BORE, EDGE, HEAD, TOP
@@ -187,6 +199,21 @@ def test_circumstances_are_in_the_units_of_the_virtual_measurement() -> None:
     assert found["A"].harmonics_um == ()  # a plane has no axis to lobe about
     (clamped,) = clamping_of(job, plan_of(job))
     assert np.all(clamped.size == 0.5e-3)  # type: ignore[attr-defined]
+
+
+def test_noise_of_the_readings_goes_through_to_the_diameter() -> None:
+    """A least-squares diameter of n points in regular sections has u = 2σ/√n, to first order exactly."""
+    sigma, n, count = 1e-3, 24, 20_000
+    job = plate(stylus=[{"name": "down", "diameter_mm": 4.0, "offset_mm": [0.0, 0.0, -150.0]}], environment=None, form=None,
+                part={"name": "plate"}, characteristic=[TABLES["characteristic"][0]])  # fmt: skip
+    found = plan_of(job)
+    state = MachineState(Machine("CMM"), (), np.zeros((1, 0)), StatedNoise(np.full(3, sigma)))
+    given = circumstances_of(job, state, found, 1)
+    virtual = AtPose(found, given, given.poses[0])
+    errors = virtual.errors(virtual.drawn(np.random.default_rng(7), count))[:, 0]
+    assert errors.std() == pytest.approx(
+        2 * sigma / np.sqrt(n), rel=4 / np.sqrt(2 * count)
+    )  # four of its own standard errors
 
 
 def test_a_whole_surface_is_probed_from_end_to_end() -> None:

@@ -177,9 +177,10 @@ class _Document:
         if not length:
             self.drawing_.open_keys[found["name"]] = ["length_mm", "point_mm"]
         end = self.millimetres * number_of(length) if length else found.get("diameter_mm", _LENGTH_MM) / 2
-        middle = 0.5 * (start + end) / (math.hypot(*found["direction"]) or 1.0)
+        middle = 0.5 * (start + end)
+        way = middle / (math.hypot(*found["direction"]) or 1.0)
         found["length_mm"] = end - start
-        found["point_mm"] = [a + middle * b for a, b in zip(found["point_mm"], found["direction"], strict=True)]
+        found["point_mm"] = [a + way * b for a, b in zip(found["point_mm"], found["direction"], strict=True)]
         if slope:
             found["diameter_mm"] += 2 * slope * middle
 
