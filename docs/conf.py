@@ -25,7 +25,7 @@ CONTENTS: dict[str, list[str]] = {
     ],
     "Records": ["records/index", "records/*"],
     "Reference": [
-        "reference/job", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
+        "reference/job", "reference/part", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
         "reference/instrument", "reference/schedule",
         "reference/commands", "reference/results", "reference/prove", "running",
         "api", "reference/python", "uncertainty/model-file",

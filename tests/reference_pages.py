@@ -20,6 +20,11 @@ from cmm_uq.instruments.library import profile_named, ready
 from cmm_uq.instruments.profile import ProfileFile
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
+from cmm_uq.jobs.part import drawing_dmis, drawing_qif
+from cmm_uq.jobs.part.characteristic import ASKS, LIMITS, Asks
+from cmm_uq.jobs.part.drawing_dmis import PROGRAM as DMIS
+from cmm_uq.jobs.part.drawing_qif import PROGRAM as QIF
+from cmm_uq.jobs.part.feature import FEWEST, PATTERNS
 from cmm_uq.jobs.recording import REQUIRED
 from cmm_uq.jobs.schema import keys_of
 from cmm_uq.jobs.sentences import unit_of
@@ -46,6 +51,7 @@ def files() -> dict[Path, str]:
     schemas = {SHIPPED / f"{name}.schema.json": as_text(schema_named(name)) for name in SCHEMAS}
     pages = {
         "job": job(),
+        "part": part(),
         "plan": plan(),
         "truth": truth(),
         "budget": budget(),
@@ -90,6 +96,54 @@ def job() -> str:
             ]
     parts += ["`[plan]` has [a page of its own](plan.md)."]
     return page("job.toml, key by key", *parts)
+
+
+def part() -> str:
+    """Every key of a part's job.toml."""
+    schema = schema_named("part")
+    parts = [
+        "The job of a part is a folder with a `job.toml` and the files that state the machine. `cmm-uq new part` writes one "
+        "with every key explained, or with features and tolerances of a QIF plan or a DMIS program (`--from FILE`); "
+        "`cmm-uq check JOB` says all that is wrong with it.",
+        EDITORS.format(name="part"),
+        "Coordinates of features are those of the part in mm at 20 °C. Units stand at the end of a key's name. A standard "
+        "uncertainty u has k = 1.",
+    ]
+    for name, one in schema["properties"].items():
+        parts += [f"## `{header(name, one)}`", one["description"], keys_table(one)]
+        if name == "feature":
+            kinds = [
+                (f"`{kind}`", str(least), ", ".join(f"`{pattern}`" for pattern in PATTERNS[kind]) or "–")
+                for kind, least in FEWEST.items()
+            ]
+            parts.append(table(("kind", "points at least", "patterns"), kinds))
+        if name == "characteristic":
+            rows = [(f"`{what}`", *_asked(asks)) for what, asks in ASKS.items()]
+            parts.append(table(("`what`", "of", "about datums", "limits"), rows))
+    parts += [
+        "## Plans of other programs",
+        "`cmm-uq new part --from FILE` makes these tables of a QIF plan or a DMIS program. What is not understood is refused "
+        "by name; `--set part.not_measured='[\"NAME\"]'` leaves it out knowingly, `'[\"*\"]'` all of it, and the job says "
+        "what was left out. What such a file leaves open stands in the job as an example.",
+        *(
+            f"{program}: {text[0].lower()}{text[1:]}"
+            for program, reader in ((QIF, drawing_qif), (DMIS, drawing_dmis))
+            for text in (" ".join(str(reader.__doc__).replace("``", "`").split("\n\n")[1].split()),)
+        ),
+    ]
+    return page("job.toml of a part, key by key", *parts)
+
+
+def _asked(asks: Asks) -> tuple[str, str, str]:
+    """Of what a characteristic is, about what, and how it is limited."""
+    of = f"{'two of ' if asks.features > 1 else ''}{', '.join(asks.kinds)}"
+    if not asks.datum_kinds:
+        about = "–"
+    elif asks.datums:
+        about = ", ".join(asks.datum_kinds)
+    else:
+        about = "any, else the alignment"
+    return of, about, " and ".join(f"`{key}`" for key in LIMITS[asks.limits])
 
 
 def plan() -> str:

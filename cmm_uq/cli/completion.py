@@ -30,9 +30,9 @@ def kinds(incomplete: str) -> list[str]:
     from cmm_uq.cli.deferred import defer_scipy
 
     defer_scipy()
-    from cmm_uq.commands.new import BUDGET, PLAN, known
+    from cmm_uq.commands.new import BUDGET, PART, PLAN, known
 
-    return [name for name in (*known(), PLAN, BUDGET) if name.startswith(incomplete)]
+    return [name for name in (*known(), PLAN, PART, BUDGET) if name.startswith(incomplete)]
 
 
 def profiles(incomplete: str) -> list[str]:

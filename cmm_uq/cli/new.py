@@ -28,7 +28,7 @@ def command(
     kind: Annotated[
         str,
         typer.Argument(
-            help="Kind of measurement, shift_plate, plan or budget; without it they are listed.",
+            help="Kind of measurement, shift_plate, plan, part or budget; without it they are listed.",
             metavar="KIND",
             autocompletion=kinds,
         ),
@@ -56,7 +56,8 @@ def command(
         Path | None,
         typer.Option(
             "--from",
-            help="Begin from a laboratory's export; needs --machine and --set job.date=… See cmm-uq import.",
+            help="Begin from a laboratory's export (see cmm-uq import), which needs --machine and --set job.date=…; "
+            "a part from a QIF plan or a DMIS program.",
             metavar="FILE",
             show_default="simulated readings",
         ),
@@ -71,7 +72,7 @@ def command(
     On a terminal it asks for machine, artefact and limits, unless one of the options gives something.
     """
     defer_scipy()
-    from cmm_uq.commands.new import BUDGET, check_empty, known, titles, write_new
+    from cmm_uq.commands.new import BUDGET, PART, check_empty, known, titles, write_new
 
     if not kind:
         if json:
@@ -82,8 +83,12 @@ def command(
         return
     target = folder or Path(kind)
     check_empty(target)
+    if kind == PART and (column or key):
+        raise CmmUqError(
+            "the plan of a part has no columns that an option could name", where="--column", fix="Leave it out"
+        )
     given = _given(machine, serial, settings or [])
-    if export is not None:
+    if export is not None and kind != PART:
         files = _of_export(kind, export, target, given, keys_of(column, key), quiet=quiet or json)
         if json:
             put_manifest(files)
@@ -92,7 +97,7 @@ def command(
         from cmm_uq.cli.asking import answers
 
         given = answers(kind)
-    files = write_new(kind, target, given)
+    files = write_new(kind, target, given, drawing=export)
     if json:
         put_manifest(files)
     elif not quiet:

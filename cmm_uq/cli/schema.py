@@ -15,7 +15,7 @@ EXAMPLES = examples("schema job > job.schema.json", "schema budget", "schema tru
 
 def command(
     name: Annotated[
-        str, typer.Argument(help="job (with its plan), budget, truth, instrument or schedule.", metavar="NAME")
+        str, typer.Argument(help="job (with its plan), part, budget, truth, instrument or schedule.", metavar="NAME")
     ] = "job",
 ) -> None:
     """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""

@@ -24,6 +24,7 @@ from cmm_uq.files.limits import JOB_BYTES, TABLE_BYTES
 from cmm_uq.jobs.file_names import inside
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.part.job import is_part, read_part
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.kinds import kind_of
 from cmm_uq.notebook import html_table
@@ -129,6 +130,8 @@ def check_job(folder: Path) -> Checked:
     wrong, path = Gathered(), folder if folder.suffix == ".toml" else folder / "job.toml"
     job: Job | None = None
     warnings: list[Problem] = []
+    if _of_a_part(path):
+        return _check_part(folder, path)
     with wrong.going_on():
         job = read_job(folder)
     if job is None:
@@ -137,6 +140,30 @@ def check_job(folder: Path) -> Checked:
         warnings = _of_a_job(job, path, wrong)
     problems = _once(Problem.of(_placed(error, path)) for error in wrong.problems)
     return Checked(str(folder), problems, _once(warnings), _clauses(job))
+
+
+def _of_a_part(path: Path) -> bool:
+    try:
+        return is_part(content_of(path, JOB_BYTES, ""))
+    except CmmUqError:
+        return False
+
+
+def _check_part(folder: Path, path: Path) -> Checked:
+    """The job of a part: what its readers refuse, and that its figures are an example's."""
+    from cmm_uq.commands.part_plan import refuse_unfit  # the virtual measurement, which no other job needs
+
+    wrong, warnings, job = Gathered(), list[Problem](), None
+    with wrong.going_on():
+        job = read_part(folder, machine=False)
+        refuse_unfit(job)
+    if job is not None:
+        with wrong.going_on():
+            read_part(folder)  # with the files that state the machine
+        if (origin := job.facts.job.origin) != MEASURED:
+            said = f"the figures are {origin}, and all that is made of them says so"
+            warnings.append(Problem(said, str(path), key="[job] origin", fix="Put in your own, and take origin away"))
+    return Checked(str(folder), _once(Problem.of(error) for error in wrong.problems), tuple(warnings))
 
 
 @naming_package()

@@ -28,6 +28,7 @@ from cmm_uq.commands.new_folder import (
     kind_or_refused,
     read_new,
 )
+from cmm_uq.commands.new_part import PART, part_files, part_of_drawing
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.beginning import MACHINE, Beginning
 from cmm_uq.jobs.derived_job import PROGRAM
@@ -42,7 +43,7 @@ from cmm_uq.units import MICROMETRE
 from cmm_uq.writing import Owner, staged
 
 __all__ = [
-    "BUDGET", "KEPT", "PLAN", "README", "RECORDING", "SCHEMA", "job_files", "job_id", "job_of_export", "known",
+    "BUDGET", "KEPT", "PART", "PLAN", "README", "RECORDING", "SCHEMA", "job_files", "job_id", "job_of_export", "known",
     "new_job", "new_plan", "titles", "usual", "write_new",
 ]  # fmt: skip
 
@@ -66,6 +67,7 @@ def titles() -> dict[str, str]:
     return {
         **kinds,
         PLAN: "A job that is only planned (--set artefact.kind=…)",
+        PART: "A part: its features, tolerances, and the machine that measures it",
         BUDGET: "A measurement model of one's own",
     }
 
@@ -152,14 +154,15 @@ def new_plan(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     return job_files(kind.name, tables, {}, example_keys(tables, given), begin=replace(begin, command=PLAN))
 
 
-def write_new(name: str, folder: Path, given: Tables) -> dict[str, Path]:
-    """Write the folder of a new job, or of a new budget; never over anything.
+def write_new(name: str, folder: Path, given: Tables, *, drawing: Path | None = None) -> dict[str, Path]:
+    """Write the folder of a new job, of a part or of a new budget; never over anything.
 
     Parameters
     ----------
-    name : see :func:`known`, or :data:`PLAN` or :data:`BUDGET`.
+    name : see :func:`known`, or :data:`PLAN`, :data:`PART` or :data:`BUDGET`.
     folder : that does not exist, or is empty.
     given : see :func:`new_job`.
+    drawing : QIF plan or DMIS program that a part begins from.
 
     Returns
     -------
@@ -178,6 +181,8 @@ def write_new(name: str, folder: Path, given: Tables) -> dict[str, Path]:
         if given:
             raise CmmUqError("a new budget has no machine, artefact or job", where="--set", fix="Leave it out")
         files, origin = budget_files(), MEASURED
+    elif name == PART:
+        files, origin = part_of_drawing(drawing, given, id=id) if drawing else part_files(given, id=id), SIMULATED
     elif name == PLAN:
         files, origin = new_plan(given, id=id), MEASURED
     else:
@@ -216,7 +221,7 @@ def _begun(name: str) -> tuple[Kind, Beginning]:
     if kind is None:
         kinds = known()
         if name not in kinds:
-            raise CmmUqError(f"there is no kind {name!r}", fix=suggestion(name, (*kinds, PLAN, BUDGET)))
+            raise CmmUqError(f"there is no kind {name!r}", fix=suggestion(name, (*kinds, PLAN, PART, BUDGET)))
         kind = kind_or_refused(kinds[name])
     return kind, kind.beginning(name)
 

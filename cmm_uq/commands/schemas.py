@@ -54,6 +54,13 @@ def budget() -> Schema:
     }  # fmt: skip
 
 
+def part() -> Schema:
+    """Of the job of a part."""
+    from cmm_uq.jobs.part.file import PartFile
+
+    return schema_of(PartFile, "job.toml of a part, for cmm-uq")
+
+
 def instrument() -> Schema:
     """Of the profile of an instrument."""
     return schema_of(ProfileFile, "instrument profile of cmm-uq")
@@ -71,7 +78,7 @@ def _told(effect: Effect) -> str:
 
 
 SCHEMAS: Mapping[str, Callable[[], Schema]] = MappingProxyType({
-    "job": job, "budget": budget, "truth": truth, "instrument": instrument, "schedule": schedule,
+    "job": job, "part": part, "budget": budget, "truth": truth, "instrument": instrument, "schedule": schedule,
 })  # fmt: skip
 """By name."""
 

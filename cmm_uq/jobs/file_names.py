@@ -23,6 +23,9 @@ DERIVED = ("truth.toml", "compensation.json")
 RESULTS = "results.json"
 """Name of what another job's report wrote; a job may keep it in a folder of its own."""
 
+_REPORTED = re.compile(r"results\.json|posterior.*\.npz|certificate.*\.pdf", re.IGNORECASE)
+"""Names of what another job's report wrote and this one may go by."""
+
 _DEVICE = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])(\..*)?", re.IGNORECASE)
 """Windows takes these for devices, with any ending."""
 
@@ -86,7 +89,7 @@ def check_distinct(names: Iterable[str], where: str) -> None:
 
 def _taken_along(parts: Sequence[str]) -> bool:
     """Whether a file that a command wrote belongs to a job: with its recording, or as the results of another in a folder."""
-    return parts[-1] in DERIVED or (len(parts) > 1 and parts[-1] == RESULTS)
+    return parts[-1] in DERIVED or (len(parts) > 1 and _REPORTED.fullmatch(parts[-1]) is not None)
 
 
 def device_name(name: str) -> bool:

@@ -42,6 +42,9 @@ from cmm_uq.writing import finish_interrupted
 if TYPE_CHECKING:
     from cmm_uq.jobs.certified import Read
 
+PART = "part"
+"""The table by which the job of a part is told from others; see :mod:`cmm_uq.jobs.part`."""
+
 
 @dataclass(frozen=True)
 class Nameable:
@@ -214,7 +217,7 @@ def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile, Read | N
         return {**data, "artefact": found.beside(data["artefact"])}
 
     facts = checked(
-        content, source.toml, lambda data: _model_for(data, nameable), nameable.standards, beside=beside
+        content, source.toml, lambda data: _model_for(data, nameable, source.toml), nameable.standards, beside=beside
     )  # fmt: skip
     return content, facts, says[0] if says else None
 
@@ -251,8 +254,16 @@ def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str
     )  # fmt: skip
 
 
-def _model_for(data: dict[str, Any], nameable: Nameable) -> type[JobFile]:
-    """What a job.toml must say for the kind that it names."""
+def _model_for(data: dict[str, Any], nameable: Nameable, path: Path) -> type[JobFile]:
+    """What a job.toml must say for the kind that it names.
+
+    Raises
+    ------
+    CmmUqError : it is the job of a part.
+    """
+    if PART in data and "artefact" not in data:
+        raise CmmUqError("is the job of a part, not of a machine", where=f"{path}: [{PART}]",
+                         fix="cmm-uq check JOB says what it lacks")  # fmt: skip
     artefact = data.get("artefact")
     kind = artefact.get("kind") if isinstance(artefact, dict) else None
     if not isinstance(kind, str):

@@ -18,6 +18,7 @@ from cmm_uq.commands.budget import write_budget
 from cmm_uq.commands.check import check_job, check_read
 from cmm_uq.commands.new import (
     BUDGET,
+    PART,
     PLAN,
     README,
     RECORDING,
@@ -70,7 +71,7 @@ def paths(data: object, above: str = "") -> list[str]:
 def test_every_built_in_kind_and_a_plate_that_is_shifted_can_be_begun() -> None:
     assert tuple(known()) == tuple(sorted(NAMES, key=list(known()).index))
     assert set(known()) == set(NAMES)
-    assert set(titles()) == {*NAMES, PLAN, BUDGET}
+    assert set(titles()) == {*NAMES, PLAN, PART, BUDGET}
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -41,7 +41,7 @@ class Dmis(Format):
         """See :meth:`Format.read`."""
         text, encoding = decoded(content, where, keys.encoding)
         unit, rows, others = None, [], 0
-        for line, statement in _statements(report_lines(text, where), where):
+        for line, statement in statements(report_lines(text, where), where):
             if found := _UNIT.match(statement):
                 unit = _one_unit(unit, found[1], f"{where} line {line}")
             elif found := _ACTUAL.match(statement):
@@ -61,7 +61,7 @@ class Dmis(Format):
         return sheets_of(rows, ["name", "x", "y", "z", "i", "j", "k"], unit=unit, decimal=".", facts=tuple(facts))
 
 
-def _statements(lines: Sequence[str], where: str) -> Iterator[tuple[int, str]]:
+def statements(lines: Sequence[str], where: str) -> Iterator[tuple[int, str]]:
     """Statements without comments, those over several lines joined, with the line that each begins on."""
     begun, start = "", 0
     for line, content in enumerate(lines, 1):

@@ -34,7 +34,7 @@ class Qif(Format):
         """See :meth:`Format.read`."""
         root = root_of(content, where)
         items = [element for element in root.iter() if local(element).endswith("FeatureItem")]
-        named = {item.get("id", ""): _child(item, "FeatureName") for item in items}
+        named = {item.get("id", ""): child(item, "FeatureName") for item in items}
         rows: list[Row] = []
         others = 0
         for element in root.iter():
@@ -50,16 +50,21 @@ class Qif(Format):
         facts = [Fact("version", say("Version of QIF"), Verbatim(root.get("versionQIF", "")))]
         if others:
             facts.append(Fact("features_not_used", say("Features that are no place"), number(others)))
-        return sheets_of(rows, _HEADINGS, unit=_unit(root, where), decimal=".", facts=tuple(facts))
+        return sheets_of(rows, _HEADINGS, unit=length_unit(root, where), decimal=".", facts=tuple(facts))
 
 
-def _unit(root: Element, where: str) -> str | None:
-    """The unit of length in ``FileUnits``, whose name must fit the factor beside it."""
+def length_unit(root: Element, where: str) -> str | None:
+    """Name of the unit of length in ``FileUnits``, whose name must fit the factor beside it; ``None`` where there is none.
+
+    Raises
+    ------
+    CmmUqError : a unit that is not known, or another factor than its own.
+    """
     found = next((e for e in root.iter() if local(e) == "PrimaryUnits"), None)
     length = None if found is None else next((e for e in found if local(e) == "LinearUnit"), None)
     if length is None:
         return None
-    name, factor = _child(length, "UnitName"), next((e.text for e in length.iter() if local(e) == "Factor"), "1")
+    name, factor = child(length, "UnitName"), next((e.text for e in length.iter() if local(e) == "Factor"), "1")
     unit = length_named(name)
     if unit is None:
         metres = float(factor or "1")
@@ -79,10 +84,10 @@ def _metres(name: str) -> float:
 def _feature(element: Element, named: dict[str, str], where: str) -> Row:
     sort, number_ = local(element).removesuffix(_MEASUREMENT).lower(), element.get("id", "")
     place = f"{where}: {local(element)} id {number_}"
-    xyz = _three(_child(element, "Location"), place)
-    label = named.get(_child(element, "FeatureItemId"), "") or number_
-    normal = _child(element, "Normal") if sort == "point" else ""
-    vector: list[Cell] = [*_three(normal, place)] if normal else ["", "", ""]
+    xyz = three(child(element, "Location"), place)
+    label = named.get(child(element, "FeatureItemId"), "") or number_
+    normal = child(element, "Normal") if sort == "point" else ""
+    vector: list[Cell] = [*three(normal, place)] if normal else ["", "", ""]
     return sort, [label, *xyz, *vector], int(number_) if number_.isdigit() else 0
 
 
@@ -103,7 +108,13 @@ def _points(element: Element, where: str) -> Iterator[Row]:
         yield "measured point", [f"set {number_} point {i // 3 + 1}", *words[i : i + 3], *vector], int(number_ or 0)
 
 
-def _three(text: str, place: str) -> list[str]:
+def three(text: str, place: str) -> list[str]:
+    """The three numbers of a place or a direction, as they are written.
+
+    Raises
+    ------
+    CmmUqError : there are fewer or more.
+    """
     words = text.split()
     if len(words) != 3:
         raise CmmUqError(f"has {len(words)} coordinates where a place has three", where=place,
@@ -111,6 +122,7 @@ def _three(text: str, place: str) -> list[str]:
     return words
 
 
-def _child(element: Element, name: str) -> str:
+def child(element: Element, name: str) -> str:
+    """Text of the first element of this name in another; empty where there is none."""
     found = next((e for e in element if local(e) == name), None)
     return "" if found is None or found.text is None else found.text.strip()

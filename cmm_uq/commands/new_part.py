@@ -1,0 +1,219 @@
+"""A new job of a part: every key explained, figures of an example, or features and tolerances of another program's plan."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from cmm_uq.commands.schemas import shipped
+from cmm_uq.errors import CmmUqError
+from cmm_uq.files.content import content_of
+from cmm_uq.files.limits import TABLE_BYTES
+from cmm_uq.jobs.importing.encodings import head_text
+from cmm_uq.jobs.importing.format import HEAD
+from cmm_uq.jobs.importing.xml_files import begins_with
+from cmm_uq.jobs.origin import EXAMPLE, SIMULATED
+from cmm_uq.jobs.part.beginning import TABLES
+from cmm_uq.jobs.part.drawing import KEY, Drawing, Unknown
+from cmm_uq.jobs.part.drawing_dmis import drawing_of_dmis
+from cmm_uq.jobs.part.drawing_qif import drawing_of_qif
+from cmm_uq.jobs.part.feature import FeatureFacts
+from cmm_uq.jobs.part.freedoms import freedoms
+from cmm_uq.jobs.part.job import part_of
+from cmm_uq.jobs.part.probed import Probed, probed
+from cmm_uq.jobs.toml_file import as_toml
+from cmm_uq.jobs.toml_text import commented, written
+
+Tables = Mapping[str, Mapping[str, Any]]
+
+PART = "part"
+SCHEMA, README = ".cmm-uq/part.schema.json", "README.md"
+_NAMED = ("name", "kind", "what", "features", "datums", "not_measured", "drawing")
+"""Keys whose values are no figures."""
+
+_LISTS = ("stylus", "feature", "characteristic")
+
+
+def part_files(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
+    """Contents of every file of a new job of a part, by name; its figures are an example.
+
+    Parameters
+    ----------
+    given : what job.toml is to say, by table and key, in place of the example.
+    id : of the job.
+
+    Raises
+    ------
+    CmmUqError : what is given is refused by the readers of such a job.
+    """
+    tables = _with({name: _copied(table) for name, table in TABLES.items()}, given, id)
+    marked = {f"{name}.{key}" for name, table in TABLES.items() for key in _keys(table)}
+    return _files(tables, marked - _given_keys(given), {})
+
+
+def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
+    """Contents of every file of a new job of a part whose plan another program wrote.
+
+    Parameters
+    ----------
+    path : of a QIF plan or a DMIS program.
+    given : what job.toml is to say; ``part.not_measured`` names what may be left out.
+    id : of the job.
+
+    Raises
+    ------
+    CmmUqError : the file is damaged, or something of it is not understood and may not be left out; or the readers of a job
+        refuse what is made of it.
+    """
+    content, where = content_of(path, TABLE_BYTES, "Check its name"), str(path)
+    head = content[:HEAD]
+    if begins_with(head, "QIFDocument"):
+        drawing = drawing_of_qif(content, where)
+    elif "/" in head_text(head) and not head_text(head).lstrip().startswith("<"):
+        drawing = drawing_of_dmis(content, where)
+    else:
+        raise CmmUqError("is neither a QIF plan nor a DMIS program", where=where, fix="Export one of these")
+    without = given.get(PART, {}).get("not_measured", [])
+    if not (isinstance(without, list) and all(isinstance(name, str) for name in without)):
+        raise CmmUqError("must be a list of names", where=KEY, fix='Write it as \'["NAME", "NAME"]\'')
+    left_out = drawing.settled(without, where)
+    example = {name: _copied(TABLES[name]) for name in ("machine_state", "stylus", "environment", "form")}
+    whole: dict[str, Any] = example | {
+        PART: {"name": path.stem[:100], **({"not_measured": left_out} if left_out else {})},
+        "feature": drawing.features, "characteristic": drawing.characteristics, **_aligned(drawing),
+        **({"stylus": drawing.styli} if drawing.styli else {}),
+    }  # fmt: skip
+    whole["placing"] = {"origin_mm": _in_the_middle(whole)}
+    said = {name: dict(keys) for name, keys in given.items()}
+    said.get(PART, {}).pop("not_measured", None)
+    marked = {f"{name}.{key}" for name in ("machine_state", "environment", "form", "placing") for key in whole[name]}
+    marked |= set() if drawing.styli else {f"stylus.{key}" for key in whole["stylus"][0]}
+    marked |= {"alignment.best_fit"}
+    opened = {name: set(keys) for name, keys in drawing.open_keys.items()}
+    return _files(_with(whole, said, id), marked - _given_keys(said), opened, drawing.unknown)
+
+
+def _aligned(drawing: Drawing) -> dict[str, Any]:
+    """The first datums of the drawing that fix the part; else a best fit, which nobody has asked for."""
+    features = {one["name"]: _probed(one) for one in drawing.features}
+    asked = [drawing.datums, *(one.get("datums", []) for one in drawing.characteristics)]
+    for datums in asked:
+        if datums and not freedoms([features[name] for name in datums]):
+            return {"alignment": {"datums": datums}}
+    return {"alignment": {"best_fit": True}}
+
+
+def _probed(given: Mapping[str, Any]) -> Probed:
+    where = f"feature {given['name']!r}"
+    try:
+        facts = FeatureFacts.model_validate(dict(given))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise CmmUqError(f"{'.'.join(map(str, first['loc']))}: {first['msg'].removeprefix('Value error, ')}", where=where,
+                         fix=f"Leave it out knowingly: --set part.not_measured='[\"{given['name']}\"]'") from None  # fmt: skip
+    return probed(facts, where)
+
+
+def _in_the_middle(tables: Mapping[str, Any]) -> list[float]:
+    """Where the part's origin lies so that its points are in the middle of the travel."""
+    points = np.concatenate([_probed(one).points for one in tables["feature"]])
+    travel = tables["machine_state"]["travel_mm"]
+    middle = np.array([sum(travel[axis]) / 2 for axis in "xyz"])
+    offset = np.array(tables["stylus"][0].get("offset_mm", [0.0, 0.0, 0.0]))
+    place = middle + offset - (points.min(axis=0) + points.max(axis=0)) / 2
+    return [float(value) for value in np.round(place)]
+
+
+def _with(tables: dict[str, Any], given: Tables, id: str) -> dict[str, Any]:  # noqa: A002
+    """What job.toml says: an example or a drawing, and over it what is given."""
+    for name, keys in given.items():
+        if name == "machine":
+            raise CmmUqError("the job of a part names its machine by a certificate", where="--machine",
+                             fix="Leave it out, or give --set machine_state.certificate=machine")  # fmt: skip
+        if name in _LISTS:
+            raise CmmUqError(f"there may be several [[{name}]], which no option names", where="--set",
+                             fix="Write them into job.toml")  # fmt: skip
+        tables[name] = {**tables.get(name, {}), **keys}
+    today = dt.datetime.now(tz=dt.UTC).date()
+    return {**tables, "job": {"id": id, "date": today, "origin": SIMULATED, **tables.get("job", {})}}
+
+
+def _files(
+    tables: Mapping[str, Any], marked: Collection[str], opened: Mapping[str, Collection[str]],
+    left_out: Collection[Unknown] = (),
+) -> dict[str, bytes]:  # fmt: skip
+    part_of({"job.toml": as_toml(tables, "job.toml")}, machine=False)
+    return {
+        "job.toml": _text(tables, marked, opened).encode(), README: _readme(left_out).encode(),
+        SCHEMA: shipped(PART).encode(),
+    }  # fmt: skip
+
+
+def _text(tables: Mapping[str, Any], marked: Collection[str], opened: Mapping[str, Collection[str]]) -> str:
+    """job.toml: of several tables of one name the first with every key explained."""
+    head = (
+        f"#:schema ./{SCHEMA}\n# A part and its uncertainty. What stands behind # is the default, or what may be said "
+        f"besides.\n# Figures marked {EXAMPLE} are nobody's: put in your own, then take the marks and origin below away."
+    )
+    schema, parts = json.loads(shipped(PART)), [head]
+    for name, one in schema["properties"].items():
+        alone = {"properties": {name: one}}
+        if name not in _LISTS:
+            given = {name: tables[name]} if name in tables else {}
+            parts.append(commented(alone, given, examples=_marks(name, tables.get(name), marked, {})))
+            continue
+        for i, said in enumerate(tables[name]):
+            marks = _marks(name, said, marked, opened)
+            parts.append(commented(alone, {name: [said]}, examples=marks) if i == 0 else _short(name, said, marks))
+    return "\n".join([parts[0], "", *parts[1:]])
+
+
+def _marks(name: str, said: Any, marked: Collection[str], opened: Mapping[str, Collection[str]]) -> set[str]:
+    """Dotted keys of a table whose values are examples."""
+    own = opened.get(str((said or {}).get("name", "")), ()) if name == "feature" else ()
+    return {f"{name}.{key}" for key in said or {} if f"{name}.{key}" in marked or key in own}
+
+
+def _short(name: str, said: Mapping[str, Any], marks: Collection[str]) -> str:
+    lines = [f"[[{name}]]"]
+    for key, value in said.items():
+        lines.append(
+            f"{key} = {written(value)}" + (f"  # {EXAMPLE}, put in your own" if f"{name}.{key}" in marks else "")
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _keys(table: Any) -> list[str]:
+    found = [key for one in (table if isinstance(table, list) else [table]) for key in one]
+    return [key for key in dict.fromkeys(found) if key not in _NAMED]
+
+
+def _given_keys(given: Tables) -> set[str]:
+    return {f"{table}.{key}" for table, keys in given.items() for key in keys}
+
+
+def _copied(table: Any) -> Any:
+    return [dict(one) for one in table] if isinstance(table, list) else dict(table)
+
+
+def _readme(left_out: Collection[Unknown]) -> str:
+    lines = [
+        "# A part and its uncertainty", "",
+        "- `job.toml`: features with the points at which they are probed, datums, tolerances, styli, temperatures. Editors "
+        f"that know TOML schemas explain every key (`{SCHEMA}`).",
+        "- Put the machine's `results.json` and `posterior.npz`, as `cmm-uq report` wrote them, into the folder `machine`, "
+        "or name its certificate in `[machine_state]`.",
+        f"- **The figures marked {EXAMPLE} are nobody's.** Put in your own, then take the marks away, and "
+        '`origin = "simulated"`.',
+        "- `cmm-uq check .` says what is missing or wrong.",
+    ]  # fmt: skip
+    if left_out:
+        lines += ["", "What was not understood of the plan, and is not measured:", ""]
+        lines += [f"- `{one.name}` {one.why}." for one in left_out]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,152 @@
+"""The measurement plan of a part's job and its circumstances, as the virtual measurement takes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.form import FormFacts
+from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.jobs.part.placing import rotation
+from cmm_uq.jobs.part.probed import Probed, whole_surface
+from cmm_uq.jobs.part.tables import StylusFacts
+from cmm_uq.parts.causes import Cause, Scatter
+from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.machine import MachineState
+from cmm_uq.parts.of_form import Form
+from cmm_uq.parts.of_temperature import Expansion, Surroundings
+from cmm_uq.parts.placing import Pose, around
+from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan, Stylus
+from cmm_uq.parts.virtual import Circumstances
+from cmm_uq.units import MICROMETRE
+
+
+def plan_of(job: PartJob) -> Plan:
+    """The plan of a job that was read: geometry alone, in mm and rad, in the frame of the part."""
+    facts, styli = job.facts, [one.name for one in job.facts.stylus]
+    features = tuple(_feature(one, one.facts.stylus or styli[0], one.facts.form or facts.form) for one in job.features)
+    names = [one.name for one in features]
+    ends = np.cumsum([0, *(len(one.points) for one in features)])
+    order = [names.index(name) for name in facts.probing.order] or list(range(len(names)))
+    rows = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in order])
+    times = np.zeros(0)
+    if facts.probing.seconds_per_point:
+        times = np.empty(len(rows))
+        times[rows] = facts.probing.seconds_per_point * np.arange(len(rows))
+    return Plan(
+        features,
+        tuple(_characteristic(one) for one in facts.characteristic),
+        tuple(
+            _stylus(one)
+            for one in facts.stylus
+        ),
+        Alignment(tuple(facts.alignment.datums), facts.alignment.best_fit),
+        rows.astype(np.int64),
+        times,
+    )  # fmt: skip
+
+
+def refuse_unfit(job: PartJob) -> None:
+    """Refuse what a virtual measurement of the job would refuse of its plan.
+
+    Raises
+    ------
+    CmmUqError : points that do not determine a feature, datums that do not fix a frame.
+    """
+    plan = plan_of(job)
+    try:
+        Evaluator(plan, np.zeros_like(plan.points), ())
+    except CmmUqError as error:
+        raise CmmUqError(
+            error.problem, where=f"{job.folder / 'job.toml'}: {error.where or ''}", fix=error.fix
+        ) from error
+
+
+def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: int) -> Circumstances:
+    """How and where the part is measured.
+
+    Parameters
+    ----------
+    machine : as its certificate states it.
+    plan : of the job.
+    places : where the part may lie, if it does not lie in the same place each time.
+    """
+    return Circumstances(
+        machine, poses_of(job, places), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
+        clamping_of(job, plan),
+    )  # fmt: skip
+
+
+def poses_of(job: PartJob, count: int) -> tuple[Pose, ...]:
+    """Where the part lies: the one place that is stated, or so many where it may lie.
+
+    Parameters
+    ----------
+    count : of places, where they are not the same each time.
+    """
+    given = job.facts.placing
+    pose = Pose(rotation(given), np.array(given.origin_mm, dtype=np.float64))
+    if not (any(given.u_origin_mm) or any(given.u_rotation_deg)):
+        return (pose,)
+    return around(pose, np.array(given.u_origin_mm), np.radians(given.u_rotation_deg), count)
+
+
+def surroundings_of(job: PartJob) -> Surroundings:
+    """Temperatures of part and scales, and what is known of them."""
+    facts, given = job.facts.part, job.facts.environment
+    part = Expansion(facts.cte_per_k, facts.u_cte_per_k, given.part_c, given.u_part_k, given.compensated)
+    x, y, z = (
+        Expansion(given.scales_cte_per_k, given.u_scales_cte_per_k, celsius, given.u_scales_k, given.compensated)
+        for celsius in given.scales_c
+    )
+    return Surroundings(part, (x, y, z), np.array(given.u_gradient_k_per_m))
+
+
+def forms_of(job: PartJob) -> tuple[Form, ...]:
+    """Form of each feature: its own, else that of all."""
+    found = []
+    for one in job.features:
+        given = one.facts.form or job.facts.form
+        lobed = one.facts.kind in _LOBED
+        harmonics = tuple((int(count), size) for count, size in given.harmonics_um.items()) if lobed else ()
+        form = Form(one.facts.name, harmonics, given.field_um, given.correlation_mm, given.roughness_um)
+        if form.field_um or form.harmonics_um or form.roughness_um:
+            found.append(form)
+    return tuple(found)
+
+
+def clamping_of(job: PartJob, plan: Plan) -> tuple[Cause, ...]:
+    """What clamping does to each point on its own; none where nothing is stated."""
+    size = MICROMETRE * job.facts.placing.u_fixture_um
+    return (Scatter.of("fixture", "fixture", np.full((len(plan.points), 3), size)),) if size else ()
+
+
+_LOBED = ("circle", "cylinder", "cone")
+
+
+def _stylus(one: StylusFacts) -> Stylus:
+    at = None if one.qualified_at_mm is None else np.array(one.qualified_at_mm)
+    return Stylus(one.name, np.array(one.offset_mm), one.diameter_mm, one.u_diameter_um, np.array(one.u_offset_um),
+                  one.lobing_um, at)  # fmt: skip
+
+
+def _feature(one: Probed, stylus: str, form: FormFacts) -> Feature:
+    facts = one.facts
+    half = None if facts.angle_deg is None else float(np.radians(facts.angle_deg / 2))
+    sized = facts.diameter_mm if facts.kind != "plane" else None
+    nominal = Nominal(np.array(facts.point_mm), one.direction, sized, half)
+    given = Feature(facts.name, facts.kind, one.points, one.normals, stylus, nominal, facts.association)
+    whole = whole_surface(facts, form.surface_points)
+    return given if whole is None else replace(given, surface=whole.points, surface_normals=whole.normals)
+
+
+def _characteristic(one: CharacteristicFacts) -> Characteristic:
+    lower, upper = one.lower_mm, one.upper_mm
+    if one.asks.limits == "angles":
+        lower, upper = (None if limit is None else float(np.radians(limit)) for limit in (one.lower_deg, one.upper_deg))
+    elif one.asks.limits == "zone":
+        upper = one.tolerance_mm
+    return Characteristic(one.name, one.what, tuple(one.features), tuple(one.datums), lower, upper, one.association)

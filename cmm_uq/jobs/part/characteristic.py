@@ -1,0 +1,133 @@
+"""``[[characteristic]]``: what the drawing asks for, of which features, about which datums, within which limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from cmm_uq.jobs.part.feature import Association, Kind
+from cmm_uq.jobs.table import Length, Position, Table
+
+What = Literal[
+    "size", "straightness", "flatness", "roundness", "cylindricity", "sphericity", "distance", "angle", "parallelism",
+    "perpendicularity", "angularity", "position", "coaxiality", "x", "y", "z", "circular_runout", "total_runout",
+]  # fmt: skip
+
+AXIAL: tuple[Kind, ...] = ("line", "cylinder", "cone")
+TURNED: tuple[Kind, ...] = ("line", "plane", "cylinder", "cone")
+"""Kinds whose direction is measured; that of a circle is nominal."""
+
+DIRECTED: tuple[Kind, ...] = ("line", "plane", "circle", "cylinder", "cone")
+EVERY: tuple[Kind, ...] = ("point", "line", "plane", "circle", "sphere", "cylinder", "cone")
+PLACED: tuple[Kind, ...] = ("point", "circle", "sphere", "cylinder", "cone")
+
+Feature = Annotated[str, Field(min_length=1, max_length=100)]
+
+
+@dataclass(frozen=True)
+class Asks:
+    """What a characteristic is of.
+
+    Parameters
+    ----------
+    kinds : of features that it may be of.
+    features : how many of them.
+    datum_kinds : of datums that it may have; none where it has no datums.
+    datums : how many of them at least.
+    limits : how the drawing limits it: by a ``zone``, by ``lengths`` or by ``angles``.
+    framed : whether it needs the alignment where it has no datums of its own.
+    """
+
+    kinds: tuple[Kind, ...]
+    features: int = 1
+    datum_kinds: tuple[Kind, ...] = ()
+    datums: int = 0
+    limits: Literal["zone", "lengths", "angles"] = "zone"
+    framed: bool = False
+
+
+ASKS: Mapping[What, Asks] = {
+    "size": Asks(("circle", "sphere", "cylinder"), limits="lengths"),
+    "straightness": Asks(("line",)), "flatness": Asks(("plane",)), "roundness": Asks(("circle",)),
+    "cylindricity": Asks(("cylinder",)), "sphericity": Asks(("sphere",)),
+    "distance": Asks(EVERY, 2, limits="lengths"), "angle": Asks(TURNED, 2, limits="angles"),
+    "parallelism": Asks(TURNED, 1, DIRECTED, 1), "perpendicularity": Asks(TURNED, 1, DIRECTED, 1),
+    "angularity": Asks(TURNED, 1, DIRECTED, 1),
+    "position": Asks(EVERY, 1, EVERY, framed=True), "coaxiality": Asks(("circle", *AXIAL), 1, AXIAL, 1),
+    **{axis: Asks(PLACED, 1, EVERY, limits="lengths", framed=True) for axis in ("x", "y", "z")},
+    "circular_runout": Asks(("plane", "circle", "cylinder"), 1, AXIAL, 1),
+    "total_runout": Asks(("plane", "cylinder"), 1, AXIAL, 1),
+}  # fmt: skip
+"""Of each kind of characteristic (ISO 1101, ISO 5459, ISO 14405-1)."""
+
+LIMITS: Mapping[str, tuple[str, ...]] = {
+    "zone": ("tolerance_mm",), "lengths": ("lower_mm", "upper_mm"), "angles": ("lower_deg", "upper_deg"),
+}  # fmt: skip
+"""Keys of a characteristic's limits, by how the drawing limits it."""
+
+Degrees = Annotated[float, Field(ge=-360, le=360)]
+
+
+class CharacteristicFacts(Table):
+    """One ``[[characteristic]]``."""
+
+    name: Annotated[str, Field(min_length=1, max_length=100)]
+    """Name or number on the drawing."""
+    what: What
+    """What is asked for."""
+    features: Annotated[list[Feature], Field(max_length=2)] = []
+    """Names of the features that it is of: two of a distance and an angle, one of all else."""
+    datums: Annotated[list[Feature], Field(max_length=6)] = []
+    """Names of the features that are its datums, in order; where it needs some and has none, those of `[alignment]`."""
+    tolerance_mm: Length | None = None
+    """Width of the tolerance zone, of form, orientation, location and runout; of a position its diameter."""
+    lower_mm: Position | None = None
+    """Lower limit of a size, distance or coordinate."""
+    upper_mm: Position | None = None
+    """Upper limit of a size, distance or coordinate."""
+    lower_deg: Degrees | None = None
+    """Lower limit of an angle."""
+    upper_deg: Degrees | None = None
+    """Upper limit of an angle."""
+    association: Association | None = None
+    """How its features are made of their points, where not as they say themselves."""
+
+    @property
+    def asks(self) -> Asks:
+        """What it is of."""
+        return ASKS[self.what]
+
+    @model_validator(mode="after")
+    def _of_features(self) -> Self:
+        count = self.asks.features
+        if not self.features:
+            example = ", ".join(['"…"'] * count)
+            raise ValueError(f"names no feature: give features = [{example}], whose {self.what} it is")
+        if len(self.features) != count:
+            raise ValueError(f"a {self.what} is of {count} {'features' if count > 1 else 'feature'}: give so many")
+        if len(set(self.features)) < count:
+            raise ValueError(f"a {self.what} is of two features: {self.features[0]!r} stands there twice")
+        if self.datums and not self.asks.datum_kinds:
+            raise ValueError(f"{self.what} has no datums: leave them out")
+        if len(self.datums) < self.asks.datums:
+            raise ValueError(f"{self.what} is about a datum: give datums with the name of a feature")
+        twice = next((name for name in self.datums if self.datums.count(name) > 1 or name in self.features), None)
+        if twice is not None:
+            raise ValueError(f"{twice!r} cannot be its own datum, or a datum twice")
+        return self
+
+    @model_validator(mode="after")
+    def _limits_of_its_kind(self) -> Self:
+        own = LIMITS[self.asks.limits]
+        for key in (key for keys in LIMITS.values() for key in keys):
+            if getattr(self, key) is not None and key not in own:
+                raise ValueError(f"a {self.what} has no {key}: its limits are {' and '.join(own)}")
+        for low, high in ((self.lower_mm, self.upper_mm), (self.lower_deg, self.upper_deg)):
+            if low is not None and high is not None and not low < high:
+                raise ValueError(
+                    f"its lower limit {low:g} is not below its upper limit {high:g}: exchange or mend them"
+                )
+        return self

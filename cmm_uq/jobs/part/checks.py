@@ -1,0 +1,190 @@
+"""What a part's tables say together: names that lead somewhere, datums that fix a frame, a part within the travel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from cmm_uq.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.file import PartFile
+from cmm_uq.jobs.part.freedoms import freedoms
+from cmm_uq.jobs.part.located import Places
+from cmm_uq.jobs.part.placing import readings
+from cmm_uq.jobs.part.probed import Probed
+from cmm_uq.points import AXES
+
+_NEARLY = np.sin(np.radians(1.0))
+"""Of a nominal orientation: what is off by more than a degree is another orientation than the drawing's."""
+
+_FAR = 0.1
+"""Share of a nominal size by which the middle of its limits may lie beside it, for fits."""
+
+
+def check_names(facts: PartFile, places: Places, wrong: Gathered) -> None:
+    """Gather names that stand twice or lead nowhere."""
+    for table, named in (
+        ("stylus", facts.stylus),
+        ("feature", facts.feature),
+        ("characteristic", facts.characteristic),
+    ):
+        names = [one.name for one in named]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                wrong.add(CmmUqError(f"the {table} {name!r} stands there twice", where=places.of(table, "name", i),
+                                     fix="Give each a name of its own"))  # fmt: skip
+    styli, features = [one.name for one in facts.stylus], [one.name for one in facts.feature]
+    for i, feature in enumerate(facts.feature):
+        if not feature.stylus and len(styli) > 1:
+            said = f"there are {len(styli)} styli, and {feature.name!r} does not say which probes it"
+            where = places.of("feature", "stylus", i)
+            wrong.add(CmmUqError(said, where=where, fix=f"Give stylus = {styli[0]!r} or another"))
+        _known([feature.stylus] if feature.stylus else [], styli, "stylus", places.of("feature", "stylus", i), wrong)
+    _known(facts.alignment.datums, features, "feature", places.of("alignment", "datums"), wrong)
+    for i, one in enumerate(facts.characteristic):
+        for key in ("features", "datums"):
+            _known(getattr(one, key), features, "feature", places.of("characteristic", key, i), wrong)
+    order = facts.probing.order
+    _known(order, features, "feature", places.of("probing", "order"), wrong)
+    left = [name for name in features if name not in order]
+    if order and (left or len(order) != len(features)):
+        said = f"leaves {left[0]!r} out" if left else "names a feature twice"
+        wrong.add(CmmUqError(said, where=places.of("probing", "order"), fix="Name each feature once"))
+
+
+def _known(names: Sequence[str], known: Sequence[str], what: str, where: str, wrong: Gathered) -> None:
+    for name in names:
+        if name not in known:
+            wrong.add(CmmUqError(f"there is no {what} {name!r}", where=where, fix=suggestion(name, known)))
+
+
+def check_plan(facts: PartFile, features: Mapping[str, Probed], places: Places, wrong: Gathered) -> None:
+    """Gather what the tables say against each other; all names lead somewhere.
+
+    Parameters
+    ----------
+    features : by name.
+    """
+    for check in (_tips, _alignment, _characteristics, _travel):
+        for error in check(facts, features, places):
+            wrong.add(error)
+
+
+def _tips(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
+    styli = {one.name: one for one in facts.stylus}
+    for i, one in enumerate(facts.feature):
+        tip = styli[one.stylus or facts.stylus[0].name].diameter_mm
+        if one.inner and one.diameter_mm is not None and tip >= one.diameter_mm:
+            yield CmmUqError(f"a tip of {tip:g} mm does not fit into {one.name!r}, a hole of {one.diameter_mm:g} mm",
+                             where=places.of("feature", "diameter_mm", i), fix="Name a smaller stylus")  # fmt: skip
+
+
+def _alignment(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
+    given = facts.alignment
+    if given.datums:
+        if free := freedoms([features[name] for name in given.datums]):
+            yield _unfixed(free, places.of("alignment", "datums"))
+    elif not given.best_fit:
+        asking = [(i, one) for i, one in enumerate(facts.characteristic) if one.asks.framed and not one.datums]
+        if asking:
+            i, one = asking[0]
+            yield CmmUqError(f"the {one.what} of {one.features[0]!r} has no datums, and there is no alignment",
+                             where=places.of("characteristic", "datums", i),
+                             fix="Give datums, or [alignment] datums = [\"…\", …] or best_fit = true")  # fmt: skip
+
+
+def _unfixed(free: Sequence[str], where: str) -> CmmUqError:
+    return CmmUqError(f"these datums do not fix the part: they leave free {', '.join(free)}", where=where,
+                      fix="Add a feature that fixes it, as a plane, a line across it and a point: 3-2-1")  # fmt: skip
+
+
+_Check = Callable[[CharacteristicFacts, Mapping[str, Probed]], tuple[str, str, str] | None]
+
+
+def _characteristics(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
+    checks: tuple[_Check, ...] = (_of_its_kinds, _nominal_orientation, _limits_of_the_value, _frame_of_a_coordinate)
+    for i, one in enumerate(facts.characteristic):
+        found = next((found for check in checks if (found := check(one, features))), None)
+        if found:
+            problem, key, fix = found
+            yield CmmUqError(problem, where=places.of("characteristic", key, i), fix=fix)
+
+
+def _of_its_kinds(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+    """That it is of features, and about datums, that can have it."""
+    for names, kinds, key, of in (
+        (one.features, one.asks.kinds, "features", "is of"), (one.datums, one.asks.datum_kinds, "datums", "is about"),
+    ):  # fmt: skip
+        for name in names:
+            kind = features[name].facts.kind
+            if kind not in kinds:
+                return (f"a {one.what} {of} a {' or '.join(kinds)}, and {name!r} is a {kind}", key,
+                        "Name another feature, or another characteristic")  # fmt: skip
+    return None
+
+
+def _nominal_orientation(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+    """That what is to be parallel or perpendicular to its datum is so by its nominal."""
+    if one.what not in ("parallelism", "perpendicularity"):
+        return None
+    feature, datum = features[one.features[0]], features[one.datums[0]]
+    if feature.direction is None or datum.direction is None:
+        return None
+    one_normal = (feature.facts.kind in _NORMAL) != (datum.facts.kind in _NORMAL)
+    cosine = abs(float(feature.direction @ datum.direction))
+    sine = float(np.linalg.norm(np.cross(feature.direction, datum.direction)))
+    along = (one.what == "parallelism") != one_normal
+    if (sine if along else cosine) <= _NEARLY:
+        return None
+    angle = np.degrees(np.arctan2(sine, cosine))
+    angle = 90 - angle if one_normal else angle
+    return (f"{one.features[0]!r} lies at {angle:.4g}° to {one.datums[0]!r} by their nominals, which is no {one.what}", "what",
+            'Mend a direction, or ask for "angularity"')  # fmt: skip
+
+
+_NORMAL = ("plane",)
+"""Kinds whose direction is across what they are; a circle is told by its axis."""
+
+
+def _limits_of_the_value(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+    """That limits of a size are limits of the size, not deviations from it."""
+    nominal = features[one.features[0]].facts.diameter_mm
+    if one.what != "size" or nominal is None:
+        return None
+    given = [limit for limit in (one.lower_mm, one.upper_mm) if limit is not None]
+    if not given or abs(sum(given) / len(given) - nominal) <= _FAR * nominal:
+        return None
+    said = " to ".join(f"{limit:g}" for limit in given)
+    return (f"limits of {said} mm, where {one.features[0]!r} has a nominal diameter of {nominal:g} mm",
+            "lower_mm" if one.lower_mm is not None else "upper_mm",
+            "Give limits of the diameter itself, as 9.9 and 10.1, not deviations from it")  # fmt: skip
+
+
+def _frame_of_a_coordinate(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+    """That a coordinate with datums of its own has a whole frame."""
+    if one.what not in AXES or not one.datums:
+        return None
+    free = freedoms([features[name] for name in one.datums])
+    told = _unfixed(free, "")
+    return (told.problem, "datums", told.fix or "") if free else None
+
+
+def _travel(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
+    """That the axes reach every point: once an axis, by its farthest point."""
+    travel, styli = facts.machine_state.travel_mm, {one.name: one for one in facts.stylus}
+    named = list(features.values())
+    read = [readings(one, styli[one.facts.stylus or facts.stylus[0].name], facts) for one in named]
+    every = np.concatenate(read)
+    owner = np.repeat(np.arange(len(named)), [len(one) for one in read])
+    for i, axis in enumerate(AXES):
+        given = getattr(travel, axis)
+        if given is None:
+            continue
+        beyond = np.maximum(given[0] - every[:, i], every[:, i] - given[1])
+        row = int(np.argmax(beyond))
+        if beyond[row] > 0:
+            name = named[owner[row]].facts.name
+            yield CmmUqError(f"axis {axis} would have to go to {every[row, i]:.6g} mm for {name!r}, and its travel is "
+                             f"{given[0]:g} to {given[1]:g} mm", where=places.of("placing", "origin_mm"),
+                             fix="Place the part elsewhere, or name another stylus")  # fmt: skip

@@ -1,0 +1,142 @@
+"""What another program's plan asks for, as tables of a part's job; what is not understood of it is refused by name.
+
+A plan is read once, when a job is begun: features, characteristics, styli and alignment become tables that anybody can
+read and correct. What such a file leaves open (how a feature is probed, how long it is) stands there as an example.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from cmm_uq.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.jobs.part.characteristic import ASKS, What
+
+Facts = dict[str, Any]
+
+_DIGITS = 9
+"""Decimals of a limit: a picometre, which the sum of a size and a deviation keeps."""
+
+ALL = "*"
+"""In place of names: everything that is not understood."""
+
+KEY = "[part] not_measured"
+
+
+class NotUnderstoodError(Exception):
+    """What of a feature, a characteristic or a statement is not understood, to follow its name."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """Something that is not understood.
+
+    Parameters
+    ----------
+    name : of the feature or characteristic, or of the statement.
+    why : what of it is not understood, to follow its name.
+    where : file and line.
+    """
+
+    name: str
+    why: str
+    where: str
+
+
+@dataclass
+class Drawing:
+    """What was read.
+
+    Parameters
+    ----------
+    program : format that it was read from.
+    features, characteristics, styli : tables, in order.
+    datums : names of features, of the alignment.
+    unknown : what was not understood.
+    open_keys : by the name of a feature, keys that the file leaves open, whose values are examples.
+    """
+
+    program: str
+    features: list[Facts] = field(default_factory=list)
+    characteristics: list[Facts] = field(default_factory=list)
+    styli: list[Facts] = field(default_factory=list)
+    datums: list[str] = field(default_factory=list)
+    unknown: list[Unknown] = field(default_factory=list)
+    open_keys: dict[str, list[str]] = field(default_factory=dict)
+
+    def settled(self, without: Sequence[str], where: str) -> list[str]:
+        """Names of what is left out knowingly.
+
+        Parameters
+        ----------
+        without : names that may be left out, or :data:`ALL`.
+        where : file, for messages.
+
+        Raises
+        ------
+        CmmUqError : something is not understood and may not be left out, or a name is of nothing that is there; or nothing is
+            left to be measured.
+        """
+        wrong = Gathered()
+        for one in self.unknown:
+            if ALL not in without and one.name not in without:
+                wrong.add(CmmUqError(f"{one.name!r} {one.why}", where=one.where,
+                                     fix=f"Leave it out knowingly: --set part.not_measured='[\"{one.name}\"]', or "
+                                         f"'[\"{ALL}\"]' for all of these"))  # fmt: skip
+        named = {*(one.name for one in self.unknown), *(f["name"] for f in (*self.features, *self.characteristics))}
+        for name in without:
+            if name not in (ALL, *named):
+                wrong.add(CmmUqError(f"has nothing named {name!r}", where=where, fix=suggestion(name, named)))
+        wrong.refuse()
+        for table in (self.features, self.characteristics):
+            table[:] = [one for one in table if one["name"] not in without]
+        self._without_their_features()
+        for table, what in ((self.features, "feature"), (self.characteristics, "tolerance")):
+            if not table:
+                raise CmmUqError(f"holds no {what} that is understood", where=where,
+                                 fix="Write the job by hand: cmm-uq new part")  # fmt: skip
+        return list(dict.fromkeys([*(one.name for one in self.unknown), *(name for name in without if name != ALL)]))
+
+    def _without_their_features(self) -> None:
+        """Leave out characteristics whose feature or datum was left out, by name."""
+        there = {one["name"] for one in self.features}
+        for one in list(self.characteristics):
+            if not there.issuperset([*one["features"], *one.get("datums", ())]):
+                self.characteristics.remove(one)
+                self.unknown.append(Unknown(one["name"], "is of a feature that was left out", ""))
+        self.datums[:] = self.datums if there.issuperset(self.datums) else []
+
+
+def limits(what: str, low: float, high: float) -> Facts:
+    """Keys of two limits of a size, distance or coordinate, or of an angle in degrees."""
+    unit = "deg" if what == "angle" else "mm"
+    return {f"lower_{unit}": round(low, _DIGITS), f"upper_{unit}": round(high, _DIGITS)}
+
+
+def refuse_other_kind(what: What, kind: str) -> None:
+    """Refuse a characteristic of a feature that has none of the kind.
+
+    Raises
+    ------
+    NotUnderstoodError : it has none.
+    """
+    if kind not in ASKS[what].kinds:
+        raise NotUnderstoodError(f"is a {what} of a {kind}, which is not read")
+
+
+def usual_strategy(kind: str, count: int | None = None) -> Facts:
+    """How a feature is probed where its plan does not say it.
+
+    Parameters
+    ----------
+    kind : of feature.
+    count : of its points, where that is said.
+    """
+    if kind == "cylinder" and not count:
+        return {"pattern": "sections", "sections": 3, "points": 8}
+    return {"pattern": "points", "points": count or _USUAL[kind]}
+
+
+_USUAL: Mapping[str, int] = {"line": 5, "plane": 12, "circle": 12, "sphere": 25, "cylinder": 24, "cone": 24}
+"""Points where nothing is said; 25 of a sphere as in ISO 10360-5."""

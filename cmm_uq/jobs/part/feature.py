@@ -1,0 +1,225 @@
+"""``[[feature]]``: where a feature is meant to be, and where it is probed.
+
+Coordinates are those of the part, mm, at 20 °C. What each kind needs, and what none of its kind has, is said here once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Annotated, Literal, Self, get_args
+
+from pydantic import Field, field_validator, model_validator
+
+from cmm_uq.files.limits import LISTED
+from cmm_uq.jobs.part.form import FormFacts
+from cmm_uq.jobs.table import Length, Table, Triple
+
+Kind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
+Association = Literal["least_squares", "minimum_zone", "maximum_inscribed", "minimum_circumscribed", "tangent"]
+Pattern = Literal["points", "grid", "sections", "lines", "circles", "spiral"]
+
+FEWEST: Mapping[Kind, int] = {
+    "point": 1, "line": 2, "plane": 3, "circle": 3, "sphere": 4, "cylinder": 5, "cone": 6,
+}  # fmt: skip
+"""Points that determine a feature."""
+
+PATTERNS: Mapping[Kind, tuple[Pattern, ...]] = {
+    "point": (), "line": ("points",), "plane": ("points", "grid", "circles", "spiral"), "circle": ("points",),
+    "sphere": ("points", "sections", "spiral"), "cylinder": ("points", "sections", "lines", "spiral"),
+    "cone": ("points", "sections", "lines", "spiral"),
+}  # fmt: skip
+"""Of each kind, the first of which is its usual one."""
+
+ROUND: tuple[Kind, ...] = ("circle", "sphere", "cylinder", "cone")
+"""Kinds with a diameter, whose material lies inside of it or around it."""
+
+DIRECTED: tuple[Kind, ...] = ("point", "line", "plane", "circle", "cylinder", "cone")
+"""Kinds that are nothing without a direction: that in which a point is probed is against its normal."""
+
+_ASSOCIATIONS: Mapping[Kind, tuple[Association, ...]] = {
+    "point": ("least_squares",), "line": ("least_squares", "minimum_zone", "tangent"),
+    "plane": ("least_squares", "minimum_zone", "tangent"),
+    "circle": get_args(Association)[:4], "sphere": get_args(Association)[:4], "cylinder": get_args(Association)[:4],
+    "cone": get_args(Association)[:2],
+}  # fmt: skip
+
+_KEYS: Mapping[str, tuple[Kind, ...]] = {
+    "diameter_mm": (*ROUND, "plane"), "inner_diameter_mm": ("plane",), "angle_deg": ("cone",), "inner": ROUND,
+    "length_mm": ("line", "plane", "cylinder", "cone"), "width_mm": ("plane",), "normal": ("line",),
+    "along": ("plane", "circle", "sphere", "cylinder", "cone"),
+}  # fmt: skip
+"""Keys that only some kinds have."""
+
+_NEEDED: Mapping[Pattern, tuple[str, ...]] = {
+    "points": ("points",), "grid": ("rows", "columns"), "sections": ("sections", "points"), "lines": ("lines", "points"),
+    "circles": ("circles", "points"), "spiral": ("turns", "points"),
+}  # fmt: skip
+
+_ONLY: Mapping[str, Callable[[Kind, Pattern], bool]] = {
+    "cap_deg": lambda kind, _: kind == "sphere",
+    "margin_mm": lambda kind, _: kind not in ("circle", "sphere"),
+    "start_deg": lambda kind, pattern: kind != "line" and (kind, pattern) not in (("plane", "grid"), ("plane", "points")),
+    "sweep_deg": lambda kind, pattern: _ONLY["start_deg"](kind, pattern)
+    and (pattern != "spiral" and (kind, pattern) != ("sphere", "points")),
+}  # fmt: skip
+"""Keys of a strategy that only some patterns of some kinds heed."""
+
+Count = Annotated[int, Field(ge=1, le=LISTED.most)]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+
+NONE_OF_LENGTH = 1e-9
+"""Length of a vector below which it has no direction."""
+
+
+def _a_direction(vector: list[float] | None) -> list[float] | None:
+    if vector is not None and math.hypot(*vector) < NONE_OF_LENGTH:
+        raise ValueError(f"{vector} has no direction: give three components that are not all 0")
+    return vector
+
+
+class Strategy(Table):
+    """``strategy``: a pattern of points on the nominal surface."""
+
+    pattern: Pattern
+    """`points` spread evenly, a `grid`, `sections` across the axis, `lines` along it, `circles` about a plane's point, or
+    a `spiral`."""
+    points: Count | None = None
+    """Points in all; of `sections`, `lines` and `circles` those of each."""
+    sections: Count | None = None
+    """Sections across the axis, or circles of latitude on a sphere."""
+    lines: Count | None = None
+    """Lines along the axis."""
+    circles: Count | None = None
+    """Concentric circles on a plane."""
+    rows: Count | None = None
+    """Rows of a grid, across the plane's length."""
+    columns: Count | None = None
+    """Columns of a grid, along the plane's length."""
+    turns: Annotated[float, Field(gt=0, le=1000)] | None = None
+    """Turns of a spiral."""
+    start_deg: Angle = 0.0
+    """Angle of the first point from `along`, counted about the direction by the right hand."""
+    sweep_deg: Annotated[float, Field(gt=0, le=360)] = 360.0
+    """Angle that is probed, for part of a circle, cylinder or cone."""
+    cap_deg: Annotated[float, Field(gt=0, lt=180)] = 90.0
+    """Of a sphere, how far from its direction it is probed."""
+    margin_mm: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    """What stays free at each end and edge."""
+
+    @model_validator(mode="after")
+    def _what_the_pattern_needs(self) -> Self:
+        needed = _NEEDED[self.pattern]
+        for key in needed:
+            if getattr(self, key) is None:
+                raise ValueError(f"the pattern {self.pattern!r} needs {key}: give {' and '.join(needed)}")
+        counts = {key for keys in _NEEDED.values() for key in keys}
+        for key in sorted(counts & self.model_fields_set - set(needed)):
+            raise ValueError(f"the pattern {self.pattern!r} has no {key}: leave it out")
+        return self
+
+
+class FeatureFacts(Table):
+    """One ``[[feature]]``."""
+
+    name: Annotated[str, Field(min_length=1, max_length=100)]
+    """Name by which datums and characteristics name it."""
+    kind: Kind
+    """What it is."""
+    point_mm: Triple
+    """A point on it: its centre, the middle of its axis or line, or a point of its plane."""
+    direction: Triple | None = None
+    """Along a line or an axis, or normal: of a plane and a point out of the material. Of a sphere from its centre to the
+    middle of what is probed, by default z. Of any length."""
+    diameter_mm: Length | None = None
+    """Nominal diameter; of a cone at `point_mm`; of a round plane its outer one."""
+    inner_diameter_mm: Length | None = None
+    """Inner diameter of a plane that is a ring."""
+    angle_deg: Annotated[float, Field(gt=0, lt=180)] | None = None
+    """Whole angle of a cone, which widens along its direction."""
+    inner: bool | None = None
+    """Whether it is a hole: material lies around it."""
+    length_mm: Length | None = None
+    """How long it is along its direction, half on either side of `point_mm`; of a plane along `along`."""
+    width_mm: Length | None = None
+    """How wide a plane is across `along`."""
+    along: Triple | None = None
+    """Across the direction: where angles begin and along what a plane's length lies; by default the axis of the part that is
+    the most across, the first of several."""
+    normal: Triple | None = None
+    """Of a line, out of the material of the surface that it lies on."""
+    stylus: str = ""
+    """Name of the stylus that probes it; may be left out where there is one."""
+    association: Association = "least_squares"
+    """How it is made of its points, where a characteristic says nothing else."""
+    strategy: Strategy | None = None
+    """Where it is probed: a pattern of points."""
+    points_mm: Annotated[list[Triple], Field(max_length=LISTED.most)] | None = None
+    """In place of a pattern, its contact points on the nominal surface; normals follow from it."""
+    form: FormFacts | None = None
+    """Its own form and roughness, in place of `[form]`."""
+
+    @field_validator("direction", "along", "normal")
+    @classmethod
+    def _directions(cls, vector: list[float] | None) -> list[float] | None:
+        return _a_direction(vector)
+
+    @model_validator(mode="after")
+    def _keys_of_its_kind(self) -> Self:
+        for key, kinds in _KEYS.items():
+            if key in self.model_fields_set and self.kind not in kinds:
+                raise ValueError(f"a {self.kind} has no {key}: leave it out")
+        if self.kind in DIRECTED and self.direction is None:
+            raise ValueError(f"a {self.kind} needs a direction: give direction = [x, y, z]")
+        if self.kind in ROUND and (self.diameter_mm is None or self.inner is None):
+            raise ValueError(f"a {self.kind} needs diameter_mm, and inner: true of a hole, false of a shaft")
+        if self.kind == "cone" and self.angle_deg is None:
+            raise ValueError("a cone needs angle_deg: give its whole angle")
+        if self.kind == "line" and self.normal is None:
+            raise ValueError("a line needs normal: out of the material of the surface that it lies on")
+        if self.association not in _ASSOCIATIONS[self.kind]:
+            known = ", ".join(_ASSOCIATIONS[self.kind])
+            raise ValueError(f"a {self.kind} has no association {self.association!r}: give one of {known}")
+        return self
+
+    @model_validator(mode="after")
+    def _one_source_of_points(self) -> Self:
+        if self.kind == "point":
+            if self.strategy is not None or self.points_mm is not None:
+                raise ValueError("a point is probed at point_mm: leave strategy and points_mm out")
+        elif (self.strategy is None) == (self.points_mm is None):
+            raise ValueError('give either strategy = { pattern = "…", … } or points_mm = [[x, y, z], …]')
+        return self
+
+    @model_validator(mode="after")
+    def _extent_of_the_pattern(self) -> Self:
+        if self.strategy is None or self.kind in ("point", "circle", "sphere"):
+            return self._pattern_of_its_kind()
+        if self.kind == "plane":
+            self._extent_of_a_plane(self.strategy)
+        elif self.length_mm is None:
+            raise ValueError(f"a {self.kind} that is probed by a pattern needs length_mm")
+        return self._pattern_of_its_kind()
+
+    def _pattern_of_its_kind(self) -> Self:
+        if self.strategy is not None and self.strategy.pattern not in PATTERNS[self.kind]:
+            raise ValueError(
+                f"a {self.kind} is not probed by the pattern {self.strategy.pattern!r}: "
+                f"give one of {', '.join(PATTERNS[self.kind])}"
+            )
+        if (found := self.strategy) is not None:
+            for key in sorted(found.model_fields_set & set(_ONLY)):
+                if not _ONLY[key](self.kind, found.pattern):
+                    raise ValueError(f"the pattern {found.pattern!r} of a {self.kind} has no {key}: leave it out")
+        return self
+
+    def _extent_of_a_plane(self, strategy: Strategy) -> None:
+        square, disk = self.length_mm is not None and self.width_mm is not None, self.diameter_mm is not None
+        if strategy.pattern == "grid" and not square:
+            raise ValueError("a plane that is probed by a grid needs length_mm and width_mm")
+        if strategy.pattern in ("circles", "spiral") and not disk:
+            raise ValueError(f"a plane that is probed by the pattern {strategy.pattern!r} needs diameter_mm")
+        if square == disk:
+            raise ValueError("a plane has either length_mm and width_mm, or diameter_mm")
+        if self.inner_diameter_mm is not None and not 0 < self.inner_diameter_mm < (self.diameter_mm or 0.0):
+            raise ValueError("inner_diameter_mm must be smaller than diameter_mm")

@@ -1,0 +1,143 @@
+"""From the folder of a part's job to a :class:`PartJob`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from cmm_uq.errors import CmmUqError, Gathered
+from cmm_uq.files.content import text_of
+from cmm_uq.files.limits import JOB_BYTES, LISTED, TABLE_BYTES
+from cmm_uq.files.toml import toml_of
+from cmm_uq.jobs.file_names import RESULTS
+from cmm_uq.jobs.origin import check_examples, check_mark
+from cmm_uq.jobs.part.checks import check_names, check_plan
+from cmm_uq.jobs.part.file import PartFile
+from cmm_uq.jobs.part.located import Places
+from cmm_uq.jobs.part.measured import measured_points
+from cmm_uq.jobs.part.probed import Probed, probed
+from cmm_uq.jobs.part.tables import MachineStateFacts
+from cmm_uq.jobs.reading import PART
+from cmm_uq.jobs.source import InFolder, InMemory, Source
+from cmm_uq.jobs.toml_file import checked
+from cmm_uq.points import Floats
+from cmm_uq.writing import finish_interrupted
+
+_FIX = "A part's job is a folder with a job.toml; cmm-uq new part begins one"
+_CERTIFICATES = (".pdf", ".xml", ".json")
+POSTERIOR = "posterior.npz"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PartJob:
+    """A part's job as read, with the bytes of every file it was read from.
+
+    Parameters
+    ----------
+    folder : where it lies; the empty path for a job that lies in no folder yet.
+    facts : job.toml.
+    features : with their contact points, in the order of the job.
+    inputs : contents of each input by its path inside the folder.
+    measured : (n, 3) measured points in the order of the features' points, mm; ``None`` where nothing is measured.
+    """
+
+    folder: Path
+    facts: PartFile
+    features: tuple[Probed, ...]
+    inputs: Mapping[str, bytes]
+    measured: Floats | None = None
+
+    @property
+    def machine_files(self) -> Mapping[str, bytes]:
+        """Those of the inputs that state the machine: its certificate or results, and the draws of its errors."""
+        return {
+            name: self.inputs[name] for name in files_of_the_machine(self.facts.machine_state) if name in self.inputs
+        }
+
+
+def is_part(content: bytes) -> bool:
+    """Whether a job.toml is of a part."""
+    try:
+        return PART in toml_of(text_of(content, ""), "")
+    except (CmmUqError, ValueError):
+        return False
+
+
+def read_part(folder: Path, *, machine: bool = True) -> PartJob:
+    """Read and check a part's job.
+
+    Parameters
+    ----------
+    folder : the job folder, or its job.toml.
+    machine : whether the files that state the machine must be there.
+
+    Raises
+    ------
+    CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
+    """
+    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    finish_interrupted(path.parent)
+    return _read(InFolder(path), machine=machine)
+
+
+def part_of(files: Mapping[str, bytes], *, machine: bool = True) -> PartJob:
+    """Read and check a part's job that lies in no folder yet; see :func:`read_part`.
+
+    Parameters
+    ----------
+    files : contents of job.toml and of all that it names, by name.
+
+    Raises
+    ------
+    CmmUqError : see :func:`read_part`.
+    """
+    return _read(InMemory(files), machine=machine)
+
+
+def files_of_the_machine(facts: MachineStateFacts) -> tuple[str, ...]:
+    """Names of the files that state the machine.
+
+    Beside results.json lie the draws, which a certificate carries in itself.
+    """
+    name = facts.certificate.removesuffix("/")
+    if not name.lower().endswith(_CERTIFICATES):
+        name = f"{name}/{RESULTS}"
+    if facts.posterior:
+        return name, facts.posterior
+    parent, _, file = name.rpartition("/")
+    return (name, f"{parent}/{POSTERIOR}" if parent else POSTERIOR) if file.endswith(".json") else (name,)
+
+
+def _read(source: Source, *, machine: bool) -> PartJob:
+    path, folder = source.toml, source.toml.parent
+    content = source.job_file(JOB_BYTES, _FIX)
+    facts = checked(content, path, PartFile)
+    places, wrong = Places(path, text_of(content, str(path))), Gathered()
+    check_examples(content, facts.job.origin, str(path))
+    features: list[Probed] = []
+    check_names(facts, places, wrong)
+    for i, feature in enumerate(facts.feature):
+        with wrong.going_on():
+            features.append(probed(feature, places.of("feature", number=i)))
+    wrong.refuse()
+    total = sum(len(one.points) for one in features)
+    if total > LISTED.most:
+        raise CmmUqError(f"has {total} points: {LISTED.most} are the most", where=str(path), fix="Probe fewer")
+    check_plan(facts, {one.facts.name: one for one in features}, places, wrong)
+    wrong.refuse()
+    inputs = {"job.toml": content}
+    if machine:
+        fix = f"Put it into the job's folder, or mend its name in {path}: [machine_state]"
+        for name in files_of_the_machine(facts.machine_state):
+            with wrong.going_on():
+                inputs[name] = source.content(name, TABLE_BYTES, fix, written=True)
+    measured = None
+    if facts.recording is not None:
+        with wrong.going_on():
+            name = facts.recording.file
+            inputs[name] = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
+            check_mark(folder, facts.job.origin, inputs[name], str(folder / name))
+            measured = measured_points(inputs[name], str(folder / name), features)
+    wrong.refuse()
+    return PartJob(folder, facts, tuple(features), inputs, measured)

@@ -1,0 +1,29 @@
+"""Jobs of parts for tests: the plate that a new job begins with, with what a test says otherwise."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from typing import Any
+
+from cmm_uq.jobs.part.beginning import TABLES
+from cmm_uq.jobs.part.feature import FeatureFacts
+from cmm_uq.jobs.part.job import PartJob, part_of
+from cmm_uq.jobs.part.probed import Probed, probed
+from cmm_uq.jobs.toml_file import as_toml
+
+
+def tables(**changes: Any) -> dict[str, Any]:
+    """Tables of the plate; a table that is given stands in place of its own, ``None`` takes it away."""
+    whole: dict[str, Any] = {"job": {"id": "plate", "date": dt.date(2026, 5, 31)}, **TABLES, **changes}
+    return {name: table for name, table in whole.items() if table is not None}
+
+
+def plate(files: Mapping[str, bytes] | None = None, **changes: Any) -> PartJob:
+    """The plate as it is read, without its machine."""
+    return part_of({"job.toml": as_toml(tables(**changes), "job.toml"), **(files or {})}, machine=False)
+
+
+def feature(kind: str, **keys: Any) -> Probed:
+    """A feature with its contact points."""
+    return probed(FeatureFacts.model_validate({"name": kind, "kind": kind, **keys}), "feature")
