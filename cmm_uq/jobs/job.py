@@ -28,7 +28,6 @@ from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.plan import PlanFacts
 from cmm_uq.jobs.prediction import Prediction
 from cmm_uq.jobs.prove import ProveFacts
-from cmm_uq.jobs.replaced import Replaced
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.simulation import SimulationFacts
 from cmm_uq.jobs.table import (
@@ -38,7 +37,6 @@ from cmm_uq.jobs.table import (
     Table,
     at_least,
 )
-from cmm_uq.languages.language import ENGLISH, Code
 from cmm_uq.notebook import html_table
 from cmm_uq.points import Points
 from cmm_uq.writing import Owner, staged
