@@ -14,7 +14,9 @@ from cmm_uq.conformity.decision import rule_name
 from cmm_uq.documents.origin import CERTIFICATE
 from cmm_uq.documents.traceability_section import statement_of_traceability
 from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.replaced import Replaced
 from cmm_uq.messages import Text, Verbatim, day, say
@@ -136,20 +138,32 @@ def _reporting(facts: JobFile) -> tuple[Clause, ...]:
 
 
 def _of_every_report(facts: JobFile) -> tuple[Clause, ...]:
-    job, laboratory, machine = facts.job, facts.laboratory, facts.machine
+    machine = facts.machine
     named = (machine.manufacturer, machine.model, machine.name)
     item = f"{_lines(named)}, serial number {machine.serial}" if machine.serial else ""
+    serial = _asked("7.8.2.1 g", say("serial number of the machine"), item, "[machine] serial")
+    return of_every_report(facts.job, facts.laboratory, CERTIFICATE, serial)
+
+
+def of_every_report(job: Identification, laboratory: Laboratory, title: str, item: Clause) -> tuple[Clause, ...]:
+    """7.8.2.1 of any report.
+
+    Parameters
+    ----------
+    title : of the document.
+    item : what names the item (7.8.2.1 g).
+    """
     return (
-        _asked("7.8.2.1 a", "title", CERTIFICATE),
+        _asked("7.8.2.1 a", "title", title),
         _asked("7.8.2.1 b", say("name of the laboratory"), laboratory.name, "[laboratory] name"),
         _asked("7.8.2.1 b", say("address of the laboratory"), _lines([laboratory.address]), "[laboratory] address"),
         _asked("7.8.2.1 c", say("place of the measurement"), job.place, "[job] place"),
         _asked("7.8.2.1 d", "every part known as part of one report, and its end",
-               f"number {_number(facts)} and page of pages on every page; mark of the end", "[job] number"),
+               f"number {job.number or job.id} and page of pages on every page; mark of the end", "[job] number"),
         _asked("7.8.2.1 e", say("customer"), job.customer, "[job] customer"),
         _asked("7.8.2.1 e", say("how to reach the customer"), _lines([job.address]), "[job] address"),
         _asked("7.8.2.1 f", say("method"), job.procedure, "[job] procedure"),
-        _asked("7.8.2.1 g", say("serial number of the machine"), item, "[machine] serial"),
+        item,
         _where("7.8.2.1 h", "date of receipt, where it matters", job.received, "[job] received"),
         _asked("7.8.2.1 i", "date of the measurement", job.date, "[job] date"),
         _asked("7.8.2.1 j", say("date of issue"), job.issued, "[job] issued"),
