@@ -260,8 +260,7 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
     try:
         model, _ = screened_model(job)
         model, _, _ = with_noise(model)
-        sigma = float(np.sqrt(np.mean(state.noise.usual_mm**2)))
-        together = given_recording(state, model, sigma, seed=seed)
+        together = given_recording(state, model, seed=seed)
     except CmmUqError as error:
         why = Verbatim(error.problem)
         told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)
