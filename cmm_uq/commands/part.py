@@ -14,15 +14,16 @@ from cmm_uq.commands.written import Stage, silent
 from cmm_uq.conformity.limits import Judged, Limits, judge
 from cmm_uq.conformity.risk import Known
 from cmm_uq.documents.effect_words import title_of
-from cmm_uq.documents.part_found import MATTERS, Displaced, PartFound, Unseen
+from cmm_uq.documents.part_found import MATTERS, PartFound, Unseen
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.parts.budget import Budget, budget
+from cmm_uq.parts.displaced import displaced
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.reducing import ways
 from cmm_uq.parts.result import conforming, evaluated, stated
-from cmm_uq.parts.virtual import AtPose, Virtual
+from cmm_uq.parts.virtual import Virtual
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 from cmm_uq.units import MICROMETRE
@@ -35,9 +36,6 @@ TRIALS = 200_000
 
 KEPT = 100_000
 """Virtual measurements that are kept, for probabilities: one of 5 % is then known to 0.07 %."""
-
-DRAWN = 400
-"""Virtual measurements that say by how much points are displaced: spreads to 4 %, for pictures."""
 
 COVERAGE = 0.95
 
@@ -86,7 +84,7 @@ def part_found(
     return PartFound(
         job, plan, given, virtual, simulated, stated(simulated, measured), measured, shares, _unseen(virtual, shares), None,
         judged(job, plan, errors, measured), None if together is None or np.isnan(together) else together, tuple(found_ways),
-        displaced(virtual, job.measured, seed), machine.standing, digits=digits, seed=seed, warnings=machine.warnings,
+        displaced(virtual, seed=seed), machine.standing, digits=digits, seed=seed, warnings=machine.warnings,
     )  # fmt: skip
 
 
@@ -187,31 +185,3 @@ def _prior(
     if facts.asks.limits == "angles":
         raise CmmUqError("a prior in µm is none of an angle", where=where, fix="Give share_of_limit")
     return Known(middle + MICROMETRE * given.mean_um, MICROMETRE * float(given.sd_um or 0.0))
-
-
-def displaced(virtual: Virtual, measured: Floats | None = None, seed: int = 0) -> Displaced:
-    """By how much the contact points are found displaced.
-
-    Parameters
-    ----------
-    measured : (n, 3) points about which errors are drawn; ``None`` for the nominal ones.
-    """
-    random, n = np.random.default_rng(seed), len(virtual.plan.points)
-
-    def about(place: AtPose) -> Floats | float:
-        """What of the base is the part as it was measured, and no error."""
-        return 0.0 if measured is None or place.true is not None else measured - virtual.plan.points
-
-    each = max(2, DRAWN // len(virtual.places))
-    mean, square = np.zeros((n, 3)), np.zeros((n, 3, 3))
-    for place in virtual.places:
-        moved = np.zeros((each, n, 3))
-        for cause, coefficients in zip(place.causes, place.drawn(random, each), strict=True):
-            moved += cause.moved(coefficients, slice(0, n))
-
-        moved += place.measured.base - about(place)
-        mean += moved.sum(axis=0)
-        square += np.einsum("kni,knj->nij", moved, moved)
-    count = each * len(virtual.places)
-    mean /= count
-    return Displaced(mean, (square - count * np.einsum("ni,nj->nij", mean, mean)) / (count - 1))

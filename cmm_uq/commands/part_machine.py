@@ -201,7 +201,8 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
         stated.source, stated.files, number=str(said.get("number") or (own and own.job.number) or said["id"]),
         laboratory="" if own is None else own.laboratory.name, machine=str(said["machine"]),
         serial=str(said.get("serial") or ""), origin=str(said["origin"]), date=date, age=on - date, valid_until=until,
-        verdict=stated.verdict, checked=stated.checked, again=stated.again, trusted=trusted, draft=stated.job is not None and draft(stated.job), given_recording=False,
+        verdict=stated.verdict, checked=stated.checked, again=stated.again, trusted=trusted, draft=stated.job is not None and draft(stated.job),
+        given_recording=False,
         path=say("not said yet"), drift=_undrifted(on - date),
         temperature_c=None if temperatures is None else float(np.mean(temperatures)),
         inputs_sha256=dict(said["inputs_sha256"]) if stated.job is None else hashes(stated.job.inputs),
@@ -259,8 +260,7 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
     try:
         model, _ = screened_model(job)
         model, _, _ = with_noise(model)
-        sigma = float(np.sqrt(np.mean(state.noise.usual_mm**2)))
-        together = given_recording(state, model, sigma, seed=seed)
+        together = given_recording(state, model, seed=seed)
     except CmmUqError as error:
         why = Verbatim(error.problem)
         told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)

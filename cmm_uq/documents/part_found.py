@@ -10,11 +10,13 @@ from typing import Literal
 
 import numpy as np
 
+from cmm_uq.conformity.decision import rule_words
 from cmm_uq.conformity.limits import Judged
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.messages import Text
 from cmm_uq.parts.budget import Budget
+from cmm_uq.parts.displaced import Displaced
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.reducing import Way
 from cmm_uq.parts.result import Stated
@@ -138,20 +140,6 @@ class Further:
 
 
 @dataclass(frozen=True, eq=False)
-class Displaced:
-    """By how much the contact points are found displaced, in the frame of the part, mm.
-
-    Parameters
-    ----------
-    mean : (n, 3) that can be expected.
-    covariance : (n, 3, 3) about it.
-    """
-
-    mean: Floats
-    covariance: Floats
-
-
-@dataclass(frozen=True, eq=False)
 class PartFound:
     """A part's measurement, with its uncertainty and what follows.
 
@@ -239,6 +227,11 @@ class PartFound:
             if worst in found:
                 return worst
         return "pass"
+
+    @property
+    def judged_by(self) -> Text:
+        """The decision rule, in words."""
+        return rule_words(self.job.facts.decision.rule)
 
     @property
     def conforming(self) -> bool:

@@ -67,7 +67,7 @@ class MachineStateFacts(Table):
     valid_until: dt.date | None = None
     """Last day on which the certificate holds; where it is left out, the day that it names for the next calibration."""
     travel_mm: Travel = Travel()
-    """Lowest and highest scale reading of each axis, as the certificate says where it is left out; a part outside is refused."""
+    """Lowest and highest scale reading of each axis; as the certificate says where left out. A part outside is refused."""
     chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
     """Carriages from the table to the ram, with F for the frame where the workpiece moves; as the certificate says where it is
     left out."""
