@@ -12,7 +12,6 @@ from cmm_uq.documents.part_found import PartFound
 from cmm_uq.documents.part_picture import part_picture
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, in_a_row, names, number, plural, say, semicolons, signed
 from cmm_uq.parts.deviating import deviations_of
-from cmm_uq.parts.displaced import displaced
 from cmm_uq.parts.in_words import ASSOCIATIONS, KINDS
 from cmm_uq.parts.plan import Plan, Stylus
 from cmm_uq.points import Floats
@@ -85,7 +84,7 @@ def _three(values: Sequence[float]) -> Text:
 
 def errors_section(found: PartFound) -> Section:
     """The errors of the points, and the form that was measured."""
-    blocks: list[Block] = [errors_picture(found.plan, displaced(found.virtual, seed=found.seed))]
+    blocks: list[Block] = [errors_picture(found.plan, found.displaced)]
     deviations = None if found.job.measured is None else deviations_of(found.plan, found.job.measured)
     if deviations is not None and np.isfinite(deviations).any():
         blocks += [form_picture(found.plan, deviations), _forms(found.plan, deviations)]

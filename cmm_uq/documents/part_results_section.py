@@ -91,7 +91,7 @@ def conformity_section(found: PartFound) -> Section:
 
 
 def _rule(found: PartFound, limited: Sequence[Figures]) -> Text:
-    told = say("Decision rule: {rule}.", rule=limited[0].judged.rule if limited[0].judged else DASH)
+    told = say("Decision rule: {rule}.", rule=found.judged_by)
     if found.together is None or len(limited) < 2:
         return told
     return say(
