@@ -69,7 +69,7 @@ def largest_words(one: Figures) -> Text:
     budget = one.found.budget
     line = budget.worst(one.stated.name)
     return say("The largest part of the uncertainty of {name} comes from {cause:small} ({share} % of the variance).",
-               name=one.name, cause=line_words(line), share=_percent(share_of(one, line)))  # fmt: skip
+               name=one.called, cause=line_words(line), share=_percent(share_of(one, line)))  # fmt: skip
 
 
 def share_of(one: Figures, line: str) -> float:
@@ -93,8 +93,8 @@ def _lines(detailed: list[Figures], count: int) -> Table:
     notes: list[Text] = [
         say(
             "Shares of the variance (Sobol): first order is what knowing this cause alone would take away, total what would "
-            "remain if all else were known. They differ where causes do not simply add up, as in a position or a form; they are "
-            "known to about 1 %."
+            "remain if all else were known. They differ where causes do not simply add up, as in a position or a form; they "
+            "are known to about 1 %."
         )
     ]
     if len(detailed) < count:
@@ -109,11 +109,11 @@ def _budget(one: Figures) -> Iterable[tuple[Text, ...]]:
     order = np.argsort(-total, kind="stable").tolist()
     kept = [g for g in order if total[g] >= _LEAST][:_LINES]
     for g in kept:
-        yield one.number, one.titled, line_words(budget.causes[g]), _percent(max(first[g], 0.0)), _percent(total[g])
+        yield one.number, one.beside, line_words(budget.causes[g]), _percent(max(first[g], 0.0)), _percent(total[g])
     rest = [g for g in order if g not in kept and total[g] > 0]
     if rest:
         others = plural(len(rest), one=say("another cause"), many=say("{count} other causes", count=len(rest)))
-        yield one.number, one.titled, others, DASH, say("each below {share}", share=_percent(_above(total[rest])))
+        yield one.number, one.beside, others, DASH, say("each below {share}", share=_percent(_above(total[rest])))
 
 
 def _above(shares: Floats) -> float:
@@ -130,15 +130,15 @@ def _factors(detailed: list[Figures]) -> Table:
     for one in detailed:
         within = budget.within[:, one.place]
         order = np.argsort(-np.abs(within), kind="stable").tolist()
-        rows += [(one.number, one.titled, line_words(budget.factors[f]), _percent(within[f]))
+        rows += [(one.number, one.beside, line_words(budget.factors[f]), _percent(within[f]))
                  for f in order[:_LINES] if abs(within[f]) >= _LEAST]  # fmt: skip
     columns = (
         Column(say("No.")), Column(say("Characteristic"), numeric=False), Column(say("Error"), numeric=False),
         Column(say("Share"), unit("%")),
     )  # fmt: skip
     note = say(
-        "Errors that the calibration ties together have no variance of their own; their shares are covariances with the error of "
-        "the characteristic, and one that makes up for another is negative."
+        "Errors that the calibration ties together have no variance of their own; their shares are covariances with the error "
+        "of the characteristic, and one that makes up for another is negative."
     )
     return Table(say("Errors that are known together, by name"), columns, tuple(rows), (note,))
 
@@ -176,8 +176,12 @@ def _by_effect(unseen: Iterable[Unseen]) -> list[list[Unseen]]:
     return sorted(each, key=lambda own: -own[0].share)
 
 
+def _called(one: Unseen) -> Text:
+    return say("characteristic {name}", name=Verbatim(one.characteristic))
+
+
 def _whose(own: list[Unseen]) -> Text:
-    first = Verbatim(own[0].characteristic)
+    first = _called(own[0])
     if len(own) == 1:
         return first
     return plural(len(own) - 1, one=say("{name}, and one more", name=first),
@@ -188,7 +192,7 @@ def unseen_words(found: PartFound) -> Text:
     """The gravest of it in a sentence."""
     most = _by_effect(found.unseen)[0][0]
     return say("{share} % of the variance of {name} comes from {error:small}: {why}.", share=_percent(most.share),
-               name=Verbatim(most.characteristic), error=most.title, why=most.why)  # fmt: skip
+               name=_called(most), error=most.title, why=most.why)  # fmt: skip
 
 
 def ways_section(found: PartFound) -> Section:
@@ -218,10 +222,11 @@ def best_words(one: Figures) -> Text:
     best = min(others, key=lambda way: float(way.u[one.place]), default=None)
     if best is None or not now or 1 - best.u[one.place] / now < _GAIN:
         return say(
-            "None of the ways that were tried makes the uncertainty of {name} smaller by more than 2 %.", name=one.name
+            "None of the ways that were tried makes the uncertainty of {name} smaller by more than 2 %.",
+            name=one.called,
         )
-    told = say("{way:capital} would reduce the uncertainty of {name} most, by {gain} %.", way=best.name, name=one.name,
+    told = say("{way:capital} would reduce the uncertainty of {name} most, by {gain} %.", way=best.name, name=one.called,
                gain=number(100 * (1 - float(best.u[one.place]) / now), ".0f"))  # fmt: skip
-    helped = [other.name for other in figures_of(one.found)
+    helped = [other.called for other in figures_of(one.found)
               if other.place != one.place and best.u[other.place] < (1 - _GAIN) * planned.u[other.place]]  # fmt: skip
     return after(told, say("It helps {names} too.", names=commas(helped)) if 0 < len(helped) <= _WAYS else NOTHING)

@@ -97,7 +97,17 @@ class Figures:
         return say("{name}: {what}", name=self.name, what=self.what)
 
     @property
-    def U(self) -> float:
+    def beside(self) -> Text:
+        """The same beside its number, which it does not say again."""
+        return say("{what:capital}", what=self.what) if self.stated.name == self.number else self.titled
+
+    @property
+    def called(self) -> Text:
+        """In a sentence."""
+        return say("characteristic {name}", name=self.name)
+
+    @property
+    def expanded(self) -> float:
         """Half of the shortest 95 % interval, mm or rad."""
         low, high = self.stated.interval
         return 0.5 * (high - low)
@@ -113,11 +123,11 @@ class Figures:
 
     def at(self, value: float) -> Number:
         """A value to the place of its U, in mm or °."""
-        return rounded(value / self.scale.per_value, self.U / self.scale.per_value)[0]
+        return rounded(value / self.scale.per_value, self.expanded / self.scale.per_value)[0]
 
     def error(self, value: float) -> Number:
         """A difference to the place of U, in µm or ″."""
-        return rounded(value / self.scale.per_small, self.U / self.scale.per_small)[0]
+        return rounded(value / self.scale.per_small, self.expanded / self.scale.per_small)[0]
 
     def limit(self, value: float | None) -> Text:
         """A limit or a nominal value as it was given, in mm or °."""
@@ -157,7 +167,7 @@ class Figures:
     @property
     def result(self) -> Text:
         """The value with U; U alone where nothing was measured."""
-        U = say("U = {U} {unit}", U=self.small(self.U), unit=self.scale.small)
+        U = say("U = {U} {unit}", U=self.small(self.expanded), unit=self.scale.small)
         if self.stated.value is None:
             return U
         return say("{value} {unit}, {U}", value=self.at(self.stated.value), unit=self.scale.value, U=U)
@@ -173,7 +183,7 @@ def critical(found: PartFound) -> Figures:
     every = figures_of(found)
     if found.nearest is not None:
         return every[found.nearest]
-    taken = [one.U / one.width if one.width > 0 else -1.0 for one in every]
+    taken = [one.expanded / one.width if one.width > 0 else -1.0 for one in every]
     return every[int(np.argmax(taken))]
 
 

@@ -23,7 +23,7 @@ def machine_section(found: PartFound) -> Section:
         *certificate_rows(standing),
         (say("Files"), commas(names(standing.files))),
         (say("Verified"), verified_words(standing)),
-        (say("Signatures"), say("held to trusted certificates") if standing.trusted else say("not held to anybody")),
+        (say("Signatures"), say("by trusted certificates") if standing.trusted else say("not asked for")),
         (say("Temperature of the scales at the calibration"), _celsius(standing.temperature_c)),
         (say("Noise of a coordinate"), _noise(found)),
     )

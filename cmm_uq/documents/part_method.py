@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cmm_uq import __version__
 from cmm_uq.documents.document import Block, Facts, Paragraph, Section
+from cmm_uq.documents.effect_words import titles
 from cmm_uq.documents.part_figures import figures_of
 from cmm_uq.documents.part_found import PartFound
 from cmm_uq.documents.program import NAME
@@ -32,25 +33,25 @@ def method_section(found: PartFound) -> Section:
 
 
 _METHOD = say(
-    "The measurement is made many times in the computer: at the planned points of contact, with errors of the machine drawn from "
-    "what its calibration says of all of them together, and with stylus, temperatures, form and place of the part drawn beside "
-    "them. Every virtual measurement is associated, aligned and evaluated as the real one is. What it finds less what is true "
-    "is an error; the standard deviation of the errors is u."
+    "The measurement is made many times in the computer: at the planned points of contact, with errors of the machine drawn "
+    "from what its calibration says of all of them together, and with stylus, temperatures, form and place of the part drawn "
+    "beside them. Every virtual measurement is associated, aligned and evaluated as the real one is. What it finds less what "
+    "is true is an error; the standard deviation of the errors is u."
 )
 
 _STANDARDS = (
     say(
-        "ISO/TS 15530-4 (uncertainty by simulation): its statements on what is simulated, and what is not, are made here. The tests "
-        "on the machine itself that it asks of such a program, with calibrated parts, are not made by this program; those by "
-        "reference data and by simulated machines are published with it."
+        "ISO/TS 15530-4 (uncertainty by simulation): its statements on what is simulated, and what is not, are made here. The "
+        "tests on the machine itself that it asks of such a program, with calibrated parts, are not made by this program; "
+        "those by reference data and by simulated machines are published with it."
     ),
     say(
-        "VDI/VDE 2617-7 (uncertainty by simulation): its idea is followed; no conformity with it is claimed, since it was not at "
-        "hand when this was written."
+        "VDI/VDE 2617-7 (uncertainty by simulation): its idea is followed; no conformity with it is claimed, since it was not "
+        "at hand when this was written."
     ),
     say(
-        "VDI/VDE 2617-11 (uncertainty budgets): the budget here has shares of simulated variances in place of the lines that it "
-        "sets up by hand; no conformity with it is claimed."
+        "VDI/VDE 2617-11 (uncertainty budgets): the budget here has shares of simulated variances in place of the lines that "
+        "it sets up by hand; no conformity with it is claimed."
     ),
     say(
         "Propagation of distributions by JCGM 101 and JCGM 102, features by ISO 17450-1, associations and zones by ISO 1101, "
@@ -77,8 +78,8 @@ def _evaluated(found: PartFound) -> Text:
     if found.virtual.exact:
         return say("every feature by its association on the points of every draw")
     return say(
-        "least-squares features by the derivative of their fit, all else on the points of every draw; {checked} draws evaluated "
-        "on all points differ by {off} of u, less than {limit:g} %",
+        "least-squares features by the derivative of their fit, all else on the points of every draw; {checked} draws "
+        "evaluated on all points differ by {off} of u, less than {limit:g} %",
         checked=CHECKED, off=say("{off} %", off=number(100 * float(found.virtual.off.max(initial=0.0)), ".2g")),
         limit=100 * AGREES,
     )  # fmt: skip
@@ -121,7 +122,7 @@ def not_covered(found: PartFound) -> tuple[Text, ...]:
         )
     if found.virtual.places[0].lacking:
         told.append(say("Of the machine's errors, these could not be drawn, for lack of what they depend on: {names}.",
-                        names=commas(names(sorted(found.virtual.places[0].lacking)))))  # fmt: skip
+                        names=commas(titles(sorted(found.virtual.places[0].lacking)))))  # fmt: skip
     if unstated := _unstated(found):
         told.append(
             say("Not stated in the job, and so taken to be without uncertainty: {what}.", what=listed(unstated))
@@ -130,9 +131,9 @@ def not_covered(found: PartFound) -> tuple[Text, ...]:
         told.append(say("A characteristic with u = 0 is one to which nothing that is stated contributes."))
     told.append(
         say(
-            "The noise of a reading is that of the calibration's points; a point that is probed in another way scatters otherwise. "
-            "Scanning and its filters, parts that bend when they are held or probed, datums on more than one feature, material "
-            "conditions and profiles of surfaces are not modelled."
+            "The noise of a reading is that of the calibration's points; a point that is probed in another way scatters "
+            "otherwise. Scanning and its filters, parts that bend when they are held or probed, datums on more than one "
+            "feature, material conditions and profiles of surfaces are not modelled."
         )
     )
     return tuple(told)

@@ -24,10 +24,11 @@ def overview_of(found: PartFound) -> Overview:
     rows = (
         (say("Part"), part_words(found)),
         (say("Decision rule"), found.judged_by if any(found.judged) else NOTHING),
-        (say("Least margin") if found.nearest is not None else say("Largest share of tolerance"), _least(one)),
+        (say("Least margin") if found.nearest is not None else say("Tightest"), _least(one)),
         (say("Probability"), _together(found)),
         (say("Uncertainty"), largest_words(one) if found.budget.causes and one.stated.u else NOTHING),
         (say("To reduce it"), best_words(one) if len(found.ways) > 1 else NOTHING),
+        (say("Not seen"), unseen_words(found) if found.unseen else NOTHING),
         (say("Not covered"), _not_covered(found)),
     )
     return Overview(verdict_words(found), STANDING[found.outcome], tuple(row for row in rows if row[1]))
@@ -41,7 +42,7 @@ def verdict_words(found: PartFound) -> Text:
     all_, outcome = len(outcomes), found.outcome
     if outcome == "pass":
         return plural(all_, one=say("Conforms: its one limited characteristic is within its limits"),
-                      many=say("Conforms: all {count} limited characteristics are within their limits", count=all_))  # fmt: skip
+                      many=say("Conforms: all {count} limited characteristics are within limits", count=all_))  # fmt: skip
     if outcome in ("fail", "conditional fail"):
         out = sum(one in ("fail", "conditional fail") for one in outcomes)
         told = plural(out, one=say("one of {all} characteristics is not", all=all_),
@@ -52,8 +53,10 @@ def verdict_words(found: PartFound) -> Text:
     if outcome == "conditional pass":
         return say("Conditionally accepted: all values are within their limits, not all with their uncertainty")
     open_ = sum(one == "undecided" for one in outcomes)
-    return plural(open_, one=say("Undecided: one of {all} characteristics is too near to a limit", all=all_),
-                  many=say("Undecided: {count} of {all} characteristics are too near to a limit", count=open_, all=all_))  # fmt: skip
+    return plural(
+        open_, one=say("Undecided: one of {all} characteristics is too near to a limit", all=all_),
+        many=say("Undecided: {count} of {all} characteristics are too near to a limit", count=open_, all=all_),
+    )  # fmt: skip
 
 
 _UNMEASURED = say("Uncertainty of a planned measurement: nothing was measured")
@@ -80,7 +83,7 @@ def _least(one: Figures) -> Text:
     if not one.width > 0:
         return told
     return say("{told}; the 95 % interval takes {share} % of it", told=told,
-               share=signed(200 * one.U / one.width, ".0f"))  # fmt: skip
+               share=signed(200 * one.expanded / one.width, ".0f"))  # fmt: skip
 
 
 def _together(found: PartFound) -> Text:
@@ -92,8 +95,6 @@ def _together(found: PartFound) -> Text:
 
 def _not_covered(found: PartFound) -> Text:
     told: list[Text] = []
-    if found.unseen:
-        told.append(unseen_words(found))
     left = found.job.facts.part.not_measured
     if left:
         told.append(say("Not measured: {names}.", names=commas(names(left))))

@@ -16,8 +16,8 @@ from cmm_uq.documents.part_results_section import conformity_section, correlatio
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.messages import NOTHING, Text, Verbatim, day, names, say
 
-TITLE = say("Measurement report of a part")
-PLANNED = say("Measurement uncertainty of a part")
+TITLE = say("Measurement report")
+PLANNED = say("Measurement uncertainty")
 
 
 def part_document(found: PartFound) -> Document:
@@ -43,11 +43,8 @@ def part_document(found: PartFound) -> Document:
         method_section(found),
         not_covered_section(found),
     )
-    came = (
-        say("measured on {date}", date=day(facts.job.date))
-        if measured
-        else say("planned for {date}", date=day(facts.job.date))
-    )
+    date = day(facts.job.date)
+    came = say("measured on {date}", date=date) if measured else say("planned for {date}", date=date)
     return Document(
         title=TITLE if measured else PLANNED,
         number=Verbatim(facts.job.number or facts.job.id),

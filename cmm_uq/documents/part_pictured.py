@@ -1,4 +1,4 @@
-"""The part itself: its features as they are probed, where it lies, the errors of its points, and the form that was measured."""
+"""The part itself: its features as they are probed, where it lies, the errors of its points, the form that was measured."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def errors_section(found: PartFound) -> Section:
         blocks += [form_picture(found.plan, deviations), _forms(found.plan, deviations)]
     elif found.measured is not None:
         blocks.append(Paragraph(say("No feature has more points than determine it: no form was measured."), "note"))
-    return Section(say("Errors of its points"), tuple(blocks))
+    return Section(say("Errors of the points"), tuple(blocks))
 
 
 def _forms(plan: Plan, deviations: Floats) -> Table:

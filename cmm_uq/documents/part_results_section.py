@@ -52,14 +52,23 @@ def _table(every: Sequence[Figures], *, measured: bool) -> Table:
 def _row(one: Figures, *, measured: bool) -> tuple[Text, ...]:
     value = () if one.stated.value is None else (one.at(one.stated.value),)
     error = () if measured else (one.error(one.stated.error),)
-    return (one.number, one.titled, *value, one.small(one.stated.u), one.small(one.U), one.factor, one.interval, *error)
+    return (
+        one.number,
+        one.beside,
+        *value,
+        one.small(one.stated.u),
+        one.small(one.expanded),
+        one.factor,
+        one.interval,
+        *error,
+    )
 
 
 def _notes(every: Sequence[Figures]) -> tuple[Text, ...]:
     notes: list[Text] = [
         say(
-            "u: standard uncertainty. 95 % interval: the shortest that holds 95 % of the virtual measurements; U = k · u is half "
-            "of it, and the value lies in its middle only where errors to both sides are alike."
+            "u: standard uncertainty. 95 % interval: the shortest that holds 95 % of the virtual measurements; U = k · u is "
+            "half of it, and the value lies in its middle only where errors to both sides are alike."
         )
     ]
     if every[0].stated.value is None:
@@ -127,7 +136,7 @@ def _decision(one: Figures, nominal: float, *, measured: bool) -> tuple[Text, ..
             DASH if judged.probability is None else probability(judged.probability),
         )
     shown = DASH if one.zone else one.limit(nominal)
-    return one.number, one.titled, shown, one.limit(low), one.limit(high), _accepted(one), *decided
+    return one.number, one.beside, shown, one.limit(low), one.limit(high), _accepted(one), *decided
 
 
 def _accepted(one: Figures) -> Text:
@@ -145,12 +154,12 @@ def _accepted(one: Figures) -> Text:
 def _margin(one: Figures) -> Margin:
     judged, (low, high) = one.judged, one.limits
     low = 0.0 if one.zone else low
-    stated = one.stated
+    stated, accepted = one.stated, None if judged is None else judged.accepted
     if stated.value is None:
         middle = 0.5 * ((low or 0.0) + (high or 0.0))
-        return Margin(one.titled, middle, (middle - one.U, middle + one.U), low, high, None, judged and judged.accepted)
+        return Margin(one.titled, middle, (middle - one.expanded, middle + one.expanded), low, high, None, accepted)
     return Margin(
-        one.titled, stated.value, stated.interval, low, high, judged and judged.outcome, judged and judged.accepted
+        one.titled, stated.value, stated.interval, low, high, None if judged is None else judged.outcome, accepted
     )
 
 
@@ -166,7 +175,7 @@ def correlation_section(found: PartFound) -> Section:
     if len(every) > FEW:
         return Section(say("Correlations"), (told, correlation_plot([one.number for one in every], found.correlation)))
     rows = tuple(
-        (one.number, one.titled, *(_r(float(found.correlation[one.place, j]), one.place, j) for j in range(len(every))))
+        (one.number, one.beside, *(_r(float(found.correlation[one.place, j]), one.place, j) for j in range(len(every))))
         for one in every
     )
     columns = (

@@ -24,7 +24,7 @@ def deviations_of(plan: Plan, measured: Floats) -> Floats:
 
 def _deviations(feature: Feature, points: Floats) -> Floats:
     if feature.kind == "point":
-        return np.einsum("ni,ni->n", points - points.mean(axis=0), feature.normals)
+        return np.asarray(np.einsum("ni,ni->n", points - points.mean(axis=0), feature.normals))
     if feature.kind == "line" and feature.nominal.direction is not None:
         along = np.asarray(feature.nominal.direction)
         out = feature.normals.mean(axis=0)
@@ -37,4 +37,4 @@ def _deviations(feature: Feature, points: Floats) -> Floats:
     if feature.kind == "plane":
         return associate("plane", points, outward=feature.normals.mean(axis=0)).deviations
     sign = -1.0 if feature.internal else 1.0
-    return np.asarray(sign * associate(feature.kind, points).deviations)  # type: ignore[arg-type]
+    return np.asarray(sign * associate(feature.kind, points).deviations)
