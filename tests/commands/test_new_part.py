@@ -229,7 +229,7 @@ def test_a_whole_surface_is_probed_from_end_to_end() -> None:
 
 def test_a_part_that_is_put_down_anew_each_time_lies_in_many_places() -> None:
     job = plate(placing={"origin_mm": [300.0, 450.0, -500.0], "u_origin_mm": [20.0, 20.0, 0.0]})
-    places = np.array([pose.translation_mm for pose in poses_of(job, 50)])
+    places = np.array([pose.translation_mm for pose in poses_of(job, 50, Machine())])
     assert len(places) == 50
     assert np.ptp(places[:, 2]) == 0
     assert np.ptp(places[:, 0]) > 20
