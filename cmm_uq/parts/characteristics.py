@@ -3,8 +3,9 @@
 Sizes are global ones by the association that is asked for (ISO 14405-1: least squares (GG), minimum zone, …). Tolerances of
 form, orientation, location and runout are widths of the zones of ISO 1101:2017 that just hold what is measured: points of
 surfaces, the associated axis of a hole or shaft over its measured length; circular runout is the largest of any section.
-Two-point sizes (LP, which ISO 14405-1 takes where a drawing says nothing) are not evaluated. A zone that one datum leaves free to turn is the
-smallest one where it stands at right angles to the datum; where it is tilted it turns with the associated plane.
+A zone that one datum leaves free to turn is the smallest one where it stands at right angles to the datum; where it is
+tilted it turns with the associated plane. Two-point sizes (LP, which ISO 14405-1 takes where a drawing says nothing) are not
+evaluated.
 """
 
 from __future__ import annotations

@@ -83,9 +83,7 @@ class Together:
         kept = s > max(_SMALLEST, _UNSEEN * estimate.least_squares.sigma_of_residuals)
         one = unit("1")
         combined = tuple(Unknown(("left out", str(j)), one, 0.0, 1.0, 1.0) for j in range(int(kept.sum())))
-        whole = replace(
-            own, design=np.hstack([own.design, U[:, kept] * s[kept]]), unknowns=(*own.unknowns, *combined)
-        )
+        whole = replace(own, design=np.hstack([own.design, U[:, kept] * s[kept]]), unknowns=(*own.unknowns, *combined))
         value = np.append(estimate.least_squares.value, np.zeros(len(combined)))
         return cls(whole, replace(estimate.least_squares, value=value), which, effects, sd, Vt[kept])
 

@@ -114,7 +114,7 @@ def of_section(height: float, offset: float, wider: float) -> Move:
 
     def move(p: Floats, n: Floats) -> Floats:
         here = (np.abs(p[:, 2] - height) < 1)[:, None]
-        return np.asarray(np.where(here, p + [offset, 0, 0], p + wider * n))
+        return np.asarray(np.where(here, p + np.array([offset, 0, 0]), p + wider * n))
 
     return move
 
@@ -128,14 +128,17 @@ def test_circular_runout_is_that_of_the_worst_section(what: str, value: float) -
 
 
 def test_a_face_runs_out_on_each_of_its_circles() -> None:
-    """An outer circle of a shoulder that lies 20 µm higher than the inner one, each of them flat, and that tilted by 0.1 mrad."""
+    """The outer circle of a shoulder lies 20 µm higher than the inner one, which is tilted by 0.1 mrad."""
     (inner, _), (outer, _) = ring([0, 0, 0], 20.0, 10.0, 8), ring([0, 0, 0], 30.0, 10.0, 8)
     points, up = np.vstack([inner, outer]), np.tile(UP, (16, 1))
     face = Feature("face", "plane", points, up, "stylus", Nominal(np.array([0.0, 0, 10]), UP))
-    moves: dict[str, Move] = {"face": lambda p, n: p + np.outer(np.where(np.hypot(*p[:, :2].T) > 25, 0.02, 1e-4 * p[:, 0]), UP)}
+
+    def lifted(p: Floats, n: Floats) -> Floats:
+        return p + np.where(np.hypot(p[:, 0], p[:, 1]) > 25, 0.02, 1e-4 * p[:, 0])[:, None] * n
+
     for what, value in (("circular_runout", 1e-4 * 40), ("total_runout", 0.02 + 1e-4 * 20)):
         one = Characteristic("", what, ("face",), ("journal",))
-        assert measured((*stepped()[:1], face), one, moves) == pytest.approx(value, abs=NANOMETRE)
+        assert measured((*stepped()[:1], face), one, {"face": lifted}) == pytest.approx(value, abs=NANOMETRE)
 
 
 def test_coaxiality_of_an_axis_counts_its_lean() -> None:

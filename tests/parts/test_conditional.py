@@ -10,9 +10,9 @@ from scipy.stats import binom
 
 import cmm_uq
 from cmm_uq.errors import CmmUqError
-from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.inference.noise import Sizes
 from cmm_uq.inference.sampling import sample_with_noise
+from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.model.noise import noise_of
@@ -112,7 +112,9 @@ def test_offsets_of_set_ups_widen_what_is_left_out_as_generalised_least_squares_
         sizes = Sizes(np.full((count, 3), sigma), np.full(count, tau), none, none, none + 1)
         drawn = draws_given(together, components, sizes, np.random.default_rng(4))
         scale = np.sqrt(np.diagonal(covariance))
-        np.testing.assert_allclose(np.cov(drawn.T) / np.outer(scale, scale), covariance / np.outer(scale, scale), atol=0.03)
+        np.testing.assert_allclose(
+            np.cov(drawn.T) / np.outer(scale, scale), covariance / np.outer(scale, scale), atol=0.03
+        )
         np.testing.assert_allclose(drawn.mean(axis=0) / scale, mean / scale, atol=0.03)
         widths.append(drawn.std(axis=0))
     assert (widths[1] > widths[0]).all()
@@ -137,7 +139,9 @@ def test_the_noise_is_found_together_with_what_was_left_out() -> None:
     assert found.prior_share["rotation_x_x"] == pytest.approx(found.draws[:, 6].std() / 60.0)
 
 
-def test_a_noise_that_could_as_well_be_errors_left_out_is_that_of_the_certificate(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_noise_that_could_as_well_be_errors_left_out_is_that_of_the_certificate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     state = MachineState(BARS.machine, effects(MODELLED), np.zeros((2, 6)), unmodelled=left_out(*CURVED))
     found = given_recording(state, calibration())
     monkeypatch.setattr("cmm_uq.parts.conditional._UNTOLD", 1.0)
