@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 AXES = (say("x / mm"), say("y / mm"), say("z / mm"))
 
-_LEFT, _RIGHT, _TOP, _GAP, _UNDER, _BETWEEN = 13.0, 2.0, 5.0, 11.0, 9.5, 14.0
+_LEFT, _RIGHT, _TOP, _GAP, _UNDER, _BETWEEN = 13.0, 2.0, 5.0, 8.0, 9.5, 14.0
 """mm: beside the left panels, right of the others, above, between the rows besides what stands under each, between columns."""
 
 _HIGHEST = 118.0
