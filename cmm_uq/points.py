@@ -83,6 +83,21 @@ class Machine:
         return float(low), float(high)
 
 
+def beyond_travel(readings: Floats, travel_mm: Floats) -> list[tuple[int, int]]:
+    """(axis, row) of the reading that lies farthest beyond the travel of each axis, where one does.
+
+    Parameters
+    ----------
+    readings : (n, axes) of the scales, mm.
+    travel_mm : (axes, 2) lowest and highest; ``nan`` bounds nothing.
+    """
+    if not len(readings):
+        return []
+    beyond = np.maximum(travel_mm[:, 0] - readings, readings - travel_mm[:, 1])
+    rows = np.argmax(np.where(np.isnan(beyond), -np.inf, beyond), axis=0)
+    return [(axis, int(row)) for axis, row in enumerate(rows) if beyond[row, axis] > 0]
+
+
 @dataclass(frozen=True, eq=False)
 class Points:
     """Indicated coordinates of one recording, and all that was recorded beside them.

@@ -10,7 +10,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.form import FormFacts
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.jobs.part.placing import rotation
+from cmm_uq.jobs.part.placing import readings, rotation
 from cmm_uq.jobs.part.probed import Probed, whole_surface
 from cmm_uq.jobs.part.tables import StylusFacts
 from cmm_uq.parts.causes import Cause, Scatter
@@ -21,6 +21,7 @@ from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, around
 from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan, Stylus
 from cmm_uq.parts.virtual import Circumstances
+from cmm_uq.points import AXES, Floats, Machine
 from cmm_uq.units import MICROMETRE
 
 
@@ -75,23 +76,54 @@ def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: in
     places : where the part may lie, if it does not lie in the same place each time.
     """
     return Circumstances(
-        machine, poses_of(job, places), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
+        machine, poses_of(job, places, machine.machine), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
         clamping_of(job, plan),
     )  # fmt: skip
 
 
-def poses_of(job: PartJob, count: int) -> tuple[Pose, ...]:
+def poses_of(job: PartJob, count: int, machine: Machine) -> tuple[Pose, ...]:
     """Where the part lies: the one place that is stated, or so many where it may lie.
 
     Parameters
     ----------
     count : of places, where they are not the same each time.
+    machine : in the middle of whose travel it lies where the job does not say where.
+
+    Raises
+    ------
+    CmmUqError : neither the job says where, nor anything how far an axis goes.
     """
     given = job.facts.placing
-    pose = Pose(rotation(given), np.array(given.origin_mm, dtype=np.float64))
+    pose = Pose(rotation(given), origin_of(job, machine))
     if not (any(given.u_origin_mm) or any(given.u_rotation_deg)):
         return (pose,)
     return around(pose, np.array(given.u_origin_mm), np.radians(given.u_rotation_deg), count)
+
+
+def origin_of(job: PartJob, machine: Machine) -> Floats:
+    """(3,) where the part's origin lies in coordinates of the machine, as the job says; else in the middle of the travel.
+
+    Raises
+    ------
+    CmmUqError : see :func:`poses_of`.
+    """
+    if job.facts.placing.origin_mm is not None:
+        return np.array(job.facts.placing.origin_mm, dtype=np.float64)
+    return _in_the_middle(job, machine)
+
+
+def _in_the_middle(job: PartJob, machine: Machine) -> Floats:
+    """(3,) where the part's origin lies so that its points are in the middle of the travel, to the mm."""
+    if np.isnan(machine.travel_mm).any():
+        axis = AXES[int(np.flatnonzero(np.isnan(machine.travel_mm).any(axis=1))[0])]
+        raise CmmUqError(f"does not say where the part lies, and nothing says how far axis {axis} goes",
+                         where=f"{job.folder / 'job.toml'}: [placing] origin_mm",
+                         fix="Give origin_mm, or [machine_state] travel_mm")  # fmt: skip
+    styli = {one.name: one for one in job.facts.stylus}
+    first = job.facts.stylus[0].name
+    read = np.concatenate([readings(one, styli[one.facts.stylus or first], job.facts) for one in job.features])
+    read = read - job.facts.machine_state.origin_mm + machine.origin_mm
+    return np.asarray(np.round(machine.travel_mm.mean(axis=1) - 0.5 * (read.min(axis=0) + read.max(axis=0))))
 
 
 def surroundings_of(job: PartJob) -> Surroundings:

@@ -59,7 +59,7 @@ def _lies(found: PartFound) -> list[tuple[Text, Text]]:
     facts, given = found.job.facts, found.job.facts.placing
     varied = len(found.given.poses)
     placed = say("origin at {origin} mm, turned by {angles}° about x, y, z of the machine",
-                 origin=_three(given.origin_mm), angles=_three(given.rotation_deg))  # fmt: skip
+                 origin=_three(found.origin_mm), angles=_three(given.rotation_deg))  # fmt: skip
     if varied > 1:
         placed = say("{placed}; drawn in {count} places about it", placed=placed, count=varied)
     datums = commas(names(facts.alignment.datums))

@@ -50,8 +50,9 @@ def part_results(found: PartFound) -> dict[str, Any]:
         "budget": _budget(found),
         "unseen": [_unseen(one) for one in found.unseen],
         "further": None if found.further is None else _further(found.further),
-        "ways": [{"way": _plain(way.name), "u": [_in(one, float(u)) for one, u in zip(found.characteristics, way.u, strict=True)]}
-                 for way in found.ways],
+        "ways": [
+            {"way": _plain(way.name), "u": list(map(_in, found.characteristics, way.u.tolist()))} for way in found.ways
+        ],
         "warnings": [_plain(text) for text in found.warnings],
     }  # fmt: skip
 
@@ -79,7 +80,8 @@ def standing_data(one: Standing) -> dict[str, Any]:
 def _job(job: PartJob) -> dict[str, Any]:
     said = job.facts.job
     return {
-        "id": said.id, **({"number": said.number} if said.number else {}), "origin": said.origin, "date": said.date.isoformat(),
+        "id": said.id, **({"number": said.number} if said.number else {}), "origin": said.origin,
+        "date": said.date.isoformat(),
         **({"language": said.language} if said.language != ENGLISH else {}), "inputs_sha256": sha256(job.inputs),
     }  # fmt: skip
 

@@ -117,11 +117,14 @@ class MachineState:
     prior_share : by effect, part of its posterior standard deviation that is the prior's own: near 1 where the calibration
         said nothing.
     unmodelled : errors that it may have besides.
-    drift : (k,) standard deviation of each coefficient's change since the calibration.
+    drift : (k,) root mean square of each coefficient's change since the calibration.
     corrected : whether the machine corrects errors that were found, so that what remains is about zero.
     corrections : (k,) coefficients that it then corrects; their means by default.
     calibrated, valid_until : days of its certificate.
-    temperature_c : at its calibration.
+    temperature_c : at its calibration: the errors of its scales are those of that temperature. ``None`` where they are those
+        of 20 °C, or nobody knows.
+    measured : day of the part's measurement.
+    drift_unknown : effects of which nobody knows how they have changed since the calibration.
 
     Raises
     ------
@@ -141,6 +144,8 @@ class MachineState:
     calibrated: date | None = None
     valid_until: date | None = None
     temperature_c: float | None = None
+    measured: date | None = None
+    drift_unknown: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         k = sum(len(effect.coefficients) for effect in self.effects)
@@ -166,6 +171,13 @@ class MachineState:
         if not self.corrected:
             return np.zeros(self.draws.shape[1])
         return self.corrections if len(self.corrections) else self.mean
+
+    @property
+    def age_days(self) -> int | None:
+        """Days from its calibration to the part's measurement; ``None`` where one of them is not known."""
+        if self.measured is None or self.calibrated is None:
+            return None
+        return (self.measured - self.calibrated).days
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -107,11 +107,10 @@ def noise(state: MachineState, points: Points, pose: Pose, repeats: int = 1, fir
         size = np.tile(usual / np.sqrt(repeats), (n, 1))
         found.append(Scatter.of(NOISE, "reading", size, pose.back(np.eye(3)), _one_of(ratio)))
     found += _scattered("set-up", stated.placing_mm, np.ones(n))
-    if stated.longest_mm:
-        away = np.linalg.norm(points.xyz - points.xyz[first], axis=1) / stated.longest_mm
-    else:
-        away = np.ones(n)
-    found += _scattered("growing", stated.growth_mm, away / np.sqrt(repeats))
+    far = (
+        np.linalg.norm(points.xyz - points.xyz[first], axis=1) / stated.longest_mm if stated.longest_mm else np.ones(n)
+    )
+    found += _scattered("growing", stated.growth_mm, far / np.sqrt(repeats))
     if np.any(stated.slow_mm) and "time_s" in points.columns:
         kernel = stated.slow_kernel(points.column("time_s"))
         found += [field_along(NOISE, "slow", kernel, np.tile(axis, (n, 1))) for axis in np.eye(3)]

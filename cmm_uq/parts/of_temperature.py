@@ -6,11 +6,12 @@ what remains is the difference of two products, drawn as such. A warm scale read
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from cmm_uq.parts.causes import Cause, Common, normal
+from cmm_uq.parts.of_fixture import elapsed
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Plan
 from cmm_uq.points import AXES, Floats, Points
@@ -28,6 +29,8 @@ class Expansion:
     cte_per_k, u_cte_per_k : coefficient of thermal expansion, and its standard uncertainty.
     temperature_c, u_temperature_k : as measured, and its standard uncertainty.
     corrected : whether results are reduced to 20 °C with these.
+    known_at_c : temperature at which its size is known: 20 °C; of scales that of the machine's calibration, where the errors
+        that it found are those of then.
     """
 
     cte_per_k: float = 0.0
@@ -35,11 +38,17 @@ class Expansion:
     temperature_c: float = REFERENCE_TEMPERATURE
     u_temperature_k: float = 0.0
     corrected: bool = True
+    known_at_c: float = REFERENCE_TEMPERATURE
+
+    @property
+    def excess(self) -> float:
+        """K by which it is warmer than where its size is known."""
+        return self.temperature_c - self.known_at_c
 
     @property
     def left(self) -> float:
         """Relative expansion that is not corrected, as far as it is known."""
-        return 0.0 if self.corrected else self.cte_per_k * (self.temperature_c - REFERENCE_TEMPERATURE)
+        return 0.0 if self.corrected else self.cte_per_k * self.excess
 
     @property
     def uncertain(self) -> bool:
@@ -48,9 +57,8 @@ class Expansion:
 
     def drawn(self, cte: Floats, kelvin: Floats) -> Floats:
         """(N,) relative expansion about its mean, for standard normal draws of the coefficient and of the temperature."""
-        excess = self.temperature_c - REFERENCE_TEMPERATURE
-        true = (self.cte_per_k + self.u_cte_per_k * cte) * (excess + self.u_temperature_k * kelvin)
-        return np.asarray(true - self.cte_per_k * excess)
+        true = (self.cte_per_k + self.u_cte_per_k * cte) * (self.excess + self.u_temperature_k * kelvin)
+        return np.asarray(true - self.cte_per_k * self.excess)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +71,23 @@ class Surroundings:
     scales : of x, y, z, of one material: what is not known of their coefficient is common to them. Without uncertainty by
         default, as it is right where the machine's certificate models their expansion.
     u_gradient_k_per_m : (3,) standard uncertainty of the temperature's gradient in the part along the axes of the machine.
+    u_drift_k : standard uncertainty of how much the part, and each scale, has warmed from the first point to the last, evenly
+        in the order of probing.
     columns : temperatures by their columns, for effects of the machine that need some.
     """
 
     part: Expansion = Expansion()
     scales: tuple[Expansion, Expansion, Expansion] = (Expansion(), Expansion(), Expansion())
     u_gradient_k_per_m: Floats = field(default_factory=lambda: np.zeros(3))
+    u_drift_k: float = 0.0
     columns: dict[str, float] = field(default_factory=dict)
+
+    def since(self, calibrated_c: float | None) -> Surroundings:
+        """With scales that are known at the temperature of the machine's calibration; ``None`` leaves them at 20 °C."""
+        if calibrated_c is None:
+            return self
+        x, y, z = (replace(scale, known_at_c=calibrated_c) for scale in self.scales)
+        return replace(self, scales=(x, y, z))
 
 
 def mean_expansion(surroundings: Surroundings, plan: Plan, points: Points, pose: Pose) -> Floats:
@@ -100,7 +118,20 @@ def temperatures(surroundings: Surroundings, plan: Plan, points: Points, pose: P
         basis = part.cte_per_k * _bent(_about(plan), pose.back(np.eye(3))) / METRE
         draw = normal(surroundings.u_gradient_k_per_m)
         found.append(Common(name=TEMPERATURE, factors=("gradient in the part",) * 3, draw=draw, basis=basis))
-    return found
+    return [*found, *_warming(surroundings, plan, points, pose)]
+
+
+def _warming(surroundings: Surroundings, plan: Plan, points: Points, pose: Pose) -> list[Cause]:
+    """Expansion of part and scales while points are probed: what is probed later is warmer."""
+    kelvin, done = surroundings.u_drift_k, elapsed(plan)[:, None]
+    bases = {"warming of the part": surroundings.part.cte_per_k * done * _about(plan)}
+    for i, (axis, scale) in enumerate(zip(AXES, surroundings.scales, strict=True)):
+        bases[f"warming of scale {axis}"] = pose.back(-scale.cte_per_k * done * points.carriages[:, [i]] * np.eye(3)[i])
+    return [
+        Common(name=TEMPERATURE, factors=(factor,), draw=normal([kelvin]), basis=basis[None])
+        for factor, basis in bases.items()
+        if kelvin and np.any(basis)
+    ]
 
 
 def _about(plan: Plan) -> Floats:

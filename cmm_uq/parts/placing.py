@@ -13,7 +13,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.plan import Plan
-from cmm_uq.points import AXES, Floats, Machine, Points
+from cmm_uq.points import AXES, Floats, Machine, Points, beyond_travel
 
 OWN_COLUMNS = tuple(
     f"{begin}{axis}{end}" for begin, end in (("n", ""), ("tip_", "_mm"), ("approach_", "")) for axis in AXES
@@ -129,14 +129,10 @@ def probed(
 
 
 def _refuse_out_of_travel(plan: Plan, points: Points) -> None:
-    for axis, name in enumerate(AXES):
+    for axis, row in beyond_travel(points.carriages, points.machine.travel_mm):
         low, high = points.machine.travel_mm[axis]
-        read = points.carriages[:, axis]
-        beyond = np.flatnonzero((read < low) | (read > high))  # nan bounds nothing
-        if len(beyond):
-            row = int(beyond[np.argmax(np.maximum(low - read, read - high)[beyond])])
-            feature = next(f for f in plan.features if plan.rows[f.name].start <= row < plan.rows[f.name].stop)
-            raise CmmUqError(
-                f"{name.upper()} would have to read {read[row]:.1f} mm at feature {feature.name!r}, beyond its travel of "
-                f"{low:g} to {high:g} mm", where="placing", fix="Move the part, or take another stylus",
-            )  # fmt: skip
+        feature = next(f for f in plan.features if plan.rows[f.name].start <= row < plan.rows[f.name].stop)
+        raise CmmUqError(
+            f"{AXES[axis].upper()} would have to read {points.carriages[row, axis]:.1f} mm at feature {feature.name!r}, "
+            f"beyond its travel of {low:g} to {high:g} mm", where="placing", fix="Move the part, or take another stylus",
+        )  # fmt: skip

@@ -85,7 +85,8 @@ class AtPose:
     """
 
     def __init__(self, plan: Plan, given: Circumstances, pose: Pose, known: Known | None = None) -> None:
-        points = placed(plan, pose, given.machine.machine, given.surroundings.columns)
+        surroundings = given.surroundings.since(given.machine.temperature_c)
+        points = placed(plan, pose, given.machine.machine, surroundings.columns)
         qualified = Qualified.on(plan, points, given.machine.machine)
         unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
         own, on_surface = forms(given.forms, plan)
@@ -94,11 +95,11 @@ class AtPose:
             *unmodelled,
             *noise(given.machine, points, pose, given.repeats, int(plan.order[0]) if len(plan.order) else 0),
             *styli(plan, pose),
-            *temperatures(given.surroundings, plan, points, pose),
+            *temperatures(surroundings, plan, points, pose),
             *given.further,
             *own,
         ]
-        base = mean_errors(given.machine, qualified, pose) + mean_expansion(given.surroundings, plan, points, pose)
+        base = mean_errors(given.machine, qualified, pose) + mean_expansion(surroundings, plan, points, pose)
         drawn = any(len(feature.surface) for feature in plan.features)
         self.part = part = plan.points if drawn or given.measured is None else given.measured
         self.measured = Evaluator(plan, base + part - plan.points, self.causes, known)

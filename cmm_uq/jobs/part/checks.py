@@ -13,7 +13,7 @@ from cmm_uq.jobs.part.freedoms import freedoms
 from cmm_uq.jobs.part.located import Places
 from cmm_uq.jobs.part.placing import readings
 from cmm_uq.jobs.part.probed import Probed
-from cmm_uq.points import AXES
+from cmm_uq.points import AXES, beyond_travel
 
 _NEARLY = np.sin(np.radians(1.0))
 """Of a nominal orientation: what is off by more than a degree is another orientation than the drawing's."""
@@ -172,19 +172,16 @@ def _frame_of_a_coordinate(one: CharacteristicFacts, features: Mapping[str, Prob
 
 def _travel(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
     """That the axes reach every point: once an axis, by its farthest point."""
-    travel, styli = facts.machine_state.travel_mm, {one.name: one for one in facts.stylus}
+    if facts.placing.origin_mm is None:
+        return
+    given, styli = facts.machine_state.travel_mm, {one.name: one for one in facts.stylus}
     named = list(features.values())
     read = [readings(one, styli[one.facts.stylus or facts.stylus[0].name], facts) for one in named]
-    every = np.concatenate(read)
+    every = np.concatenate([np.zeros((0, len(AXES))), *read])
     owner = np.repeat(np.arange(len(named)), [len(one) for one in read])
-    for i, axis in enumerate(AXES):
-        given = getattr(travel, axis)
-        if given is None:
-            continue
-        beyond = np.maximum(given[0] - every[:, i], every[:, i] - given[1])
-        row = int(np.argmax(beyond))
-        if beyond[row] > 0:
-            name = named[owner[row]].facts.name
-            yield CmmUqError(f"axis {axis} would have to go to {every[row, i]:.6g} mm for {name!r}, and its travel is "
-                             f"{given[0]:g} to {given[1]:g} mm", where=places.of("placing", "origin_mm"),
-                             fix="Place the part elsewhere, or name another stylus")  # fmt: skip
+    travel = np.array([getattr(given, axis) or (np.nan, np.nan) for axis in AXES], dtype=np.float64)
+    for i, row in beyond_travel(every, travel):
+        name, (low, high) = named[owner[row]].facts.name, travel[i]
+        yield CmmUqError(f"axis {AXES[i]} would have to go to {every[row, i]:.6g} mm for {name!r}, and its travel is "
+                         f"{low:g} to {high:g} mm", where=places.of("placing", "origin_mm"),
+                         fix="Place the part elsewhere, or name another stylus")  # fmt: skip

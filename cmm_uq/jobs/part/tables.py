@@ -131,8 +131,8 @@ class AlignmentFacts(Table):
 class PlacingFacts(Table):
     """``[placing]``: where the part lies in the machine."""
 
-    origin_mm: Triple = [0.0, 0.0, 0.0]
-    """Where the part's origin lies, in coordinates of the machine."""
+    origin_mm: Triple | None = None
+    """Where the part's origin lies, in coordinates of the machine; where left out, the part is in the middle of the travel."""
     rotation_deg: Angles = [0.0, 0.0, 0.0]
     """How the part is turned about the axes of the machine: first about x, then y, then z."""
     u_origin_mm: Lengths = [0.0, 0.0, 0.0]
