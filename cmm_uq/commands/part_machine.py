@@ -129,7 +129,8 @@ def _certified(job: PartJob, *, rerun: bool, trust: Iterable[Path] | None, stage
     found = verify_given(given, rerun=rerun, trust=trust)
     if wrong := found.inquiry.findings:
         more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
-        raise CmmUqError(f"the machine's certificate does not verify: {wrong[0]}{more}", where=where,
+        first = ": ".join(filter(None, (wrong[0].file, wrong[0].place, wrong[0].problem)))
+        raise CmmUqError(f"the machine's certificate does not verify: {first}{more}", where=where,
                          fix="cmm-uq verify says all that is wrong; ask for the certificate as it was issued")  # fmt: skip
     results = given.results[1]
     source: Source = "results" if found.job is None else "certificate"
