@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.geometry.association import Association, associate
+from cmm_uq.geometry.association import Association
 from cmm_uq.geometry.repeated import Drawn, Repeated
 from cmm_uq.parts.plan import DIRECTED, Feature
 from cmm_uq.points import Floats
@@ -112,7 +112,10 @@ class ProbedFeature:
         if self.association in ("minimum_zone", "tangent"):
             drawn = self._repeated.minimum_zone(displacements)
             return self._outside(drawn) if self.association == "tangent" else drawn
-        return self._one_by_one(displacements)
+        try:
+            return self._repeated.one_sided(displacements, inscribed=self.association == "maximum_inscribed")
+        except CmmUqError as error:
+            raise CmmUqError(error.problem, where=f"feature {self.feature.name!r}", fix=error.fix) from error
 
     def _outside(self, drawn: Drawn) -> Drawn:
         """The side of a minimum zone that looks out of the material."""
@@ -124,18 +127,6 @@ class ProbedFeature:
             raise CmmUqError(f"a {self.feature.kind} has no tangent feature", where=f"feature {self.feature.name!r}",
                              fix="Use maximum_inscribed or minimum_circumscribed")  # fmt: skip
         return replace(drawn, position=drawn.position + 0.5 * drawn.form[:, None] * across / np.linalg.norm(across))
-
-    def _one_by_one(self, displacements: Floats) -> Drawn:
-        points = self._in_own_plane(self.points) + displacements
-        found = [associate(self.feature.kind, each, self.association) for each in points]  # type: ignore[arg-type]
-        directed = found[0].direction is not None
-        return Drawn(
-            np.array([one.position for one in found]),
-            np.array([one.direction for one in found]) if directed else None,
-            np.array([one.size for one in found]),
-            None,
-            np.array([one.form for one in found]),
-        )
 
     def _values(self, drawn: Drawn) -> Floats:
         values = np.zeros((len(drawn.position), VALUES))
