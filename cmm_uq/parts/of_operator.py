@@ -1,7 +1,7 @@
 """Operators among the causes: what repeats by different people, days or set-ups scatter by beyond everything else.
 
-Stated, not computed: from repeats of one's own. It is common to a measurement, however often each point is read, and drawn again in
-the next measurement.
+Stated, not computed: from repeats of one's own. It is common to a measurement, however often each point is read, and drawn
+again in the next measurement.
 """
 
 from __future__ import annotations
