@@ -2,7 +2,8 @@
 
 Sizes are global ones by the association that is asked for (ISO 14405-1: least squares (GG), minimum zone, …). Tolerances of
 form, orientation, location and runout are widths of the zones of ISO 1101:2017 that just hold what is measured: points of
-surfaces, the associated axis of a hole or shaft over its measured length. A zone that one datum leaves free to turn is the
+surfaces, the associated axis of a hole or shaft over its measured length; circular runout is the largest of any section.
+Two-point sizes (LP, which ISO 14405-1 takes where a drawing says nothing) are not evaluated. A zone that one datum leaves free to turn is the
 smallest one where it stands at right angles to the datum; where it is tilted it turns with the associated plane.
 """
 
@@ -31,13 +32,19 @@ from cmm_uq.parts.plan import (
     FeatureKind,
     Plan,
 )
-from cmm_uq.points import AXES, Floats
+from cmm_uq.points import AXES, Floats, Ints
 
 Key = tuple[str, Association]
 """A feature by an association."""
 
 _ALONG = 0.999
 """Cosine of the angle between two directions from which on they are meant to be parallel; its complement, at right angles."""
+
+SECTION = 0.01
+"""mm: how far points of one section may lie apart along the datum's axis; of a plane, across it."""
+
+_FEWEST_IN_SECTION = 3
+"""Points by which a section shows any runout beyond where the axis stands."""
 
 _ROUND: tuple[FeatureKind, ...] = ("line", "cylinder", "cone")
 """Features whose axis is what a tolerance of orientation or location is of."""
@@ -140,6 +147,36 @@ class Evaluation:
         return _extent(self.feature.points, of.position[0], of.direction[0])
 
     @cached_property
+    def sections(self) -> tuple[Ints, ...]:
+        """Rows of the points of each section of a circular runout, by their nominal place; of all else, all rows.
+
+        Sections are places along the axis, of a plane circles about it, with three points at least.
+        """
+        points, one = self.feature.points, self.characteristic
+        if one.what != "circular_runout" or self.feature.kind == "circle":
+            return (np.arange(len(points)),)
+        datum = self.nominal[one.datums[0]]
+        apart = points - datum.position[0]
+        place = apart @ datum.direction[0]
+        if self.feature.kind == "plane":
+            place = np.linalg.norm(apart - np.outer(place, datum.direction[0]), axis=1)
+        order = np.argsort(place, kind="stable")
+        ends = np.flatnonzero(np.diff(place[order]) > SECTION) + 1
+        return tuple(rows for rows in np.split(order, ends) if len(rows) >= _FEWEST_IN_SECTION)
+
+    def refuse_unfit(self) -> None:
+        """Refuse what only the nominal points show.
+
+        Raises
+        ------
+        CmmUqError : no section of a circular runout has three points.
+        """
+        if self.characteristic.what in RUNOUTS and not self.sections:
+            raise CmmUqError(f"no section of {self.feature.name!r} has {_FEWEST_IN_SECTION} points",
+                             where=f"characteristic {self.characteristic.name!r}",
+                             fix="Probe it in circles about the datum's axis, or ask for total runout")  # fmt: skip
+
+    @cached_property
     def across(self) -> Repeated:
         """Of a plane that stands at right angles to its datum: its points seen along the datum."""
         return Repeated("line", self.feature.points @ self._seen.T)
@@ -236,14 +273,14 @@ def _coordinate(of: Evaluation, measured: Measured) -> Floats:
 
 
 def _runout(of: Evaluation, measured: Measured) -> Floats:
-    """Range of the points' distances from the datum axis, or along it where they are of a plane."""
+    """Largest range in a section of the points' distances from the datum axis, or along it where they are of a plane."""
     own, datum = of.first(measured), measured.features[of.datums[0]]
     apart = own.points - datum.position[:, None]
     along = np.einsum("npi,ni->np", apart, datum.direction)
-    if of.feature.kind == "plane":
-        return np.asarray(np.ptp(along, axis=1))
-    radial = apart - along[:, :, None] * datum.direction[:, None]
-    return np.asarray(np.ptp(np.linalg.norm(radial, axis=2), axis=1))
+    seen = along
+    if of.feature.kind != "plane":
+        seen = np.linalg.norm(apart - along[:, :, None] * datum.direction[:, None], axis=2)
+    return np.asarray(np.max([np.ptp(seen[:, rows], axis=1) for rows in of.sections], axis=0))
 
 
 _OF: Mapping[str, Callable[[Evaluation, Measured], Floats]] = {
@@ -267,7 +304,7 @@ def _refuse(one: Characteristic, plan: Plan) -> None:
     if one.what in ORIENTATIONS:
         allowed = ("line", "plane", "cylinder", "cone")
     if one.what in RUNOUTS:
-        allowed = ("plane", "circle" if one.what == "circular_runout" else "cylinder")
+        allowed = ("plane", "circle", "cylinder") if one.what == "circular_runout" else ("plane", "cylinder")
     for kind in kinds:
         if allowed and kind not in allowed:
             raise CmmUqError(f"a {kind} has no {one.what}", where=where, fix=f"It is of {', '.join(allowed)}")

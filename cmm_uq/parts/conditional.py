@@ -1,35 +1,117 @@
 """The machine's errors given the recording of its calibration, those included that the calibration did not model.
 
-What a calibration leaves out of its model does not stay out of its recording: it goes into the estimates of what is modelled.
-A part measured like the artefact then errs by less than both would alone, another part by more. Where the recording is at hand
-(a job, or a certificate that carries it) everything is therefore estimated together, each error with the prior that physics
-allows, and drawn from that joint posterior; what the machine corrects stays what its certificate states.
+What a calibration leaves out of its model does not stay out of its recording: it goes into the estimates of what is modelled,
+and into its noise. A part measured like the artefact then errs by less than both would alone, another part by more. Where the
+recording is at hand (a job, or a certificate that carries it) everything is therefore estimated together, each error with the
+prior that physics allows, under a noise of components whose sizes are sampled with them; what the machine corrects stays what
+its certificate states.
+
+However many errors were left out, a recording sees no more combinations of them than it has observations: those are sampled,
+and what it does not see of each keeps its prior.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.model.measurement import MeasurementModel
-from cmm_uq.parts.machine import MachineState, Unmodelled
-from cmm_uq.points import Floats
+from cmm_uq.inference.least_squares import LeastSquares
+from cmm_uq.inference.linear_model import LinearModel, Unknown
+from cmm_uq.inference.marginal import Marginal
+from cmm_uq.inference.noise import Components, Sizes
+from cmm_uq.inference.sampling import sample_with_noise
+from cmm_uq.model.measurement import ARTEFACT, MeasurementModel
+from cmm_uq.model.noise import noise_of
+from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled
+from cmm_uq.parts.periods import linear
+from cmm_uq.parts.recorded_noise import stated_noise
+from cmm_uq.physics.effect import Effect
+from cmm_uq.points import Floats, Ints
+from cmm_uq.units import unit
 
 DRAWS = 10_000
+
+_UNSEEN = 0.01
+"""Of the scatter of the residuals: what a combination of errors adds to the observations below which they do not show it."""
+
+_SMALLEST = 1e-6
+"""mm: the smallest noise that is sampled."""
+
+_UNTOLD = 100.0
+"""Ratio of the 95 % to the 5 % quantile of the noise from which on the recording does not tell it from errors left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """The linear model of a calibration with what it left out.
+
+    Attributes
+    ----------
+    linear : of the calibration's unknowns, then of combinations of what it left out, standard normal beforehand.
+    estimate : least squares of the calibration, where these are zero.
+    which : places of what takes part in what was left out.
+    effects : those, linear.
+    sd : (f,) of their coefficients beforehand.
+    seen : (r, f) orthonormal rows: the combinations of the coefficients over their standard deviations.
+    """
+
+    linear: LinearModel
+    estimate: LeastSquares
+    which: tuple[int, ...]
+    effects: tuple[Effect, ...]
+    sd: Floats
+    seen: Floats
+
+    @classmethod
+    def of(cls, model: MeasurementModel, further: Sequence[Unmodelled]) -> Together:
+        """Of a calibration and of what it left out; what needs columns that were not recorded takes no part."""
+        recorded = model.artefact.points.columns
+        which = tuple(i for i, one in enumerate(further) if all(name in recorded for name in one.effect.columns))
+        effects = tuple(linear(further[i].effect) for i in which)
+        # the recording itself says how large an error may be that it shows: beforehand it is what physics allows
+        sd = np.array([c.prior_sd for effect in effects for c in effect.coefficients])
+        estimate = model.estimate()
+        own = estimate.linear
+        shown = [model.seen(model.columns(effect, (), estimate.about), estimate.about) for effect in effects]
+        columns = np.hstack([np.zeros((len(own.observed), 0)), *shown]) * sd
+        # what a placing reaches shows nothing
+        left = own.reduce(columns) * own.noise_scale[:, None]
+        U, s, Vt = np.linalg.svd(left, full_matrices=False)
+        kept = s > max(_SMALLEST, _UNSEEN * estimate.least_squares.sigma_of_residuals)
+        one = unit("1")
+        combined = tuple(Unknown(("left out", str(j)), one, 0.0, 1.0, 1.0) for j in range(int(kept.sum())))
+        whole = replace(
+            own, design=np.hstack([own.design, U[:, kept] * s[kept]]), unknowns=(*own.unknowns, *combined)
+        )
+        value = np.append(estimate.least_squares.value, np.zeros(len(combined)))
+        return cls(whole, replace(estimate.least_squares, value=value), which, effects, sd, Vt[kept])
+
+    def coefficients(self, draws: Floats, random: np.random.Generator) -> Floats:
+        """(N, k + f) of the calibration's effects, then of what it left out, of draws (N, …) of the linear model."""
+        k = len(draws[0]) - len(self.seen) - self._sizes
+        combined = draws[:, len(draws[0]) - len(self.seen) :]
+        free = random.standard_normal((len(draws), len(self.sd)))
+        found = free + (combined - free @ self.seen.T) @ self.seen
+        return np.hstack([draws[:, :k], found * self.sd])
+
+    @property
+    def _sizes(self) -> int:
+        """How many of the calibration's unknowns are sizes of its artefact."""
+        return sum(unknown.key[0] == ARTEFACT for unknown in self.linear.unknowns)
 
 
 def joint_posterior(
     model: MeasurementModel, further: Sequence[Unmodelled], sigma_mm: float
 ) -> tuple[tuple[int, ...], Floats, Floats]:
-    """Normal posterior of a calibration's errors and of errors that it did not model, for a given noise.
+    """Normal posterior of a calibration's errors and of errors that it did not model, for a white noise that is known.
 
     Parameters
     ----------
     model : of the calibration.
-    further : what it did not model; those with a nonlinear parameter, or that need what was not recorded, are left out.
+    further : what it did not model; what needs columns that were not recorded is left out.
     sigma_mm : standard deviation of one recorded coordinate.
 
     Returns
@@ -41,61 +123,96 @@ def joint_posterior(
     ------
     CmmUqError : the recording leaves even the sizes of the artefact open.
     """
-    columns = model.artefact.points.columns
-    which = tuple(
-        i for i, one in enumerate(further)
-        if not one.effect.shape and all(name in columns for name in one.effect.columns)
-    )  # fmt: skip
-    whole = MeasurementModel(
-        model.artefact, (*model.effects, *(further[i].effect for i in which)), model.sigma, model.used, model.shapes
-    )
-    about, k = model.estimate().about, sum(len(effect.coefficients) for effect in model.effects)
-    sd = np.concatenate([np.zeros(0), *(further[i].sd for i in which)])
-    linear = whole.linearised(np.concatenate([about[:k], np.zeros(len(sd)), about[k:]]))
-    unknowns = [
-        replace(unknown, prior_sd=float(sd[i - k])) if k <= i < k + len(sd) else unknown
-        for i, unknown in enumerate(linear.unknowns)
-    ]
-    linear = replace(linear, unknowns=tuple(unknowns))
-    rows, given = linear.priors
-    scale = np.array([unknown.scale for unknown in linear.unknowns])
-    root = np.vstack([linear.reduced.design / sigma_mm, rows]) * scale
-    target = np.append(linear.reduced.observed / sigma_mm, given)
+    whole = Together.of(model, further)
+    rows, given = whole.linear.priors
+    scale = np.array([unknown.scale for unknown in whole.linear.unknowns])
+    root = np.vstack([whole.linear.reduced.design / sigma_mm, rows]) * scale
+    target = np.append(whole.linear.reduced.observed / sigma_mm, given)
     if np.linalg.matrix_rank(root) < root.shape[1]:
-        raise CmmUqError("the recording leaves a size of its artefact open, of which nothing is known beforehand",
-                         where="the calibration", fix="Give the artefact's length")  # fmt: skip
+        raise _open()
     inverse = np.linalg.pinv(root)
     mean, covariance = scale * (inverse @ target), np.outer(scale, scale) * (inverse @ inverse.T)
-    count = k + len(sd)
-    return which, np.asarray(mean[:count]), np.asarray(covariance[:count, :count])
+    k = sum(len(effect.coefficients) for effect in model.effects)
+    at = np.r_[:k, len(mean) - len(whole.seen) : len(mean)]
+    into = np.zeros((k + len(whole.sd), len(at)))
+    into[:k, :k] = np.eye(k)
+    into[k:, k:] = whole.sd[:, None] * whole.seen.T
+    unseen = np.zeros((len(into), len(into)))
+    unseen[k:, k:] = np.outer(whole.sd, whole.sd) * (np.eye(len(whole.sd)) - whole.seen.T @ whole.seen)
+    return whole.which, into @ mean[at], into @ covariance[np.ix_(at, at)] @ into.T + unseen
+
+
+def draws_given(whole: Together, components: Components, sizes: Sizes, random: np.random.Generator) -> Floats:
+    """Exact draws (N, k + f) of all errors, one for each of N sizes of the noise; no finite ones where a size is open."""
+    return whole.coefficients(Marginal(whole.linear, components, whole.estimate).draw(sizes, random), random)
 
 
 def given_recording(
-    state: MachineState, model: MeasurementModel, sigma_mm: float, draws: int = DRAWS, seed: int = 0
+    state: MachineState, model: MeasurementModel, sigma_mm: float | None = None, draws: int = DRAWS, seed: int = 0
 ) -> MachineState:
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
 
     Parameters
     ----------
     state : as its certificate states it, its effects in the model's order; the model may have others, as of its artefact.
-    model : of the calibration.
-    sigma_mm : standard deviation of one recorded coordinate.
+    model : of the calibration, without the observations that its certificate set aside.
+    sigma_mm : standard deviation of one recorded coordinate, where the noise is known and white; else it is sampled.
+
+    Raises
+    ------
+    CmmUqError : the recording leaves even the sizes of the artefact open.
     """
-    which, mean, covariance = joint_posterior(model, state.unmodelled, sigma_mm)
-    own = [effect.name in {one.name for one in state.effects} for effect in model.effects for _ in effect.coefficients]
-    kept = np.flatnonzero([*own, *(True for _ in range(len(mean) - len(own)))])
-    mean, covariance = mean[kept], covariance[np.ix_(kept, kept)]
-    together = tuple(state.unmodelled[i].effect for i in which)
-    rest = tuple(one for i, one in enumerate(state.unmodelled) if i not in which)
-    more = len(mean) - state.draws.shape[1]
-    corrections = np.append(state.corrects, np.zeros(more))
-    drawn = np.random.default_rng(seed).multivariate_normal(mean, covariance, draws, method="svd")
-    noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
-    prior = np.concatenate([np.zeros(0), *(state.unmodelled[i].sd for i in which)])
-    share = np.sqrt(np.diagonal(covariance))[len(mean) - more :] / prior
-    names = [effect.name for effect in together for _ in effect.coefficients]
-    shares = {**state.prior_share, **dict(zip(names, share.tolist(), strict=True))}
-    return replace(
-        state, effects=(*state.effects, *together), draws=drawn, noise=noise, unmodelled=rest, prior_share=shares,
-        drift=np.append(state.drift, np.zeros(more)), corrected=True, corrections=corrections,
+    whole, random = Together.of(model, state.unmodelled), np.random.default_rng(seed)
+    if sigma_mm is not None:
+        _, mean, covariance = joint_posterior(model, state.unmodelled, sigma_mm)
+        drawn = random.multivariate_normal(mean, covariance, draws, method="svd")
+        return _with(state, model, whole, drawn, replace(state.noise, coordinate_mm=state.noise.usual_mm))
+    components = replace(noise_of(model), known=model.least_noise)
+    posterior = sample_with_noise(whole.linear, components, whole.estimate, seed)
+    every = _evenly(len(posterior.draws), draws)
+    sizes, drawn = posterior.sizes.at(every), whole.coefficients(posterior.draws[every], random)
+    low, high = np.quantile(sizes.coordinate, [0.05, 0.95])
+    if high > _UNTOLD * low:  # any noise would do: it is taken for what the calibration took it for, which is no less
+        estimate = model.estimate()
+        alone = sample_with_noise(estimate.linear, components, estimate.least_squares, seed)
+        sizes = alone.sizes.at(_evenly(len(alone.draws), draws))
+        drawn = draws_given(whole, components, sizes, random)
+    return _with(state, model, whole, drawn, stated_noise(model, components, sizes))
+
+
+def _with(
+    state: MachineState, model: MeasurementModel, whole: Together, drawn: Floats, noise: StatedNoise
+) -> MachineState:  # fmt: skip
+    """The state with draws (N, k + f) of all errors together."""
+    if not np.isfinite(drawn).all():
+        raise _open()
+    acting = {one.name for one in state.effects}
+    own = [effect.name in acting for effect in model.effects for _ in effect.coefficients]
+    kept = np.flatnonzero(np.append(own, np.ones(len(whole.sd), dtype=bool)))
+    none = np.zeros(len(whole.sd))
+    together = replace(
+        state, effects=(*state.effects, *whole.effects), draws=drawn[:, kept], noise=noise, corrected=True,
+        unmodelled=tuple(one for i, one in enumerate(state.unmodelled) if i not in whole.which),
+        corrections=np.append(state.corrects, none), drift=np.append(state.drift, none),
     )  # fmt: skip
+    return replace(together, prior_share=_shares(together))
+
+
+def _shares(state: MachineState) -> dict[str, float]:
+    """Posterior standard deviation of each effect over its prior one, of several coefficients in the root mean square."""
+    found, start = dict[str, float](), 0
+    for effect in state.effects:
+        own = state.draws[:, start : start + len(effect.coefficients)]
+        start += len(effect.coefficients)
+        prior = sum(coefficient.prior_sd**2 for coefficient in effect.coefficients)
+        found[effect.name] = float(np.sqrt(own.var(axis=0).sum() / prior)) if prior else 0.0
+    return found
+
+
+def _evenly(count: int, wanted: int) -> Ints:
+    return np.linspace(0, count - 1, min(wanted, count)).astype(np.int64)
+
+
+def _open() -> CmmUqError:
+    return CmmUqError("the recording leaves a size of its artefact open, of which nothing is known beforehand",
+                      where="the calibration", fix="Give the artefact's length")  # fmt: skip

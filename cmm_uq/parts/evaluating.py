@@ -52,6 +52,8 @@ class Evaluator:
         self.evaluations = [Evaluation(one, plan, self.nominal) for one in plan.characteristics]
         self.keys = list(dict.fromkeys(key for one in self.evaluations for key in (*one.keys, *one.datums)))
         self.of_points = {one.keys[0] for one in self.evaluations if one.of_points}
+        for one in self.evaluations:
+            one.refuse_unfit()
         self.associated = {(name, how): self._associated(name, how) for name, how in self.keys}
         self.frames = {
             one.frame_of: DatumSystem(

@@ -29,6 +29,9 @@ OTHERWISE = ("artefact", "probe")
 _SURROUNDINGS = "temp_"
 """What begins the columns of effects that the temperatures of the part's measurement drive."""
 
+_TIMES = 200
+"""Draws of a slow wander of which its covariance is the mean."""
+
 FREE = 0.5
 """Share of the prior in a posterior standard deviation from which on the calibration left an error free."""
 
@@ -57,24 +60,47 @@ class Unmodelled:
 
 @dataclass(frozen=True, eq=False)
 class StatedNoise:
-    """Noise of one coordinate of one point, as the calibration found it.
+    """Noise of one coordinate of one point, as the calibration found it: each size a number, or one for each of M draws.
 
     Parameters
     ----------
-    coordinate_mm : (3,) standard deviation of each reading along x, y, z, or (M, 3) with each draw of the posterior.
-    placing_mm : of what a set-up adds to each of its points.
-    slow_mm, slow_time_s : of a slow wander of each coordinate, and the time over which it forgets.
+    coordinate_mm : (3,) standard deviation of each reading along x, y, z, or (M, 3).
+    placing_mm : of what a set-up adds to each of its points, and its repeats share.
+    slow_mm, slow_time_s : of a slow wander of each coordinate, and the time over which it forgets: infinite of a random walk.
+    growth_mm : of what grows with the distance from the first point that is probed, at the distance ``longest_mm``; where that
+        is zero it is not known, and all of it acts everywhere.
+    walked_s : time after which a random walk has the mean square ``slow_mm²`` from its beginning until then.
     """
 
     coordinate_mm: Floats = field(default_factory=lambda: np.zeros(3))
-    placing_mm: float = 0.0
-    slow_mm: float = 0.0
-    slow_time_s: float = 600.0
+    placing_mm: Floats | float = 0.0
+    slow_mm: Floats | float = 0.0
+    slow_time_s: Floats | float = 600.0
+    growth_mm: Floats | float = 0.0
+    longest_mm: float = 0.0
+    walked_s: float = 600.0
 
     @property
     def usual_mm(self) -> Floats:
         """(3,) root mean square of the standard deviation of a reading."""
         return np.asarray(np.sqrt(np.mean(np.atleast_2d(self.coordinate_mm) ** 2, axis=0)))
+
+    def slow_kernel(self, seconds: Floats) -> Floats:
+        """(n, n) covariance, mm², of the slow wander at times (n,), the mean over its draws.
+
+        Of a walk only what it has moved since the first of the times matters; its variance grows by 2·slow²/walked.
+        """
+        sd, time = np.broadcast_arrays(np.atleast_1d(self.slow_mm), np.atleast_1d(self.slow_time_s))
+        apart = np.abs(np.subtract.outer(seconds, seconds))
+        walks, count = np.isinf(time), len(sd)
+        since = seconds - seconds.min(initial=np.inf)
+        kernel = 2 * np.sum(sd[walks] ** 2) / self.walked_s * np.minimum.outer(since, since)
+        returning = np.flatnonzero(~walks & (sd > 0))
+        few = returning[np.linspace(0, len(returning) - 1, min(len(returning), _TIMES)).astype(np.int64)]
+        scale = np.sum(sd[returning] ** 2) / max(float(np.sum(sd[few] ** 2)), np.finfo(np.float64).tiny)
+        for i in few:
+            kernel += scale * sd[i] ** 2 * np.exp(-apart / time[i])
+        return np.asarray(kernel / count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,10 +229,7 @@ def noise_of_draws(reported: Mapping[str, Floats]) -> StatedNoise:
     if one is None:
         return StatedNoise()
     axes = [np.asarray(reported.get(f"noise.{axis}_um", one)) for axis in "xyz"]
-    placing = np.asarray(reported.get("noise.placing_um", np.zeros(1)))
-    slow = np.asarray(reported.get("noise.slow_um", np.zeros(1)))
-    return StatedNoise(
-        MICROMETRE * np.column_stack(axes),
-        MICROMETRE * float(np.sqrt(np.mean(placing**2))),
-        MICROMETRE * float(np.sqrt(np.mean(slow**2))),
+    placing, slow, growth = (
+        MICROMETRE * np.asarray(reported.get(f"noise.{name}_um", np.zeros(1))) for name in ("placing", "slow", "growth")
     )
+    return StatedNoise(MICROMETRE * np.column_stack(axes), placing, slow, growth_mm=growth)

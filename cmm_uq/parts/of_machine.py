@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.messages import say
-from cmm_uq.parts.causes import Cause, Common, Scatter, field_along
+from cmm_uq.parts.causes import Cause, Common, Draw, Scatter, field_along
 from cmm_uq.parts.machine import MachineState, Unmodelled
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.qualifying import Qualified
@@ -92,30 +92,47 @@ def _unmodelled(one: Unmodelled, qualified: Qualified, pose: Pose) -> Common:
                   basis=-_in_part(qualified.left(columns), pose))  # fmt: skip
 
 
-def noise(state: MachineState, points: Points, pose: Pose, repeats: int = 1) -> list[Cause]:
-    """Noise of readings, what a set-up adds to each point, and slow noise where times are known.
+def noise(state: MachineState, points: Points, pose: Pose, repeats: int = 1, first: int = 0) -> list[Cause]:
+    """Noise of readings, what a set-up adds to each point, what grows with distance, and slow noise where times are known.
 
     Parameters
     ----------
     repeats : of each point, of whose readings the mean is taken; they share the set-up and the moment.
+    first : row of the point that is probed first, from which distances are.
     """
     stated, n, found = state.noise, len(points), list[Cause]()
     usual = stated.usual_mm
     if usual.any():
         ratio = np.atleast_2d(stated.coordinate_mm) / np.where(usual > 0, usual, 1.0)
-
-        def scale(random: np.random.Generator, count: int) -> Floats:
-            return np.asarray(ratio[random.integers(len(ratio), size=count)])
-
         size = np.tile(usual / np.sqrt(repeats), (n, 1))
-        found.append(Scatter.of(NOISE, "reading", size, pose.back(np.eye(3)), scale if len(ratio) > 1 else None))
-    if stated.placing_mm:
-        found.append(Scatter.of(NOISE, "set-up", np.full((n, 3), stated.placing_mm)))
-    if stated.slow_mm and "time_s" in points.columns:
-        apart = np.abs(np.subtract.outer(points.column("time_s"), points.column("time_s")))
-        kernel = stated.slow_mm**2 * np.exp(-apart / stated.slow_time_s)
+        found.append(Scatter.of(NOISE, "reading", size, pose.back(np.eye(3)), _one_of(ratio)))
+    found += _scattered("set-up", stated.placing_mm, np.ones(n))
+    if stated.longest_mm:
+        away = np.linalg.norm(points.xyz - points.xyz[first], axis=1) / stated.longest_mm
+    else:
+        away = np.ones(n)
+    found += _scattered("growing", stated.growth_mm, away / np.sqrt(repeats))
+    if np.any(stated.slow_mm) and "time_s" in points.columns:
+        kernel = stated.slow_kernel(points.column("time_s"))
         found += [field_along(NOISE, "slow", kernel, np.tile(axis, (n, 1))) for axis in np.eye(3)]
     return found
+
+
+def _scattered(factor: str, size_mm: Floats | float, part: Floats) -> list[Cause]:
+    """Every coordinate on its own, by parts (n,) of a size of which draws are given; none where it is zero."""
+    drawn = np.atleast_1d(np.asarray(size_mm, dtype=np.float64))
+    usual = float(np.sqrt(np.mean(drawn**2)))
+    if not usual:
+        return []
+    size = np.repeat(usual * part[:, None], 3, axis=1)
+    return [Scatter.of(NOISE, factor, size, scale=_one_of(np.repeat(drawn[:, None] / usual, 3, axis=1)))]
+
+
+def _one_of(ratio: Floats) -> Draw | None:
+    """One of rows (M, 3) a draw; nothing where there is only one."""
+    if len(ratio) == 1:
+        return None
+    return lambda random, count: np.asarray(ratio[random.integers(len(ratio), size=count)])
 
 
 def _in_part(columns: Floats, pose: Pose) -> Floats:

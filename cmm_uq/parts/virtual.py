@@ -92,7 +92,7 @@ class AtPose:
         self.causes: list[Cause] = [
             modelled(given.machine, qualified, pose),
             *unmodelled,
-            *noise(given.machine, points, pose, given.repeats),
+            *noise(given.machine, points, pose, given.repeats, int(plan.order[0]) if len(plan.order) else 0),
             *styli(plan, pose),
             *temperatures(given.surroundings, plan, points, pose),
             *given.further,

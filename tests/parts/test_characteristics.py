@@ -109,6 +109,35 @@ def test_a_shaft_that_turns(one: Characteristic, moves: dict[str, Move], value: 
     assert measured(stepped(), one, moves) == pytest.approx(value, abs=2e-6)
 
 
+def of_section(height: float, offset: float, wider: float) -> Move:
+    """Points at one height are shifted along x, all others stand farther out."""
+
+    def move(p: Floats, n: Floats) -> Floats:
+        here = (np.abs(p[:, 2] - height) < 1)[:, None]
+        return np.asarray(np.where(here, p + [offset, 0, 0], p + wider * n))
+
+    return move
+
+
+@pytest.mark.parametrize(("what", "value"), [("circular_runout", 0.010), ("total_runout", 0.025)])
+def test_circular_runout_is_that_of_the_worst_section(what: str, value: float) -> None:
+    """A section 5 µm off its axis runs out by 10 µm; another that is 20 µm wider all round runs out by nothing itself."""
+    features = (*stepped()[:1], bore("pin", [0, 0, 0], 5.0, (60.0, 50.0), hole=False))
+    one = Characteristic("", what, ("pin",), ("journal",))
+    assert measured(features, one, {"pin": of_section(60.0, 0.005, 0.020)}) == pytest.approx(value, abs=5e-6)
+
+
+def test_a_face_runs_out_on_each_of_its_circles() -> None:
+    """An outer circle of a shoulder that lies 20 µm higher than the inner one, each of them flat, and that tilted by 0.1 mrad."""
+    (inner, _), (outer, _) = ring([0, 0, 0], 20.0, 10.0, 8), ring([0, 0, 0], 30.0, 10.0, 8)
+    points, up = np.vstack([inner, outer]), np.tile(UP, (16, 1))
+    face = Feature("face", "plane", points, up, "stylus", Nominal(np.array([0.0, 0, 10]), UP))
+    moves: dict[str, Move] = {"face": lambda p, n: p + np.outer(np.where(np.hypot(*p[:, :2].T) > 25, 0.02, 1e-4 * p[:, 0]), UP)}
+    for what, value in (("circular_runout", 1e-4 * 40), ("total_runout", 0.02 + 1e-4 * 20)):
+        one = Characteristic("", what, ("face",), ("journal",))
+        assert measured((*stepped()[:1], face), one, moves) == pytest.approx(value, abs=NANOMETRE)
+
+
 def test_coaxiality_of_an_axis_counts_its_lean() -> None:
     features = (bore("journal", [0, 0, 0], 10.0, (-40.0, 0.0)), bore("other", [0, 0, 0], 5.0, (100.0, 150.0)))
     one = Characteristic("", "coaxiality", ("other",), ("journal",))
@@ -210,8 +239,9 @@ def test_a_best_fit_of_one_face_is_refused() -> None:
     (Characteristic("c", "parallelism", ("A",)), "needs a datum"),
     (Characteristic("c", "coaxiality", ("h1",), ("A",)), "the datum of coaxiality is a plane"),
     (Characteristic("c", "position", ("h1",)), "position needs datums"),
-    (Characteristic("c", "circular_runout", ("h1",), ("h2",)), "a cylinder has no circular_runout"),
+    (Characteristic("c", "circular_runout", ("A",), ("h2",)), "no section of 'A' has 3 points"),
+    (Characteristic("c", "total_runout", ("round",), ("h2",)), "a circle has no total_runout"),
 ])  # fmt: skip
 def test_what_a_feature_does_not_have_is_refused(one: Characteristic, words: str) -> None:
     with pytest.raises(CmmUqError, match=words):
-        measured(BLOCK, one, {})
+        measured((*BLOCK, circle("round", [100, 50, 0], 5.0)), one, {})
