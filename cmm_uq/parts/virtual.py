@@ -102,7 +102,8 @@ class AtPose:
         ]
         base = mean_errors(given.machine, qualified, pose) + mean_expansion(surroundings, plan, points, pose)
         drawn = any(len(feature.surface) for feature in plan.features)
-        part = plan.points if drawn or given.measured is None else given.measured
+        # what was measured has the mean errors in it: the part itself is without them
+        part = plan.points if drawn or given.measured is None else given.measured - base
         self.measured = Evaluator(plan, base + part - plan.points, self.causes, known)
         self.still = characteristics_of(plan, part)
         self.true: Evaluator | None = None
