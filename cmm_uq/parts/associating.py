@@ -20,7 +20,7 @@ from cmm_uq.points import Floats
 _STEP = 1e-3
 """mm: of central differences, whose error is the square of step over radius."""
 
-_NEAR = 1e-3
+_NEAR = 1e-2
 """Of a feature's extent: how far points may be from those that it was prepared for."""
 
 VALUES = 8
