@@ -46,8 +46,9 @@ def budget_section(found: PartFound) -> Section:
     blocks += shares_plots([one.titled for one in every], causes, shares)
     detailed = sorted(by_margin(found)[:DETAILED], key=lambda one: one.place)
     blocks.append(_lines(detailed, len(every)))
-    if len(budget.factors):
-        blocks.append(_factors(detailed))
+    within = _factors(detailed)
+    if within.rows:
+        blocks.append(within)
     return Section(say("What the uncertainty is made of"), tuple(blocks))
 
 
@@ -81,6 +82,7 @@ def share_of(one: Figures, line: str) -> float:
 
 
 def _percent(share: float) -> Number:
+    share = min(share, 1.0)  # as far as draws know it
     return signed(100 * share, ".0f") if abs(share) >= 0.1 else signed(100 * share, ".2g")
 
 
@@ -109,11 +111,18 @@ def _budget(one: Figures) -> Iterable[tuple[Text, ...]]:
     order = np.argsort(-total, kind="stable").tolist()
     kept = [g for g in order if total[g] >= _LEAST][:_LINES]
     for g in kept:
-        yield one.number, one.beside, line_words(budget.causes[g]), _percent(max(first[g], 0.0)), _percent(total[g])
+        name = one.beside if g == order[0] else NOTHING
+        yield one.number, name, line_words(budget.causes[g]), _percent(max(first[g], 0.0)), _percent(total[g])
     rest = [g for g in order if g not in kept and total[g] > 0]
     if rest:
         others = plural(len(rest), one=say("another cause"), many=say("{count} other causes", count=len(rest)))
-        yield one.number, one.beside, others, DASH, say("each below {share}", share=_percent(_above(total[rest])))
+        yield (
+            one.number,
+            NOTHING if kept else one.beside,
+            others,
+            DASH,
+            say("each below {share}", share=_percent(_above(total[rest]))),
+        )
 
 
 def _above(shares: Floats) -> float:
@@ -130,8 +139,11 @@ def _factors(detailed: list[Figures]) -> Table:
     for one in detailed:
         within = budget.within[:, one.place]
         order = np.argsort(-np.abs(within), kind="stable").tolist()
-        rows += [(one.number, one.beside, line_words(budget.factors[f]), _percent(within[f]))
-                 for f in order[:_LINES] if abs(within[f]) >= _LEAST]  # fmt: skip
+        kept = [f for f in order[:_LINES] if abs(within[f]) >= _LEAST]
+        rows += [
+            (one.number, NOTHING if i else one.beside, line_words(budget.factors[f]), _percent(within[f]))
+            for i, f in enumerate(kept)
+        ]
     columns = (
         Column(say("No.")), Column(say("Characteristic"), numeric=False), Column(say("Error"), numeric=False),
         Column(say("Share"), unit("%")),

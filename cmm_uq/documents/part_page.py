@@ -83,7 +83,9 @@ def _particulars(found: PartFound) -> tuple[Facts, ...]:
     job, part = facts.job, facts.part
     expansion: Text = NOTHING
     if part.cte_per_k:
-        expansion = say("{cte:g} × 10⁻⁶ /K, u = {u:g} × 10⁻⁶ /K", cte=part.cte_per_k * 1e6, u=part.u_cte_per_k * 1e6)
+        expansion = say("{cte:g} × 10⁻⁶ /K", cte=part.cte_per_k * 1e6)
+    if part.cte_per_k and part.u_cte_per_k:
+        expansion = say("{expansion}, u = {u:g} × 10⁻⁶ /K", expansion=expansion, u=part.u_cte_per_k * 1e6)
     return grouped(
         identified(job, facts.laboratory, job.origin),
         (

@@ -123,8 +123,14 @@ def _decisions(every: Sequence[Figures], nominal: Sequence[float], *, measured: 
         notes.append(say("P: probability that the true value is within its limits, by the virtual measurements."))
     if any(one.judged is not None and one.judged.accepted is None for one in every):
         notes.append(say("None: the uncertainty is too large for any value to be accepted."))
-    caption = say("Decisions") if measured else say("What the rule will accept")
+    caption = _caption(angular=every[0].angular, measured=measured)
     return Table(caption, columns, rows, tuple(notes))
+
+
+def _caption(*, angular: bool, measured: bool) -> Text:
+    if measured:
+        return say("Decisions on angles") if angular else say("Decisions")
+    return say("Angles that the rule will accept") if angular else say("What the rule will accept")
 
 
 def _decision(one: Figures, nominal: float, *, measured: bool) -> tuple[Text, ...]:
@@ -179,7 +185,7 @@ def correlation_section(found: PartFound) -> Section:
         for one in every
     )
     columns = (
-        Column(say("No.")), Column(say("Characteristic"), numeric=False), *(Column(one.number) for one in every),
+        Column(say("No.")), Column(say("Characteristic"), numeric=False), *(Column(say("No. {number}", number=one.number)) for one in every),
     )  # fmt: skip
     return Section(say("Correlations"), (told, Table(say("Correlations between the characteristics"), columns, rows)))
 
