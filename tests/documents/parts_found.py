@@ -39,7 +39,9 @@ STANDING = Standing(
 )  # fmt: skip
 
 
-def machine(scale_ppm: float = 3.0, *, unmodelled: Sequence[str] = ("straightness_x_y", "hysteresis_y")) -> MachineState:
+def machine(
+    scale_ppm: float = 3.0, *, unmodelled: Sequence[str] = ("straightness_x_y", "hysteresis_y")
+) -> MachineState:
     """One with uncertain scales and squarenesses, and errors that its calibration did not model."""
     sizes = np.array([scale_ppm] * 3 + [1.0] * 3)
     draws = np.random.default_rng(1).standard_normal((DRAWS, len(sizes))) * sizes
