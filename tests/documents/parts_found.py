@@ -90,6 +90,6 @@ def found_of(
     found = PartFound(
         job, plan, given, virtual, simulated, stated(simulated, values), values, shares, unseen, None,
         judged(job, plan, errors, values), None if together is None or np.isnan(together) else together,
-        tuple(ways(plan, given, 1000)), displaced(virtual, 200), STANDING,
+        tuple(ways(plan, given, 1000)), displaced(virtual, 200), (300.0, 450.0, -500.0), STANDING,
     )  # fmt: skip
     return replace(found, **changes)
