@@ -129,7 +129,8 @@ def _certified(job: PartJob, *, rerun: bool, trust: Iterable[Path] | None, stage
     found = verify_given(given, rerun=rerun, trust=trust)
     if wrong := found.inquiry.findings:
         more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
-        raise CmmUqError(f"the machine's certificate does not verify: {wrong[0]}{more}", where=where,
+        first = ": ".join(filter(None, (wrong[0].file, wrong[0].place, wrong[0].problem)))
+        raise CmmUqError(f"the machine's certificate does not verify: {first}{more}", where=where,
                          fix="cmm-uq verify says all that is wrong; ask for the certificate as it was issued")  # fmt: skip
     results = given.results[1]
     source: Source = "results" if found.job is None else "certificate"
@@ -232,7 +233,7 @@ def _machine(job: PartJob, calibrated: Job | None) -> Machine:
 
     Raises
     ------
-    CmmUqError : both say a chain or a travel, and not the same.
+    CmmUqError : both say a chain or a travel, and not the same; or neither a travel.
     """
     facts, own = job.facts.machine_state, None if calibrated is None else calibrated.facts.machine
     chain, origin = facts.chain, facts.origin_mm
@@ -252,8 +253,11 @@ def _machine(job: PartJob, calibrated: Job | None) -> Machine:
                 f"{here[0]:g} to {here[1]:g} mm", where=f"{WHERE} travel_mm",
                 fix="Leave it out, or give the certificate of this machine",
             )  # fmt: skip
-        if (given := here or there) is not None:
-            travel[i] = given
+        given = here or there
+        if given is None:
+            raise CmmUqError(f"nothing says how far axis {axis} goes, by which errors of guideways are told", where=WHERE,
+                             fix=f"Give travel_mm = {{ {axis} = [lowest, highest] }}, or the certificate as PDF")  # fmt: skip
+        travel[i] = given
     name = "" if own is None else own.name
     return Machine(name, chain, travel, np.array(origin, dtype=np.float64))
 
