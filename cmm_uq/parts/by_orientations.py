@@ -30,6 +30,8 @@ STATEMENT = say(
     "standard was not at hand."
 )
 
+_ORIENTATIONS, _REPEATS = say("between orientations"), say("between repeats in one orientation")
+
 
 @dataclass(frozen=True, eq=False)
 class Standard:
@@ -125,7 +127,7 @@ def by_orientations(
     own, found = unit("rad" if angle else "mm"), one_way(readings, orientation)
     used = [stylus for stylus in standards.tips if slopes.tips.get(stylus, 0.0)]
     error = slopes.scale * standards.scale + sum(slopes.tips[stylus] * standards.tip(stylus) for stylus in used)
-    lines = found.lines(say("orientations of the part"), say("repeats in one orientation"), unit=own)
+    lines = [found.line(say("measurements of the part"), _ORIENTATIONS, _REPEATS, own)]
     if standards.length is not None:
         # a tip is compared with its standard by the same scale, which so far takes itself out of what the tip finds
         by_scale = slopes.scale - sum(
@@ -154,12 +156,9 @@ def _of_standard(one: Standard, name: Text, slope: float) -> list[Line]:
     mm = unit("mm")
     return [
         Line(say("{standard}: calibration", standard=name), one.u, CERTIFICATE, unit=mm, sensitivity=slope),
-        *one.variances.lines(
-            say("{standard}: orientations", standard=name), say("{standard}: repeats", standard=name),
-            sensitivity=slope, unit=mm,
-        ),
+        one.variances.line(say("{standard}: measurements", standard=name), _ORIENTATIONS, _REPEATS, mm, slope),
         Line(say("{standard}: expansion", standard=name), one.u_expansion, JUDGEMENT, unit=mm, sensitivity=slope),
-    ]  # fmt: skip
+    ]
 
 
 def _of_warmth(scale: float, warm: PartWarmth) -> list[Line]:

@@ -6,7 +6,7 @@ The model is x_ij = µ + g_i + e_ij, with groups g (days, set-ups, orientations)
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, sqrt
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text
 from cmm_uq.points import Floats, Ints
-from cmm_uq.uncertainty.budget import REPEATS, Line
+from cmm_uq.uncertainty.budget import REPEATS, Budget, Line
 
 
 @dataclass(frozen=True)
@@ -68,25 +68,27 @@ class OneWay:
         """Standard uncertainty of the mean of all readings."""
         return sqrt(max(self.between, self.within) / (self.groups * self.repeats))
 
-    def lines(
-        self, group: Text, repeat: Text, *, sensitivity: float = 1.0, unit: Text, origin: Text = REPEATS
-    ) -> list[Line]:
-        """The uncertainty of the mean as two lines of a budget.
+    @property
+    def dof_mean(self) -> float:
+        """Degrees of freedom of :attr:`u_mean`: those of the larger mean square."""
+        return self.groups - 1.0 if self.between >= self.within else float(self.groups * (self.repeats - 1))
 
-        The groups' degrees of freedom are those by which both lines together have those of the mean square that they come
-        from.
+    def line(self, name: Text, group: Text, repeat: Text, unit: Text, sensitivity: float = 1.0) -> Line:
+        """The uncertainty of the mean as a line of a budget, made up of that by groups and that by readings within them.
+
+        Both come from the same mean square, so that its degrees of freedom are those of the sum, not of the parts.
         """
-        of_groups, of_repeats = self.s_group / sqrt(self.groups), self.s_repeat / sqrt(self.groups * self.repeats)
         within = float(self.groups * (self.repeats - 1))
-        dof = within
-        if of_groups:
-            whole = (of_groups**2 + of_repeats**2) ** 2 / (self.groups - 1) - of_repeats**4 / within
-            dof = of_groups**4 / whole
-        # of a small part of the variance the quotient may fall below 1, which no budget takes; its weight is as small
-        return [
-            Line(group, of_groups, origin, unit=unit, dof=max(1.0, dof), sensitivity=sensitivity),
-            Line(repeat, of_repeats, origin, unit=unit, dof=within, sensitivity=sensitivity),
-        ]
+        parts = Budget(
+            name,
+            [
+                Line(group, self.s_group / sqrt(self.groups), REPEATS, unit=unit, dof=self.groups - 1.0),
+                Line(repeat, self.s_repeat / sqrt(self.groups * self.repeats), REPEATS, unit=unit, dof=within),
+            ],
+            unit=unit,
+            effective_dof=self.dof_mean,
+        )
+        return replace(parts.as_line(name, sensitivity), origin=REPEATS)
 
 
 def one_way(readings: Sequence[float] | Floats, group: Sequence[int] | Ints) -> OneWay:
