@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.commands.part_machine import machine_found
-from cmm_uq.commands.part_plan import circumstances_of, plan_of
+from cmm_uq.commands.part_plan import circumstances_of, origin_of, plan_of
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.conformity.limits import Judged, Limits, judge
 from cmm_uq.conformity.risk import Known
@@ -84,8 +84,14 @@ def part_found(
     return PartFound(
         job, plan, given, virtual, simulated, stated(simulated, measured), measured, shares, _unseen(virtual, shares), None,
         judged(job, plan, errors, measured), None if together is None or np.isnan(together) else together, tuple(found_ways),
-        displaced(virtual, seed=seed), machine.standing, digits=digits, seed=seed, warnings=machine.warnings,
+        displaced(virtual, seed=seed), _three(origin_of(job, machine.state.machine)),
+        machine.standing, digits=digits, seed=seed, warnings=machine.warnings,
     )  # fmt: skip
+
+
+def _three(values: Floats) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 @dataclass(eq=False)

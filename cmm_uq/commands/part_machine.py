@@ -14,6 +14,7 @@ import numpy as np
 
 from cmm_uq.commands.diagnosing import screened_model
 from cmm_uq.commands.estimation import with_noise
+from cmm_uq.commands.part_drift import with_drift
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.documents.clauses import draft
@@ -25,7 +26,7 @@ from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.reading import sha256 as hashes
 from cmm_uq.kinds import kind_of
-from cmm_uq.messages import Text, Verbatim, day, plural, say
+from cmm_uq.messages import NOTHING, Text, Verbatim, day, say
 from cmm_uq.parts.conditional import given_recording
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.stated import machine_stated
@@ -73,8 +74,9 @@ class _Stated:
 
 
 def machine_found(
-    job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None, seed: int = 0, stage: Stage = silent
-) -> MachineFound:
+    job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None, records: str | Path | None = None,
+    seed: int = 0, stage: Stage = silent,
+) -> MachineFound:  # fmt: skip
     """The machine of a part's job.
 
     Parameters
@@ -82,6 +84,7 @@ def machine_found(
     job : that was read.
     rerun : whether the certificate's figures are computed again from its inputs.
     trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
+    records : of the machine's history, for its drift; ``None`` for none.
     seed : of the draws.
     stage : told of progress.
 
@@ -98,11 +101,13 @@ def machine_found(
     machine = _machine(job, stated.job)
     state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
     state = replace(
-        state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=standing.temperature_c
+        state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=_known_at(state, standing)
     )
+    since = with_drift(state, standing.serial or standing.machine, job.facts.job.date, records, _where(job))
+    state = since.state
     stage("The machine's errors, given the recording of its calibration", 0.15)
     state, path, given = _given(state, stated.job, seed)
-    standing = replace(standing, path=path, given_recording=given)
+    standing = replace(standing, path=path, drift=since.told, given_recording=given)
     return MachineFound(state, standing, stated.job, tuple(_warnings(job, standing, stated.job)))
 
 
@@ -115,8 +120,7 @@ def _certified(job: PartJob, *, rerun: bool, trust: Iterable[Path] | None, stage
     """
     from cmm_uq.commands.verify import verify_given
 
-    named = str(job.facts.machine_state.certificate)
-    where = f"{WHERE} certificate = {named!r}"
+    where = _where(job)
     given = given_of(job.machine_files)
     if given.results is None:
         raise CmmUqError("states too little: neither draws of the machine's errors nor its recording are inside", where=where,
@@ -125,7 +129,8 @@ def _certified(job: PartJob, *, rerun: bool, trust: Iterable[Path] | None, stage
     found = verify_given(given, rerun=rerun, trust=trust)
     if wrong := found.inquiry.findings:
         more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
-        raise CmmUqError(f"the machine's certificate does not verify: {wrong[0]}{more}", where=where,
+        first = ": ".join(filter(None, (wrong[0].file, wrong[0].place, wrong[0].problem)))
+        raise CmmUqError(f"the machine's certificate does not verify: {first}{more}", where=where,
                          fix="cmm-uq verify says all that is wrong; ask for the certificate as it was issued")  # fmt: skip
     results = given.results[1]
     source: Source = "results" if found.job is None else "certificate"
@@ -187,7 +192,7 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
     """
     said, facts, on = stated.results["job"], job.facts.machine_state, job.facts.job.date
     date = dt.date.fromisoformat(said["date"])
-    where = f"{WHERE} {'job' if facts.job is not None else 'certificate'} = {facts.job or facts.certificate!r}"
+    where = _where(job)
     if date > on:
         raise CmmUqError(f"the machine was calibrated on {date}, after the part was measured on {on}", where=where,
                          fix="Give the certificate that held on that day, or mend [job] date")  # fmt: skip
@@ -204,20 +209,23 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
         verdict=stated.verdict, checked=stated.checked, again=stated.again, trusted=trusted,
         draft=stated.job is not None and draft(stated.job),
         given_recording=False,
-        path=say("not said yet"), drift=_undrifted(on - date),
+        path=NOTHING, drift=NOTHING,
         temperature_c=None if temperatures is None else float(np.mean(temperatures)),
         inputs_sha256=dict(said["inputs_sha256"]) if stated.job is None else hashes(stated.job.inputs),
     )  # fmt: skip
 
 
-def _undrifted(age: dt.timedelta) -> Text:
-    return plural(
-        age.days,
-        one=say("What changed in the day since the calibration is not known and not reckoned with."),
-        many=say(
-            "What changed in the {count} days since the calibration is not known and not reckoned with.", count=age.days
-        ),
-    )
+def _known_at(state: MachineState, standing: Standing) -> float | None:
+    """Temperature at which the errors of the scales are known: of 20 °C where the calibration modelled their expansion."""
+    modelled = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
+    return None if modelled else standing.temperature_c
+
+
+def _where(job: PartJob) -> str:
+    """What states the machine, for messages."""
+    facts = job.facts.machine_state
+    key, named = ("certificate", facts.certificate) if facts.job is None else ("job", facts.job)
+    return f"{WHERE} {key} = {named!r}"
 
 
 def _machine(job: PartJob, calibrated: Job | None) -> Machine:

@@ -94,11 +94,22 @@ def poses_of(job: PartJob, count: int, machine: Machine) -> tuple[Pose, ...]:
     CmmUqError : neither the job says where, nor anything how far an axis goes.
     """
     given = job.facts.placing
-    origin = _in_the_middle(job, machine) if given.origin_mm is None else np.array(given.origin_mm, dtype=np.float64)
-    pose = Pose(rotation(given), origin)
+    pose = Pose(rotation(given), origin_of(job, machine))
     if not (any(given.u_origin_mm) or any(given.u_rotation_deg)):
         return (pose,)
     return around(pose, np.array(given.u_origin_mm), np.radians(given.u_rotation_deg), count)
+
+
+def origin_of(job: PartJob, machine: Machine) -> Floats:
+    """(3,) where the part's origin lies in coordinates of the machine, as the job says; else in the middle of the travel.
+
+    Raises
+    ------
+    CmmUqError : see :func:`poses_of`.
+    """
+    if job.facts.placing.origin_mm is not None:
+        return np.array(job.facts.placing.origin_mm, dtype=np.float64)
+    return _in_the_middle(job, machine)
 
 
 def _in_the_middle(job: PartJob, machine: Machine) -> Floats:

@@ -35,8 +35,9 @@ RARE = 50
 FEWEST = 500
 """Effective draws of a weighted sample; with fewer the posterior is that of normal distributions."""
 
-_GRID = 129
-_HALVINGS = 50
+_GRID = 33
+_HALVINGS = 30
+_NODES = 2000
 _REACH = 8.0
 
 
@@ -171,12 +172,12 @@ class Limits:
         for limit, side in ((self.lower, -1.0), (self.upper, 1.0)):
             if limit is None:
                 continue
-            true = limit + side * np.linspace(0.0, reach, 2001)[1:]
+            true = limit + side * reach * (np.arange(_NODES) + 0.5) / _NODES
             density = np.exp(-0.5 * ((true - prior.mean) / prior.sd) ** 2) / (prior.sd * np.sqrt(2 * np.pi))
             high = np.full(len(true), np.inf) if self.upper is None else self.upper - guard - true
             low = np.full(len(true), -np.inf) if self.lower is None else self.lower + guard - true
             accepted = self._shares(high, "right") - self._shares(low, "left")
-            found += float(np.sum(density * np.maximum(0.0, accepted))) * reach / 2000
+            found += float(np.sum(density * np.maximum(0.0, accepted))) * reach / _NODES
         return found / (float(special.ndtr(prior.mean / prior.sd)) if self.zone else 1.0)
 
     def _shares(self, error: Floats, side: str) -> Floats:

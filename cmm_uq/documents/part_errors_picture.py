@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmm_uq.documents.document import Plot
-from cmm_uq.documents.part_views import draw_outlines, panels, segments
+from cmm_uq.documents.part_views import draw_outlines, panels, segments, span_of
 from cmm_uq.documents.plot_style import ACCENT, DIVERGING, INK, MUTED, TINY, WIDTH_MM, dots, drawn, house_style
 from cmm_uq.documents.shown import shown, told
 from cmm_uq.documents.vector_plot import round_length
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 _LONGEST = 0.13
 """Of the largest span, the largest error as it is drawn."""
 
-_STEPS = 24
+_STEPS = 20
 _SEEN = 0.02
 """Of the longest, an arrow that can be seen as one."""
 
-MOST = 400
+MOST = 150
 """Ellipses in one view: more run into each other."""
 
 
@@ -104,7 +104,7 @@ def form_picture(plan: Plan, deviations: Floats) -> Plot:
 
 def _factor(plan: Plan, longest_um: float) -> float:
     """Length drawn for one µm, mm."""
-    return _LONGEST * max(float(np.ptp(plan.points, axis=0).max()), 1.0) / longest_um
+    return _LONGEST * span_of(plan) / longest_um
 
 
 def _times(factor: float) -> Text:

@@ -157,6 +157,7 @@ class PartFound:
     together : probability that all limits are kept at once; ``None`` without measured points or limits.
     ways : as planned, then what would change u.
     displaced : contact points.
+    origin_mm : where the part's origin lies in coordinates of the machine, or about which place it does.
     standing : the machine's certificate.
     methods : results of other methods on this part, in their own terms.
     digits : of u that were asked for; ``None`` where the number of draws was.
@@ -178,6 +179,7 @@ class PartFound:
     together: float | None
     ways: tuple[Way, ...]
     displaced: Displaced
+    origin_mm: tuple[float, float, float]
     standing: Standing
     methods: tuple[object, ...] = ()
     digits: int | None = None

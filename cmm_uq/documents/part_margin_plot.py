@@ -165,4 +165,5 @@ def _interval(ax: Axes, place: int, row: Margin) -> None:
         side = 1 if at > 0.5 else -1
         text = say("{times} times the tolerance", times=number(row.of(row.value), ".1f"))
         ax.annotate(text, (at, place), (-7 * side, 0), textcoords="offset points", ha="right" if side > 0 else "left",
-                    va="center", color=INK, fontsize=6.5, zorder=6)  # fmt: skip
+                    va="center", color=INK, fontsize=6.5, zorder=6,
+                    bbox={"facecolor": "white", "alpha": 0.8, "lw": 0, "pad": 0.5})  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.documents.document import Plot
-from cmm_uq.documents.part_views import draw_outlines, label, panels, segments
+from cmm_uq.documents.part_views import draw_outlines, label, panels, segments, span_of
 from cmm_uq.documents.plot_style import ACCENT, DIVERGING, WIDTH_MM, dots, drawn, house_style
 from cmm_uq.documents.shown import shown, told
 from cmm_uq.messages import Text, plural, say
@@ -29,7 +29,7 @@ def part_picture(plan: Plan, pose: Pose, names: Sequence[Text]) -> Plot:
     names : of the features, as the pictures letter them.
     """
     points, normals = plan.points, plan.normals
-    largest = max(float(np.ptp(points, axis=0).max()), 1.0)
+    largest = span_of(plan)
     tips, roots = _stems(plan, pose, largest)
     rows = shown([points[:, 2]])
     everything = np.vstack([points, points + _NORMAL * largest * normals, tips, roots])

@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 AXES = (say("x / mm"), say("y / mm"), say("z / mm"))
 
-_LEFT, _RIGHT, _TOP, _GAP, _UNDER, _BETWEEN = 13.0, 2.0, 5.0, 11.0, 9.5, 14.0
+_LEFT, _RIGHT, _TOP, _GAP, _UNDER, _BETWEEN = 13.0, 2.0, 5.0, 8.0, 9.5, 14.0
 """mm: beside the left panels, right of the others, above, between the rows besides what stands under each, between columns."""
 
 _HIGHEST = 118.0
 """mm that both rows may take together."""
 
-_LEAST = 9.0
-"""mm that the smallest panel is wide or high, so that its axis can be read."""
+_SMALLEST, _NARROWEST = 10.0, 0.16
+"""Least span of a part that is drawn, mm, and of a panel, of the largest span: its axis must find room."""
 
 _OUTLINE = "#a9b4ba"
 
@@ -87,15 +87,15 @@ def panels(points: Floats, room: float, note_mm: float) -> tuple[Figure, list[tu
     """
     low, high = points.min(axis=0), points.max(axis=0)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
-    largest = max(float((high - low).max()), 1.0)
+    largest = max(float((high - low).max()), _SMALLEST)
     seen = [view.of(corners) for view in VIEWS]
-    lows = [each.min(axis=0) - room * largest for each in seen]
-    spans = [np.ptp(each, axis=0) + 2 * room * largest for each in seen]
+    spans = [np.maximum(np.ptp(each, axis=0) + 2 * room * largest, _NARROWEST * largest) for each in seen]
+    lows = [0.5 * (each.min(axis=0) + each.max(axis=0) - span) for each, span in zip(seen, spans, strict=True)]
     columns = [max(float(spans[i][0]), float(spans[i + 2][0])) for i in (0, 1)]
     rows = [max(float(spans[i][1]), float(spans[i + 1][1])) for i in (0, 2)]
     width = WIDTH_MM - _LEFT - _RIGHT - _BETWEEN
     scale = min(width / sum(columns), _HIGHEST / sum(rows))
-    tall = [max(scale * each, _LEAST) for each in rows]
+    tall = [scale * each for each in rows]
     height = _TOP + tall[0] + _GAP + _UNDER + tall[1] + _UNDER + note_mm
     figure = new_figure(height)
     second = _LEFT + max(scale * columns[0], 0.5 * (width - 10.0)) + _BETWEEN
@@ -124,6 +124,11 @@ def _lettered(ax: Axes, view: View, across_mm: float, up_mm: float) -> None:
     ax.set_xlabel(AXES[view.axes[0]], labelpad=1, fontsize=TINY)
     ax.set_ylabel(AXES[view.axes[1]], labelpad=2, fontsize=TINY)
     ax.tick_params(labelsize=TINY)
+
+
+def span_of(plan: Plan) -> float:
+    """The largest extent of a part's points, mm, or what it is drawn as if it is less."""
+    return max(float(np.ptp(plan.points, axis=0).max()), _SMALLEST)
 
 
 def draw_outlines(ax: Axes, view: View, plan: Plan) -> None:

@@ -354,9 +354,22 @@ def _cut(text: Text, length: int) -> Text:
 def narrowed(text: Text, room_mm: float) -> Text:
     """A name as it is lettered, cut to the room that it has."""
     said = lettered(text)
-    kept = str.__str__(said)
-    while width_mm(kept, SMALL) > room_mm:
-        kept = kept.removesuffix("…")[:-1].rstrip(" ,") + "…"
+    whole = str.__str__(said)
+    kept = whole if width_mm(whole, SMALL) <= room_mm else _longest(whole, room_mm)
     if kept == text:
         return text
     return Verbatim(kept) if said is text else Said(kept, text)
+
+
+def _longest(text: str, room_mm: float) -> str:
+    """The longest beginning of a text that has room, with what says that it goes on."""
+    fits, too_long, trial = 0, len(text), len(text) // 2
+    while too_long - fits > 1:
+        width = width_mm(_going_on(text, trial), SMALL)
+        fits, too_long = (trial, too_long) if width <= room_mm else (fits, trial)
+        trial = min(max(round(trial * room_mm / width), fits + 1), too_long - 1)
+    return _going_on(text, fits)
+
+
+def _going_on(text: str, count: int) -> str:
+    return text[:count].rstrip(" ,") + "…"

@@ -16,9 +16,12 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.exchange import least_zones
+from cmm_uq.geometry.extremes import circumscribed as alone_circumscribed
+from cmm_uq.geometry.extremes import inscribed as alone_inscribed
 from cmm_uq.geometry.extremes import least_zone
+from cmm_uq.geometry.one_sided import held
 from cmm_uq.geometry.placed import FeatureKind, Placed, placed
-from cmm_uq.geometry.shapes import LINE
+from cmm_uq.geometry.shapes import CIRCLE, CYLINDER, LINE, SPHERE
 from cmm_uq.points import Floats
 
 SETTLED = 1e-9
@@ -127,6 +130,35 @@ class Repeated:
             for i in left:
                 state[rows.start + i] = least_zone(self.placed, local[:, i], state[rows.start + i]).state
                 form[rows.start + i] = self._range(state[rows.start + i], local[:, i])
+        return self._drawn(state, form)
+
+    def one_sided(self, displacements: ArrayLike, *, inscribed: bool) -> Drawn:
+        """The largest circle, sphere or cylinder inside the points of each draw, or the smallest about them.
+
+        Each is held by contact points near the least-squares feature: of several inscribed ones that points hold, as they do
+        where errors leave a feature of few points nearly perfect, one may be larger by less than a nanometre.
+
+        Parameters
+        ----------
+        displacements : (N, n, d) errors of the points, mm.
+        inscribed : whether it is the inscribed one.
+
+        Raises
+        ------
+        CmmUqError : as for least squares; a feature without a size, or points that hold no such one.
+        """
+        if self.placed.shape not in (CIRCLE, SPHERE, CYLINDER):
+            raise CmmUqError(f"{self.placed.shape.name}: it has no size to be inscribed or circumscribed",
+                             fix="Ask for circles, spheres and cylinders")  # fmt: skip
+        errors, alone = self._checked(displacements), alone_inscribed if inscribed else alone_circumscribed
+        state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
+        for rows in self._blocks(len(errors), 20 * BLOCK):
+            local = self._local(errors[rows], rows.start)
+            begun, _ = self._descended(local, errors[rows], rows.start)
+            state[rows], left = held(self.placed.shape, begun, local, self._units, -1.0 if inscribed else 1.0)
+            for i in left:
+                state[rows.start + i] = alone(self.placed, local[:, i]).state
+            form[rows] = np.ptp(self.placed.shape.distances(state[rows], local)[0], axis=1)
         return self._drawn(state, form)
 
     def _range(self, state: Floats, local: Floats) -> float:

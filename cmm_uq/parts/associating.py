@@ -12,13 +12,16 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.geometry.association import Association, associate
+from cmm_uq.geometry.association import Association
 from cmm_uq.geometry.repeated import Drawn, Repeated
 from cmm_uq.parts.plan import DIRECTED, Feature
 from cmm_uq.points import Floats
 
 _STEP = 1e-3
 """mm: of central differences, whose error is the square of step over radius."""
+
+_NEAR = 1e-2
+"""Of a feature's extent: how far points may be from those that it was prepared for."""
 
 VALUES = 8
 """Numbers that a feature is told by: position (3), direction (3), diameter, half angle."""
@@ -63,21 +66,36 @@ class ProbedFeature:
     feature : of the plan.
     points : (n, 3) its points as they are measured without any draw, mm.
     association : how.
+    looked_at : the same feature at points that are near, whose preparation then serves for these too.
 
     Raises
     ------
     CmmUqError : points that do not determine it.
     """
 
-    def __init__(self, feature: Feature, points: Floats, association: Association) -> None:
+    def __init__(
+        self, feature: Feature, points: Floats, association: Association, looked_at: ProbedFeature | None = None
+    ) -> None:
         self.feature, self.points, self.association = feature, points, association
         self.n = len(points)
+        self._offset = np.zeros_like(points)
+        self._repeated: Repeated
         if feature.kind == "point":
+            return
+        if looked_at is not None and looked_at.is_near(points):
+            self._repeated = looked_at._repeated
+            self._offset = points - (looked_at.points - looked_at._offset)
             return
         try:
             self._repeated = Repeated(feature.kind, self._in_own_plane(points))
         except CmmUqError as error:
             raise CmmUqError(error.problem, where=f"feature {feature.name!r}", fix=error.fix) from error
+
+    def is_near(self, points: Floats) -> bool:
+        """Whether points (n, 3) are so near to its own that steps from these end at the association."""
+        if self.feature.kind == "point":
+            return False
+        return bool(np.abs(points - self.points).max(initial=0.0) < _NEAR * self._repeated.placed.extent)
 
     @cached_property
     def _plane(self) -> Floats:
@@ -103,7 +121,7 @@ class ProbedFeature:
             values = np.zeros((len(displacements), VALUES))
             values[:, :3] = (self.points + displacements).mean(axis=1)
             return Features(values, np.zeros(len(displacements)), points)
-        drawn = self._associated(self._in_own_plane(displacements))
+        drawn = self._associated(self._in_own_plane(displacements + self._offset))
         return Features(self._values(drawn), drawn.form, points)
 
     def _associated(self, displacements: Floats) -> Drawn:
@@ -112,7 +130,10 @@ class ProbedFeature:
         if self.association in ("minimum_zone", "tangent"):
             drawn = self._repeated.minimum_zone(displacements)
             return self._outside(drawn) if self.association == "tangent" else drawn
-        return self._one_by_one(displacements)
+        try:
+            return self._repeated.one_sided(displacements, inscribed=self.association == "maximum_inscribed")
+        except CmmUqError as error:
+            raise CmmUqError(error.problem, where=f"feature {self.feature.name!r}", fix=error.fix) from error
 
     def _outside(self, drawn: Drawn) -> Drawn:
         """The side of a minimum zone that looks out of the material."""
@@ -124,18 +145,6 @@ class ProbedFeature:
             raise CmmUqError(f"a {self.feature.kind} has no tangent feature", where=f"feature {self.feature.name!r}",
                              fix="Use maximum_inscribed or minimum_circumscribed")  # fmt: skip
         return replace(drawn, position=drawn.position + 0.5 * drawn.form[:, None] * across / np.linalg.norm(across))
-
-    def _one_by_one(self, displacements: Floats) -> Drawn:
-        points = self._in_own_plane(self.points) + displacements
-        found = [associate(self.feature.kind, each, self.association) for each in points]  # type: ignore[arg-type]
-        directed = found[0].direction is not None
-        return Drawn(
-            np.array([one.position for one in found]),
-            np.array([one.direction for one in found]) if directed else None,
-            np.array([one.size for one in found]),
-            None,
-            np.array([one.form for one in found]),
-        )
 
     def _values(self, drawn: Drawn) -> Floats:
         values = np.zeros((len(drawn.position), VALUES))

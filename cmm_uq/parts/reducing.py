@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import Text, say
+from cmm_uq.messages import Text, Verbatim, say, signed
+from cmm_uq.parts.of_fixture import FIXTURE
 from cmm_uq.parts.of_machine import NOISE
+from cmm_uq.parts.of_operator import OPERATOR
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual
 from cmm_uq.points import Floats
 
-DRAWS = 20_000
-"""Of each way; u is then known to half a percent."""
+DRAWS = 10_000
+"""Of each way; u is then known to 0.7 %."""
+
+_LOOKED_AT = 1000
+"""Draws by which places on the table are compared."""
+
+ANEW = (NOISE, OPERATOR, FIXTURE)
+"""Causes that another set-up draws again; machine, styli, temperatures and the part stay what they are."""
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 _QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+Doubled = Callable[[], tuple[Plan, Circumstances]]
+"""The plan with twice the points in every feature, and its circumstances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,53 +57,99 @@ def spread(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Floats:
 def mean_of_places(places: Sequence[AtPose], random: np.random.Generator, n: int, *, exact: bool = False) -> Floats:
     """(n, c) errors of the mean of measurements in several places: reversal, or several orientations.
 
-    Noise is drawn anew in each; machine, styli, temperatures and the part stay what they are.
+    Noise, and what comes of operators and fixtures, is drawn anew in each (:data:`ANEW`).
     """
     common = places[0].drawn(random, n)
     found = np.zeros((n, len(places[0].measured.evaluations)))
     for place in places:
         drawn = [
-            cause.draw(random, n) if cause.name == NOISE else same
+            cause.draw(random, n) if cause.name in ANEW else same
             for cause, same in zip(place.causes, common, strict=True)
         ]
         found += place.errors(drawn, exact=exact) / len(places)
     return found
 
 
-def ways(plan: Plan, given: Circumstances, draws: int = DRAWS, seed: int = 0) -> list[Way]:
+def ways(
+    plan: Plan, given: Circumstances, draws: int = DRAWS, seed: int = 0, *,
+    doubled: Doubled | None = None, planned: Virtual | None = None,
+) -> list[Way]:  # fmt: skip
     """The measurement as it is planned first, then what changes it, each alone.
 
     Ways that the travel of the machine does not allow are left out.
+
+    Parameters
+    ----------
+    doubled : gives the plan with twice the points; without it that way is left out.
+    planned : the measurement as it is planned, where it is there already.
     """
-    planned = Virtual(plan, given)
-    found = [Way(say("as planned"), spread(planned, draws, seed))]
+    first = Virtual(plan, given) if planned is None else planned
+    found = [Way(say("as planned"), spread(first, draws, seed))]
+    for name, change in _changes(plan, given, doubled):
+        with suppress(CmmUqError):  # beyond the travel
+            found.append(Way(name, spread(Virtual(*change(), first.known), draws, seed)))
+    with suppress(CmmUqError):
+        found += _elsewhere(plan, given, first, draws, seed)
+    pose = given.poses[0]
+    for name, turns in (
+        (say("mean of two measurements, the part turned by 180° about Z between them"), (np.eye(3), _HALF_TURN)),
+        (say("mean of four measurements, the part turned by 90° about Z each time"),
+         [np.linalg.matrix_power(_QUARTER_TURN, i) for i in range(4)]),
+        (say("mean of four measurements, the part set up anew in its place each time"), [np.eye(3)] * 4),
+    ):  # fmt: skip
+        with suppress(CmmUqError):
+            places = [AtPose(plan, given, _turned(pose, turn, plan), first.known) for turn in turns]
+            errors = mean_of_places(places, np.random.default_rng(seed), draws, exact=first.exact)
+            found.append(Way(name, errors.std(axis=0)))
+    return found
+
+
+def _changes(
+    plan: Plan, given: Circumstances, doubled: Doubled | None
+) -> Iterator[tuple[Text, Callable[[], tuple[Plan, Circumstances]]]]:
+    """Each change of the plan or its circumstances."""
+    yield say("each point four times"), lambda: (plan, replace(given, repeats=4 * given.repeats))
+    if doubled is not None:
+        yield say("twice the points in every feature"), doubled
     styli = tuple(replace(s, u_diameter_um=0.5 * s.u_diameter_um, u_offset_um=0.5 * s.u_offset_um,
                           lobing_um=0.5 * s.lobing_um) for s in plan.styli)  # fmt: skip
+    yield say("styli qualified twice as well"), lambda: (replace(plan, styli=styli), given)
     part = given.surroundings.part
-    steadier = replace(part, u_temperature_k=0.5 * part.u_temperature_k)
+    steadier = replace(given.surroundings, part=replace(part, u_temperature_k=0.5 * part.u_temperature_k))
+    yield say("temperature of the part known twice as well"), lambda: (plan, replace(given, surroundings=steadier))
     turned = tuple(_turned(pose, _QUARTER_TURN, plan) for pose in given.poses)
-    changed: Mapping[Text, tuple[Plan, Circumstances]] = {
-        say("each point four times"): (plan, replace(given, repeats=4 * given.repeats)),
-        say("styli qualified twice as well"): (replace(plan, styli=styli), given),
-        say("temperature of the part known twice as well"):
-            (plan, replace(given, surroundings=replace(given.surroundings, part=steadier))),
-        say("part turned by 90° about Z"): (plan, replace(given, poses=turned)),
-    }  # fmt: skip
-    for name, (other, circumstances) in changed.items():
-        try:
-            found.append(Way(name, spread(Virtual(other, circumstances), draws, seed)))
-        except CmmUqError:  # beyond the travel
-            continue
-    try:
-        pose = given.poses[0]
-        places = [AtPose(plan, given, pose), AtPose(plan, given, _turned(pose, _HALF_TURN, plan))]
-        errors = mean_of_places(places, np.random.default_rng(seed), draws, exact=planned.exact)
-        found.append(
-            Way(say("mean of two measurements, the part turned by 180° about Z between them"), errors.std(axis=0))
-        )
-    except CmmUqError:
-        pass
-    return found
+    yield say("part turned by 90° about Z"), lambda: (plan, replace(given, poses=turned))
+
+
+def _elsewhere(plan: Plan, given: Circumstances, first: Virtual, draws: int, seed: int) -> list[Way]:
+    """The best of the corners and the middle of what the travel leaves, at the height where the part is; none without travel.
+
+    Best is the place with the least mean of the uncertainties over those where it was planned.
+    """
+    travel = given.machine.machine.travel_mm
+    if not np.isfinite(travel[:2]).all():
+        return []
+    read = first.places[0].points.carriages
+    room = np.stack([travel[:2, 0] - read[:, :2].min(axis=0), travel[:2, 1] - read[:, :2].max(axis=0)])  # (2, axes)
+    planned, best = _quick(first.places[0], seed), (1.0, given, np.zeros(2))
+    for part in product((0.0, 0.5, 1.0), repeat=2):
+        shift = room[0] + np.array(part) * (room[1] - room[0])
+        moved = tuple(replace(p, translation_mm=p.translation_mm + np.append(shift, 0.0)) for p in given.poses)
+        there = replace(given, poses=moved)
+        with suppress(CmmUqError):
+            u = _quick(AtPose(plan, there, moved[0], first.known), seed)
+            ratio = float(np.mean(u / np.maximum(planned, np.finfo(np.float64).tiny)))
+            best = (ratio, there, shift) if ratio < best[0] else best
+    if best[1] is given:
+        return []
+    x, y = (signed(float(mm), "+.0f") for mm in best[2])
+    name = say("part moved by {x} mm along {a} and {y} mm along {b}", x=x, y=y, a=Verbatim("X"), b=Verbatim("Y"))
+    return [Way(name, spread(Virtual(plan, best[1], first.known), draws, seed))]
+
+
+def _quick(place: AtPose, seed: int) -> Floats:
+    """(c,) standard deviations to first order, of the same draws in every place."""
+    return np.asarray(place.errors(place.drawn(np.random.default_rng(seed), _LOOKED_AT)).std(axis=0))
 
 
 def _turned(pose: Pose, turn: Floats, plan: Plan) -> Pose:

@@ -19,6 +19,7 @@ from cmm_uq.parts.evaluating import Evaluator, Known, characteristics_of
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.of_form import Form, forms, whole_surfaces
 from cmm_uq.parts.of_machine import mean_errors, modelled, noise, not_modelled
+from cmm_uq.parts.of_operator import Beside
 from cmm_uq.parts.of_stylus import styli
 from cmm_uq.parts.of_temperature import Surroundings, mean_expansion, temperatures
 from cmm_uq.parts.placing import Pose, placed
@@ -86,7 +87,7 @@ class AtPose:
 
     def __init__(self, plan: Plan, given: Circumstances, pose: Pose, known: Known | None = None) -> None:
         surroundings = given.surroundings.since(given.machine.temperature_c)
-        points = placed(plan, pose, given.machine.machine, surroundings.columns)
+        self.points = points = placed(plan, pose, given.machine.machine, surroundings.columns)
         qualified = Qualified.on(plan, points, given.machine.machine)
         unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
         own, on_surface = forms(given.forms, plan)
@@ -101,14 +102,15 @@ class AtPose:
         ]
         base = mean_errors(given.machine, qualified, pose) + mean_expansion(surroundings, plan, points, pose)
         drawn = any(len(feature.surface) for feature in plan.features)
-        self.part = part = plan.points if drawn or given.measured is None else given.measured
+        # what was measured has the mean errors in it: the part itself is without them
+        self.part = part = plan.points if drawn or given.measured is None else given.measured - base
         self.measured = Evaluator(plan, base + part - plan.points, self.causes, known)
-        self.still = characteristics_of(plan, part)
+        self.still = characteristics_of(plan, part, known)
         self.true: Evaluator | None = None
         if drawn:
             true = whole_surfaces(plan)
             still: list[Cause | None] = [None] * (len(self.causes) - len(own))
-            self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface])
+            self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface], known)
 
     def drawn(self, random: np.random.Generator, n: int) -> list[Floats]:
         """Coefficients (n, K) of each cause."""
@@ -117,7 +119,11 @@ class AtPose:
     def errors(self, coefficients: Sequence[Floats], *, exact: bool = False) -> Floats:
         """(n, c) errors of the characteristics."""
         true = self.still if self.true is None else self.true(coefficients, exact=exact)
-        return np.asarray(self.measured(coefficients, exact=exact) - true)
+        found = np.asarray(self.measured(coefficients, exact=exact) - true)
+        for cause, drawn in zip(self.causes, coefficients, strict=True):
+            if isinstance(cause, Beside):
+                found += drawn @ cause.adds
+        return found
 
     def off(self, seed: int = 0, count: int = CHECKED) -> Floats:
         """(c,) root mean square difference of first order from exact errors, of their standard deviation."""
@@ -131,17 +137,23 @@ class AtPose:
 class Virtual:
     """Virtual measurements of a part in all of its places, to be drawn in blocks.
 
+    Parameters
+    ----------
+    plan, given : of the measurement, and its circumstances.
+    known : features that were looked at before (:class:`Evaluator`).
+
     Attributes
     ----------
+    known : those, and its own.
     places : one a pose.
     exact : whether nothing is taken to first order, because that is off by more than a hundredth of an uncertainty.
     off : (c,) by how much first order is off in the first place, of the standard deviation.
     """
 
-    def __init__(self, plan: Plan, given: Circumstances) -> None:
+    def __init__(self, plan: Plan, given: Circumstances, known: Known | None = None) -> None:
         self.plan = plan
-        known: Known = {}
-        self.places = [AtPose(plan, given, pose, known) for pose in given.poses]
+        self.known: Known = {} if known is None else known
+        self.places = [AtPose(plan, given, pose, self.known) for pose in given.poses]
         self.off = self.places[0].off()
         self.exact = bool(np.any(self.off > AGREES))
 

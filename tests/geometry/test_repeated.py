@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
@@ -155,6 +157,56 @@ def test_the_exchange_leaves_no_plane_circle_or_sphere_open(kind):
     start = np.tile(of.placed.state, (200, 1))
     left = exchange.least_zones(of.placed.shape, start, local, of.placed.units())[2]
     assert not len(left)
+
+
+def exhaustively(points, *, inscribed):
+    """Diameters of the circles that two or three of the points hold: about all of them the least, within them the largest."""
+    held = []
+    for i, j, k in combinations(range(len(points)), 3):
+        a, b, c = points[i], points[j], points[k]
+        centre = a + np.linalg.solve(2 * np.array([b - a, c - a]), [(b - a) @ (b - a), (c - a) @ (c - a)])
+        corners = np.column_stack([points[[i, j, k]], np.ones(3)])
+        if (np.linalg.solve(corners.T, np.append(centre, 1)) >= 0).all():  # the three surround it
+            held.append((centre, np.linalg.norm(a - centre)))
+    if not inscribed:
+        held += [(0.5 * (a + b), 0.5 * np.linalg.norm(a - b)) for a, b in combinations(points, 2)]
+    side = -1 if inscribed else 1
+    kept = [r for c, r in held if (side * (np.linalg.norm(points - c, axis=1) - r)).max() < 1e-9]
+    return 2 * (max(kept) if inscribed else min(kept))
+
+
+@pytest.mark.parametrize("count", [6, 9])
+@pytest.mark.parametrize("inscribed", [True, False])
+def test_extreme_circles_are_those_of_an_exhaustive_search(count, inscribed):
+    """With an even number of points two opposite ones may hold a circumscribed circle."""
+    angles = 2 * np.pi * np.arange(count) / count
+    points = 10 * np.column_stack([np.cos(angles), np.sin(angles)])
+    displaced = np.random.default_rng(5).normal(0, 0.01, (40, count, 2))
+    drawn = Repeated("circle", points).one_sided(displaced, inscribed=inscribed)
+    expected = [exhaustively(points + one, inscribed=inscribed) for one in displaced]
+    # of several inscribed circles that points hold another may be larger, by the square of the errors over the radius
+    np.testing.assert_allclose(drawn.size, expected, rtol=0, atol=2 * 0.02**2 / 10 if inscribed else 1e-9)
+    assert np.mean(np.abs(drawn.size - expected) < 1e-9) > 0.9
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder"])
+@pytest.mark.parametrize("inscribed", [True, False])
+def test_each_draw_has_the_extreme_size_that_it_has_alone(kind, inscribed, monkeypatch):
+    points, how = nominal(kind, 30), "maximum_inscribed" if inscribed else "minimum_circumscribed"
+    of, displaced = Repeated(kind, points), errors(points, 3)
+    drawn = of.one_sided(displaced, inscribed=inscribed)
+    for i in range(3):
+        alone = associate(kind, points + displaced[i], how)
+        assert abs(drawn.size[i] - alone.size) < 1e-8
+        assert abs(drawn.form[i] - alone.form) < 1e-6  # where it stands is held less well than how large it is
+    monkeypatch.setattr("cmm_uq.geometry.one_sided.MOST_STEPS", 0)
+    one_by_one = of.one_sided(displaced[:1], inscribed=inscribed)
+    np.testing.assert_allclose(one_by_one.size, drawn.size[:1], rtol=0, atol=1e-8)
+
+
+def test_a_plane_has_no_extreme_size():
+    with pytest.raises(CmmUqError, match="no size to be inscribed or circumscribed"):
+        Repeated("plane", PLANE).one_sided(errors(PLANE, 1), inscribed=True)
 
 
 def test_blocks_change_nothing(monkeypatch):

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.budget import PLACE, budget
 from cmm_uq.parts.machine import unmodelled_errors
+from cmm_uq.parts.of_operator import of_points, reproducibility
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, around
 from cmm_uq.parts.plan import Characteristic, Plan
 from cmm_uq.parts.reducing import mean_of_places, ways
 from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual
-from tests.parts_drawn import POSE, block, machine, plane, spot
+from tests.parts_drawn import POSE, block, circle, machine, plane, spot
 
 PAIR = Plan(
     (spot("one", [0, 0, 0]), spot("other", [300, 0, 0])), (Characteristic("apart", "distance", ("one", "other")),)
@@ -115,9 +117,63 @@ def test_ways_say_what_they_change() -> None:
     """Noise alone: four readings halve u, and so nearly does nothing else but the mean of two measurements."""
     found = {str(way.name): way.u[0] for way in ways(PAIR, Circumstances(machine(noise_um=2.0), (POSE,)))}
     planned = found["as planned"]
+    anew = "mean of four measurements, the part set up anew in its place each time"
+    assert found[anew] == pytest.approx(planned / 2, rel=0.02)
+    assert found["mean of four measurements, the part turned by 90° about Z each time"] == pytest.approx(
+        planned / 2, rel=0.02
+    )
+    assert not any(name.startswith("part moved") for name in found)  # noise is the same everywhere
+    assert "twice the points in every feature" not in found
     assert planned == pytest.approx(2e-3 * np.sqrt(2), rel=0.02)
     assert found["each point four times"] == pytest.approx(planned / 2, rel=0.02)
     assert found["styli qualified twice as well"] == pytest.approx(planned, rel=0.02)
     assert found["mean of two measurements, the part turned by 180° about Z between them"] == pytest.approx(
         planned / np.sqrt(2), rel=0.02
     )
+
+
+def test_a_part_goes_where_the_guideway_is_straightest() -> None:
+    """A bow is z = b·(2x/900 − 1)², level in the middle of the travel: there a corner of two faces errs least."""
+    bow = 20.0 * np.random.default_rng(3).standard_normal((2000, 1))
+    features = (
+        plane("A", [0, 0, 1], [0, 0, 0], [[100, 0, 0], [0, 50, 0]]),
+        plane("B", [-1, 0, 0], [0, 0, 0], [[0, 50, 0], [0, 0, -20]]),
+    )
+    plan = Plan(features, (Characteristic("corner", "angle", ("A", "B")),))
+    given = Circumstances(machine(["straightness_x_z"], bow), (Pose(np.eye(3), np.array([100.0, 200, -300])),))
+    found = {str(way.name): way.u[0] for way in ways(plan, given, 2000)}
+    (moved,) = [name for name in found if name.startswith("part moved by +300 mm along X")]
+    assert found[moved] < 0.01 * found["as planned"]
+
+
+def test_twice_the_points_halve_the_variance_of_noise() -> None:
+    """Of a diameter by eight points, and by sixteen."""
+
+    def of(count: int) -> tuple[Plan, Circumstances]:
+        plan = Plan((circle("c", [0, 0, 0], 10.0, count),), (Characteristic("d", "size", ("c",)),))
+        return plan, Circumstances(machine(noise_um=2.0), (POSE,))
+
+    found = {str(way.name): way.u[0] for way in ways(*of(8), doubled=lambda: of(16))}
+    assert found["as planned"] == pytest.approx(2 * 2e-3 / np.sqrt(8), rel=0.02)
+    assert found["twice the points in every feature"] == pytest.approx(2 * 2e-3 / np.sqrt(16), rel=0.02)
+
+
+def test_operators_scatter_by_what_is_stated_and_anew_in_each_set_up() -> None:
+    """3 µm of the distance, and 1 µm of each point: √(3² + 2·1²), however often each point is read; half of it in the mean of
+    four set-ups. Of the other characteristic the points alone."""
+    other = Characteristic("other", "distance", ("two", "three"))
+    plan = Plan(
+        (*PAIR.features, spot("two", [0, 100, 0]), spot("three", [200, 100, 0])), (*PAIR.characteristics, other)
+    )
+    (name,) = (one.name for one in PAIR.characteristics)
+    causes = (reproducibility(plan, {name: 3e-3}), of_points(plan, 1.0))
+    given = Circumstances(machine(), (POSE,), repeats=16, further=causes)
+    found = {str(way.name): way.u for way in ways(plan, given)}
+    assert found["as planned"] == pytest.approx([np.sqrt(11) * 1e-3, np.sqrt(2) * 1e-3], rel=0.02)
+    anew = found["mean of four measurements, the part set up anew in its place each time"]
+    assert anew == pytest.approx(found["as planned"] / 2, rel=0.02)
+    shares = budget(Virtual(plan, given), 4096)
+    at = shares.causes.index(f"operator: reproducibility of {name}")
+    assert shares.first[at] == pytest.approx([9 / 11, 0.0], abs=0.03)
+    with pytest.raises(CmmUqError, match="there is no characteristic 'lenght'"):
+        reproducibility(plan, {"lenght": 1.0})

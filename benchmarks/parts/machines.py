@@ -1,0 +1,178 @@
+"""Do 95 % intervals of parts hold? Machines with a hidden truth, calibrated and certified, then measuring a part as it was made.
+
+Truth, recordings, the measured part and what a drawing asks of it come from :mod:`benchmarks.parts.truth`, which shares no code
+with the package. Every machine has all common errors, as large as physics allows. The calibration models six of them; the machine
+corrects its estimates; parts are measured on the truth, and their intervals stated given the recording, as ``cmm-uq part`` does.
+
+Run: ``python -m benchmarks.parts.machines FOLDER [--machines N] [--only WORDS]``; ``--page`` prints the tables of what is there.
+Every machine is appended to ``FOLDER/<cell>.jsonl`` as it is done: a run can be stopped and taken up again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.coverage.measuring import kept
+from benchmarks.coverage.study import measure, waiting
+from benchmarks.parts import truth
+from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, parted, plan
+from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
+from cmm_uq.kinds.ballbar.observe import Ballbar
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
+from cmm_uq.model import MeasurementModel
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.parts.conditional import given_recording, joint_posterior
+from cmm_uq.parts.machine import MachineState, StatedNoise, unmodelled_errors
+from cmm_uq.parts.of_temperature import Expansion, Surroundings
+from cmm_uq.parts.placing import Pose
+from cmm_uq.parts.result import evaluated, stated
+from cmm_uq.parts.virtual import Circumstances, Virtual
+from cmm_uq.physics.catalogue import effects
+
+TRIALS = 4000
+NAMED = effects(truth.SIX)
+UNMODELLED = tuple(one for one in unmodelled_errors(truth.SIX, {}) if "time_s" not in one.effect.columns)
+BAR_MM, U_BAR_UM = 400.0, 0.5
+GAUGE_MM, U_GAUGE_UM = 800.0, 0.4
+PART = Expansion(11.5e-6, 1e-6, 21.0, 0.3)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Machines that are calibrated alike.
+
+    Parameters
+    ----------
+    artefact : bars, free bars (whose length nobody certified), or a step gauge.
+    noise : ``stated``: white, and the job says how large; ``white``, ``set-up``: to be found, of an offset of each set-up too.
+    share : of all machines.
+    """
+
+    artefact: str
+    noise: str
+    share: float
+
+    @property
+    def name(self) -> str:
+        """Of its file too."""
+        return f"{self.artefact}, {self.noise}"
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """Seeds of its own."""
+        return ("bars", "free bars", "step gauge").index(self.artefact), ("stated", "white", "set-up").index(self.noise)
+
+
+CELLS = tuple(
+    Cell(artefact, noise, share)
+    for noise, share in (("stated", 0.24), ("white", 0.05), ("set-up", 0.05))
+    for artefact in ("bars", "free bars", "step gauge")
+)
+
+
+def calibrated(cell: Cell, hidden: truth.Truth, sigma: float, offset: float, random: np.random.Generator) -> Artefact:
+    """The recording of a calibration as the package reads it."""
+    repeats = 1 if cell.noise == "stated" else 3
+    if cell.artefact == "step gauge":
+        growth = 1e-3 * U_GAUGE_UM / GAUGE_MM * random.standard_normal()
+        made = truth.step_gauge(hidden, growth, repeats, sigma, offset, random)
+        return StepGauge(ReferencedFacts(kind="step_gauge", u_um=U_GAUGE_UM, length_mm=GAUGE_MM), as_points(made))
+    length = BAR_MM + 1e-3 * U_BAR_UM * random.standard_normal()
+    made = truth.bars(hidden, length, repeats, sigma, offset, random)
+    certified = {} if cell.artefact == "free bars" else {"length_mm": BAR_MM, "u_um": U_BAR_UM}
+    return Ballbar(ArtefactFacts(kind="ballbar", **certified), as_points(made))
+
+
+def placed(random: np.random.Generator) -> Pose:
+    """Anywhere in the volume, turned anyhow about z."""
+    angle = random.uniform(0, 2 * np.pi)
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    middle = random.uniform([120, 120, -450], [780, 480, -150])
+    return Pose(turn, middle - turn @ [100.0, 50, 0])
+
+
+def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
+    """One machine: of each characteristic what is true, its value, u and interval; what was refused is kept in words."""
+    cell, seed, number = task
+    random = np.random.default_rng([seed, *cell.key, number])
+    start = time.process_time()
+    try:
+        found = _measured(cell, random)
+    except Exception as fault:  # a study of thousands goes on, and counts it
+        found = {"fault": f"{type(fault).__name__}: {fault}"}
+    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
+
+
+def _measured(cell: Cell, random: np.random.Generator) -> dict[str, Any]:
+    hidden = truth.Truth.drawn(random)
+    sigma = 1e-3 * float(np.exp(random.uniform(*np.log([0.7, 2.0]))))
+    offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
+    model = MeasurementModel(calibrated(cell, hidden, sigma, offset, random), NAMED)
+    given = sigma if cell.noise == "stated" else None
+    _, mean, _ = joint_posterior(model, (), sigma)
+    certificate = MachineState(MACHINE, NAMED, mean[None], StatedNoise(np.full(3, sigma)), unmodelled=UNMODELLED,
+                               corrections=mean)  # fmt: skip
+    state = given_recording(certificate, model, given, TRIALS, int(random.integers(2**31)))
+    growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
+        PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()
+    ) - PART.cte_per_k * (PART.temperature_c - 20)
+    pose = placed(random)
+    part, corrected = truth.made_part(random), truth.Truth.of_six(dict(zip(truth.SIX, mean, strict=True)))
+    measuring = truth.Measuring(hidden, corrected, pose.rotation, pose.translation_mm, float(np.hypot(sigma, offset)),
+                                1e-3 * U_TIP_UM * float(random.standard_normal()), float(growth))  # fmt: skip
+    normals = np.concatenate([normal for _, normal in truth.nominal_part().values()])
+    points = measuring.measured(joined(part), normals, random)
+    true = truth.characteristics(part)
+    how = Circumstances(state, (pose,), Surroundings(PART), measured=points)
+    simulated = Virtual(plan(), how).simulated(TRIALS, seed=int(random.integers(2**31)))
+    rows = {one.name: [true[one.name], one.value, one.u, *one.interval]
+            for one in stated(simulated, evaluated(plan(), points))}  # fmt: skip
+    return {"intervals": rows, "sigma_um": round(1e3 * sigma, 3), "offset_um": round(1e3 * offset, 3)}
+
+
+def tables(folder: Path) -> str:
+    """What holds, cell by cell and over all."""
+    records = kept(folder)
+    lines = [f"{len(records)} machines, {sum('fault' in r for r in records)} faults, "
+             f"{np.mean([r['seconds'] for r in records]):.2f} s each"]  # fmt: skip
+    names = [cell.name for cell in CELLS if any(r["cell"] == cell.name for r in records)]
+    lines += ["", "| characteristic | " + " | ".join(names) + " | all |", "| --- " * (len(names) + 2) + "|"]
+    for one in CHARACTERISTICS:
+        unit, word = (1e6, "µrad") if one.what == "angle" else (1e3, "µm")
+        cells = []
+        for name in [*names, ""]:
+            rows = np.array([r["intervals"][one.name] for r in records if name in ("", r["cell"]) and "intervals" in r])
+            true, _, u, low, high = rows.T
+            cells.append(f"{100 * np.mean((low <= true) & (true <= high)):.1f} %, {unit * np.median(u):.3g} {word}")
+        lines.append(f"| {WORDS[one.name]} | " + " | ".join(cells) + " |")
+    counts = [sum(r["cell"] == name for r in records) for name in names]
+    lines.append("| machines | " + " | ".join(map(str, [*counts, len(records)])) + " |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run, then say what there is."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--machines", type=int, default=10_000)
+    parser.add_argument("--only", nargs="*", default=[], help="words of the cells' names")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--page", action="store_true", help="run nothing")
+    chosen = parser.parse_args()
+    if not chosen.page:
+        some = [cell for cell in CELLS if not chosen.only or any(word in cell.name for word in chosen.only)]
+        tasks = [task for cell in some for task in waiting([cell], chosen.folder, chosen.seed, round(cell.share * chosen.machines))]
+        tasks.sort(key=lambda task: task[2] / task[0].share)
+        measure(tasks, chosen.folder, chosen.processes, measured)
+    print(tables(chosen.folder))
+
+
+if __name__ == "__main__":
+    main()
