@@ -12,10 +12,9 @@ from cmm_uq.jobs.part.by_readings import Read, Repeats
 from cmm_uq.jobs.part.by_tables import CalibratedFacts, CalibratedPartFacts, OrientationsFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.messages import Text, listed, names, say
-from cmm_uq.parts.budget import PLACE, Budget
+from cmm_uq.parts.budget import PLACE
 from cmm_uq.parts.by_calibrated_part import FEWEST_CYCLES, Calibrated, Warmth, by_calibrated_part
-from cmm_uq.parts.by_comparison import compared
-from cmm_uq.parts.by_method import ByMethod, Comparison, Condition, Seen
+from cmm_uq.parts.by_method import ByMethod, Condition, Seen
 from cmm_uq.parts.by_orientations import PartWarmth, Slopes, Standard, Standards, by_orientations
 from cmm_uq.parts.of_fixture import FIXTURE
 from cmm_uq.parts.of_form import FORM
@@ -23,7 +22,7 @@ from cmm_uq.parts.of_machine import MACHINE, NOISE
 from cmm_uq.parts.of_stylus import STYLUS
 from cmm_uq.parts.of_temperature import TEMPERATURE
 from cmm_uq.parts.plan import FORMS, ORIENTATIONS, RUNOUTS, Plan
-from cmm_uq.parts.result import Stated, evaluated
+from cmm_uq.parts.result import evaluated
 from cmm_uq.parts.sensitivities import Sensitivities, sensitivities
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.budgets.machine import FEWEST_READINGS
@@ -59,23 +58,6 @@ def methods_of(job: PartJob, plan: Plan, measured: Floats | None) -> tuple[ByMet
     if facts.by_orientations is not None and job.others.orientations is not None and slopes is not None:
         found.append(_orientations(job, facts.by_orientations, job.others.orientations, plan, slopes))
     return tuple(found)
-
-
-def comparison_of(
-    job: PartJob, plan: Plan, measured: Floats | None, stated: Sequence[Stated], shares: Budget
-) -> Comparison:
-    """Other methods beside the virtual measurement, and why they differ.
-
-    Parameters
-    ----------
-    measured : see :func:`methods_of`.
-    stated, shares : of the virtual measurement.
-
-    Raises
-    ------
-    CmmUqError : see :func:`methods_of`.
-    """
-    return compared(stated, shares, methods_of(job, plan, measured))
 
 
 def lacking(job: PartJob) -> tuple[Text, ...]:

@@ -28,8 +28,8 @@ METHODS: Mapping[Method, Text] = {
 }  # fmt: skip
 
 
-def compared(stated: Sequence[Stated], shares: Budget, methods: Sequence[ByMethod]) -> Comparison:
-    """Other methods beside the virtual measurement.
+def compared(stated: Sequence[Stated], shares: Budget, methods: Sequence[ByMethod]) -> Comparison | None:
+    """Other methods beside the virtual measurement; ``None`` where there are none.
 
     Parameters
     ----------
@@ -37,6 +37,8 @@ def compared(stated: Sequence[Stated], shares: Budget, methods: Sequence[ByMetho
     shares : of its variance by cause.
     methods : the others.
     """
+    if not methods:
+        return None
     found = []
     for one in stated:
         figures = [(other, figure) for other in methods if (figure := other.of(one.name)) is not None]
