@@ -60,20 +60,24 @@ def methods_of(job: PartJob, plan: Plan, measured: Floats | None) -> tuple[ByMet
     return tuple(found)
 
 
-def lacking(job: PartJob) -> tuple[Text, ...]:
-    """What the tests of other methods lack, one sentence each.
+def lacking(job: PartJob) -> tuple[tuple[str, Text, str], ...]:
+    """What the tests of other methods lack: table of the job, what is asked for, what to do.
 
     Raises
     ------
     CmmUqError : see :func:`methods_of`.
     """
+    if job.facts.by_calibrated_part is None and job.facts.by_orientations is None:
+        return ()
     plan = plan_of(job)
-    measured = None if job.measured is None else evaluated(plan, job.measured)
     return tuple(
-        say("{condition}: not met", condition=one.text) if one.met is False else
-        say("{condition}: not stated", condition=one.text)
-        for method in methods_of(job, plan, measured) for one in method.conditions if not one.met
+        (f"by_{method.method}", say("{asked}: {met}", asked=one.text, met=_MET[one.met]), _FIXES[one.met])
+        for method in methods_of(job, plan, None) for one in method.conditions if not one.met
     )  # fmt: skip
+
+
+_MET = {False: say("not met"), None: say("not stated")}
+_FIXES = {False: "Complete the test; the report says so as long as it is not", None: "State whether it was so"}
 
 
 def _values(repeats: Repeats, plan: Plan) -> Mapping[str, Floats]:

@@ -68,7 +68,9 @@ def test_uncertainties_of_standards_and_temperature_go_in_by_their_slopes() -> N
 
 def test_a_bore_compared_with_a_ring_of_its_size_needs_no_length_standard() -> None:
     ring = standard(20.0, 0.0, 0.4e-3, inner=True)
-    coarse = by_orientations("d", 20 + G + E, OF, Slopes(20.0, {"s": -1.0}), Standards(standard(500.0, 0.0, 1.0), {"s": ring}))
+    coarse = by_orientations(
+        "d", 20 + G + E, OF, Slopes(20.0, {"s": -1.0}), Standards(standard(500.0, 0.0, 1.0), {"s": ring})
+    )
     none = by_orientations("d", 20 + G + E, OF, Slopes(20.0, {"s": -1.0}), Standards(None, {"s": ring}))
     assert coarse.u == pytest.approx(none.u)
 
@@ -104,7 +106,10 @@ def test_how_characteristics_follow_scale_and_tip() -> None:
 
 
 def test_a_tip_moves_what_it_probes_alone() -> None:
-    features = (bore("h", [0, 0, 0], 10.0, stylus="one"), plane("A", [0, 0, 1], [0, 0, 0], [[9, 0, 0], [0, 9, 0]], stylus="two"))
+    features = (
+        bore("h", [0, 0, 0], 10.0, stylus="one"),
+        plane("A", [0, 0, 1], [0, 0, 0], [[9, 0, 0], [0, 9, 0]], stylus="two"),
+    )
     plan = Plan(features, (Characteristic("d", "size", ("h",)),), (Stylus("one"), Stylus("two")))
     found = sensitivities(plan)
     assert found.tips["one"] == pytest.approx([-1.0], rel=1e-6)
