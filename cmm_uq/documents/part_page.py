@@ -10,6 +10,7 @@ from cmm_uq.documents.part_budget_section import budget_section, unseen_section,
 from cmm_uq.documents.part_found import PartFound
 from cmm_uq.documents.part_machine_section import certificate_rows, machine_section
 from cmm_uq.documents.part_method import method_section, not_covered_section, program_words
+from cmm_uq.documents.part_methods import methods_section
 from cmm_uq.documents.part_overview import overview_of, part_words
 from cmm_uq.documents.part_pictured import errors_section, part_section
 from cmm_uq.documents.part_results_section import conformity_section, correlation_section, results_section
@@ -38,6 +39,7 @@ def part_document(found: PartFound) -> Document:
         budget_section(found),
         unseen_section(found),
         ways_section(found),
+        methods_section(found.methods),
         correlation_section(found),
         machine_section(found),
         method_section(found),
