@@ -18,7 +18,7 @@ from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats, Points
 
 TRIED = 64
-"""Periods: a pair of points is then correlated by less than a tenth where it should not be."""
+"""Periods: correlations of errors at two places are then off by less than a tenth in the root mean square."""
 
 
 class EveryPeriod(Effect):
