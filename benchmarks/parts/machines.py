@@ -186,7 +186,11 @@ def main() -> None:
     chosen = parser.parse_args()
     if not chosen.page:
         some = [cell for cell in CELLS if not chosen.only or any(word in cell.name for word in chosen.only)]
-        tasks = [task for cell in some for task in waiting([cell], chosen.folder, chosen.seed, round(cell.share * chosen.machines))]
+        tasks = [
+            task
+            for cell in some
+            for task in waiting([cell], chosen.folder, chosen.seed, round(cell.share * chosen.machines))
+        ]
         tasks.sort(key=lambda task: task[2] / task[0].share)
         measure(tasks, chosen.folder, chosen.processes, measured)
     print(tables(chosen.folder))

@@ -20,6 +20,9 @@ from cmm_uq.points import Floats
 _STEP = 1e-3
 """mm: of central differences, whose error is the square of step over radius."""
 
+_NEAR = 1e-2
+"""Of a feature's extent: how far points may be from those that it was prepared for."""
+
 VALUES = 8
 """Numbers that a feature is told by: position (3), direction (3), diameter, half angle."""
 
@@ -63,21 +66,36 @@ class ProbedFeature:
     feature : of the plan.
     points : (n, 3) its points as they are measured without any draw, mm.
     association : how.
+    looked_at : the same feature at points that are near, whose preparation then serves for these too.
 
     Raises
     ------
     CmmUqError : points that do not determine it.
     """
 
-    def __init__(self, feature: Feature, points: Floats, association: Association) -> None:
+    def __init__(
+        self, feature: Feature, points: Floats, association: Association, looked_at: ProbedFeature | None = None
+    ) -> None:
         self.feature, self.points, self.association = feature, points, association
         self.n = len(points)
+        self._offset = np.zeros_like(points)
+        self._repeated: Repeated
         if feature.kind == "point":
+            return
+        if looked_at is not None and looked_at.is_near(points):
+            self._repeated = looked_at._repeated
+            self._offset = points - (looked_at.points - looked_at._offset)
             return
         try:
             self._repeated = Repeated(feature.kind, self._in_own_plane(points))
         except CmmUqError as error:
             raise CmmUqError(error.problem, where=f"feature {feature.name!r}", fix=error.fix) from error
+
+    def is_near(self, points: Floats) -> bool:
+        """Whether points (n, 3) are so near to its own that steps from these end at the association."""
+        if self.feature.kind == "point":
+            return False
+        return bool(np.abs(points - self.points).max(initial=0.0) < _NEAR * self._repeated.placed.extent)
 
     @cached_property
     def _plane(self) -> Floats:
@@ -103,7 +121,7 @@ class ProbedFeature:
             values = np.zeros((len(displacements), VALUES))
             values[:, :3] = (self.points + displacements).mean(axis=1)
             return Features(values, np.zeros(len(displacements)), points)
-        drawn = self._associated(self._in_own_plane(displacements))
+        drawn = self._associated(self._in_own_plane(displacements + self._offset))
         return Features(self._values(drawn), drawn.form, points)
 
     def _associated(self, displacements: Floats) -> Drawn:

@@ -73,9 +73,13 @@ class Evaluator:
         return self._probed(name, how, self.plan.feature(name).points + self.base[self.plan.rows[name]])
 
     def _probed(self, name: str, how: Association, points: Floats) -> ProbedFeature:
+        feature = self.plan.feature(name)
+        first = name, EXACT, feature.points.tobytes()
+        if first not in self._known:
+            self._known[first] = ProbedFeature(feature, feature.points, EXACT)
         key = name, how, points.tobytes()
         if key not in self._known:
-            self._known[key] = ProbedFeature(self.plan.feature(name), points, how)
+            self._known[key] = ProbedFeature(feature, points, how, self._known[first])
         return self._known[key]
 
     def to_first_order(self, key: Key) -> bool:
@@ -148,9 +152,9 @@ class Evaluator:
         return found
 
 
-def characteristics_of(plan: Plan, points: Floats) -> Floats:
+def characteristics_of(plan: Plan, points: Floats, known: Known | None = None) -> Floats:
     """Characteristics (c,) of points (n, 3) in the frame of the part, mm."""
-    return np.asarray(Evaluator(plan, points - plan.points, [])([], exact=True)[0])
+    return np.asarray(Evaluator(plan, points - plan.points, [], known)([], exact=True)[0])
 
 
 def _count(coefficients: Sequence[Floats]) -> int:

@@ -19,10 +19,10 @@ from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual
 from cmm_uq.points import Floats
 
-DRAWS = 20_000
-"""Of each way; u is then known to half a percent."""
+DRAWS = 10_000
+"""Of each way; u is then known to 0.7 %."""
 
-_LOOKED_AT = 2000
+_LOOKED_AT = 1000
 """Draws by which places on the table are compared."""
 
 ANEW = (NOISE, OPERATOR, FIXTURE)

@@ -103,14 +103,14 @@ class AtPose:
         base = mean_errors(given.machine, qualified, pose) + mean_expansion(surroundings, plan, points, pose)
         drawn = any(len(feature.surface) for feature in plan.features)
         # what was measured has the mean errors in it: the part itself is without them
-        part = plan.points if drawn or given.measured is None else given.measured - base
+        self.part = part = plan.points if drawn or given.measured is None else given.measured - base
         self.measured = Evaluator(plan, base + part - plan.points, self.causes, known)
-        self.still = characteristics_of(plan, part)
+        self.still = characteristics_of(plan, part, known)
         self.true: Evaluator | None = None
         if drawn:
             true = whole_surfaces(plan)
             still: list[Cause | None] = [None] * (len(self.causes) - len(own))
-            self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface])
+            self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface], known)
 
     def drawn(self, random: np.random.Generator, n: int) -> list[Floats]:
         """Coefficients (n, K) of each cause."""
