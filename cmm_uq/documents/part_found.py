@@ -16,6 +16,7 @@ from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.messages import Text
 from cmm_uq.parts.budget import Budget
+from cmm_uq.parts.by_method import Comparison
 from cmm_uq.parts.displaced import Displaced
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.reducing import Way
@@ -159,7 +160,7 @@ class PartFound:
     displaced : contact points.
     origin_mm : where the part's origin lies in coordinates of the machine, or about which place it does.
     standing : the machine's certificate.
-    methods : results of other methods on this part, in their own terms.
+    methods : other methods on this part beside this one; ``None`` where the job has none.
     digits : of u that were asked for; ``None`` where the number of draws was.
     seed : of everything random.
     warnings : what the reader must know before using a figure.
@@ -181,7 +182,7 @@ class PartFound:
     displaced: Displaced
     origin_mm: tuple[float, float, float]
     standing: Standing
-    methods: tuple[object, ...] = ()
+    methods: Comparison | None = None
     digits: int | None = None
     seed: int = 0
     warnings: tuple[Text, ...] = ()

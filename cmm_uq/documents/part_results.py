@@ -9,6 +9,7 @@ from cmm_uq import __version__
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.limits import Judged
 from cmm_uq.documents.part_found import Further, PartFound, Standing, Unseen
+from cmm_uq.documents.part_methods_data import methods_data
 from cmm_uq.documents.program import NAME
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
@@ -53,6 +54,7 @@ def part_results(found: PartFound) -> dict[str, Any]:
         "ways": [
             {"way": _plain(way.name), "u": list(map(_in, found.characteristics, way.u.tolist()))} for way in found.ways
         ],
+        "other_methods": methods_data(found.methods),
         "warnings": [_plain(text) for text in found.warnings],
     }  # fmt: skip
 

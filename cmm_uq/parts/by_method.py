@@ -13,9 +13,9 @@ Method = Literal["virtual", "calibrated_part", "orientations"]
 """Virtual measurements; a calibrated part measured again and again; the part itself in several orientations."""
 
 Seen = Literal["drawn", "varied", "systematic", "corrected", "stated", "unseen"]
-"""How a method takes hold of a cause: *drawn* from what is known of it; as scatter, because it *varied* between repeats; in the
-*systematic* error that was found; *corrected* by a standard, with the standard's uncertainty; *stated* from descriptions; or
-*unseen*."""
+"""How a method takes hold of a cause: *drawn* from what is known of it; as scatter, because it *varied* between repeats; in
+the *systematic* error that was found; *corrected* by a standard, with the standard's uncertainty; *stated* from descriptions;
+or *unseen*."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class Figure:
     systematic : error that the method found and takes off; ``None`` where it looks for none.
     corrected : whether it is taken off; where not, its size is added to U.
     single : standard uncertainty of one measurement in one orientation, where ``budget`` is of the mean of all.
+    scatter, scatter_dof : standard deviation of one measurement among the repeats, and its degrees of freedom.
     """
 
     name: str
@@ -52,6 +53,13 @@ class Figure:
     systematic: float | None = None
     corrected: bool = True
     single: float | None = None
+    scatter: float = 0.0
+    scatter_dof: float = 1.0
+
+    @property
+    def angle(self) -> bool:
+        """Whether it is one, in rad."""
+        return self.budget.unit == "rad"
 
     @property
     def u(self) -> float:

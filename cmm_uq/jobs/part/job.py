@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from cmm_uq.errors import CmmUqError, Gathered
@@ -13,6 +13,7 @@ from cmm_uq.files.limits import JOB_BYTES, JSON_BYTES, LISTED, TABLE_BYTES
 from cmm_uq.files.toml import toml_of
 from cmm_uq.jobs.file_names import RESULTS
 from cmm_uq.jobs.origin import COMPENSATED, SIMULATED, check_examples, check_mark
+from cmm_uq.jobs.part.by_readings import OtherReadings, other_readings
 from cmm_uq.jobs.part.checks import check_names, check_plan
 from cmm_uq.jobs.part.file import PartFile
 from cmm_uq.jobs.part.located import Places
@@ -43,6 +44,7 @@ class PartJob:
     inputs : contents of each input by its path inside the folder.
     measured : (n, 3) measured points in the order of the features' points, mm; ``None`` where nothing is measured.
     stated_by : names of those of the inputs that state the machine.
+    others : recordings of other methods.
     """
 
     folder: Path
@@ -51,6 +53,7 @@ class PartJob:
     inputs: Mapping[str, bytes]
     measured: Floats | None = None
     stated_by: tuple[str, ...] = ()
+    others: OtherReadings = field(default_factory=OtherReadings)
 
     @property
     def machine_files(self) -> Mapping[str, bytes]:
@@ -155,12 +158,16 @@ def _read(source: Source, *, machine: bool) -> PartJob:
         for name in stated_by:
             with wrong.going_on():
                 inputs[name] = source.content(name, TABLE_BYTES, fix, written=True)
+
+    def recorded(name: str) -> tuple[bytes, str]:
+        inputs[name] = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
+        check_mark(folder, facts.job.origin, inputs[name], str(folder / name))
+        return inputs[name], str(folder / name)
+
     measured = None
     if facts.recording is not None:
         with wrong.going_on():
-            name = facts.recording.file
-            inputs[name] = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
-            check_mark(folder, facts.job.origin, inputs[name], str(folder / name))
-            measured = measured_points(inputs[name], str(folder / name), features)
+            measured = measured_points(*recorded(facts.recording.file), features)
+    others = other_readings(facts, features, places, recorded, wrong)
     wrong.refuse()
-    return PartJob(folder, facts, tuple(features), inputs, measured, stated_by)
+    return PartJob(folder, facts, tuple(features), inputs, measured, stated_by, others)
