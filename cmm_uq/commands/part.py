@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from cmm_uq.commands.part_machine import machine_found
 from cmm_uq.commands.part_methods import methods_of
-from cmm_uq.commands.part_plan import circumstances_of, origin_of, plan_of
+from cmm_uq.commands.part_plan import circumstances_of, doubled, origin_of, plan_of
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.conformity.limits import Judged, Limits, judge
 from cmm_uq.conformity.risk import Known
@@ -22,10 +22,11 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.parts.budget import Budget, budget
 from cmm_uq.parts.by_comparison import compared
 from cmm_uq.parts.displaced import displaced
+from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.reducing import ways
 from cmm_uq.parts.result import conforming, evaluated, stated
-from cmm_uq.parts.virtual import Virtual
+from cmm_uq.parts.virtual import Circumstances, Virtual
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 from cmm_uq.units import MICROMETRE
@@ -81,7 +82,7 @@ def part_found(
     stage("Shares of each cause", 0.6)
     shares = budget(virtual, seed=seed)
     stage("What would change the uncertainty", 0.7)
-    found_ways = ways(plan, given, seed=seed)
+    found_ways = ways(plan, given, seed=seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual)
     stage("Decisions", 0.85)
     known = stated(simulated, measured)
     together = None if measured is None else conforming(plan, errors, measured)[1]
@@ -91,6 +92,15 @@ def part_found(
         displaced(virtual, seed=seed), _three(origin_of(job, machine.state.machine)),
         machine.standing, compared(known, shares, others), digits=digits, seed=seed, warnings=machine.warnings,
     )  # fmt: skip
+
+
+def _with_twice_the_points(job: PartJob, machine: MachineState) -> Callable[[], tuple[Plan, Circumstances]]:
+    def more() -> tuple[Plan, Circumstances]:
+        other = doubled(job)
+        plan = plan_of(other)
+        return plan, circumstances_of(other, machine, plan, PLACES)
+
+    return more
 
 
 def _three(values: Floats) -> tuple[float, float, float]:

@@ -233,7 +233,7 @@ def _machine(job: PartJob, calibrated: Job | None) -> Machine:
 
     Raises
     ------
-    CmmUqError : both say a chain or a travel, and not the same.
+    CmmUqError : both say a chain or a travel, and not the same; or neither a travel.
     """
     facts, own = job.facts.machine_state, None if calibrated is None else calibrated.facts.machine
     chain, origin = facts.chain, facts.origin_mm
@@ -253,8 +253,11 @@ def _machine(job: PartJob, calibrated: Job | None) -> Machine:
                 f"{here[0]:g} to {here[1]:g} mm", where=f"{WHERE} travel_mm",
                 fix="Leave it out, or give the certificate of this machine",
             )  # fmt: skip
-        if (given := here or there) is not None:
-            travel[i] = given
+        given = here or there
+        if given is None:
+            raise CmmUqError(f"nothing says how far axis {axis} goes, by which errors of guideways are told", where=WHERE,
+                             fix=f"Give travel_mm = {{ {axis} = [lowest, highest] }}, or the certificate as PDF")  # fmt: skip
+        travel[i] = given
     name = "" if own is None else own.name
     return Machine(name, chain, travel, np.array(origin, dtype=np.float64))
 

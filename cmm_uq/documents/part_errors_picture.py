@@ -56,8 +56,7 @@ def errors_picture(plan: Plan, errors: Displaced) -> Plot:
             sentences((
                 say("Errors of the points as they are expected: arrows are mean errors, ellipses their standard uncertainty, "
                     "both magnified {times} times.", times=_times(factor)),
-                *((say("A shift and a turn that all points have in common show in no result and are left out."),)
-                  if errors.relative else ()),
+                say("A shift and a turn that all points have in common show in no result and are left out."),
             )),
             len(rows), len(plan.points),
         )  # fmt: skip

@@ -10,7 +10,7 @@ from cmm_uq.documents.document import Block, Column, Facts, Paragraph, Section, 
 from cmm_uq.documents.part_errors_picture import errors_picture, form_picture
 from cmm_uq.documents.part_found import PartFound
 from cmm_uq.documents.part_picture import part_picture
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, in_a_row, names, number, plural, say, semicolons, signed
+from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, in_a_row, names, number, plural, say, semicolons, signed
 from cmm_uq.parts.deviating import deviations_of
 from cmm_uq.parts.in_words import ASSOCIATIONS, KINDS
 from cmm_uq.parts.plan import Plan, Stylus
@@ -39,7 +39,8 @@ def part_section(found: PartFound) -> Section:
     )  # fmt: skip
     rows = tuple(
         (number(i + 1), Verbatim(feature.name), KINDS[feature.kind], number(len(feature.points)),
-         *((Verbatim(feature.stylus),) if several else ()), ASSOCIATIONS[feature.association])
+         *((Verbatim(feature.stylus),) if several else ()),
+         ASSOCIATIONS[feature.association] if len(feature.points) > 1 else DASH)
         for i, feature in enumerate(plan.features)
     )  # fmt: skip
     blocks: tuple[Block, ...] = (

@@ -185,7 +185,8 @@ def correlation_section(found: PartFound) -> Section:
         for one in every
     )
     columns = (
-        Column(say("No.")), Column(say("Characteristic"), numeric=False), *(Column(say("No. {number}", number=one.number)) for one in every),
+        Column(say("No.")), Column(say("Characteristic"), numeric=False),
+        *(Column(say("No. {number}", number=one.number)) for one in every),
     )  # fmt: skip
     return Section(say("Correlations"), (told, Table(say("Correlations between the characteristics"), columns, rows)))
 

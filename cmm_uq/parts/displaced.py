@@ -1,7 +1,6 @@
 """How far each point of a plan is off: its mean error and the covariance of it, over all causes and places.
 
-A shift and a turn that all points have in common show in no characteristic and are taken out of every draw, by least squares;
-of a single point nothing is taken out, or nothing would be left.
+A shift and a turn that all points have in common show in no characteristic and are taken out of every draw, by least squares.
 """
 
 from __future__ import annotations
@@ -31,19 +30,17 @@ class Displaced:
     ----------
     mean : (n, 3) mm.
     covariance : (n, 3, 3) of each point, mm².
-    relative : whether the motion common to all points is taken out.
     """
 
     mean: Floats
     covariance: Floats
-    relative: bool
 
 
 def displaced(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Displaced:
     """Mean and covariance of the error of each point, each place as often as the others."""
     points, random = virtual.plan.points, np.random.default_rng(seed)
     n = len(points)
-    rigid = _rigid(points) if n > 1 else np.zeros((3 * n, 0))
+    rigid = _rigid(points)
     block = max(1, min(draws, _BLOCK // (3 * n)))
     each = max(1, -(-draws // len(virtual.places)))
     total, first, second = 0, np.zeros((n, 3)), np.zeros((n, 3, 3))
@@ -58,7 +55,7 @@ def displaced(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Displaced:
             second += np.einsum("kni,knj->nij", off, off)
             total += count
     mean = first / total
-    return Displaced(mean, second / total - mean[:, :, None] * mean[:, None, :], n > 1)
+    return Displaced(mean, second / total - mean[:, :, None] * mean[:, None, :])
 
 
 def _rigid(points: Floats) -> Floats:

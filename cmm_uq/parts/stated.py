@@ -48,7 +48,11 @@ def machine_stated(
     CmmUqError : results of another kind, or draws that do not belong to them.
     """
     if "estimates" not in results or "identifiability" not in results:
-        raise CmmUqError("states no errors of a machine", where=_WHERE, fix="Give the results of cmm-uq report")
+        raise CmmUqError(
+            "states no errors of a machine",
+            where=_WHERE,
+            fix="Give a certificate whose analysis names errors: of a ballbar, step gauge, plate, sphere, …",
+        )
     modelled = list(results["estimates"])
     # faults of the artefact, and of the probe that calibrated, are not those of this measurement
     found = tuple(effect for effect in effects(modelled, where=_WHERE) if of_machine(effect))

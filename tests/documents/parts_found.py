@@ -39,7 +39,9 @@ STANDING = Standing(
 )  # fmt: skip
 
 
-def machine(scale_ppm: float = 3.0, *, unmodelled: Sequence[str] = ("straightness_x_y", "hysteresis_y")) -> MachineState:
+def machine(
+    scale_ppm: float = 3.0, *, unmodelled: Sequence[str] = ("straightness_x_y", "hysteresis_y")
+) -> MachineState:
     """One with uncertain scales and squarenesses, and errors that its calibration did not model."""
     sizes = np.array([scale_ppm] * 3 + [1.0] * 3)
     draws = np.random.default_rng(1).standard_normal((DRAWS, len(sizes))) * sizes
@@ -88,6 +90,6 @@ def found_of(
     found = PartFound(
         job, plan, given, virtual, simulated, stated(simulated, values), values, shares, unseen, None,
         judged(job, plan, errors, values), None if together is None or np.isnan(together) else together,
-        tuple(ways(plan, given, 1000)), displaced(virtual, 200), STANDING,
+        tuple(ways(plan, given, 1000)), displaced(virtual, 200), (300.0, 450.0, -500.0), STANDING,
     )  # fmt: skip
     return replace(found, **changes)

@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import binom
 
 import cmm_uq
+from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.noise import Sizes
 from cmm_uq.inference.sampling import sample_with_noise
@@ -17,7 +18,7 @@ from cmm_uq.model import MeasurementModel
 from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.model.noise import noise_of
 from cmm_uq.parts.conditional import Together, draws_given, given_recording, joint_posterior
-from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled
+from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled, of_machine
 from cmm_uq.parts.periods import EveryPeriod
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Characteristic, Plan
@@ -188,6 +189,33 @@ def test_an_error_that_was_left_out_does_not_make_intervals_of_parts_too_narrow(
 def _errors(plan: Plan, state: MachineState, pose: Pose, random: np.random.Generator, n: int) -> Floats:
     at = AtPose(plan, Circumstances(state), pose)
     return at.errors(at.drawn(random, n))[:, 0]
+
+
+def test_faults_of_the_artefact_and_of_its_probe_stay_with_them() -> None:
+    """Gauge blocks whose calibration has a probe's radius between scales and squarenesses: each error keeps its own draws."""
+    job = cmm_uq.read(ROOT / "examples" / "gauge-blocks-simulated")
+    model, _ = recorded_model(job)
+    names = [effect.name for effect in model.effects]
+    own = tuple(effect for effect in model.effects if of_machine(effect))
+    assert "probe_radius" in names
+    assert "probe_radius" not in [effect.name for effect in own]
+    _, mean, covariance = joint_posterior(model, (), 3e-4)
+    state = MachineState(job.points.machine, own, np.zeros((2, len(own))))
+    found = given_recording(state, model, 3e-4, 20_000)
+    at = [names.index(effect.name) for effect in own]
+    sd = np.sqrt(np.diagonal(covariance))[at]
+    np.testing.assert_allclose((found.draws.mean(axis=0) - mean[at]) / sd, 0, atol=0.03)
+    np.testing.assert_allclose(found.draws.std(axis=0) / sd, 1, rtol=0.03)
+
+
+@pytest.mark.parametrize("corrected", [True, False])
+def test_a_machine_corrects_what_its_certificate_states_and_no_more(corrected: bool) -> None:
+    draws = np.random.default_rng(0).normal([40.0, 90, 10, -170, -20, 20], 2.0, (500, 6))
+    state = MachineState(
+        BARS.machine, effects(MODELLED), draws, unmodelled=left_out("rotation_x_x"), corrected=corrected
+    )
+    found = given_recording(state, calibration(), SIGMA, 500)
+    np.testing.assert_allclose(found.corrects, [*(draws.mean(axis=0) if corrected else np.zeros(6)), 0.0])
 
 
 def test_a_certificate_says_what_it_left_free() -> None:

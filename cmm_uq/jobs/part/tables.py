@@ -152,6 +152,8 @@ class ProbingFacts(Table):
     """Time from a point to the next, for noise that wanders; 0 where it is not known."""
     repeats: Count = 1
     """How often each point is probed; its mean counts."""
+    u_operator_um: Uncertainty = 0.0
+    """Standard uncertainty of each coordinate of each point by who measures and how, common to its repeats."""
 
 
 class EnvironmentFacts(Table):
@@ -173,6 +175,8 @@ class EnvironmentFacts(Table):
     """Standard uncertainty of that coefficient, 1/K."""
     u_gradient_k_per_m: Annotated[list[Kelvins], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
     """Standard uncertainties of the gradient of the part's temperature along the axes of the machine, K/m."""
+    u_drift_k: Kelvins = 0.0
+    """Standard uncertainty of how much part and scales have warmed from the first point to the last."""
 
 
 class DecisionFacts(Table):
