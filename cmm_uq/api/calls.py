@@ -211,8 +211,8 @@ def part(
     Examples
     --------
     >>> import cmm_uq
-    >>> cmm_uq.part("examples/part-plate", trials=2000)
-    <Part of part-plate: 5 characteristics, pass>
+    >>> cmm_uq.part("examples/part-plate-simulated", trials=2000)
+    <Part of part-plate-simulated: 5 characteristics, pass>
     """
     from cmm_uq.api.part import Part
     from cmm_uq.commands.part_written import Asked, found_of

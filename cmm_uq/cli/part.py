@@ -14,7 +14,7 @@ from cmm_uq.cli.printing import put_json, show_summary
 from cmm_uq.cli.progress import shown
 
 EXAMPLES = examples(
-    "part examples/part-plate", "part JOB --digits 2 --rerun", "part JOB --json --strict > results.json"
+    "part examples/part-plate-simulated", "part JOB --digits 2 --rerun", "part JOB --json --strict > results.json"
 )
 
 

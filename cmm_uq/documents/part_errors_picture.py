@@ -11,7 +11,7 @@ from cmm_uq.documents.part_views import draw_outlines, panels, segments, span_of
 from cmm_uq.documents.plot_style import ACCENT, DIVERGING, INK, MUTED, TINY, WIDTH_MM, dots, drawn, house_style
 from cmm_uq.documents.shown import shown, told
 from cmm_uq.documents.vector_plot import round_length
-from cmm_uq.messages import Text, number, say, sentences
+from cmm_uq.messages import Text, number, say, sentences, signed
 from cmm_uq.parts.displaced import Displaced
 from cmm_uq.parts.plan import Plan
 from cmm_uq.points import Floats
@@ -96,7 +96,7 @@ def form_picture(plan: Plan, deviations: Floats) -> Plot:
         )  # fmt: skip
         alternative = say(
             "The part in four views with the distances of its measured points from their features: {low} to {high} µm.",
-            low=number(float(sizes.min(initial=0.0)), ".2g"), high=number(float(sizes.max(initial=0.0)), ".2g"),
+            low=signed(float(sizes.min(initial=0.0)), ".1f"), high=signed(float(sizes.max(initial=0.0)), ".1f"),
         )  # fmt: skip
         return drawn(figure, caption, alternative)
 

@@ -10,7 +10,20 @@ from cmm_uq.documents.document import Block, Column, Facts, Paragraph, Section, 
 from cmm_uq.documents.part_errors_picture import errors_picture, form_picture
 from cmm_uq.documents.part_found import PartFound
 from cmm_uq.documents.part_picture import part_picture
-from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, commas, in_a_row, names, number, plural, say, semicolons, signed
+from cmm_uq.messages import (
+    DASH,
+    NOTHING,
+    Text,
+    Verbatim,
+    commas,
+    in_a_row,
+    names,
+    number,
+    plural,
+    say,
+    semicolons,
+    signed,
+)
 from cmm_uq.parts.deviating import deviations_of
 from cmm_uq.parts.in_words import ASSOCIATIONS, KINDS
 from cmm_uq.parts.plan import Plan, Stylus

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.part_correlation_plot import correlation_plot
 from cmm_uq.documents.part_figures import Figures, figures_of
@@ -17,8 +15,6 @@ from cmm_uq.parts.evaluating import characteristics_of
 
 FEW = 8
 """Characteristics up to which their correlations are a table."""
-
-_ONE = 1.0
 
 
 def results_section(found: PartFound) -> Section:
@@ -192,10 +188,10 @@ def correlation_section(found: PartFound) -> Section:
 
 
 def _r(value: float, row: int, column: int) -> Text:
-    """Of a matrix that is as good below as above its diagonal, the lower half; no figure is a whole one but that of itself."""
+    """Of a matrix that is the same below and above its diagonal, the lower half."""
     if column > row:
         return DASH
-    return number(_ONE, "g") if column == row else signed(float(np.clip(value, -0.995, 0.995)), ".2f")
+    return number(1) if column == row else signed(value, ".2f")
 
 
 def count_words(count: int) -> Text:

@@ -98,7 +98,7 @@ def panels(points: Floats, room: float, note_mm: float) -> tuple[Figure, list[tu
     tall = [scale * each for each in rows]
     height = _TOP + tall[0] + _GAP + _UNDER + tall[1] + _UNDER + note_mm
     figure = new_figure(height)
-    second = _LEFT + max(scale * columns[0], 0.5 * (width - 10.0)) + _BETWEEN
+    second = min(_LEFT + max(scale * columns[0], 0.5 * width) + _BETWEEN, WIDTH_MM - _RIGHT - scale * columns[1])
     bottoms = (height - _TOP - tall[0], note_mm + _UNDER)
     found = []
     for i, view in enumerate(VIEWS):

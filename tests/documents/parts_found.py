@@ -1,4 +1,4 @@
-"""What is found of parts, for tests of their page: drawn by the engine on a machine that a test states, few draws, no files."""
+"""What is found of parts, for tests of their page: few draws on a machine that a test states, and no files."""
 
 from __future__ import annotations
 

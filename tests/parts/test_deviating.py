@@ -1,4 +1,4 @@
-"""Distances of measured points from their features, by constructions of which they are known; positive is out of the material."""
+"""Distances of measured points from their features where they are known; positive is out of the material."""
 
 from __future__ import annotations
 

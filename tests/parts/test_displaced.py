@@ -29,7 +29,7 @@ def test_a_scale_stretches_the_part_about_its_middle(scale: str, pose: Pose) -> 
 
 
 def test_readings_keep_what_is_not_common() -> None:
-    """Noise of 2 µm in x of both ends: their mean is a shift, and √2 µm is left of each; in y and z a shift and a turn take all."""
+    """Noise of 2 µm in x of both ends: √2 µm is left of each about their mean; in y and z a shift and a turn take all."""
     found = displaced(Virtual(ENDS, Circumstances(machine(noise_um=2.0), (POSE,))))
     u = 1e3 * np.sqrt(np.einsum("nii->ni", found.covariance.clip(0)))
     np.testing.assert_allclose(u, [[np.sqrt(2), 0, 0]] * 2, atol=0.07)
