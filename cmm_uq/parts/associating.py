@@ -92,8 +92,11 @@ class ProbedFeature:
             raise CmmUqError(error.problem, where=f"feature {feature.name!r}", fix=error.fix) from error
 
     def is_near(self, points: Floats) -> bool:
-        """Whether points (n, 3) are so near to its own that steps from these end at the association."""
-        if self.feature.kind == "point":
+        """Whether points (n, 3) are so near to its own that these serve for them too; only of what takes long to prepare.
+
+        The point on the axis is then the one over the middle of its own points.
+        """
+        if self.feature.kind not in ("cylinder", "cone"):
             return False
         return bool(np.abs(points - self.points).max(initial=0.0) < _NEAR * self._repeated.placed.extent)
 

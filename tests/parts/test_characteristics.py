@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
+from cmm_uq.parts.associating import ProbedFeature
 from cmm_uq.parts.evaluating import Evaluator
 from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan
 from cmm_uq.points import Floats
@@ -248,3 +249,47 @@ def test_a_best_fit_of_one_face_is_refused() -> None:
 def test_what_a_feature_does_not_have_is_refused(one: Characteristic, words: str) -> None:
     with pytest.raises(CmmUqError, match=words):
         measured((*BLOCK, circle("round", [100, 50, 0], 5.0)), one, {})
+
+
+def cone(name: str, rings: tuple[float, ...] = (0.0, 8.0, 16.0)) -> Feature:
+    """A cone of a half angle of 10° that widens upwards, of a radius of 10 mm at its position."""
+    tangent = np.tan(np.radians(10.0))
+    points = np.vstack([ring([0, 0, 0], 10.0 + tangent * z, z, 8, 0.2 * i)[0] for i, z in enumerate(rings)])
+    out = np.column_stack(
+        [points[:, :2] / np.hypot(points[:, 0], points[:, 1])[:, None], np.full(len(points), -tangent)]
+    )
+    nominal = Nominal(np.zeros(3), UP, 20.0, np.radians(10.0))
+    return Feature(name, "cone", points, out / np.linalg.norm(out, axis=1)[:, None], "stylus", nominal)
+
+
+PREPARED = {"cylinder": BLOCK[4], "cone": cone("cone")}
+
+
+@pytest.mark.parametrize("kind", PREPARED)
+@pytest.mark.parametrize("how", ["least_squares", "minimum_zone"])
+def test_a_feature_prepared_at_its_nominal_points_is_the_same_a_little_elsewhere(kind: str, how: Association) -> None:
+    """30 µm away, with form: the same axis, of which the point over the middle of the nominal points is told."""
+    feature, random = PREPARED[kind], np.random.default_rng(1)
+    points = feature.points + random.normal(0.03, 0.01, feature.points.shape)
+    nominal = ProbedFeature(feature, feature.points, "least_squares")
+    assert nominal.is_near(points)
+    alone, shared = ProbedFeature(feature, points, how).base, ProbedFeature(feature, points, how, nominal).base
+    np.testing.assert_allclose(shared[3:6], alone[3:6], atol=1e-9)
+    assert shared[7] == pytest.approx(alone[7], abs=1e-9)
+    along = (alone[:3] - shared[:3]) @ alone[3:6]
+    np.testing.assert_allclose(shared[:3] + along * alone[3:6], alone[:3], atol=1e-8)
+    assert alone[6] - shared[6] == pytest.approx(2 * along * np.tan(alone[7]), abs=1e-8)
+    assert shared[:3] @ shared[3:6] == pytest.approx(feature.points.mean(axis=0) @ shared[3:6], abs=1e-4)
+    again = ProbedFeature(feature, feature.points, how, ProbedFeature(feature, points, how, nominal))
+    np.testing.assert_allclose(again.base, ProbedFeature(feature, feature.points, how).base, atol=1e-8)
+
+
+def test_a_feature_that_lies_far_away_is_prepared_anew() -> None:
+    feature = PREPARED["cylinder"]
+    nominal = ProbedFeature(feature, feature.points, "least_squares")
+    far = feature.points * [1.1, 1.1, 1.0]
+    assert not nominal.is_near(far)
+    middle = feature.nominal.point * [1.1, 1.1, 1.0]
+    found = ProbedFeature(feature, far, "least_squares", nominal).base
+    assert found[6] == pytest.approx(22.0, abs=NANOMETRE)
+    np.testing.assert_allclose(found[:2], middle[:2], atol=NANOMETRE)
