@@ -59,7 +59,9 @@ def plan() -> Plan:
 
 def as_points(recording: truth.Recording) -> Points:
     """A recording as the package reads it."""
-    return Points(recording.xyz, recording.measurement, recording.point, recording.repeat, MACHINE, recording.columns, start_s=0.0)
+    return Points(
+        recording.xyz, recording.measurement, recording.point, recording.repeat, MACHINE, recording.columns, start_s=0.0
+    )
 
 
 def joined(features: Mapping[str, Floats]) -> Floats:

@@ -18,7 +18,14 @@ import numpy as np
 TRAVEL = np.array([[0.0, 900.0], [0.0, 600.0], [-500.0, 0.0]])
 SECOND = np.pi / 648000
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
-PHYSICS = {"scale": 300.0, "squareness": 500.0, "straightness": 50.0, "rotation": 60.0, "hysteresis": 30.0, "periodic": 10.0}
+PHYSICS = {
+    "scale": 300.0,
+    "squareness": 500.0,
+    "straightness": 50.0,
+    "rotation": 60.0,
+    "hysteresis": 30.0,
+    "periodic": 10.0,
+}
 """Standard deviations of true errors: ppm, ″, µm, ″/m, µm, µm of each of two amplitudes. As large as physics allows."""
 PERIODS = (0.5, 1000.0)
 """mm; evenly in the logarithm."""
@@ -49,7 +56,14 @@ class Truth:
     @classmethod
     def drawn(cls, random: np.random.Generator) -> Truth:
         """Any machine."""
-        sizes = {"scale": 3, "squareness": 3, "straightness": (3, 3), "rotation": (3, 3), "hysteresis": 3, "periodic": (3, 2)}
+        sizes = {
+            "scale": 3,
+            "squareness": 3,
+            "straightness": (3, 3),
+            "rotation": (3, 3),
+            "hysteresis": 3,
+            "periodic": (3, 2),
+        }
         errors = [PHYSICS[name] * random.standard_normal(shape) for name, shape in sizes.items()]
         errors[2] *= 1 - np.eye(3)
         return cls(*errors, np.exp(random.uniform(*np.log(PERIODS), 3)))
@@ -109,7 +123,9 @@ class Recording:
     columns: Mapping[str, np.ndarray]
 
 
-def bars(truth: Truth, length: float, repeats: int, sigma: float, offset: float, random: np.random.Generator) -> Recording:
+def bars(
+    truth: Truth, length: float, repeats: int, sigma: float, offset: float, random: np.random.Generator
+) -> Recording:
     """Twenty bars anyhow in the volume: centres of balls, which backlash does not move."""
     half = 0.5 * length * unit(random.standard_normal((20, 3)))
     room = np.ptp(TRAVEL, axis=1) - 2 * np.abs(half)
@@ -123,7 +139,9 @@ def bars(truth: Truth, length: float, repeats: int, sigma: float, offset: float,
     return Recording(placed + sigma * random.standard_normal(placed.shape), m, p, r, {})
 
 
-def step_gauge(truth: Truth, growth: float, repeats: int, sigma: float, offset: float, random: np.random.Generator) -> Recording:
+def step_gauge(
+    truth: Truth, growth: float, repeats: int, sigma: float, offset: float, random: np.random.Generator
+) -> Recording:
     """Seven lines of six faces, every second met from the other side: along the axes and the diagonals of the body."""
     diagonals = [unit(np.array([x, y, 1.0]) * np.ptp(TRAVEL, axis=1)) for x in (1, -1) for y in (1, -1)]
     parts: dict[str, list[np.ndarray]] = {name: [] for name in ("xyz", "m", "p", "r", "at", "travel")}
@@ -133,7 +151,9 @@ def step_gauge(truth: Truth, growth: float, repeats: int, sigma: float, offset: 
         room = np.ptp(TRAVEL, axis=1) - np.abs(direction) * faces[-1]
         low = TRAVEL[:, 0] + room * random.uniform(0.1, 0.9, 3)
         start = np.where(direction < 0, low + np.abs(direction) * faces[-1], low)
-        travel = np.where(np.arange(6)[:, None] % 2, -1.0, 1.0) * np.sign(np.where(np.abs(direction) > 1e-6, direction, 0.0))
+        travel = np.where(np.arange(6)[:, None] % 2, -1.0, 1.0) * np.sign(
+            np.where(np.abs(direction) > 1e-6, direction, 0.0)
+        )
         points = truth.read(start + (1 + growth) * faces[:, None] * direction, np.zeros(3), travel)
         points = points + offset * random.standard_normal(points.shape)
         parts["xyz"].append(np.tile(points, (repeats, 1)))
@@ -215,7 +235,9 @@ def plane(points: np.ndarray, sense: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return middle, normal * np.sign(normal @ sense)
 
 
-def cylinder(points: np.ndarray, nominal: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
+def cylinder(
+    points: np.ndarray, nominal: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
     """Point of the axis at the height of the nominal one, direction, radius and distances; the axis is near z."""
     state = np.array([nominal[0], nominal[1], 0.0, 0.0, radius])
     for _ in range(12):
@@ -279,7 +301,9 @@ def nominal_part() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Points and normals out of the material by feature: a plate of 200 × 100 mm, two bores, a ball above it."""
 
     def face(origin: tuple[float, ...], one: tuple[float, ...], other: tuple[float, ...], n: int, m: int) -> np.ndarray:
-        s, t = (each.ravel()[:, None] for each in np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, m), indexing="ij"))
+        s, t = (
+            each.ravel()[:, None] for each in np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, m), indexing="ij")
+        )
         return np.array(origin) + s * np.array(one) + t * np.array(other)
 
     faces = {

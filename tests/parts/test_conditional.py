@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import sici
 from scipy.stats import binom
 
 import cmm_uq
@@ -19,13 +20,12 @@ from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.model.noise import noise_of
 from cmm_uq.parts.conditional import Together, draws_given, given_recording, joint_posterior
 from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled, of_machine
-from cmm_uq.parts.periods import EveryPeriod
+from cmm_uq.parts.periods import TRIED, EveryPeriod
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Characteristic, Plan
 from cmm_uq.parts.stated import flat_draws, machine_stated
 from cmm_uq.parts.virtual import AtPose, Circumstances
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.physics.effect import TRIALS
 from cmm_uq.points import Floats
 from tests.conftest import ROOT
 from tests.parts_drawn import MACHINE, spot
@@ -65,21 +65,22 @@ def test_the_joint_posterior_is_the_normal_distribution_of_parameters_given_obse
 def test_what_cannot_be_told_from_the_recording_stays_on_its_own() -> None:
     which, mean, _ = joint_posterior(calibration(), left_out("hysteresis_x", "rotation_x_x", "periodic_scale_y"), SIGMA)
     assert which == (1, 2)  # play needs directions of approach
-    assert len(mean) == 6 + 1 + 2 * TRIALS
+    assert len(mean) == 6 + 1 + 2 * TRIED
 
 
-def test_all_trial_periods_together_have_the_covariance_of_one_of_them() -> None:
-    """Of errors at two places, by draws of one period each and normal amplitudes."""
+def test_all_trial_periods_together_have_nearly_the_covariance_of_a_period_that_nobody_knows() -> None:
+    """Of errors at two places d apart: that of any period λ, evenly in ln λ, is the mean of A²·cos(2πd/λ), a difference of
+    cosine integrals, from which a finite sum is off by less than a tenth of A² in the root mean square."""
     (periodic,) = effects(["periodic_scale_x"])
-    points = BARS.select(np.arange(6))
     whole = EveryPeriod(periodic)
-    random, trials = np.random.default_rng(3), list(periodic.trials())
-    bases = np.array([periodic.basis(points, shape)[:, 0] for shape in trials])
-    amplitudes = 10.0 * random.standard_normal((200_000, 2))
-    drawn = np.einsum("nak,nk->na", bases[random.integers(len(trials), size=len(amplitudes))], amplitudes)
-    sd = np.array([one.prior_sd for one in whole.coefficients])
-    shown = whole.basis(points)[:, 0] * sd
-    np.testing.assert_allclose(shown @ shown.T, np.cov(drawn.T), atol=0.01 * 0.01**2)
+    shown = whole.basis(BARS)[:, 0] * [one.prior_sd for one in whole.coefficients]
+    apart = np.abs(np.subtract.outer(BARS.readings["x"], BARS.readings["x"]))
+    low, high = periodic.shape[0].low, periodic.shape[0].high
+    far = 2 * np.pi * np.where(apart > 0, apart, 1.0)
+    mean = (sici(far / low)[1] - sici(far / high)[1]) / np.log(high / low)
+    off = shown @ shown.T / 0.01**2 - np.where(apart > 0, mean, 1.0)
+    assert np.sqrt(np.mean(off**2)) < 0.1
+    np.testing.assert_allclose(np.diagonal(off), 0.0, atol=1e-12)
 
 
 def repeated(times: int) -> MeasurementModel:
