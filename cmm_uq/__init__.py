@@ -13,15 +13,15 @@ from __future__ import annotations
 TYPE_CHECKING = False  # typing alone would cost ten times as much as all of this
 if TYPE_CHECKING:
     from cmm_uq.api.beginning import check, new
-    from cmm_uq.api.calls import budget, compensate, diagnose, job, plan, prove, read, report, simulate
+    from cmm_uq.api.calls import budget, compensate, diagnose, job, part, plan, prove, read, report, simulate
     from cmm_uq.api.recertification import due, history
     from cmm_uq.errors import CmmUqError
 
 __version__ = "0.7.0"
 
 __all__ = [
-    "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "due", "history", "job", "new", "plan",
-    "prove", "read", "report", "simulate",
+    "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "due", "history", "job", "new", "part",
+    "plan", "prove", "read", "report", "simulate",
 ]  # fmt: skip
 
 

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 ROOT = Path(__file__).parents[1]
+MACHINE_JOBS = sorted(
+    path.parent for path in (ROOT / "examples").glob("*/job.toml") if not path.parent.name.startswith("part-")
+)
+"""Folders of the example jobs of machines; those of parts are another sort of job."""
 
 settings.register_profile("same", derandomize=True, deadline=None)  # one commit gives one answer, on every machine
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))

@@ -119,7 +119,7 @@ COMMANDS = {"iota-1102-maps": ("diagnose",), "plan-ballbar": ("plan",), "plan-st
 @cache
 def seeds() -> dict[str, Seed]:
     """Every seed, by name."""
-    found = [_example(folder) for folder in sorted(EXAMPLES.iterdir())]
+    found = [_example(folder) for folder in sorted(EXAMPLES.iterdir()) if not folder.name.startswith("part-")]
     iota = next(seed for seed in found if seed.name == "iota-1102-20C")
     found += [_compensable(iota), _with_columns(iota), _drawn(iota)]
     found += [Seed(f"budget-{name}", {"budget.toml": content, NOTES: b"mine\n"}, "budget", ("budget",))

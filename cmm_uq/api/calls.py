@@ -18,6 +18,8 @@ from cmm_uq.languages.language import Code
 if TYPE_CHECKING:
     import pandas as pd
 
+    from cmm_uq.api.part import Part
+    from cmm_uq.jobs.part.job import PartJob
     from cmm_uq.physics.map_interpolation import Beyond
     from cmm_uq.uncertainty.distributions import Distribution
     from cmm_uq.uncertainty.evaluation import Evaluation
@@ -176,6 +178,50 @@ def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0, language: 
     from cmm_uq.commands.plan import plan_outcome
 
     return Plan(plan_outcome(in_language(_job(job), language), power=power, seed=seed))
+
+
+def part(
+    job: PartJob | str | Path,
+    *,
+    seed: int = 0,
+    trials: int | None = None,
+    digits: int | None = None,
+    rerun: bool = False,
+    trust: Sequence[str | Path] | None = None,
+    records: str | Path | None = None,
+    language: Code | None = None,
+) -> Part:
+    """The uncertainty of what is measured on a part, and whether it conforms.
+
+    Parameters
+    ----------
+    job : the job folder of a part, or such a job that was read.
+    seed : of everything random.
+    trials : number of virtual measurements; 200 000 where nothing is said.
+    digits : of u that are to be known: then so many are made as that needs, ``trials`` at least.
+    rerun : whether the machine's certificate is computed again from its inputs.
+    trust : files and folders of certificates that are trusted: the machine's must then be signed.
+    records : of the machine's history, from which its drift is known.
+    language : of the page, instead of the job's.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be evaluated as it stands, or its machine's certificate does not hold.
+
+    Examples
+    --------
+    >>> import cmm_uq
+    >>> cmm_uq.part("examples/part-plate-simulated")  # doctest: +SKIP
+    <Part of part-plate-simulated: 5 characteristics, pass>
+    """
+    from cmm_uq.api.part import Part
+    from cmm_uq.commands.part_written import Asked, found_of
+    from cmm_uq.commands.part_written import in_language as told_in
+    from cmm_uq.jobs.part.job import PartJob, read_part
+
+    read = told_in(job if isinstance(job, PartJob) else read_part(Path(job)), language)
+    trusted = None if trust is None else tuple(map(Path, trust))
+    return Part(found_of(read, Asked(seed, trials, digits, rerun, trusted, records)))
 
 
 def prove(

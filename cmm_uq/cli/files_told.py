@@ -21,6 +21,8 @@ _WHAT = {
     "validation.pdf": "the validation of the diagnosis",
     "truth.json": "what was true of each case, sealed beforehand",
     "cases.jsonl": "what was said of each case",
+    "part.html": "the part, with its uncertainty",
+    "part.pdf": "the part, with its uncertainty",
     "budget.html": "the budget",
     "budget.pdf": "the budget",
     "results.json": "every figure, for other programs",

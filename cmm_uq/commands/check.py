@@ -151,12 +151,16 @@ def _of_a_part(path: Path) -> bool:
 
 def _check_part(folder: Path, path: Path) -> Checked:
     """The job of a part: what its readers refuse, and that its figures are an example's."""
+    from cmm_uq.commands.part_methods import lacking
     from cmm_uq.commands.part_plan import refuse_unfit  # the virtual measurement, which no other job needs
 
     wrong, warnings, job = Gathered(), list[Problem](), None
     with wrong.going_on():
         job = read_part(folder, machine=False)
         refuse_unfit(job)
+        warnings += [
+            Problem(str.__str__(said), str(path), key=f"[{table}]", fix=fix) for table, said, fix in lacking(job)
+        ]
     if job is not None:
         with wrong.going_on():
             read_part(folder)  # with the files that state the machine

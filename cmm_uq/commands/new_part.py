@@ -8,7 +8,6 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import ValidationError
 
 from cmm_uq.commands.schemas import shipped
@@ -89,10 +88,9 @@ def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]: 
         "feature": drawing.features, "characteristic": drawing.characteristics, **_aligned(drawing),
         **({"stylus": drawing.styli} if drawing.styli else {}),
     }  # fmt: skip
-    whole["placing"] = {"origin_mm": _in_the_middle(whole)}
     said = {name: dict(keys) for name, keys in given.items()}
     said.get(PART, {}).pop("not_measured", None)
-    marked = {f"{name}.{key}" for name in ("machine_state", "environment", "form", "placing") for key in whole[name]}
+    marked = {f"{name}.{key}" for name in ("machine_state", "environment", "form") for key in whole[name]}
     marked |= set() if drawing.styli else {f"stylus.{key}" for key in whole["stylus"][0]}
     marked |= {"alignment.best_fit"}
     opened = {name: set(keys) for name, keys in drawing.open_keys.items()}
@@ -118,16 +116,6 @@ def _probed(given: Mapping[str, Any]) -> Probed:
         raise CmmUqError(f"{'.'.join(map(str, first['loc']))}: {first['msg'].removeprefix('Value error, ')}", where=where,
                          fix=f"Leave it out knowingly: --set part.not_measured='[\"{given['name']}\"]'") from None  # fmt: skip
     return probed(facts, where)
-
-
-def _in_the_middle(tables: Mapping[str, Any]) -> list[float]:
-    """Where the part's origin lies so that its points are in the middle of the travel."""
-    points = np.concatenate([_probed(one).points for one in tables["feature"]])
-    travel = tables["machine_state"]["travel_mm"]
-    middle = np.array([sum(travel[axis]) / 2 for axis in "xyz"])
-    offset = np.array(tables["stylus"][0].get("offset_mm", [0.0, 0.0, 0.0]))
-    place = middle + offset - (points.min(axis=0) + points.max(axis=0)) / 2
-    return [float(value) for value in np.round(place)]
 
 
 def _with(tables: dict[str, Any], given: Tables, id: str) -> dict[str, Any]:  # noqa: A002
@@ -207,11 +195,12 @@ def _readme(left_out: Collection[Unknown]) -> str:
         "# A part and its uncertainty", "",
         "- `job.toml`: features with the points at which they are probed, datums, tolerances, styli, temperatures. Editors "
         f"that know TOML schemas explain every key (`{SCHEMA}`).",
-        "- Put the machine's `results.json` and `posterior.npz`, as `cmm-uq report` wrote them, into the folder `machine`, "
-        "or name its certificate in `[machine_state]`.",
+        "- Put what `cmm-uq report` wrote for the machine into the folder `machine`: its certificate, or `results.json` and "
+        "`posterior.npz`.",
         f"- **The figures marked {EXAMPLE} are nobody's.** Put in your own, then take the marks away, and "
         '`origin = "simulated"`.',
-        "- `cmm-uq check .` says what is missing or wrong.",
+        "- `cmm-uq check .` says what is missing or wrong; `cmm-uq part .` gives the uncertainties.",
+        "- Points that were measured make values and decisions of them: name their file in `[recording]`.",
     ]  # fmt: skip
     if left_out:
         lines += ["", "What was not understood of the plan, and is not measured:", ""]

@@ -10,17 +10,19 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.form import FormFacts
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.jobs.part.placing import rotation
-from cmm_uq.jobs.part.probed import Probed, whole_surface
+from cmm_uq.jobs.part.placing import readings, rotation
+from cmm_uq.jobs.part.probed import Probed, probed, whole_surface
 from cmm_uq.jobs.part.tables import StylusFacts
 from cmm_uq.parts.causes import Cause, Scatter
 from cmm_uq.parts.evaluating import Evaluator
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.of_form import Form
+from cmm_uq.parts.of_operator import of_points, reproducibility
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, around
 from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan, Stylus
 from cmm_uq.parts.virtual import Circumstances
+from cmm_uq.points import Floats, Machine
 from cmm_uq.units import MICROMETRE
 
 
@@ -75,23 +77,41 @@ def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: in
     places : where the part may lie, if it does not lie in the same place each time.
     """
     return Circumstances(
-        machine, poses_of(job, places), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
-        clamping_of(job, plan),
+        machine, poses_of(job, places, machine.machine), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
+        (*clamping_of(job, plan), *operators_of(job, plan)),
     )  # fmt: skip
 
 
-def poses_of(job: PartJob, count: int) -> tuple[Pose, ...]:
+def poses_of(job: PartJob, count: int, machine: Machine) -> tuple[Pose, ...]:
     """Where the part lies: the one place that is stated, or so many where it may lie.
 
     Parameters
     ----------
     count : of places, where they are not the same each time.
+    machine : in the middle of whose travel it lies where the job does not say where.
+
     """
     given = job.facts.placing
-    pose = Pose(rotation(given), np.array(given.origin_mm, dtype=np.float64))
+    pose = Pose(rotation(given), origin_of(job, machine))
     if not (any(given.u_origin_mm) or any(given.u_rotation_deg)):
         return (pose,)
     return around(pose, np.array(given.u_origin_mm), np.radians(given.u_rotation_deg), count)
+
+
+def origin_of(job: PartJob, machine: Machine) -> Floats:
+    """(3,) where the part's origin lies in coordinates of the machine, as the job says; else in the middle of the travel."""
+    if job.facts.placing.origin_mm is not None:
+        return np.array(job.facts.placing.origin_mm, dtype=np.float64)
+    return _in_the_middle(job, machine)
+
+
+def _in_the_middle(job: PartJob, machine: Machine) -> Floats:
+    """(3,) where the part's origin lies so that its points are in the middle of the travel, to the mm."""
+    styli = {one.name: one for one in job.facts.stylus}
+    first = job.facts.stylus[0].name
+    read = np.concatenate([readings(one, styli[one.facts.stylus or first], job.facts) for one in job.features])
+    read = read - job.facts.machine_state.origin_mm + machine.origin_mm
+    return np.asarray(np.round(machine.travel_mm.mean(axis=1) - 0.5 * (read.min(axis=0) + read.max(axis=0))))
 
 
 def surroundings_of(job: PartJob) -> Surroundings:
@@ -102,7 +122,7 @@ def surroundings_of(job: PartJob) -> Surroundings:
         Expansion(given.scales_cte_per_k, given.u_scales_cte_per_k, celsius, given.u_scales_k, given.compensated)
         for celsius in given.scales_c
     )
-    return Surroundings(part, (x, y, z), np.array(given.u_gradient_k_per_m))
+    return Surroundings(part, (x, y, z), np.array(given.u_gradient_k_per_m), given.u_drift_k)
 
 
 def forms_of(job: PartJob) -> tuple[Form, ...]:
@@ -122,6 +142,42 @@ def clamping_of(job: PartJob, plan: Plan) -> tuple[Cause, ...]:
     """What clamping does to each point on its own; none where nothing is stated."""
     size = MICROMETRE * job.facts.placing.u_fixture_um
     return (Scatter.of("fixture", "fixture", np.full((len(plan.points), 3), size)),) if size else ()
+
+
+def operators_of(job: PartJob, plan: Plan) -> tuple[Cause, ...]:
+    """What who measures does to each point, and to characteristics; none where nothing is stated."""
+    found: list[Cause] = []
+    if job.facts.probing.u_operator_um:
+        found.append(of_points(plan, job.facts.probing.u_operator_um))
+    stated = {
+        one.name: MICROMETRE * one.u_operator_um + float(np.radians(one.u_operator_deg))
+        for one in job.facts.characteristic
+        if one.u_operator_um or one.u_operator_deg
+    }
+    return (*found, reproducibility(plan, stated)) if stated else tuple(found)
+
+
+def doubled(job: PartJob) -> PartJob:
+    """The job with twice the points in every feature that is probed by a pattern, and nothing measured.
+
+    Raises
+    ------
+    CmmUqError : no feature is.
+    """
+    features = tuple(_doubled(one) for one in job.features)
+    if all(one is other for one, other in zip(features, job.features, strict=True)):
+        raise CmmUqError("has no feature that is probed by a pattern", where=str(job.folder / "job.toml"),
+                         fix="Give strategy in place of points_mm")  # fmt: skip
+    return replace(job, features=features, measured=None)
+
+
+def _doubled(one: Probed) -> Probed:
+    pattern = one.facts.strategy
+    if pattern is None:
+        return one
+    key = "columns" if pattern.pattern == "grid" else "points"
+    more = pattern.model_copy(update={key: 2 * (getattr(pattern, key) or 1)})
+    return probed(one.facts.model_copy(update={"strategy": more}), one.facts.name)
 
 
 _LOBED = ("circle", "cylinder", "cone")

@@ -38,10 +38,12 @@ class Verification:
     ----------
     given : the forms of the certificate.
     inquiry : what was found.
+    job : of the inputs, where they are there and sound.
     """
 
     given: Given
     inquiry: Inquiry
+    job: Job | None = None
 
     @property
     def subject(self) -> str:
@@ -73,7 +75,20 @@ def verify(
     CmmUqError : a file cannot be read, is hostile, or nothing of a certificate.
     """
     stage("Opening the files", 0.0)
-    given, inquiry = read_given(tuple(paths)), Inquiry()
+    return verify_given(read_given(tuple(paths)), rerun=rerun, trust=trust, schema=schema, compute=compute, stage=stage)
+
+
+def verify_given(
+    given: Given, *, rerun: bool = True, trust: Iterable[Path] | None = None, schema: Path | None = None,
+    compute: Compute | None = None, stage: Stage = lambda what, part: None,
+) -> Verification:  # fmt: skip
+    """Verify files that were read; see :func:`verify`.
+
+    Raises
+    ------
+    CmmUqError : a file is hostile, or nothing of a certificate.
+    """
+    inquiry = Inquiry()
     _check_schema(inquiry, given)
     open_digital(inquiry, given)
     check_files(inquiry, given)
@@ -101,7 +116,7 @@ def verify(
 
         check_style(inquiry, given.html[1], given.html[0])
     stage("Done", 1.0)
-    return Verification(given, inquiry)
+    return Verification(given, inquiry, job)
 
 
 def _version(given: Given) -> str:

@@ -108,12 +108,12 @@ def _decided(
     size: float, u: float, limit: float, rule: Rule, signed: bool, chances: tuple[float, float]
 ) -> tuple[Outcome, float | None]:
     """Outcome and guard band, by rules that need no prior."""
-    if (ratio := _least_ratio(rule)) is not None:
+    if (ratio := least_ratio(rule)) is not None:
         wide = (2 if signed else 1) * limit >= ratio * 2 * COVERAGE_FACTOR * u
         return (_by_band(size, limit, 0.0), 0.0) if wide else ("undecided", None)
-    if (risk := _risk(rule)) is not None:
+    if (risk := largest_risk(rule)) is not None:
         return _by_probability(size, limit, *chances, risk), _guard_band(u, limit, risk, signed)
-    width = _width(rule) * COVERAGE_FACTOR * u
+    width = guard_width(rule) * COVERAGE_FACTOR * u
     band = width if width <= limit else None
     if "non-binary" in rule_name(rule):
         return _in_four(size, limit, width), band
@@ -127,12 +127,12 @@ def _decided_knowing(
 ) -> tuple[Outcome, float | None]:
     """The same with a prior, of which rules that need none take no account."""
     size = abs(value) if signed else value
-    if (share := _share(rule)) is not None:
+    if (share := largest_share(rule)) is not None:
         accepted = acceptance_limit(share, limit, u, prior, signed=signed)
         if accepted is not None and size <= accepted:
             return "pass", limit - accepted
         return "fail" if size > limit else "undecided", None if accepted is None else limit - accepted
-    if (least := _posterior(rule)) is None:
+    if (least := least_probability(rule)) is None:
         beyond = _beyond(size, u, limit, signed)
         return _decided(size, u, limit, rule, signed, (_within(size, u, limit, signed, beyond), beyond))
     known = prior.after(value, u)
@@ -142,35 +142,35 @@ def _decided_knowing(
     return outcome, _posterior_band(u, limit, 1 - least, signed, prior, side)
 
 
-def _risk(rule: Rule) -> float | None:
+def largest_risk(rule: Rule) -> float | None:
     """Largest probability of a wrong acceptance, and of a wrong rejection; ``None`` for rules that do not go by it."""
     if isinstance(rule, FalseAccept):
         return rule.max_false_accept
     return 1 - CONFORMANCE_PROBABILITY if rule_name(rule).startswith("ISO 14253-1") else None
 
 
-def _least_ratio(rule: Rule) -> float | None:
+def least_ratio(rule: Rule) -> float | None:
     """N of an N : 1 rule."""
     if isinstance(rule, UncertaintyRatio):
         return rule.uncertainty_ratio
     return RATIO if rule_name(rule).startswith("ASME B89.7.3.1") else None
 
 
-def _posterior(rule: Rule) -> float | None:
+def least_probability(rule: Rule) -> float | None:
     """Least posterior probability of conforming."""
     if isinstance(rule, PosteriorProbability):
         return rule.posterior_probability
     return CONFORMANCE_PROBABILITY if rule_name(rule).startswith("JCGM 106") else None
 
 
-def _share(rule: Rule) -> float | None:
+def largest_share(rule: Rule) -> float | None:
     """Largest share of wrongly accepted items."""
     if isinstance(rule, UnconditionalRisk):
         return rule.max_unconditional_false_accept
     return UNCONDITIONAL if "Z540.3" in rule_name(rule) else None
 
 
-def _width(rule: Rule) -> float:
+def guard_width(rule: Rule) -> float:
     """Guard band in expanded uncertainties."""
     if isinstance(rule, GuardBand):
         return rule.guard_band
@@ -249,7 +249,7 @@ def rule_words(rule: Rule, band: float | None = None) -> Text:
     """A rule in words; ``band`` is its guard band in standard uncertainties."""
     if rule == "simple":
         return say("simple acceptance (JCGM 106:2012, 8.2.1)")
-    if (ratio := _least_ratio(rule)) is not None:
+    if (ratio := least_ratio(rule)) is not None:
         return say("simple acceptance with an uncertainty ratio of {ratio:g} : 1 (ASME B89.7.3.1-2001)", ratio=ratio)
     if isinstance(rule, GuardBand):
         return say("guard band {guard_band:g} U, k = 2 (ILAC-G8:09/2019)", guard_band=rule.guard_band)
@@ -258,9 +258,9 @@ def rule_words(rule: Rule, band: float | None = None) -> Text:
             "probability of false acceptance at most {max_false_accept:g} (JCGM 106:2012, 9.5)",
             max_false_accept=rule.max_false_accept,
         )
-    if (least := _posterior(rule)) is not None:
+    if (least := least_probability(rule)) is not None:
         return say("posterior probability of conforming at least {least:g} (JCGM 106:2012, 8.3)", least=least)
-    if (share := _share(rule)) is not None:
+    if (share := largest_share(rule)) is not None:
         return say("at most {share:g} of all items wrongly accepted (ANSI/NCSL Z540.3-2006, 5.3 b)", share=share)
     if rule_name(rule).startswith("ILAC-G8"):
         if "non-binary" in rule_name(rule):

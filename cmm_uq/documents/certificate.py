@@ -10,9 +10,14 @@ from cmm_uq.documents.conditions import conditions
 from cmm_uq.documents.document import Document, Facts, Section, Signature
 from cmm_uq.documents.origin import CERTIFICATE, DIGITAL, came_about, file_name
 from cmm_uq.documents.provenance import FILE as PROVENANCE
+from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
+from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed
+
+Row = tuple[Text, str]
+"""What a particular is, and what the job states of it; empty where it states nothing."""
 
 
 def certificate_of(
@@ -46,18 +51,14 @@ def certificate_of(
             came_about=came_about(job),
             date=day(facts.job.date),
         ),
-        issuer=tuple(
-            Verbatim(line) for line in (facts.laboratory.name, *facts.laboratory.address.splitlines()) if line
-        ),
+        issuer=issuer_of(facts.laboratory),
         particulars=_particulars(facts, decided),
         warnings=(*told, *formal_warnings(job)),
         sections=tuple(sorted(
             (replace(first, blocks=(*first.blocks, under)) if under.rows else first, *others), key=lambda one: one.opinion
         )),
-        statements=(*STATEMENTS, NOT_OURS) if facts.job.from_customer else STATEMENTS,
-        signatures=(Signature(Verbatim(facts.laboratory.signatory), Verbatim(facts.laboratory.signatory_role)),)
-        if facts.laboratory.signatory
-        else (),
+        statements=statements_of(facts.job),
+        signatures=signatures_of(facts.laboratory),
         attachments=(
             *names(job.inputs), Verbatim("results.json"), Verbatim(file_name(DIGITAL, job.origin)), *files,
             Verbatim(PROVENANCE),
@@ -70,18 +71,10 @@ def certificate_of(
 
 
 def _particulars(facts: JobFile, decided: Text) -> tuple[Facts, ...]:
-    job, machine, laboratory = facts.job, facts.machine, facts.laboratory
-    measured = job.origin == MEASURED
-    groups = (
+    job, machine = facts.job, facts.machine
+    return grouped(
         (
-            (say("Certificate number") if measured else say("Job"), job.number if measured and job.number else job.id),
-            *(_replacement(job) if measured else ()),
-            (say("Customer"), "\n".join(filter(None, (job.customer, job.address)))),
-            (say("Order"), job.order),
-            (say("Accreditation"), laboratory.accreditation if measured else ""),
-            (say("Date of measurement") if job.origin != SIMULATED else say("Date"), day(job.date)),
-            (say("Date of receipt"), day(job.received) if job.received else ""),
-            (say("Date of issue"), day(job.issued) if job.issued else ""),
+            *identified(job, facts.laboratory, job.origin),
             (say("Next calibration, as agreed with the customer"), _agreed(job)),
         ),
         (
@@ -92,20 +85,60 @@ def _particulars(facts: JobFile, decided: Text) -> tuple[Facts, ...]:
             (say("Measuring range"), _travel(facts)),
             (say("Place"), job.place),
         ),
-        (
-            (say("Method"), job.procedure),
-            (say("Deviations from the method"), job.deviations),
-            (say("Results of external providers"), job.external),
-            (say("Data from the customer"), job.from_customer),
-            (say("Operator"), job.operator),
-            (say("Remarks"), job.remarks),
-            (say("Conformity"), decided),
-        ),
+        (*performed(job), (say("Conformity"), decided)),
     )
+
+
+def grouped(*groups: tuple[Row, ...]) -> tuple[Facts, ...]:
+    """Particulars, without what a job does not state."""
     return tuple(Facts(rows) for group in groups if (rows := tuple((k, foreign(v)) for k, v in group if v)))
 
 
-def _replacement(job: JobFacts) -> tuple[tuple[Text, str], ...]:
+def identified(job: Identification, laboratory: Laboratory, origin: str) -> tuple[Row, ...]:
+    """Number, customer, order and dates of any certificate."""
+    measured = origin == MEASURED
+    return (
+        (say("Certificate number") if measured else say("Job"), job.number if measured and job.number else job.id),
+        *(_replacement(job) if measured else ()),
+        (say("Customer"), "\n".join(filter(None, (job.customer, job.address)))),
+        (say("Order"), job.order),
+        (say("Accreditation"), laboratory.accreditation if measured else ""),
+        (say("Date of measurement") if origin != SIMULATED else say("Date"), day(job.date)),
+        (say("Date of receipt"), day(job.received) if job.received else ""),
+        (say("Date of issue"), day(job.issued) if job.issued else ""),
+    )
+
+
+def performed(job: Identification) -> tuple[Row, ...]:
+    """How, by whom, and with whose data anything was measured."""
+    return (
+        (say("Method"), job.procedure),
+        (say("Deviations from the method"), job.deviations),
+        (say("Results of external providers"), job.external),
+        (say("Data from the customer"), job.from_customer),
+        (say("Operator"), job.operator),
+        (say("Remarks"), job.remarks),
+    )
+
+
+def issuer_of(laboratory: Laboratory) -> tuple[Text, ...]:
+    """Name and address, a line each."""
+    return tuple(Verbatim(line) for line in (laboratory.name, *laboratory.address.splitlines()) if line)
+
+
+def signatures_of(laboratory: Laboratory) -> tuple[Signature, ...]:
+    """Who authorises, where it is stated."""
+    if not laboratory.signatory:
+        return ()
+    return (Signature(Verbatim(laboratory.signatory), Verbatim(laboratory.signatory_role)),)
+
+
+def statements_of(job: Identification) -> tuple[Text, ...]:
+    """What stands before the signatures."""
+    return (*STATEMENTS, NOT_OURS) if job.from_customer else STATEMENTS
+
+
+def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
     """Which certificate this one replaces, why, and what changed (7.8.8)."""
     replaced = job.replaces
     if replaced is None:

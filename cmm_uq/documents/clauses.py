@@ -14,7 +14,9 @@ from cmm_uq.conformity.decision import rule_name
 from cmm_uq.documents.origin import CERTIFICATE
 from cmm_uq.documents.traceability_section import statement_of_traceability
 from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.replaced import Replaced
 from cmm_uq.messages import Text, Verbatim, day, say
@@ -105,7 +107,7 @@ def replaced_certificate(replaced: Replaced) -> Text:
     return say("{number} of {date}", number=Verbatim(replaced.number), date=day(replaced.date))
 
 
-def _asked(clause: str, asks: str, stated: object, key: str = "") -> Clause:
+def asked(clause: str, asks: str, stated: object, key: str = "") -> Clause:
     """Of every certificate."""
     return Clause(clause, asks, "stated" if stated else "missing", _plain(stated), key)
 
@@ -130,35 +132,47 @@ def _lines(parts: Iterable[str]) -> str:
 def _reporting(facts: JobFile) -> tuple[Clause, ...]:
     return (
         _done("7.8.1.1", "results reviewed and authorised before release", "[laboratory] four_eyes"),
-        _asked("7.8.1.2", "results and all that their interpretation needs, in a report", _number(facts)),
+        asked("7.8.1.2", "results and all that their interpretation needs, in a report", _number(facts)),
         _done("7.8.1.3", "a simplified report only as agreed with the customer"),
     )
 
 
 def _of_every_report(facts: JobFile) -> tuple[Clause, ...]:
-    job, laboratory, machine = facts.job, facts.laboratory, facts.machine
+    machine = facts.machine
     named = (machine.manufacturer, machine.model, machine.name)
     item = f"{_lines(named)}, serial number {machine.serial}" if machine.serial else ""
+    serial = asked("7.8.2.1 g", say("serial number of the machine"), item, "[machine] serial")
+    return of_every_report(facts.job, facts.laboratory, CERTIFICATE, serial)
+
+
+def of_every_report(job: Identification, laboratory: Laboratory, title: str, item: Clause) -> tuple[Clause, ...]:
+    """7.8.2.1 of any report.
+
+    Parameters
+    ----------
+    title : of the document.
+    item : what names the item (7.8.2.1 g).
+    """
     return (
-        _asked("7.8.2.1 a", "title", CERTIFICATE),
-        _asked("7.8.2.1 b", say("name of the laboratory"), laboratory.name, "[laboratory] name"),
-        _asked("7.8.2.1 b", say("address of the laboratory"), _lines([laboratory.address]), "[laboratory] address"),
-        _asked("7.8.2.1 c", say("place of the measurement"), job.place, "[job] place"),
-        _asked("7.8.2.1 d", "every part known as part of one report, and its end",
-               f"number {_number(facts)} and page of pages on every page; mark of the end", "[job] number"),
-        _asked("7.8.2.1 e", say("customer"), job.customer, "[job] customer"),
-        _asked("7.8.2.1 e", say("how to reach the customer"), _lines([job.address]), "[job] address"),
-        _asked("7.8.2.1 f", say("method"), job.procedure, "[job] procedure"),
-        _asked("7.8.2.1 g", say("serial number of the machine"), item, "[machine] serial"),
+        asked("7.8.2.1 a", "title", title),
+        asked("7.8.2.1 b", say("name of the laboratory"), laboratory.name, "[laboratory] name"),
+        asked("7.8.2.1 b", say("address of the laboratory"), _lines([laboratory.address]), "[laboratory] address"),
+        asked("7.8.2.1 c", say("place of the measurement"), job.place, "[job] place"),
+        asked("7.8.2.1 d", "every part known as part of one report, and its end",
+               f"number {job.number or job.id} and page of pages on every page; mark of the end", "[job] number"),
+        asked("7.8.2.1 e", say("customer"), job.customer, "[job] customer"),
+        asked("7.8.2.1 e", say("how to reach the customer"), _lines([job.address]), "[job] address"),
+        asked("7.8.2.1 f", say("method"), job.procedure, "[job] procedure"),
+        item,
         _where("7.8.2.1 h", "date of receipt, where it matters", job.received, "[job] received"),
-        _asked("7.8.2.1 i", "date of the measurement", job.date, "[job] date"),
-        _asked("7.8.2.1 j", say("date of issue"), job.issued, "[job] issued"),
+        asked("7.8.2.1 i", "date of the measurement", job.date, "[job] date"),
+        asked("7.8.2.1 j", say("date of issue"), job.issued, "[job] issued"),
         _where("7.8.2.1 k", "sampling plan, where anything is sampled", ""),
-        _asked("7.8.2.1 l", "that the results relate to the item alone", STATEMENTS[0]),
-        _asked("7.8.2.1 m", "results with their units", "the unit with every figure"),
+        asked("7.8.2.1 l", "that the results relate to the item alone", STATEMENTS[0]),
+        asked("7.8.2.1 m", "results with their units", "the unit with every figure"),
         _where("7.8.2.1 n", "additions to, deviations from and exclusions from the method", job.deviations,
                "[job] deviations"),
-        _asked("7.8.2.1 o", say("who authorises it"), _lines([laboratory.signatory, laboratory.signatory_role])
+        asked("7.8.2.1 o", say("who authorises it"), _lines([laboratory.signatory, laboratory.signatory_role])
                if laboratory.signatory else "", "[laboratory] signatory"),
         _where("7.8.2.1 p", "results from external providers", job.external, "[job] external"),
         _where("7.8.2.2", "data from the customer, and that the laboratory does not answer for them", job.from_customer,
@@ -169,16 +183,16 @@ def _of_every_report(facts: JobFile) -> tuple[Clause, ...]:
 def _of_a_calibration(facts: JobFile) -> tuple[Clause, ...]:
     job = facts.job
     return (
-        _asked("7.8.4.1 a", "measurement uncertainty in the unit of the result",
+        asked("7.8.4.1 a", "measurement uncertainty in the unit of the result",
                "U, k and 95 % with every result", "[laboratory] cmc"),
-        _asked("7.8.4.1 b", say("conditions"), job.conditions, "[job] conditions"),
+        asked("7.8.4.1 b", say("conditions"), job.conditions, "[job] conditions"),
         *_traceable(facts),
         _where("7.8.4.1 d", "results before and after an adjustment", job.as_found, "[job] as_found"),
         _where("7.8.4.1 e", "statement of conformity", _standards(facts), "[[conformity]]"),
         _where("7.8.4.1 f", "opinions and interpretations", "annex of opinions and interpretations",
                "[job] diagnosis_on_certificate"),
         _where("7.8.4.2", "sampling by the laboratory", ""),
-        _asked("7.8.4.3", "no calibration interval that was not agreed with the customer",
+        asked("7.8.4.3", "no calibration interval that was not agreed with the customer",
                f"next calibration as agreed: {job.recalibration_agreed}" if job.recalibration_agreed else "none is printed",
                "[job] recalibration_agreed"),
     )  # fmt: skip
@@ -193,15 +207,15 @@ def _traceable(facts: JobFile) -> tuple[Clause, ...]:
     if facts.short_gauge is not None:
         found += _chain(facts.short_gauge.certificate, "[short_gauge.certificate]", say("certificate of the short gauge"),
                         say("who certified the short gauge"))  # fmt: skip
-    statement = _asked("7.8.4.1 c", "how the results are traceable", statement_of_traceability(facts))
+    statement = asked("7.8.4.1 c", "how the results are traceable", statement_of_traceability(facts))
     return (statement, *found)
 
 
 def _chain(chain: Traceability | None, table: str, certificate: Text, laboratory: Text) -> tuple[Clause, ...]:
     stated = chain or Traceability()
     return (
-        _asked("7.8.4.1 c", certificate, stated.number, f"{table} number"),
-        _asked("7.8.4.1 c", laboratory, stated.laboratory, f"{table} laboratory"),
+        asked("7.8.4.1 c", certificate, stated.number, f"{table} number"),
+        asked("7.8.4.1 c", laboratory, stated.laboratory, f"{table} laboratory"),
     )
 
 

@@ -5,7 +5,9 @@ A recording that nobody measured has no certificate, so nothing is asked of it.
 
 from __future__ import annotations
 
-from cmm_uq.documents.clauses import missing
+from collections.abc import Iterable
+
+from cmm_uq.documents.clauses import Clause, missing
 from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
@@ -29,9 +31,14 @@ def contradictions(job: Job) -> tuple[Text, ...]:
 
 
 def _missing(facts: JobFile) -> list[Text]:
+    return not_stated(missing(facts))
+
+
+def not_stated(lacking: Iterable[Clause]) -> list[Text]:
+    """That a certificate is not complete, and by which keys it would be; nothing of one that is."""
     wanted = [
         say("{what} ({clause}): {key}", what=foreign(one.asks), clause=Verbatim(one.clause), key=Verbatim(one.key))
-        for one in missing(facts)
+        for one in lacking
     ]
     if not wanted:
         return []

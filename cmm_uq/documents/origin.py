@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import PurePosixPath
 
 from cmm_uq.documents.document import Document
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import COMPENSATED, MEASURED, SIMULATED
+from cmm_uq.jobs.origin import COMPENSATED, MEASURED, SIMULATED, Origin
 from cmm_uq.messages import Text, Verbatim, after, commas, names, say
 
 BANNERS = {
@@ -37,15 +38,27 @@ def marked(document: Document, job: Job) -> Document:
 
     Nobody signs for such a recording, it has no certificate's number, and its first warning says what it is.
     """
-    warnings = (*origin_warnings(job), *document.warnings)
-    if job.origin == MEASURED:
+    return marked_as(document, job.origin, job.facts.job.id, origin_warnings(job))
+
+
+def marked_as(document: Document, origin: Origin, id: str, told: Iterable[Text]) -> Document:  # noqa: A002
+    """The same of any document.
+
+    Parameters
+    ----------
+    origin : of what was measured.
+    id : of the job.
+    told : warnings of where it comes from.
+    """
+    warnings = (*told, *document.warnings)
+    if origin == MEASURED:
         return replace(document, warnings=warnings)
     is_certificate = document.title == CERTIFICATE
     return replace(
         document,
-        title=TITLES[job.origin] if is_certificate else _of_such(document.title, job.origin),
-        number=Verbatim(job.facts.job.id),
-        banner=BANNERS[job.origin],
+        title=TITLES[origin] if is_certificate else _of_such(document.title, origin),
+        number=Verbatim(id),
+        banner=BANNERS[origin],
         draft=False,
         warnings=warnings,
         statements=(),

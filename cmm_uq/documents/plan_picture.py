@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 A_ROW = 3
 """Pictures side by side."""
 
-_DEPTH = 0.5 * np.array([np.cos(np.radians(38.0)), np.sin(np.radians(38.0))])
+DEPTH = 0.5 * np.array([np.cos(np.radians(38.0)), np.sin(np.radians(38.0))])
 """How the y axis runs into the picture."""
 
 _REACH, _BELOW = 0.04, 0.064
@@ -107,7 +107,7 @@ def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
 
 def _seen(xyz: Floats) -> Floats:
     """Points (n, 3) as drawn (n, 2): x to the right, z up, y into the picture."""
-    return np.asarray(xyz[:, [0, 2]] + xyz[:, 1:2] * _DEPTH)
+    return np.asarray(xyz[:, [0, 2]] + xyz[:, 1:2] * DEPTH)
 
 
 def _draw(ax: Axes, placing: Placing, box: Floats) -> None:

@@ -340,15 +340,36 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
         return drawn(figure, caption, alternative)
 
 
-_NAMES_MM = 54.0
+NAMES_MM = 54.0
 """Room of the names beside the bars of a budget."""
 
 
 def _cut(text: Text, length: int) -> Text:
-    said = lettered(text)
-    if said is not text:  # longer or wider letters than English ones
-        kept = str.__str__(said)
-        while width_mm(kept, SMALL) > _NAMES_MM:
-            kept = kept.removesuffix("…")[:-1].rstrip(" ,") + "…"
-        return Said(kept, text)
+    """A name for the room beside the bars of a picture, at most so many letters long; it stands whole in a table."""
+    if lettered(text) is not text:  # longer or wider letters than English ones
+        return narrowed(text, NAMES_MM)
     return text if len(text) <= length else Verbatim(text[: length - 1] + "…")
+
+
+def narrowed(text: Text, room_mm: float) -> Text:
+    """A name as it is lettered, cut to the room that it has."""
+    said = lettered(text)
+    whole = str.__str__(said)
+    kept = whole if width_mm(whole, SMALL) <= room_mm else _longest(whole, room_mm)
+    if kept == text:
+        return text
+    return Verbatim(kept) if said is text else Said(kept, text)
+
+
+def _longest(text: str, room_mm: float) -> str:
+    """The longest beginning of a text that has room, with what says that it goes on."""
+    fits, too_long, trial = 0, len(text), len(text) // 2
+    while too_long - fits > 1:
+        width = width_mm(_going_on(text, trial), SMALL)
+        fits, too_long = (trial, too_long) if width <= room_mm else (fits, trial)
+        trial = min(max(round(trial * room_mm / width), fits + 1), too_long - 1)
+    return _going_on(text, fits)
+
+
+def _going_on(text: str, count: int) -> str:
+    return text[:count].rstrip(" ,") + "…"

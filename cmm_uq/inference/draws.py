@@ -114,6 +114,34 @@ class Draws(Mapping[str, Floats]):
                 members.writestr(entry, member.getvalue())
         return archive.getvalue()
 
+    @classmethod
+    def of_npz(cls, content: bytes, where: str) -> Draws:
+        """Draws as :meth:`as_npz` wrote them.
+
+        Raises
+        ------
+        CmmUqError : it is no such archive, or a draw in it is no finite number.
+        """
+        fix = "Give posterior.npz as cmm-uq report wrote it"
+        try:
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                if sum(member.file_size for member in archive.infolist()) > 2 * max(len(content), 1):
+                    raise ValueError("its parts are larger than the file")
+            with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+                names, units, every = arrays["names"].tolist(), arrays["units"].tolist(), int(arrays["every"])
+                array = np.asarray(arrays["centre"] + arrays["draws"].astype(np.float64))
+        except (ValueError, KeyError, TypeError, EOFError, OSError, NotImplementedError, zipfile.BadZipFile) as error:
+            raise CmmUqError(f"is no file of draws ({error})", where=where, fix=fix) from None
+        if array.ndim != 3 or not array.size or len(names) != array.shape[2] or len(units) != len(names):
+            raise CmmUqError(f"draws {array.shape} do not fit {len(names)} names", where=where, fix=fix)
+        if not np.isfinite(array).all():
+            raise CmmUqError("a draw is no finite number", where=where, fix=fix)
+        return cls(dict(zip(map(str, names), map(str, units), strict=True)), array, every)
+
+    def flat(self) -> dict[str, Floats]:
+        """Each quantity (chain · draw,), by name."""
+        return {name: np.ascontiguousarray(self.array[:, :, i]).ravel() for i, name in enumerate(self.names)}
+
     def to_arviz(self) -> Any:
         """The draws as ``arviz.InferenceData``, group ``posterior``.
 

@@ -22,8 +22,8 @@ class Source(Protocol):
         """Of job.toml; for messages where it lies in no folder."""
         ...
 
-    def has(self, name: str) -> bool:
-        """Whether the file is there."""
+    def has(self, name: str, *, written: bool = False) -> bool:
+        """Whether the file is there; see :meth:`content`."""
         ...
 
     def job_file(self, limit: Limit, fix: str) -> bytes:
@@ -51,9 +51,9 @@ class InFolder:
 
     toml: Path
 
-    def has(self, name: str) -> bool:
+    def has(self, name: str, *, written: bool = False) -> bool:
         """See :meth:`Source.has`."""
-        return os.path.lexists(inside(self.toml.parent, name, str(self.toml)))
+        return os.path.lexists(inside(self.toml.parent, name, str(self.toml), written=written))
 
     def job_file(self, limit: Limit, fix: str) -> bytes:
         """See :meth:`Source.job_file`."""
@@ -75,7 +75,7 @@ class InMemory:
         """See :attr:`Source.toml`."""
         return Path("job.toml")
 
-    def has(self, name: str) -> bool:
+    def has(self, name: str, *, written: bool = False) -> bool:
         """See :meth:`Source.has`."""
         return name in self.files
 

@@ -65,20 +65,38 @@ def read_given(paths: Iterable[Path]) -> Given:
     ------
     CmmUqError : one cannot be read, is nothing of a certificate, or there are two of a form.
     """
-    given = Given()
+    read: dict[str, tuple[bytes, str]] = {}
     for path in _files(paths):
-        name = path.name
-        if name in given.contents:
-            raise CmmUqError(f"there are two files {name!r}, and one certificate is verified at a time", where=str(path),
+        if path.name in read:
+            raise CmmUqError(f"there are two files {path.name!r}, and one certificate is verified at a time", where=str(path),
                              fix=_FIX)  # fmt: skip
-        given.contents[name] = content_of(path, PDF_BYTES, _FIX)
-        _sort(given, name, given.contents[name], str(path))
+        read[path.name] = content_of(path, PDF_BYTES, _FIX), str(path)
+    return _given(read)
+
+
+def given_of(files: Mapping[str, bytes]) -> Given:
+    """The same of files that were read already, by name, or by their path in a folder that holds one certificate.
+
+    Raises
+    ------
+    CmmUqError : see :func:`read_given`.
+    """
+    return _given({name.rpartition("/")[2]: (content, name) for name, content in files.items()})
+
+
+def _given(read: Mapping[str, tuple[bytes, str]]) -> Given:
+    """Contents of files by name, each with how messages name it."""
+    given = Given()
+    for name, (content, where) in read.items():
+        given.contents[name] = content
+        _sort(given, name, content, where)
     if given.results is None and given.pdf is not None and RESULTS in given.pdf[1].files:
         content = given.pdf[1].files[RESULTS]
         where = f"{RESULTS} in {given.pdf[0]}"
         given.results = where, strict_json(content, where), content
     if given.results is None and not (given.pdf or given.html or given.xml):
-        raise CmmUqError("nothing given is a certificate", where=", ".join(map(str, paths)), fix=_FIX)
+        told = ", ".join(where for _, where in read.values())
+        raise CmmUqError("nothing given is a certificate", where=told, fix=_FIX)
     return given
 
 

@@ -17,9 +17,7 @@ from cmm_uq.commands.report import write_report
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.errors import CmmUqError
 from tests.cli.process import run
-from tests.conftest import ROOT
-
-EXAMPLES = sorted(path.parent for path in (ROOT / "examples").glob("*/job.toml"))
+from tests.conftest import MACHINE_JOBS, ROOT
 
 
 @pytest.fixture
@@ -36,7 +34,7 @@ def change(path: Path, pattern: str, replacement: str) -> int:
     return text.count("\n", 0, match.start()) + 1
 
 
-@pytest.mark.parametrize("folder", EXAMPLES, ids=lambda folder: folder.name)
+@pytest.mark.parametrize("folder", MACHINE_JOBS, ids=lambda folder: folder.name)
 def test_an_example_is_sound_unless_it_is_still_to_be_measured(folder: Path) -> None:
     found = check_job(folder)
     if folder.name.startswith("plan-"):

@@ -18,7 +18,9 @@ from cmm_uq.files.limits import OBSERVATIONS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NO_POINTS = {"shift-simulated", "shift-plate-simulated", "iota-1102-maps"}
-KINDS = sorted({path.parent.name for path in EXAMPLES.glob("*/*.csv")} - NO_POINTS)
+KINDS = sorted(
+    {path.parent.name for path in EXAMPLES.glob("*/*.csv") if not path.parent.name.startswith("part-")} - NO_POINTS
+)
 Damage = Callable[[pd.DataFrame], pd.DataFrame]
 
 

@@ -188,7 +188,7 @@ def test_circumstances_are_in_the_units_of_the_virtual_measurement() -> None:
         },
         form={"field_um": 1.0, "harmonics_um": {"3": 0.5}},
     )
-    (pose,) = poses_of(job, 20)
+    (pose,) = poses_of(job, 20, Machine())
     np.testing.assert_allclose(pose.of(np.array([1.0, 0.0, 0.0])), [300, 451, -500])  # x of the part lies along y
     around = surroundings_of(job)
     assert (around.part.temperature_c, around.part.u_temperature_k, around.part.corrected) == (21.0, 0.1, False)
@@ -205,7 +205,7 @@ def test_noise_of_the_readings_goes_through_to_the_diameter() -> None:
     """A least-squares diameter of n points in regular sections has u = 2σ/√n, to first order exactly."""
     sigma, n, count = 1e-3, 24, 20_000
     job = plate(stylus=[{"name": "down", "diameter_mm": 4.0, "offset_mm": [0.0, 0.0, -150.0]}], environment=None, form=None,
-                part={"name": "plate"}, characteristic=[TABLES["characteristic"][0]])  # fmt: skip
+                placing={"origin_mm": [0.0, 0.0, 0.0]}, part={"name": "plate"}, characteristic=[TABLES["characteristic"][0]])  # fmt: skip
     found = plan_of(job)
     state = MachineState(Machine("CMM"), (), np.zeros((1, 0)), StatedNoise(np.full(3, sigma)))
     given = circumstances_of(job, state, found, 1)
@@ -229,7 +229,7 @@ def test_a_whole_surface_is_probed_from_end_to_end() -> None:
 
 def test_a_part_that_is_put_down_anew_each_time_lies_in_many_places() -> None:
     job = plate(placing={"origin_mm": [300.0, 450.0, -500.0], "u_origin_mm": [20.0, 20.0, 0.0]})
-    places = np.array([pose.translation_mm for pose in poses_of(job, 50)])
+    places = np.array([pose.translation_mm for pose in poses_of(job, 50, Machine())])
     assert len(places) == 50
     assert np.ptp(places[:, 2]) == 0
     assert np.ptp(places[:, 0]) > 20

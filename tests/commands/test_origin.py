@@ -21,7 +21,7 @@ from cmm_uq.commands.simulate import write_simulation
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.derived_job import derived_toml
 from tests.commands.test_compensate import named, straight
-from tests.conftest import ROOT
+from tests.conftest import MACHINE_JOBS, ROOT
 
 TRUTH = "seed = 3\n[effects.squareness_xy]\nangle_arcsec = -40.0\n[noise]\ncoordinate_um = 1.0\n"
 BANNER = "SIMULATED RECORDING, not a calibration certificate"
@@ -238,9 +238,7 @@ def test_a_layout_that_cannot_be_kept_loses_its_comments_and_no_value(job: Path)
         assert data[table] == before[table]
 
 
-@pytest.mark.parametrize(
-    "folder", sorted(path.parent for path in ROOT.glob("examples/*/job.toml")), ids=lambda p: p.name
-)
+@pytest.mark.parametrize("folder", MACHINE_JOBS, ids=lambda p: p.name)
 def test_every_example_that_was_not_measured_says_so(folder: Path) -> None:
     job = read_job(folder, recorded=False)
     expected = (

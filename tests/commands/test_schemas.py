@@ -13,10 +13,8 @@ from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.schema import keys_of
 from cmm_uq.kinds import kind_named
-from tests.conftest import ROOT
+from tests.conftest import MACHINE_JOBS, ROOT
 from tests.plugin.packages import OUTSIDE_EFFECTS, OUTSIDE_KINDS, install
-
-EXAMPLES = sorted(path.parent for path in (ROOT / "examples").glob("*/job.toml"))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +53,7 @@ def test_schemas_hold_no_reference_and_no_null() -> None:
         assert "null" not in text
 
 
-@pytest.mark.parametrize("folder", EXAMPLES, ids=lambda folder: folder.name)
+@pytest.mark.parametrize("folder", MACHINE_JOBS, ids=lambda folder: folder.name)
 def test_an_example_is_valid(folder: Path, job: jsonschema.Draft7Validator) -> None:
     job.validate(told(folder))
 

@@ -24,7 +24,7 @@ from cmm_uq.documents.html import render_html
 from cmm_uq.documents.origin import marked
 from cmm_uq.documents.pdf import render_pdf
 from cmm_uq.uncertainty.model_file import read_model_file
-from tests.conftest import ROOT
+from tests.conftest import MACHINE_JOBS, ROOT
 from tests.documents.samples import ballbar_certificate
 from tests.documents.test_html_layout import CONTRASTS, LABELS_COLLIDING, OVERLAPS, WIDER_THAN_PAPER
 from tests.documents.test_translatable import MODEL
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 REPORTED = sorted(
-    path.name for path in (ROOT / "examples").iterdir()
+    path.name for path in MACHINE_JOBS
     if not path.name.startswith("plan-") and path.name != "iota-1102-maps"
 )  # fmt: skip
 

@@ -29,12 +29,12 @@ from cmm_uq.uncertainty.model_file import ModelFile, read_model_file
 from cmm_uq.uncertainty.ready_model import READY as MODELS
 from cmm_uq.units import Unit, unit
 from tests.catalogues import TRANSLATED
-from tests.conftest import ROOT
+from tests.conftest import MACHINE_JOBS, ROOT
 from tests.documents.saying import figures, leaves, strangers, untranslated
 from tests.kinds.simulated import diagnosed, document, planned
 from tests.uncertainty.test_ready_budget import BALLBAR, LENGTH, PROBING, SIMULATED, SPHERE, USE, ready
 
-EXAMPLES = sorted(path.name for path in (ROOT / "examples").iterdir() if (path / "job.toml").exists())
+EXAMPLES = [path.name for path in MACHINE_JOBS]
 KEYS = [
     f"[{table}] {key}"
     for table, keys in (("job", JobFacts), ("laboratory", Laboratory), ("machine", MachineFacts),

@@ -17,7 +17,7 @@ from cmm_uq.commands.analysis import outcome_of
 from cmm_uq.documents.document import Document, Table
 from cmm_uq.documents.results_file import as_json
 from cmm_uq.kinds.shift_plate.curves_page import EVERY
-from tests.conftest import ROOT
+from tests.conftest import MACHINE_JOBS
 from tests.kinds.reading import tables
 from tests.kinds.simulated import analysed, document
 
@@ -25,7 +25,7 @@ Record = Sequence[Any]
 Results = Mapping[str, Any]
 
 EXAMPLES = sorted(
-    folder.name for folder in (ROOT / "examples").iterdir()
+    folder.name for folder in MACHINE_JOBS
     if not folder.name.startswith("plan-") and folder.name != "iota-1102-maps"  # which is diagnosed, not certified
 )  # fmt: skip
 

@@ -20,10 +20,7 @@ def _plane(
 
 TABLES: Mapping[str, Any] = MappingProxyType({
     "part": {"name": "Plate", "drawing": "", "cte_per_k": 11.5e-6, "u_cte_per_k": 0.5e-6},
-    "machine_state": {
-        "certificate": "machine",
-        "travel_mm": {"x": [0.0, 700.0], "y": [0.0, 1000.0], "z": [-600.0, 0.0]},
-    },
+    "machine_state": {"certificate": "machine"},
     "stylus": [
         {"name": "down", "diameter_mm": 4.0, "offset_mm": [0.0, 0.0, -150.0], "u_diameter_um": 0.3, "lobing_um": 0.3},
     ],
@@ -38,7 +35,6 @@ TABLES: Mapping[str, Any] = MappingProxyType({
         },
     ],
     "alignment": {"datums": ["A", "B", "C"]},
-    "placing": {"origin_mm": [300.0, 450.0, -500.0]},
     "environment": {"u_part_k": 0.1, "u_scales_k": 0.1},
     "form": {"field_um": 1.0, "roughness_um": 0.2},
     "characteristic": [

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from cmm_uq.jobs.part.feature import Association, Kind
-from cmm_uq.jobs.table import Length, Position, Table
+from cmm_uq.jobs.table import Length, Position, Table, Uncertainty
 
 What = Literal[
     "size", "straightness", "flatness", "roundness", "cylindricity", "sphericity", "distance", "angle", "parallelism",
@@ -92,6 +92,10 @@ class CharacteristicFacts(Table):
     """Lower limit of an angle."""
     upper_deg: Degrees | None = None
     """Upper limit of an angle."""
+    u_operator_um: Uncertainty = 0.0
+    """Standard uncertainty by who measures and how, of repeats of one's own; of a length."""
+    u_operator_deg: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """The same of an angle, °."""
     association: Association | None = None
     """How its features are made of their points, where not as they say themselves."""
 
@@ -125,6 +129,9 @@ class CharacteristicFacts(Table):
         for key in (key for keys in LIMITS.values() for key in keys):
             if getattr(self, key) is not None and key not in own:
                 raise ValueError(f"a {self.what} has no {key}: its limits are {' and '.join(own)}")
+        other = "u_operator_um" if self.asks.limits == "angles" else "u_operator_deg"
+        if getattr(self, other):
+            raise ValueError(f"a {self.what} has no {other}: give the other one")
         for low, high in ((self.lower_mm, self.upper_mm), (self.lower_deg, self.upper_deg)):
             if low is not None and high is not None and not low < high:
                 raise ValueError(

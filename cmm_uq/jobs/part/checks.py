@@ -172,6 +172,8 @@ def _frame_of_a_coordinate(one: CharacteristicFacts, features: Mapping[str, Prob
 
 def _travel(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
     """That the axes reach every point: once an axis, by its farthest point."""
+    if facts.placing.origin_mm is None:
+        return
     given, styli = facts.machine_state.travel_mm, {one.name: one for one in facts.stylus}
     named = list(features.values())
     read = [readings(one, styli[one.facts.stylus or facts.stylus[0].name], facts) for one in named]

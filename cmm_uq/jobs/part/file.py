@@ -8,6 +8,7 @@ from pydantic import Field
 
 from cmm_uq.files.limits import INPUTS
 from cmm_uq.jobs.laboratory import Laboratory
+from cmm_uq.jobs.part.by_tables import CalibratedPartFacts, OrientationsFacts
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.feature import FeatureFacts
 from cmm_uq.jobs.part.form import FormFacts
@@ -57,3 +58,7 @@ class PartFile(Table):
     """By which rule conformity with the drawing is decided."""
     recording: MeasuredFacts | None = None
     """The points as they were measured; without them there are uncertainties alone."""
+    by_calibrated_part: CalibratedPartFacts | None = None
+    """A calibrated part like this one, measured again and again (ISO 15530-3): its uncertainty stands beside this one's."""
+    by_orientations: OrientationsFacts | None = None
+    """The part in several orientations with standards beside it (ISO/DTS 15530-2 as described): likewise."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from cmm_uq.errors import CmmUqError, Gathered
 from cmm_uq.files.content import text_of
-from cmm_uq.files.limits import JOB_BYTES, LISTED, TABLE_BYTES
+from cmm_uq.files.limits import JOB_BYTES, JSON_BYTES, LISTED, TABLE_BYTES
 from cmm_uq.files.toml import toml_of
 from cmm_uq.jobs.file_names import RESULTS
-from cmm_uq.jobs.origin import check_examples, check_mark
+from cmm_uq.jobs.origin import COMPENSATED, SIMULATED, check_examples, check_mark
+from cmm_uq.jobs.part.by_readings import OtherReadings, other_readings
 from cmm_uq.jobs.part.checks import check_names, check_plan
 from cmm_uq.jobs.part.file import PartFile
 from cmm_uq.jobs.part.located import Places
@@ -25,7 +27,8 @@ from cmm_uq.points import Floats
 from cmm_uq.writing import finish_interrupted
 
 _FIX = "A part's job is a folder with a job.toml; cmm-uq new part begins one"
-_CERTIFICATES = (".pdf", ".xml", ".json")
+_WHOLE = (".pdf", ".xml")
+_CERTIFICATES = tuple(f"certificate{origin}.pdf" for origin in ("", f"-{SIMULATED}", f"-{COMPENSATED}"))
 POSTERIOR = "posterior.npz"
 
 
@@ -40,6 +43,8 @@ class PartJob:
     features : with their contact points, in the order of the job.
     inputs : contents of each input by its path inside the folder.
     measured : (n, 3) measured points in the order of the features' points, mm; ``None`` where nothing is measured.
+    stated_by : names of those of the inputs that state the machine.
+    others : recordings of other methods.
     """
 
     folder: Path
@@ -47,13 +52,13 @@ class PartJob:
     features: tuple[Probed, ...]
     inputs: Mapping[str, bytes]
     measured: Floats | None = None
+    stated_by: tuple[str, ...] = ()
+    others: OtherReadings = field(default_factory=OtherReadings)
 
     @property
     def machine_files(self) -> Mapping[str, bytes]:
         """Those of the inputs that state the machine: its certificate or results, and the draws of its errors."""
-        return {
-            name: self.inputs[name] for name in files_of_the_machine(self.facts.machine_state) if name in self.inputs
-        }
+        return {name: self.inputs[name] for name in self.stated_by}
 
 
 def is_part(content: bytes) -> bool:
@@ -95,18 +100,39 @@ def part_of(files: Mapping[str, bytes], *, machine: bool = True) -> PartJob:
     return _read(InMemory(files), machine=machine)
 
 
-def files_of_the_machine(facts: MachineStateFacts) -> tuple[str, ...]:
+def files_of_the_machine(facts: MachineStateFacts, source: Source) -> tuple[str, ...]:
     """Names of the files that state the machine.
 
-    Beside results.json lie the draws, which a certificate carries in itself.
+    Beside ``results.json`` lie the draws that it names, which a certificate carries in itself; in a folder that certificate
+    too, for it has the recording inside.
     """
+    if facts.certificate is None:
+        return ()
     name = facts.certificate.removesuffix("/")
-    if not name.lower().endswith(_CERTIFICATES):
-        name = f"{name}/{RESULTS}"
-    if facts.posterior:
-        return name, facts.posterior
-    parent, _, file = name.rpartition("/")
-    return (name, f"{parent}/{POSTERIOR}" if parent else POSTERIOR) if file.endswith(".json") else (name,)
+    if name.lower().endswith(_WHOLE):
+        return (name,)
+    folder = name.rpartition("/")[0] if name.lower().endswith(".json") else name
+    certificates = (
+        () if folder != name else tuple(one for one in _CERTIFICATES if source.has(f"{folder}/{one}", written=True))
+    )
+    results = f"{folder}/{RESULTS}" if folder == name else name
+    if certificates and not source.has(results, written=True):
+        return (f"{folder}/{certificates[0]}",)
+    drawn = facts.posterior or _beside(folder, _posterior_named(source, results))
+    return (results, drawn, *(f"{folder}/{one}" for one in certificates))
+
+
+def _posterior_named(source: Source, results: str) -> str:
+    """The file of draws that ``results.json`` names; the usual one where it cannot be read or names none."""
+    try:
+        named = json.loads(source.content(results, JSON_BYTES, "", written=True))["posterior"]["file"]
+    except (CmmUqError, OSError, ValueError, KeyError, TypeError, RecursionError):
+        return POSTERIOR
+    return named if isinstance(named, str) and "/" not in named else POSTERIOR
+
+
+def _beside(folder: str, name: str) -> str:
+    return f"{folder}/{name}" if folder else name
 
 
 def _read(source: Source, *, machine: bool) -> PartJob:
@@ -126,18 +152,22 @@ def _read(source: Source, *, machine: bool) -> PartJob:
         raise CmmUqError(f"has {total} points: {LISTED.most} are the most", where=str(path), fix="Probe fewer")
     check_plan(facts, {one.facts.name: one for one in features}, places, wrong)
     wrong.refuse()
-    inputs = {"job.toml": content}
+    inputs, stated_by = {"job.toml": content}, files_of_the_machine(facts.machine_state, source) if machine else ()
     if machine:
         fix = f"Put it into the job's folder, or mend its name in {path}: [machine_state]"
-        for name in files_of_the_machine(facts.machine_state):
+        for name in stated_by:
             with wrong.going_on():
                 inputs[name] = source.content(name, TABLE_BYTES, fix, written=True)
+
+    def recorded(name: str) -> tuple[bytes, str]:
+        inputs[name] = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
+        check_mark(folder, facts.job.origin, inputs[name], str(folder / name))
+        return inputs[name], str(folder / name)
+
     measured = None
     if facts.recording is not None:
         with wrong.going_on():
-            name = facts.recording.file
-            inputs[name] = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
-            check_mark(folder, facts.job.origin, inputs[name], str(folder / name))
-            measured = measured_points(inputs[name], str(folder / name), features)
+            measured = measured_points(*recorded(facts.recording.file), features)
+    others = other_readings(facts, features, places, recorded, wrong)
     wrong.refuse()
-    return PartJob(folder, facts, tuple(features), inputs, measured)
+    return PartJob(folder, facts, tuple(features), inputs, measured, stated_by, others)

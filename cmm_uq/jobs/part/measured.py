@@ -43,7 +43,7 @@ def measured_points(content: bytes, where: str, features: Sequence[Probed]) -> F
     place = [cells.header.index(name) for name in COLUMNS]
     number = np.column_stack([_column(cells, i, where) for i in place[1:]])
     names = [row[place[0]] for row in cells.rows]
-    return _in_order(names, number[:, 0], number[:, 1:], cells, where, features)
+    return in_order(names, number[:, 0], number[:, 1:], cells, where, features)
 
 
 def _column(cells: Cells, i: int, where: str) -> Floats:
@@ -52,9 +52,15 @@ def _column(cells: Cells, i: int, where: str) -> Floats:
     )
 
 
-def _in_order(
+def in_order(
     names: Sequence[str], point: Floats, xyz: Floats, cells: Cells, where: str, features: Sequence[Probed]
 ) -> Floats:
+    """(n, 3) points in the order of the plan's, of rows that name feature and point.
+
+    Raises
+    ------
+    CmmUqError : see :func:`measured_points`.
+    """
     known = {one.facts.name: one for one in features}
     rows: dict[tuple[str, int], int] = {}
     wrong = Gathered()

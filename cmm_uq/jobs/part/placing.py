@@ -20,7 +20,11 @@ def rotation(placing: PlacingFacts) -> Floats:
 
 
 def readings(feature: Probed, stylus: StylusFacts, facts: PartFile) -> Floats:
-    """(n, 3) what the scales read while a feature is probed, mm: of the ram's reference point, which is not at the tip."""
+    """(n, 3) what the scales read while a feature is probed, mm: of the ram's reference point, which is not at the tip.
+
+    Where the job does not say where the part lies, it lies at the origin.
+    """
     centres = feature.points + 0.5 * stylus.diameter_mm * feature.normals
-    placed = centres @ rotation(facts.placing).T + facts.placing.origin_mm
+    origin = facts.placing.origin_mm or [0.0, 0.0, 0.0]
+    placed = centres @ rotation(facts.placing).T + origin
     return np.asarray(placed - stylus.offset_mm + np.array(facts.machine_state.origin_mm))

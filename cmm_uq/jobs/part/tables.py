@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
@@ -57,18 +58,31 @@ class PartFacts(Table):
 class MachineStateFacts(Table):
     """``[machine_state]``: the machine as its certificate states it, and where its axes go."""
 
-    certificate: Name
-    """The certificate (PDF or XML), its `results.json`, or the folder with it, inside the job's."""
+    certificate: Name | None = None
+    """The certificate (PDF), its `results.json`, or the folder with it, inside the job's."""
     posterior: str = ""
-    """Draws of the machine's errors (`posterior.npz`), where they lie in no folder with `results.json`."""
+    """Draws of the machine's errors (`posterior.npz`), where they do not lie beside `results.json`."""
+    job: Name | None = None
+    """In place of a certificate the folder of the machine's job, from this job's folder on; it is analysed anew."""
+    valid_until: dt.date | None = None
+    """Last day on which the certificate holds; where it is left out, the day that it names for the next calibration."""
     travel_mm: Travel = Travel()
-    """Lowest and highest scale reading of each axis; a part outside is refused."""
+    """Lowest and highest scale reading of each axis; as the certificate says where left out. A part outside is refused."""
     chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
-    """Carriages from the table to the ram, with F for the frame where the workpiece moves."""
+    """Carriages from the table to the ram, with F for the frame where the workpiece moves; as the certificate says where it is
+    left out."""
     origin_mm: Triple = [0.0, 0.0, 0.0]
-    """Scale reading of the origin of the machine's coordinates."""
+    """Scale reading of the origin of the coordinates that `[placing]` speaks of."""
     corrected: bool = True
     """Whether the machine corrects the errors that its calibration found."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.certificate is None) == (self.job is None):
+            raise ValueError("give either certificate or job: what states the machine's errors")
+        if self.job is not None and self.posterior:
+            raise ValueError("a job is analysed anew and needs no posterior: leave it out")
+        return self
 
     @model_validator(mode="after")
     def _three_carriages(self) -> Self:
@@ -117,8 +131,8 @@ class AlignmentFacts(Table):
 class PlacingFacts(Table):
     """``[placing]``: where the part lies in the machine."""
 
-    origin_mm: Triple = [0.0, 0.0, 0.0]
-    """Where the part's origin lies, in coordinates of the machine."""
+    origin_mm: Triple | None = None
+    """Where the part's origin lies, in coordinates of the machine; where left out, the part is in the middle of the travel."""
     rotation_deg: Angles = [0.0, 0.0, 0.0]
     """How the part is turned about the axes of the machine: first about x, then y, then z."""
     u_origin_mm: Lengths = [0.0, 0.0, 0.0]
@@ -138,6 +152,8 @@ class ProbingFacts(Table):
     """Time from a point to the next, for noise that wanders; 0 where it is not known."""
     repeats: Count = 1
     """How often each point is probed; its mean counts."""
+    u_operator_um: Uncertainty = 0.0
+    """Standard uncertainty of each coordinate of each point by who measures and how, common to its repeats."""
 
 
 class EnvironmentFacts(Table):
@@ -159,6 +175,8 @@ class EnvironmentFacts(Table):
     """Standard uncertainty of that coefficient, 1/K."""
     u_gradient_k_per_m: Annotated[list[Kelvins], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
     """Standard uncertainties of the gradient of the part's temperature along the axes of the machine, K/m."""
+    u_drift_k: Kelvins = 0.0
+    """Standard uncertainty of how much part and scales have warmed from the first point to the last."""
 
 
 class DecisionFacts(Table):

@@ -110,6 +110,8 @@ def use_by_calibrated_workpiece(
     u_cte_calibrated_per_k: float = 0.0,
     u_cte_workpieces_per_k: float = 0.0,
     u_form_mm: float = 0.0,
+    expanding_mm: float | None = None,
+    angle: bool = False,
 ) -> Budget:
     """Uncertainty of using the machine, from readings of a calibrated workpiece (ISO 15530-3:2011), mm.
 
@@ -123,6 +125,8 @@ def use_by_calibrated_workpiece(
     u_cte_calibrated_per_k, u_cte_workpieces_per_k : of the expansion coefficients of the calibrated one and of the
         others.
     u_form_mm : by what differs between workpieces: form, roughness, elasticity.
+    expanding_mm : length whose expansion counts, where it is not the calibrated value.
+    angle : whether values and uncertainties are in rad.
 
     Raises
     ------
@@ -134,30 +138,30 @@ def use_by_calibrated_workpiece(
             f"{len(readings)} readings of the calibrated workpiece",
             fix=f"ISO 15530-3 asks for {FEWEST_READINGS} in ten cycles or more",
         )
+    own = unit("rad" if angle else "mm")
+    length = calibrated_mm if expanding_mm is None else abs(expanding_mm)
     return Budget(
         say("systematic error of the measurement process"),
         [
-            Line(say("calibration of the workpiece"), u_calibration_mm, CERTIFICATE, unit=unit("mm")),
+            Line(say("calibration of the workpiece"), u_calibration_mm, CERTIFICATE, unit=own),
             Line(
                 say("scatter of the process"),
                 float(readings.std(ddof=1)),
                 REPEATS,
-                unit=unit("mm"),
+                unit=own,
                 dof=len(readings) - 1.0,
             ),
             _expansion(
                 say("expansion coefficient of the calibrated workpiece"),
                 u_cte_calibrated_per_k,
-                calibrated_mm,
+                length,
                 temperature_c,
             ),
-            _expansion(
-                say("expansion coefficient of the workpieces"), u_cte_workpieces_per_k, calibrated_mm, temperature_c
-            ),
-            Line(say("form and surface of the workpieces"), u_form_mm, JUDGEMENT, unit=unit("mm")),
+            _expansion(say("expansion coefficient of the workpieces"), u_cte_workpieces_per_k, length, temperature_c),
+            Line(say("form and surface of the workpieces"), u_form_mm, JUDGEMENT, unit=own),
         ],
         float(readings.mean()) - calibrated_mm,
-        unit("mm"),
+        own,
         factor=FACTOR,
         statement=_use(say("ISO 15530-3, by a calibrated workpiece")),
     )

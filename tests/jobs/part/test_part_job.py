@@ -12,6 +12,7 @@ from cmm_uq.jobs.part.beginning import TABLES
 from cmm_uq.jobs.part.job import files_of_the_machine
 from cmm_uq.jobs.part.placing import readings
 from cmm_uq.jobs.part.tables import MachineStateFacts
+from cmm_uq.jobs.source import InMemory
 from cmm_uq.jobs.toml_file import as_toml
 from tests.jobs.part.parts import plate, tables
 
@@ -91,7 +92,11 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     (asked(what="flat", features=["A"]), "Did you mean 'flatness'"),
     (asked(what="circular_runout", features=["bore"], datums=["A"], tolerance_mm=0.1), "is about a line or cylinder or cone"),
     # the machine
-    ({"placing": {"origin_mm": [650.0, 450.0, -500.0]}}, r"\[placing\] origin_mm: axis x would have to go to 765 mm for 'A'"),
+    ({"placing": {"origin_mm": [650.0, 450.0, -500.0]},
+      "machine_state": {"certificate": "m", "travel_mm": {"x": [0.0, 700.0]}}},
+     r"\[placing\] origin_mm: axis x would have to go to 765 mm for 'A'"),
+    ({"machine_state": {"certificate": "m", "job": "../m"}}, "give either certificate or job"),
+    ({"machine_state": {}}, "give either certificate or job"),
     ({"machine_state": {"certificate": "m", "chain": "XXY"}}, "give X, Y, Z once each"),
     ({"decision": {"rule": "JCGM 106"}}, "goes by what is known of such parts beforehand"),
     ({"form": {"harmonics_um": {"1": 0.5}}}, "give numbers of lobes from 2"),
@@ -129,13 +134,24 @@ def test_axes_read_where_the_ram_stands() -> None:
     np.testing.assert_allclose(readings(top, stylus, job.facts)[0], [300 - y + 1, 450 + x + 2, -500 + z + 2 + 150 + 3])
 
 
-@pytest.mark.parametrize(("given", "names"), [
-    ({"certificate": "machine"}, ("machine/results.json", "machine/posterior.npz")),
-    ({"certificate": "machine/results.json"}, ("machine/results.json", "machine/posterior.npz")),
-    ({"certificate": "m/certificate.pdf"}, ("m/certificate.pdf",)),
-    ({"certificate": "m/certificate.xml", "posterior": "m/posterior.npz"}, ("m/certificate.xml", "m/posterior.npz")),
+SIMULATED = b'{"posterior": {"file": "posterior-simulated.npz"}}'
+OUTSIDE = b'{"posterior": {"file": "../posterior.npz"}}'
+
+
+@pytest.mark.parametrize(("given", "there", "names"), [
+    ({"certificate": "machine"}, {}, ("machine/results.json", "machine/posterior.npz")),
+    ({"certificate": "machine/results.json"}, {}, ("machine/results.json", "machine/posterior.npz")),
+    ({"certificate": "machine/"}, {"machine/results.json": SIMULATED},
+     ("machine/results.json", "machine/posterior-simulated.npz")),
+    ({"certificate": "machine/"}, {"machine/results.json": OUTSIDE}, ("machine/results.json", "machine/posterior.npz")),
+    ({"certificate": "m"}, {"m/results.json": b"{", "m/certificate.pdf": b""},
+     ("m/results.json", "m/posterior.npz", "m/certificate.pdf")),
+    ({"certificate": "m"}, {"m/certificate-simulated.pdf": b""}, ("m/certificate-simulated.pdf",)),
+    ({"certificate": "m/results.json", "posterior": "draws.npz"}, {}, ("m/results.json", "draws.npz")),
+    ({"certificate": "m/certificate.pdf"}, {}, ("m/certificate.pdf",)),
+    ({"job": "../m"}, {}, ()),
 ])  # fmt: skip
-def test_a_machine_is_stated_by_its_results_with_draws_or_by_its_certificate(
-    given: Any, names: tuple[str, ...]
+def test_a_machine_is_stated_by_its_certificate_or_by_results_with_draws_or_by_a_job(
+    given: Any, there: dict[str, bytes], names: tuple[str, ...]
 ) -> None:
-    assert files_of_the_machine(MachineStateFacts.model_validate(given)) == names
+    assert files_of_the_machine(MachineStateFacts.model_validate(given), InMemory(there)) == names

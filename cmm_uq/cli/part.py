@@ -1,0 +1,88 @@
+"""``cmm-uq part JOB``: the uncertainty of what is measured on a part, and whether it conforms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cmm_uq.cli import NOT_CONFORMING
+from cmm_uq.cli.completion import job_folders
+from cmm_uq.cli.options import Force, Json, Language, Quiet, Seed, Verbose, examples, out
+from cmm_uq.cli.printing import put_json, show_summary
+from cmm_uq.cli.progress import shown
+
+EXAMPLES = examples(
+    "part examples/part-plate-simulated", "part JOB --digits 2 --rerun", "part JOB --json --strict > results.json"
+)
+
+
+def command(
+    job: Annotated[
+        Path,
+        typer.Argument(
+            help="Job folder of a part: job.toml, the machine's certificate, and the measured points if there are some.",
+            metavar="JOB",
+            autocompletion=job_folders,
+        ),
+    ],
+    out: Annotated[Path | None, out("reports/<job id>")] = None,
+    seed: Seed = 0,
+    trials: Annotated[
+        int | None, typer.Option(help="Virtual measurements.", metavar="N", min=1000, show_default="200000")
+    ] = None,
+    digits: Annotated[
+        int | None,
+        typer.Option(
+            help="Digits of u that are to be known: as many virtual measurements as they need.",
+            metavar="N",
+            min=1,
+            max=3,
+            show_default="none",
+        ),
+    ] = None,
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="Compute the machine's certificate again from its inputs, and compare.")
+    ] = False,
+    trust: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Certificates that you trust, PEM or DER: the machine's certificate must then be signed.",
+            metavar="FILE|DIR",
+            show_default="nobody",
+        ),
+    ] = None,
+    records: Annotated[
+        str | None,
+        typer.Option(
+            help="Records of the machine's history, from which its drift is known.",
+            metavar="WHERE",
+            show_default="none",
+        ),
+    ] = None,
+    force: Force = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit code 4 unless every characteristic conforms.")] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    language: Language = None,
+) -> None:
+    """Verify the machine's certificate, measure the part virtually, and write part.html, part.pdf and results.json."""
+    with shown(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.commands.part_written import Asked, write_part
+        from cmm_uq.commands.written import silent
+
+        asked = Asked(seed, trials, digits, rerun, None if trust is None else tuple(trust), records)
+        written = write_part(job, out, asked=asked, force=force, stage=stage or silent, language=language)
+    if json:
+        put_json(written.results.decode())
+    elif not quiet:
+        from cmm_uq.documents.origin import BANNERS
+        from cmm_uq.documents.part_summary import part_summary
+
+        facts = written.found.job.facts.job
+        told, banner = part_summary(written.found), BANNERS.get(facts.origin, "")
+        show_summary(told, written.files, verbose=verbose, name=facts.id, banner=banner)
+    if strict and not written.found.conforming:
+        raise typer.Exit(NOT_CONFORMING)

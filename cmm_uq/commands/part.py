@@ -1,0 +1,217 @@
+"""From a part's job to what is found of it: its machine verified, virtual measurements, budget, decisions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from cmm_uq.commands.part_machine import machine_found
+from cmm_uq.commands.part_methods import methods_of
+from cmm_uq.commands.part_plan import circumstances_of, doubled, origin_of, plan_of, poses_of
+from cmm_uq.commands.written import Stage, silent
+from cmm_uq.conformity.limits import Judged, Limits, judge
+from cmm_uq.conformity.risk import Known
+from cmm_uq.documents.effect_words import title_of
+from cmm_uq.documents.part_found import MATTERS, PartFound, Unseen
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.parts.budget import DRAWS as SHARED
+from cmm_uq.parts.budget import Budget, budget
+from cmm_uq.parts.by_comparison import compared
+from cmm_uq.parts.displaced import displaced
+from cmm_uq.parts.machine import MachineState
+from cmm_uq.parts.placing import placed
+from cmm_uq.parts.plan import Plan
+from cmm_uq.parts.reducing import DRAWS as WAYS
+from cmm_uq.parts.reducing import ways
+from cmm_uq.parts.result import conforming, evaluated, stated
+from cmm_uq.parts.virtual import Circumstances, Virtual
+from cmm_uq.points import Floats, Machine
+from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
+from cmm_uq.units import MICROMETRE
+
+PLACES = 16
+"""Places of the part that are drawn where it does not lie in the same one each time."""
+
+TRIALS = 200_000
+"""Virtual measurements: ten thousand over one less the probability of the interval (JCGM 101:2008, 7.2.2)."""
+
+KEPT = 100_000
+"""Virtual measurements that are kept, for probabilities: one of 5 % is then known to 0.07 %."""
+
+COVERAGE = 0.95
+
+
+def part_found(
+    job: PartJob,
+    *,
+    seed: int = 0,
+    trials: int = TRIALS,
+    digits: int | None = None,
+    rerun: bool = False,
+    trust: Iterable[Path] | None = None,
+    stage: Stage = silent,
+) -> PartFound:
+    """What a part's job gives.
+
+    Parameters
+    ----------
+    job : that was read.
+    seed : of everything random; the same seed gives the same result.
+    trials : number of virtual measurements.
+    digits : of u that are to be known: then so many are made as that needs (JCGM 101:2008, 7.9), ``trials`` at least.
+    rerun : whether the machine's certificate is computed again from its inputs.
+    trust : whose signatures on it are trusted; ``None`` where nothing need be signed.
+    stage : told of progress.
+
+    Raises
+    ------
+    CmmUqError : the machine's certificate does not hold, or the measurement is impossible.
+    """
+    plan = plan_of(job)
+    measured = None if job.measured is None else evaluated(plan, job.measured)
+    others = methods_of(job, plan, measured)
+
+    def fits(machine: Machine) -> None:
+        for pose in poses_of(job, PLACES, machine):
+            placed(plan, pose, machine)
+
+    machine = machine_found(job, rerun=rerun, trust=trust, seed=seed, stage=stage)
+    given = circumstances_of(job, machine.state, plan, PLACES)
+    if job.measured is not None:
+        given = replace(given, measured=job.measured)
+    stage("Preparing the virtual measurements", 0.25)
+    virtual = Virtual(plan, given)
+    simulated, errors = _simulated(virtual, trials, digits, seed, stage)
+    stage("Shares of each cause", 0.6)
+    shares = budget(virtual, min(SHARED, trials), seed)
+    stage("What would change the uncertainty", 0.7)
+    found_ways = ways(
+        plan, given, min(WAYS, trials), seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual
+    )
+    stage("Decisions", 0.85)
+    known = stated(simulated, measured)
+    together = None if measured is None else conforming(plan, errors, measured)[1]
+    return PartFound(
+        job, plan, given, virtual, simulated, known, measured, shares, _unseen(virtual, shares), None,
+        judged(job, plan, errors, measured), None if together is None or np.isnan(together) else together, tuple(found_ways),
+        displaced(virtual, seed=seed), _three(origin_of(job, machine.state.machine)),
+        machine.standing, compared(known, shares, others), digits=digits, seed=seed, warnings=machine.warnings,
+    )  # fmt: skip
+
+
+def _with_twice_the_points(job: PartJob, machine: MachineState) -> Callable[[], tuple[Plan, Circumstances]]:
+    def more() -> tuple[Plan, Circumstances]:
+        other = doubled(job)
+        plan = plan_of(other)
+        return plan, circumstances_of(other, machine, plan, PLACES)
+
+    return more
+
+
+def _three(values: Floats) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+@dataclass(eq=False)
+class _Keeping:
+    """Errors of virtual measurements, the first of them kept."""
+
+    virtual: Virtual
+    stage: Stage
+    blocks: list[Floats] = field(default_factory=list)
+    made: int = 0
+
+    def draw(self, random: np.random.Generator, n: int) -> Floats:
+        """(c, n) errors."""
+        errors = self.virtual.errors(random, n)
+        if self.made < KEPT:
+            self.blocks.append(errors[: KEPT - self.made].copy())
+        self.made += n
+        self.stage(f"Virtual measurements: {self.made}", 0.3 + 0.3 * min(1.0, self.made / TRIALS))
+        return np.ascontiguousarray(errors.T)
+
+
+def _simulated(
+    virtual: Virtual, trials: int, digits: int | None, seed: int, stage: Stage
+) -> tuple[Simulated, Floats]:  # fmt: skip
+    """Figures of the errors, and (N, c) errors of some of the virtual measurements that they come from."""
+    keeping = _Keeping(virtual, stage)
+    source = Source(virtual.names, keeping.draw)
+    if digits is None:
+        found = from_source(source, trials, COVERAGE, seed)
+    else:
+        found = settled_source(source, COVERAGE, digits, seed, fewest_trials=trials)
+    return found, np.concatenate(keeping.blocks)
+
+
+def _unseen(virtual: Virtual, shares: Budget) -> tuple[Unseen, ...]:
+    """What the calibration left free or did not see, by characteristic, the largest share first."""
+    found = []
+    for name in shares.characteristics:
+        for line, share, why in shares.told(name, virtual.named, MATTERS):
+            effect = line.partition(": ")[2]
+            found.append(Unseen(name, line, effect, title_of(effect), share, why))
+    return tuple(found)
+
+
+def judged(
+    job: PartJob, plan: Plan, errors: Floats, measured: Floats | None
+) -> tuple[Judged | None, ...]:  # fmt: skip
+    """What follows from each characteristic's limits, by the job's rule.
+
+    Where nothing was measured, what would be accepted is told of a value that is not corrected for its mean error. A zone is
+    then decided on by the root mean square of all errors as that of a normal distribution: errors about a perfect part are to
+    one side and narrower than those about a part near its limit.
+
+    Parameters
+    ----------
+    errors : (N, c) of virtual measurements.
+    measured : (c,) values; ``None`` where nothing was measured.
+
+    Raises
+    ------
+    CmmUqError : the rule needs a prior that these limits cannot have.
+    """
+    found: list[Judged | None] = []
+    for i, (facts, one) in enumerate(zip(job.facts.characteristic, plan.characteristics, strict=True)):
+        if one.lower is None and one.upper is None:
+            found.append(None)
+            continue
+        zone = facts.asks.limits == "zone"
+        mean = float(errors[:, i].mean())
+        about = errors[:, i] - mean
+        if measured is None and zone:
+            size = float(np.sqrt(np.mean(errors[:, i] ** 2)))
+            about = size * np.random.default_rng(0).standard_normal(len(errors))
+        limits = Limits(one.lower, one.upper, about, zone, _prior(job, facts, one.lower, one.upper, zone=zone))
+        value = None if measured is None else float(measured[i]) - mean
+        found.append(judge(limits, job.facts.decision.rule, value))
+    return tuple(found)
+
+
+def _prior(
+    job: PartJob, facts: CharacteristicFacts, lower: float | None, upper: float | None, *, zone: bool
+) -> Known | None:  # fmt: skip
+    """What is known of the value beforehand: about the middle of its limits, of a zone about zero."""
+    given = job.facts.decision.prior
+    if given is None:
+        return None
+    where = f"job.toml [decision] prior: characteristic {facts.name!r}"
+    if zone:
+        middle, limit = 0.0, upper or 0.0
+    elif lower is None or upper is None:
+        raise CmmUqError("a prior is about the middle of two limits, and there is one", where=where,
+                         fix="Give both limits, or a rule without a prior")  # fmt: skip
+    else:
+        middle, limit = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    if given.share_of_limit is not None:
+        return Known(middle, given.share_of_limit * limit)
+    if facts.asks.limits == "angles":
+        raise CmmUqError("a prior in µm is none of an angle", where=where, fix="Give share_of_limit")
+    return Known(middle + MICROMETRE * given.mean_um, MICROMETRE * float(given.sd_um or 0.0))

@@ -1,0 +1,340 @@
+"""The machine that a part was measured on: its certificate verified, refused where it does not hold, then its state."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cmm_uq.commands.diagnosing import screened_model
+from cmm_uq.commands.estimation import with_noise
+from cmm_uq.commands.part_drift import with_drift
+from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.written import Stage, silent
+from cmm_uq.documents.clauses import draft
+from cmm_uq.documents.part_found import Checked, Source, Standing
+from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.draws import Draws
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.jobs.reading import sha256 as hashes
+from cmm_uq.kinds import kind_of
+from cmm_uq.messages import NOTHING, Text, Verbatim, day, say
+from cmm_uq.parts.conditional import given_recording
+from cmm_uq.parts.machine import MachineState
+from cmm_uq.parts.stated import machine_stated
+from cmm_uq.points import AXES, Floats, Machine
+from cmm_uq.verification.given import Given, given_of
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.verify import Verification
+
+WHERE = "job.toml [machine_state]"
+NORMAL_C = 20.0
+"""°C to which lengths are referred (ISO 1)."""
+
+
+@dataclass(frozen=True, eq=False)
+class MachineFound:
+    """A machine, and how it is known.
+
+    Parameters
+    ----------
+    state : its errors and noise on the day of the part's measurement.
+    standing : of its certificate.
+    job : of its calibration, where the inputs are at hand.
+    warnings : what the reader must know of it.
+    """
+
+    state: MachineState
+    standing: Standing
+    job: Job | None
+    warnings: tuple[Text, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Stated:
+    """What states the machine, once it is known to hold."""
+
+    source: Source
+    files: tuple[str, ...]
+    results: Mapping[str, Any]
+    draws: Mapping[str, Floats]
+    job: Job | None
+    verdict: str
+    checked: tuple[Checked, ...]
+    again: bool = False
+
+
+def machine_found(
+    job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None, records: str | Path | None = None,
+    seed: int = 0, stage: Stage = silent, fits: Callable[[Machine], None] = lambda machine: None,
+) -> MachineFound:  # fmt: skip
+    """The machine of a part's job.
+
+    Parameters
+    ----------
+    job : that was read.
+    rerun : whether the certificate's figures are computed again from its inputs.
+    trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
+    records : of the machine's history, for its drift; ``None`` for none.
+    seed : of the draws.
+    stage : told of progress.
+    fits : refuses a machine on which the part cannot be measured, before anything is computed.
+
+    Raises
+    ------
+    CmmUqError : the certificate does not verify, does not hold on the day, states too little, or is of another machine; or the
+        job that is to be analysed in its place cannot be.
+    """
+    if job.facts.machine_state.job is not None:
+        stated = _analysed(job, seed, stage)
+    else:
+        stated = _certified(job, rerun=rerun, trust=trust, stage=stage)
+    standing = _standing(job, stated, trusted=trust is not None)
+    machine = _machine(job, stated.job)
+    fits(machine)
+    state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
+    state = replace(
+        state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=_known_at(state, standing)
+    )
+    since = with_drift(state, standing.serial or standing.machine, job.facts.job.date, records, _where(job))
+    state = since.state
+    stage("The machine's errors, given the recording of its calibration", 0.15)
+    state, path, given = _given(state, stated.job, seed)
+    standing = replace(standing, path=path, drift=since.told, given_recording=given)
+    return MachineFound(state, standing, stated.job, tuple(_warnings(job, standing, stated.job)))
+
+
+def _certified(job: PartJob, *, rerun: bool, trust: Iterable[Path] | None, stage: Stage) -> _Stated:
+    """What a certificate states that verifies.
+
+    Raises
+    ------
+    CmmUqError : it does not, or has no draws of the posterior.
+    """
+    from cmm_uq.commands.verify import verify_given
+
+    where = _where(job)
+    given = given_of(job.machine_files)
+    if given.results is None:
+        raise CmmUqError("states too little: neither draws of the machine's errors nor its recording are inside", where=where,
+                         fix="Give certificate.pdf, or the folder that cmm-uq report wrote")  # fmt: skip
+    stage("Verifying the machine's certificate", 0.02)
+    found = verify_given(given, rerun=rerun, trust=trust)
+    if wrong := found.inquiry.findings:
+        more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
+        first = ": ".join(filter(None, (wrong[0].file, wrong[0].place, wrong[0].problem)))
+        raise CmmUqError(f"the machine's certificate does not verify: {first}{more}", where=where,
+                         fix="cmm-uq verify says all that is wrong; ask for the certificate as it was issued")  # fmt: skip
+    results = given.results[1]
+    source: Source = "results" if found.job is None else "certificate"
+    return _Stated(source, job.stated_by, results, _drawn(job, given, results, where), found.job, found.inquiry.word,
+                   _checks(found), rerun and "again" in found.inquiry.done)  # fmt: skip
+
+
+def _drawn(job: PartJob, given: Given, results: Mapping[str, Any], where: str) -> dict[str, Floats]:
+    """Draws of the posterior, of the file whose hash results.json has."""
+    entry = results.get("posterior")
+    if not isinstance(entry, dict):
+        raise CmmUqError("states too little: it has no draws of the machine's errors", where=where,
+                         fix="Give the certificate of a report whose errors are a list of effects")  # fmt: skip
+    named = str(entry["file"])
+    content = given.files.get(named) or job.inputs.get(job.facts.machine_state.posterior)
+    if content is None:
+        raise CmmUqError(f"states too little: {named} is not there", where=where,
+                         fix="Put it beside results.json, or give the certificate as PDF")  # fmt: skip
+    if sha256(content).hexdigest() != entry["sha256"]:
+        raise CmmUqError(f"{named} is not the file whose hash results.json has", where=where,
+                         fix="Give both as the same report wrote them")  # fmt: skip
+    return Draws.of_npz(content, named).flat()
+
+
+def _checks(found: Verification) -> tuple[Checked, ...]:
+    from cmm_uq.verification.found import CHECKS
+
+    inquiry = found.inquiry
+    done = [Checked(what, inquiry.done[name]) for name, what in CHECKS.items() if inquiry.done.get(name)]
+    return (*done, *(Checked(left.what, 0, left.why) for left in inquiry.unchecked))
+
+
+def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
+    """What the machine's job gives when it is analysed here."""
+    from cmm_uq.commands import analysis
+    from cmm_uq.documents.as_json import as_json
+
+    named = str(job.facts.machine_state.job)
+    if job.folder == Path():
+        raise CmmUqError("a part's job in memory has no other job beside it", where=f"{WHERE} job",
+                         fix="Give the machine's certificate, or read the job from its folder")  # fmt: skip
+    stage("Analysing the machine's job", 0.02)
+    read = read_job(job.folder / named)
+    found = analysis.analyse_job(read, seed=seed)
+    outcome = analysis.outcome_of(found, seed)
+    if outcome.draws is None:
+        raise CmmUqError("states too little: its analysis draws no errors of the machine", where=f"{WHERE} job = {named!r}",
+                         fix="Name a job whose errors are a list of effects")  # fmt: skip
+    results = json.loads(as_json(outcome.results))
+    return _Stated("job", (named,), results, outcome.draws.flat(), read, "ANALYSED", ())
+
+
+def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
+    """The certificate on the day of the measurement.
+
+    Raises
+    ------
+    CmmUqError : it is later than the measurement, or no longer holds.
+    """
+    said, facts, on = stated.results["job"], job.facts.machine_state, job.facts.job.date
+    date = dt.date.fromisoformat(said["date"])
+    where = _where(job)
+    if date > on:
+        raise CmmUqError(f"the machine was calibrated on {date}, after the part was measured on {on}", where=where,
+                         fix="Give the certificate that held on that day, or mend [job] date")  # fmt: skip
+    own = None if stated.job is None else stated.job.facts
+    until = facts.valid_until or (None if own is None else own.job.recalibration_agreed)
+    if until is not None and on > until:
+        raise CmmUqError(f"the machine's certificate has expired: it held until {until}, and the part was measured on {on}",
+                         where=where, fix="Calibrate the machine, or give the certificate that held on that day")  # fmt: skip
+    temperatures = _temperatures(stated.job)
+    return Standing(
+        stated.source, stated.files, number=str(said.get("number") or (own and own.job.number) or said["id"]),
+        laboratory="" if own is None else own.laboratory.name, machine=str(said["machine"]),
+        serial=str(said.get("serial") or ""), origin=str(said["origin"]), date=date, age=on - date, valid_until=until,
+        verdict=stated.verdict, checked=stated.checked, again=stated.again, trusted=trusted,
+        draft=stated.job is not None and draft(stated.job),
+        given_recording=False,
+        path=NOTHING, drift=NOTHING,
+        temperature_c=None if temperatures is None else float(np.mean(temperatures)),
+        inputs_sha256=dict(said["inputs_sha256"]) if stated.job is None else hashes(stated.job.inputs),
+    )  # fmt: skip
+
+
+def _known_at(state: MachineState, standing: Standing) -> float | None:
+    """Temperature at which the errors of the scales are known: of 20 °C where the calibration modelled their expansion."""
+    modelled = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
+    return None if modelled else standing.temperature_c
+
+
+def _where(job: PartJob) -> str:
+    """What states the machine, for messages."""
+    facts = job.facts.machine_state
+    key, named = ("certificate", facts.certificate) if facts.job is None else ("job", facts.job)
+    return f"{WHERE} {key} = {named!r}"
+
+
+def _machine(job: PartJob, calibrated: Job | None) -> Machine:
+    """Chain, travel and origin: as the job says, else as the calibration has them.
+
+    Raises
+    ------
+    CmmUqError : both say a chain or a travel, and not the same; or neither a travel.
+    """
+    facts, own = job.facts.machine_state, None if calibrated is None else calibrated.facts.machine
+    chain, origin = facts.chain, facts.origin_mm
+    if own is not None and "chain" not in facts.model_fields_set:
+        chain = own.chain
+    if own is not None and "origin_mm" not in facts.model_fields_set:
+        origin = own.origin_mm
+    if own is not None and chain != own.chain:
+        raise CmmUqError(f"the machine's certificate is of chain {own.chain}, and the job says {chain}",
+                         where=f"{WHERE} chain", fix="Leave it out, or give the certificate of this machine")  # fmt: skip
+    travel = np.full((3, 2), np.nan)
+    for i, axis in enumerate(AXES):
+        here, there = getattr(facts.travel_mm, axis), None if own is None else getattr(own.travel_mm, axis)
+        if here is not None and there is not None and list(here) != list(there):
+            raise CmmUqError(
+                f"the machine's certificate has a travel of {axis} of {there[0]:g} to {there[1]:g} mm, and the job says "
+                f"{here[0]:g} to {here[1]:g} mm", where=f"{WHERE} travel_mm",
+                fix="Leave it out, or give the certificate of this machine",
+            )  # fmt: skip
+        given = here or there
+        if given is None:
+            raise CmmUqError(f"nothing says how far axis {axis} goes, by which errors of guideways are told", where=WHERE,
+                             fix=f"Give travel_mm = {{ {axis} = [lowest, highest] }}, or the certificate as PDF")  # fmt: skip
+        travel[i] = given
+    name = "" if own is None else own.name
+    return Machine(name, chain, travel, np.array(origin, dtype=np.float64))
+
+
+def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineState, Text, bool]:
+    """The state given the recording, where that is at hand; and how its errors are drawn, in a sentence."""
+    apart = say("errors that it did not model are each drawn on its own, which makes most uncertainties too large")
+    if job is None:
+        return state, say("The recording of the calibration is not at hand: {apart}.", apart=apart), False
+    if kind_of(job).observe is None:
+        return state, say("The calibration is of another sort than one by named errors: {apart}.", apart=apart), False
+    try:
+        model, _ = screened_model(job)
+        model, _, _ = with_noise(model)
+        together = given_recording(state, model, seed=seed)
+    except CmmUqError as error:
+        why = Verbatim(error.problem)
+        told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)
+        return state, told, False
+    text = say(
+        "All errors are drawn together, given the recording of the calibration, those included that it did not model."
+    )
+    return together, text, True
+
+
+def _temperatures(job: Job | None) -> Floats | None:
+    """What the calibration recorded of the temperatures of the scales, °C."""
+    if job is None:
+        return None
+    columns = [f"temp_{axis}_c" for axis in AXES if f"temp_{axis}_c" in job.points.columns]
+    return np.concatenate([job.points.columns[name] for name in columns]) if columns else None
+
+
+def _warnings(job: PartJob, standing: Standing, calibrated: Job | None) -> Iterable[Text]:
+    if standing.origin != MEASURED:
+        yield say(
+            "The machine's calibration is {origin}: nobody measured this machine.", origin=Verbatim(standing.origin)
+        )
+    if standing.draft:
+        yield say("The machine's certificate is a draft: it does not state all that ISO/IEC 17025:2017 asks for.")
+    if standing.source == "results":
+        yield say(
+            "The machine is taken from its figures and draws alone: its recording is not at hand and was not verified."
+        )
+    if standing.valid_until is None:
+        yield say("The machine's certificate of {date} does not say until when it holds.", date=day(standing.date))
+    yield from _thermal(job, calibrated)
+    if calibrated is not None and calibrated.facts.circumstances.probe.sensing == "optical" and _touches(job):
+        yield say(
+            "The machine was calibrated with a probe that does not touch; the noise of one that does may be another."
+        )
+
+
+def _touches(job: PartJob) -> bool:
+    return any(stylus.diameter_mm > 0 for stylus in job.facts.stylus)
+
+
+def _thermal(job: PartJob, calibrated: Job | None) -> Iterable[Text]:
+    """Temperatures of the scales beside those of the calibration, and those for which the machine is rated."""
+    given, known = job.facts.environment.scales_c, _temperatures(calibrated)
+    low, high = min(given), max(given)
+    if known is not None and (low < known.min() or high > known.max()):
+        yield say(
+            "The scales were at {low:.4g} to {high:.4g} °C, and at {coldest:.4g} to {warmest:.4g} °C when the machine was "
+            "calibrated: how its errors change between is not known.",
+            low=low, high=high, coldest=float(known.min()), warmest=float(known.max()),
+        )  # fmt: skip
+    elif known is None and (low, high) != (NORMAL_C, NORMAL_C):
+        yield say(
+            "The scales were at {low:.4g} to {high:.4g} °C; the temperature of the calibration is not known.",
+            low=low, high=high,
+        )  # fmt: skip
+    rated = None if calibrated is None else calibrated.circumstances.rated.temperature_c
+    if rated is not None and (low < rated[0] or high > rated[1]):
+        yield say(
+            "The scales were at {low:.4g} to {high:.4g} °C, outside of the {coldest:.4g} to {warmest:.4g} °C for which the "
+            "machine is rated.", low=low, high=high, coldest=rated[0], warmest=rated[1],
+        )  # fmt: skip

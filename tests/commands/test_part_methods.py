@@ -1,0 +1,142 @@
+"""Other methods from a part's job: figures by hand from its recordings, and what its tests lack."""
+
+from __future__ import annotations
+
+import re
+from math import sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmm_uq.commands.part_methods import lacking, methods_of
+from cmm_uq.commands.part_plan import plan_of
+from cmm_uq.errors import CmmUqError
+from cmm_uq.parts.by_method import ByMethod
+from cmm_uq.parts.result import evaluated
+from tests.jobs.part.other_methods import (
+    ACROSS,
+    BIAS,
+    CALIBRATED,
+    OFF,
+    ORIENTED,
+    SCALE,
+    SIZE,
+    SPREAD,
+    TIP,
+    files,
+    with_methods,
+)
+from tests.jobs.part.parts import plate
+
+
+def methods(**changes: Any) -> dict[str, ByMethod]:
+    job = with_methods(**changes)
+    plan = plan_of(job)
+    return {one.method: one for one in methods_of(job, plan, evaluated(plan, plan.points))}
+
+
+def test_the_calibrated_part_by_hand() -> None:
+    """The part measures 30 mm; b = 3 µm; u² = u_cal² + u_p² + u_w², with the scatter of ±1 µm, n = 20."""
+    found = methods()["calibrated_part"].of(SIZE)
+    assert found is not None
+    assert found.systematic == pytest.approx(BIAS)
+    assert found.value == pytest.approx(30 - BIAS)
+    assert found.u == pytest.approx(sqrt(0.4e-3**2 + SPREAD**2 * 20 / 19 + 0.3e-3**2))
+    assert pytest.approx(2 * found.u) == found.U
+
+
+def test_expansion_of_a_calibrated_part_is_of_its_length() -> None:
+    """At 22 °C: 30 mm · 2 K · u_α, its own 1 and the part's 3 · 10⁻⁶/K."""
+    part = {**plate().facts.part.model_dump(), "u_cte_per_k": 3e-6}
+    table = {**CALIBRATED, "temperature_c": 22.0, "u_cte_per_k": 1e-6}
+    cold, warm = methods()["calibrated_part"], methods(by_calibrated_part=table, part=part)["calibrated_part"]
+    apart = warm.figures[0].u ** 2 - cold.figures[0].u ** 2
+    assert apart == pytest.approx((30 * 2 * 1e-6) ** 2 + (30 * 2 * 3e-6) ** 2)
+
+
+def test_several_orientations_by_hand() -> None:
+    """Scale and tip are taken out by bar and ring: the bore has 30 mm, and its axis stands 40 mm from the face."""
+    found = methods()["orientations"]
+    bore, across = found.of(SIZE), found.of(ACROSS)
+    assert bore is not None
+    assert across is not None
+    assert bore.value == pytest.approx(30.0, abs=1e-9)
+    assert bore.systematic == pytest.approx(30 * SCALE - TIP)
+    assert across.value == pytest.approx(40.0, abs=1e-9)
+    assert across.systematic == pytest.approx(40 * SCALE + 0.5 * TIP)
+    read = 0.5e-3 * sqrt(4 * 10 / 16) / sqrt(20)
+    bar = sqrt(0.6e-3**2 + read**2) / 500
+    own, ring = float(np.var(OFF, ddof=1)) / 4, 0.2e-3**2 + read**2
+    # environment of the plate: u of its temperature is 0.1 K
+    warmth = 0.1 * plate().facts.part.cte_per_k
+    assert bore.u == pytest.approx(sqrt(own + ring + ((30 - 25) * bar) ** 2 + (30 * warmth) ** 2), rel=1e-6)
+    assert across.u == pytest.approx(sqrt(own + ring / 4 + ((40 + 0.5 * 25) * bar) ** 2 + (40 * warmth) ** 2), rel=1e-6)
+
+
+def test_points_give_the_same_as_their_values() -> None:
+    rows = ["orientation,repeat,feature,point,x_mm,y_mm,z_mm"]
+    job = plate()
+    rows += [
+        f"{i},{j},{one.facts.name},{k + 1},{x * (1 + 1e-5 * i)!r},{y!r},{z + 1e-4 * j!r}"
+        for i in (1, 2) for j in (1, 2) for one in job.features for k, (x, y, z) in enumerate(one.points.tolist())
+    ]  # fmt: skip
+    by_points = plate({"turned.csv": "\n".join(rows).encode()}, by_orientations={"file": "turned.csv"})
+    assert by_points.others.orientations is not None
+    assert by_points.others.orientations.points is not None
+    plan = plan_of(by_points)
+    (found,) = methods_of(by_points, plan, None)
+    table = np.array([evaluated(plan, points) for points in by_points.others.orientations.points])
+    assert [one.name for one in found.figures] == [one.name for one in plan.characteristics]
+    assert [one.value for one in found.figures] == pytest.approx(table.mean(axis=0))
+
+
+def test_tests_that_lack_nothing_are_told_nothing_of() -> None:
+    assert lacking(with_methods()) == ()
+    assert lacking(plate()) == ()
+
+
+@pytest.mark.parametrize(("table", "change", "words"), [
+    ("by_calibrated_part", {"similar": None}, "like the part.*: not stated"),
+    ("by_calibrated_part", {"same_procedure": False}, "measured as the part is.*: not met"),
+    ("by_calibrated_part", {"certificate": ""}, "certificate that the job names: not met"),
+    ("by_orientations", {"length_standard": None}, "length standard.*: not met"),
+    ("by_orientations", {"probe_standard": []}, "for the tips of down: not met"),
+    ("by_orientations", {"points_varied": False}, "Other points in each orientation.*: not met"),
+    ("by_orientations", {"probe_standard": [{**ORIENTED["probe_standard"][0], "certificate": ""}]},
+     "Each standard has a certificate.*: not met"),
+])  # fmt: skip
+def test_what_a_test_lacks_is_named(table: str, change: dict[str, Any], words: str) -> None:
+    given = {"by_calibrated_part": CALIBRATED, "by_orientations": ORIENTED}[table]
+    changed = {key: value for key, value in {**given, **change}.items() if value is not None}
+    ((named, said, fix),) = lacking(with_methods(**{table: changed}))
+    assert named == table
+    assert re.search(words, said)
+    assert fix
+
+
+def test_three_orientations_are_too_few_for_the_method_but_have_a_figure() -> None:
+    rows = [row for row in files()["turned.csv"].decode().split("\n") if not row.startswith("4,")]
+    job = plate({**files(), "turned.csv": "\n".join(rows).encode()}, by_orientations=ORIENTED)
+    assert [said for _, said, _ in lacking(job)] == [
+        "4 orientations or more, with 5 measurements or more in each: not met"
+    ]
+    (found,) = methods_of(job, plan_of(job), None)
+    assert found.figures[0].budget.k > 3.18
+
+
+def test_too_few_measurements_of_the_calibrated_part_are_refused() -> None:
+    rows = files()["calibrated.csv"].decode().split("\n")[:-1]
+    job = plate({"calibrated.csv": "\n".join(rows).encode()}, by_calibrated_part=CALIBRATED)
+    with pytest.raises(CmmUqError, match=r"by_calibrated_part.*'1' has 19 measurements in 10 set-ups"):
+        methods_of(job, plan_of(job), None)
+
+
+def test_what_a_method_sees_follows_from_how_it_was_done() -> None:
+    found = methods()
+    assert found["calibrated_part"].seen["machine"] == "systematic"
+    assert found["calibrated_part"].seen["place on the table"] == "unseen"
+    assert found["orientations"].seen["stylus"] == "corrected"
+    assert found["orientations"].seen["form"] == "varied"
+    moved = methods(by_calibrated_part={**CALIBRATED, "place_varied": True, "qualified_anew": True})["calibrated_part"]
+    assert moved.seen["place on the table"] == moved.seen["stylus"] == "varied"
