@@ -10,7 +10,7 @@ import numpy as np
 
 from cmm_uq.commands.part_machine import machine_found
 from cmm_uq.commands.part_methods import methods_of
-from cmm_uq.commands.part_plan import circumstances_of, doubled, origin_of, plan_of
+from cmm_uq.commands.part_plan import circumstances_of, doubled, origin_of, plan_of, poses_of
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.conformity.limits import Judged, Limits, judge
 from cmm_uq.conformity.risk import Known
@@ -19,15 +19,18 @@ from cmm_uq.documents.part_found import MATTERS, PartFound, Unseen
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.parts.budget import DRAWS as SHARED
 from cmm_uq.parts.budget import Budget, budget
 from cmm_uq.parts.by_comparison import compared
 from cmm_uq.parts.displaced import displaced
 from cmm_uq.parts.machine import MachineState
+from cmm_uq.parts.placing import placed
 from cmm_uq.parts.plan import Plan
+from cmm_uq.parts.reducing import DRAWS as WAYS
 from cmm_uq.parts.reducing import ways
 from cmm_uq.parts.result import conforming, evaluated, stated
 from cmm_uq.parts.virtual import Circumstances, Virtual
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Machine
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 from cmm_uq.units import MICROMETRE
 
@@ -72,6 +75,11 @@ def part_found(
     plan = plan_of(job)
     measured = None if job.measured is None else evaluated(plan, job.measured)
     others = methods_of(job, plan, measured)
+
+    def fits(machine: Machine) -> None:
+        for pose in poses_of(job, PLACES, machine):
+            placed(plan, pose, machine)
+
     machine = machine_found(job, rerun=rerun, trust=trust, seed=seed, stage=stage)
     given = circumstances_of(job, machine.state, plan, PLACES)
     if job.measured is not None:
@@ -80,9 +88,11 @@ def part_found(
     virtual = Virtual(plan, given)
     simulated, errors = _simulated(virtual, trials, digits, seed, stage)
     stage("Shares of each cause", 0.6)
-    shares = budget(virtual, seed=seed)
+    shares = budget(virtual, min(SHARED, trials), seed)
     stage("What would change the uncertainty", 0.7)
-    found_ways = ways(plan, given, seed=seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual)
+    found_ways = ways(
+        plan, given, min(WAYS, trials), seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual
+    )
     stage("Decisions", 0.85)
     known = stated(simulated, measured)
     together = None if measured is None else conforming(plan, errors, measured)[1]
