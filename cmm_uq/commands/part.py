@@ -54,6 +54,7 @@ def part_found(
     digits: int | None = None,
     rerun: bool = False,
     trust: Iterable[Path] | None = None,
+    records: str | Path | None = None,
     stage: Stage = silent,
 ) -> PartFound:
     """What a part's job gives.
@@ -66,6 +67,7 @@ def part_found(
     digits : of u that are to be known: then so many are made as that needs (JCGM 101:2008, 7.9), ``trials`` at least.
     rerun : whether the machine's certificate is computed again from its inputs.
     trust : whose signatures on it are trusted; ``None`` where nothing need be signed.
+    records : of the machine's history, for its drift; ``None`` for none.
     stage : told of progress.
 
     Raises
@@ -80,7 +82,7 @@ def part_found(
         for pose in poses_of(job, PLACES, machine):
             placed(plan, pose, machine)
 
-    machine = machine_found(job, rerun=rerun, trust=trust, seed=seed, stage=stage)
+    machine = machine_found(job, rerun=rerun, trust=trust, records=records, seed=seed, stage=stage, fits=fits)
     given = circumstances_of(job, machine.state, plan, PLACES)
     if job.measured is not None:
         given = replace(given, measured=job.measured)

@@ -71,7 +71,7 @@ def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
 
     return part_found(
         job, seed=asked.seed, trials=TRIALS if asked.trials is None else asked.trials, digits=asked.digits, rerun=asked.rerun,
-        trust=asked.trust, stage=stage,
+        trust=asked.trust, records=asked.records, stage=stage,
     )  # fmt: skip
 
 
