@@ -36,6 +36,7 @@ CONTENTS: dict[str, list[str]] = {
         "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features", "machine/parts",
+        "machine/other-methods",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],
     "What it rests on": [
