@@ -11,7 +11,6 @@ import gc
 import os
 import sys
 import warnings
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -42,6 +41,7 @@ _NEW_OBJECTS = 100_000
 def main() -> None:
     """Run the command; whatever happens ends with one line and a documented exit code, never with a traceback."""
     from cmm_uq.cli.encoding import any_character
+    from cmm_uq.cli.lighter import lighten
     from cmm_uq.writing.interruption import done, watch
 
     watch()
@@ -49,7 +49,7 @@ def main() -> None:
         os.environ.setdefault(variable, "1")
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # what matters is an error or a warning of the report, not a line of a library
-    _without_kde()
+    lighten()
     any_character()
     gc.set_threshold(_NEW_OBJECTS)
     code = _ended()
@@ -65,13 +65,6 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter would complain once more at its end
     done()
     sys.exit(code)
-
-
-def _without_kde() -> None:
-    """Put a stand-in where emcee has its KDE move, which needs all of scipy.stats, a fifth of a report, and is not used."""
-    module = ModuleType("emcee.moves.kde")
-    module.__dict__["KDEMove"] = None
-    sys.modules.setdefault(module.__name__, module)
 
 
 def _ended() -> int:
