@@ -34,8 +34,8 @@ NOT_VERIFIED, NOT_WHOLLY_CHECKED = 1, 3
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Matrices here are small: more threads cost more than they gain, and how many there are would show in the last digits."""
 
-_NEW_OBJECTS = 100_000
-"""Between two looks for what refers to itself: by default every 700, a twentieth of a report's time for a few megabytes."""
+_NEW_OBJECTS = 1_000_000
+"""Between two looks for what refers to itself: by default every 700, a fifteenth of a report's time for a megabyte."""
 
 
 def main() -> None:
