@@ -13,20 +13,10 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 assert not {"numpy.f2py.crackfortran", "numpy.testing._private", "h5py.h5", "fontTools.misc.textTools"} & {*sys.modules}
 assert "scipy.stats" not in sys.modules
-assert scipy.special.ndtri(0.975).round(4) == 1.96 and Figure.set.__doc__ is None
-assert scipy.special.ndtri.__doc__.startswith("ndtri(") and "Cholesky" in scipy.linalg.cholesky.__doc__
-assert scipy.linalg.cholesky(numpy.array([[[4.0]], [[9.0]]])).ravel().tolist() == [2.0, 3.0]
+assert scipy.special.ndtri(0.975).round(4) == 1.96
 figure = Figure()
 FigureCanvasSVG(figure)
 line, = figure.subplots().plot([0, 1], [0, 1])
-line.set(linewidth=3, color="red")
-assert (line.get_lw(), line.get_color()) == (3, "red")
-try:
-    line.set(no_such_property=1)
-except AttributeError:
-    pass
-else:
-    raise AssertionError
 figure.savefig(sys.stdout.buffer, format="svg", metadata={"Date": None})
 numpy.testing.assert_allclose(1.0, 1.0)
 assert numpy.f2py.get_include()
