@@ -120,3 +120,15 @@ def test_small_figures_are_in_micrometres_or_seconds() -> None:
     assert small(2.04e-3, angle=False) == "2.0 µm"
     assert small(3 * ARCSECOND, angle=True) == "3.0″"
     assert small(0.0, angle=False).endswith("µm")
+
+
+def test_a_systematic_error_beyond_what_the_machine_is_known_by_is_told() -> None:
+    """U of the virtual measurements is 10 µm about a mean error of nothing."""
+    assert "more than their U" in why(figure(systematic=10.5e-3))
+    assert "more than their U" not in why(figure(systematic=-9.5e-3))
+
+
+def test_a_zone_that_is_nearly_nothing_is_told_to_be_too_large() -> None:
+    assert "d is the width of a zone" in why(figure(zone=True, value=8e-3))
+    assert "width of a zone" not in why(figure(zone=True, value=9e-3))
+    assert "width of a zone" not in why(figure(value=8e-3))
