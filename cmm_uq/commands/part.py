@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cmm_uq.commands.part_further import further_of
 from cmm_uq.commands.part_machine import machine_found
 from cmm_uq.commands.part_methods import methods_of
 from cmm_uq.commands.part_plan import circumstances_of, doubled, origin_of, plan_of, poses_of
@@ -95,14 +96,18 @@ def part_found(
     found_ways = ways(
         plan, given, min(WAYS, trials), seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual
     )
+    stage("What to measure on the machine", 0.8)
+    unseen = _unseen(virtual, shares)
+    further = further_of(machine.job, unseen)
     stage("Decisions", 0.85)
     known = stated(simulated, measured)
     together = None if measured is None else conforming(plan, errors, measured)[1]
     return PartFound(
-        job, plan, given, virtual, simulated, known, measured, shares, _unseen(virtual, shares), None,
+        job, plan, given, virtual, simulated, known, measured, shares, unseen, None if further is None else further.further,
         judged(job, plan, errors, measured), None if together is None or np.isnan(together) else together, tuple(found_ways),
         displaced(virtual, seed=seed), _three(origin_of(job, machine.state.machine)),
         machine.standing, compared(known, shares, others), digits=digits, seed=seed, warnings=machine.warnings,
+        files={} if further is None else further.files,
     )  # fmt: skip
 
 

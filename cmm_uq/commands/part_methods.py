@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,7 +32,10 @@ from cmm_uq.units import ARCSECOND, MICROMETRE
 ORIENTATIONS_ASKED, REPEATS_ASKED = 4, 5
 """Orientations, and measurements in each, that descriptions of the method of several orientations ask for."""
 
-_NO_LENGTH = (*FORMS, *ORIENTATIONS, *RUNOUTS, "angle", "position", "coaxiality")
+ZONES = (*FORMS, *ORIENTATIONS, *RUNOUTS, "position", "coaxiality")
+"""Characteristics that are widths of zones."""
+
+_NO_LENGTH = (*ZONES, "angle")
 """Characteristics that are none or deviations: their expansion does not count."""
 
 _FELT = 1e-6
@@ -150,11 +154,10 @@ def _orientations(
     for i, one in enumerate(plan.characteristics):
         if one.name in values:
             own = Slopes(_felt(slopes.scale[i]), {name: _felt(slope[i]) for name, slope in slopes.tips.items()})
-            figures.append(
-                by_orientations(
-                    one.name, values[one.name], repeats.group, own, standards, warm, angle=one.what == "angle"
-                )
+            figure = by_orientations(
+                one.name, values[one.name], repeats.group, own, standards, warm, angle=one.what == "angle"
             )
+            figures.append(replace(figure, zone=one.what in ZONES))
     seen: dict[str, Seen] = {
         MACHINE: "varied", NOISE: "varied",
         STYLUS: "corrected" if facts.probe_standard else "varied" if facts.qualified_anew else "unseen",

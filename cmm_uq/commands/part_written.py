@@ -159,7 +159,7 @@ def contents_of(found: PartFound, stage: Stage = silent) -> dict[str, bytes]:
     stage("Rendering", 0.92)
     page = render_html(document).encode()
     further = {RESULTS: data, PROVENANCE: provenance_of(_behind(found), results, {html: page, RESULTS: data})}
-    return {html: page, pdf: render_pdf(document, {**job.inputs, **further}), **further}
+    return {html: page, pdf: render_pdf(document, {**job.inputs, **further}), **further, **found.files}
 
 
 def _behind(found: PartFound) -> Behind:

@@ -14,6 +14,9 @@ from cmm_uq.uncertainty.budget import Line
 from cmm_uq.uncertainty.rounding import figure, rounded, significant
 from cmm_uq.units import ARCSECOND, MICROMETRE, Unit, unit
 
+_NOTHING = 5e-4
+"""Share of a variance that is printed as none."""
+
 EXPLAINED = 6
 """Characteristics for which is told why methods differ, and whose budgets are listed: those that differ most."""
 
@@ -154,7 +157,7 @@ def _lines(one: Figure) -> list[tuple[Text, ...]]:
     _, small, _, per_small = _units(angle=one.angle)
     rows: list[tuple[Text, ...]] = []
     for depth, line, share in one.budget.flat():
-        if not line.u:
+        if not line.u or share < _NOTHING:
             continue
         part = say("{value} {unit}", value=significant(one.u * share**0.5 / per_small), unit=small)
         name = say("{indent}{name}", indent=Verbatim("\u2003" * depth), name=line.name)

@@ -8,7 +8,7 @@ from math import hypot, sqrt
 
 from scipy.stats import chi2
 
-from cmm_uq.messages import Text, listed, number, say
+from cmm_uq.messages import Text, Verbatim, listed, number, say
 from cmm_uq.parts.budget import Budget
 from cmm_uq.parts.by_method import ByMethod, Compared, Comparison, Figure, Method, Pair, Seen, Stating
 from cmm_uq.parts.in_words import FAMILIES, family_of
@@ -21,6 +21,9 @@ MATTERS = 0.05
 
 CHANCE = 0.05
 """Probability at which a scatter counts as another than the one that is expected."""
+
+NEAR = 3.0
+"""Scatters below which a zone counts as nearly nothing."""
 
 METHODS: Mapping[Method, Text] = {
     "virtual": say("the virtual measurements"), "calibrated_part": say("the calibrated part"),
@@ -44,7 +47,7 @@ def compared(stated: Sequence[Stated], shares: Budget, methods: Sequence[ByMetho
         figures = [(other, figure) for other in methods if (figure := other.of(one.name)) is not None]
         if not figures:
             continue
-        virtual = Stating("virtual", one.value, one.u, 0.5 * (one.interval[1] - one.interval[0]))
+        virtual = Stating("virtual", one.value, one.u, 0.5 * (one.interval[1] - one.interval[0]), one.error)
         all_stated = (virtual, *(Stating(other.method, figure.value, figure.u, figure.U) for other, figure in figures))
         pairs = tuple(_pairs(all_stated))
         by_family = family_shares(shares, one.name)
@@ -79,9 +82,17 @@ def _why(virtual: Stating, method: ByMethod, figure: Figure, shares: Mapping[str
     grouped = _grouped(method.seen, shares)
     yield say("By {method} u is {ratio} times that of the virtual measurements.", method=name,
               ratio=number(figure.u / virtual.u, ".2f"))  # fmt: skip
+    bias = abs((figure.systematic or 0.0) - virtual.error)
+    if bias > virtual.U and method.method == "calibrated_part":
+        yield say("Its systematic error differs from the mean error of the virtual measurements by {bias}, more than their U: "
+                  "the machine is not as its certificate states it, or the calibrated value is wrong.",
+                  bias=small(bias, angle=figure.angle))  # fmt: skip
     for seen, words in (("unseen", _unseen), ("systematic", _systematic), ("corrected", _corrected)):
         if (share := sum(grouped.get(seen, {}).values())) >= MATTERS:
             yield words(name, _named(grouped[seen]), _percent(share), figure)
+    if figure.zone and figure.value is not None and figure.value < NEAR * figure.scatter:
+        yield say("{name} is the width of a zone and nearly nothing: errors make it larger on average, by a part of its "
+                  "scatter that {method} does not take off.", name=Verbatim(figure.name), method=name)  # fmt: skip
     yield from _scatter(name, virtual, figure, sum(grouped.get("varied", {}).values()))
     if figure.single is not None and figure.single > figure.u:
         yield say("That is u of the mean of all its measurements; one of them alone would have {single}.",

@@ -44,6 +44,7 @@ class Figure:
     systematic : error that the method found and takes off; ``None`` where it looks for none.
     corrected : whether it is taken off; where not, its size is added to U.
     single : standard uncertainty of one measurement in one orientation, where ``budget`` is of the mean of all.
+    zone : whether it is the width of a zone, which errors make larger on average where it is small.
     scatter, scatter_dof : standard deviation of one measurement among the repeats, and its degrees of freedom.
     """
 
@@ -53,6 +54,7 @@ class Figure:
     systematic: float | None = None
     corrected: bool = True
     single: float | None = None
+    zone: bool = False
     scatter: float = 0.0
     scatter_dof: float = 1.0
 
@@ -96,12 +98,21 @@ class ByMethod:
 
 @dataclass(frozen=True)
 class Stating:
-    """What one method states of a characteristic, mm or rad: its value, where there is one, u and U."""
+    """What one method states of a characteristic, mm or rad.
+
+    Parameters
+    ----------
+    method : which.
+    value : where there is one.
+    u, U : its uncertainty.
+    error : mean error that is taken off, of virtual measurements.
+    """
 
     method: Method
     value: float | None
     u: float
     U: float
+    error: float = 0.0
 
 
 @dataclass(frozen=True)

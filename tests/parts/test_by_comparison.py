@@ -77,10 +77,7 @@ def test_what_is_not_tested_is_not_compared() -> None:
 def test_the_sentences_say_what_is_systematic_and_what_scatters() -> None:
     told = why(figure())
     assert "u is 0.30 times that of the virtual measurements" in told
-    assert (
-        "errors of the machine, 64 % of the variance of the virtual measurements, in its systematic error of 2.0 µm"
-        in told
-    )
+    assert "errors of the machine, 64 % of the variance of the virtual measurements, in its systematic error of 2.0 µm" in told
     assert "would scatter by 2.8 µm by the virtual measurements; it scattered by 2.8 µm, which chance explains" in told
     assert "form" not in told  # 4 % matter too little
     assert "differ by more" not in told
@@ -101,9 +98,7 @@ def test_what_standards_correct_is_named() -> None:
     assert "Standards correct the calibrated part for errors of the machine, 64 %" in why(figure(), machine="corrected")
 
 
-@pytest.mark.parametrize(
-    ("scatter", "words"), [(4.5e-3, "more than chance"), (1.5e-3, "less than chance"), (3e-3, "which chance")]
-)
+@pytest.mark.parametrize(("scatter", "words"), [(4.5e-3, "more than chance"), (1.5e-3, "less than chance"), (3e-3, "which chance")])
 def test_scatter_is_judged_by_its_degrees_of_freedom(scatter: float, words: str) -> None:
     """χ² of 19: a standard deviation within 0.68 and 1.31 of the true one, 19 times of 20."""
     assert words in why(figure(scatter=scatter))
@@ -125,3 +120,15 @@ def test_small_figures_are_in_micrometres_or_seconds() -> None:
     assert small(2.04e-3, angle=False) == "2.0 µm"
     assert small(3 * ARCSECOND, angle=True) == "3.0″"
     assert small(0.0, angle=False).endswith("µm")
+
+
+def test_a_systematic_error_beyond_what_the_machine_is_known_by_is_told() -> None:
+    """U of the virtual measurements is 10 µm about a mean error of nothing."""
+    assert "more than their U" in why(figure(systematic=10.5e-3))
+    assert "more than their U" not in why(figure(systematic=-9.5e-3))
+
+
+def test_a_zone_that_is_nearly_nothing_is_told_to_be_too_large() -> None:
+    assert "d is the width of a zone" in why(figure(zone=True, value=8e-3))
+    assert "width of a zone" not in why(figure(zone=True, value=9e-3))
+    assert "width of a zone" not in why(figure(value=8e-3))
