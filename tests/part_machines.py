@@ -22,7 +22,9 @@ from tests.jobs.part.parts import tables
 
 MACHINE = "bryan-simulated"
 PDF = "machine/certificate-simulated.pdf"
-TEN = [30.0, 30.0, 5.0]
+THERE = {"machine_state": {"certificate": "machine",
+                           "travel_mm": {"x": [0.0, 900.0], "y": [0.0, 1200.0], "z": [-600.0, 0.0]}}}  # fmt: skip
+"""What the machine's results do not say, and its certificate does."""
 
 
 @cache

@@ -1,10 +1,12 @@
-"""Do 95 % intervals of parts hold? Machines with a hidden truth, calibrated and certified, then measuring a part as it was made.
+"""Do 95 % intervals of parts hold? Machines with a hidden truth, calibrated and certified, then measuring a part as made.
 
-Truth, recordings, the measured part and what a drawing asks of it come from :mod:`benchmarks.parts.truth`, which shares no code
-with the package. Every machine has all common errors, as large as physics allows. The calibration models six of them; the machine
-corrects its estimates; parts are measured on the truth, and their intervals stated given the recording, as ``cmm-uq part`` does.
+Truth, recordings, the measured part and what a drawing asks of it come from :mod:`benchmarks.parts.truth`, which shares no
+code with the package. Every machine has all common errors, as large as physics allows. The calibration models six of them;
+the machine corrects its estimates; parts are measured on the truth, and their intervals stated given the recording, as
+``cmm-uq part`` does.
 
-Run: ``python -m benchmarks.parts.machines FOLDER [--machines N] [--only WORDS]``; ``--page`` prints the tables of what is there.
+Run: ``python -m benchmarks.parts.machines FOLDER [--machines N] [--only WORDS]``; ``--page`` prints the tables of what is
+there.
 Every machine is appended to ``FOLDER/<cell>.jsonl`` as it is done: a run can be stopped and taken up again.
 """
 
@@ -22,7 +24,7 @@ import numpy as np
 from benchmarks.coverage.measuring import kept
 from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import truth
-from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, parted, plan
+from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
 from cmm_uq.geometry.repeated import Repeated
 from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.kinds.ballbar.observe import Ballbar
@@ -91,7 +93,7 @@ def _remembered(kind: FeatureKind, points: Floats) -> Repeated:
     return _repeated(kind, points.shape, points.tobytes())
 
 
-setattr(associating, "Repeated", _remembered)
+associating.Repeated = _remembered  # type: ignore[assignment, misc]
 
 
 def calibrated(cell: Cell, hidden: truth.Truth, sigma: float, offset: float, random: np.random.Generator) -> Artefact:

@@ -211,7 +211,7 @@ def part(
     Examples
     --------
     >>> import cmm_uq
-    >>> cmm_uq.part("examples/part-plate-simulated", trials=2000)
+    >>> cmm_uq.part("examples/part-plate-simulated")  # doctest: +SKIP
     <Part of part-plate-simulated: 5 characteristics, pass>
     """
     from cmm_uq.api.part import Part

@@ -158,7 +158,9 @@ def _check_part(folder: Path, path: Path) -> Checked:
     with wrong.going_on():
         job = read_part(folder, machine=False)
         refuse_unfit(job)
-        warnings += [Problem(str.__str__(said), str(path), key=f"[{table}]", fix=fix) for table, said, fix in lacking(job)]
+        warnings += [
+            Problem(str.__str__(said), str(path), key=f"[{table}]", fix=fix) for table, said, fix in lacking(job)
+        ]
     if job is not None:
         with wrong.going_on():
             read_part(folder)  # with the files that state the machine

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -75,7 +75,7 @@ class _Stated:
 
 def machine_found(
     job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None, records: str | Path | None = None,
-    seed: int = 0, stage: Stage = silent,
+    seed: int = 0, stage: Stage = silent, fits: Callable[[Machine], None] = lambda machine: None,
 ) -> MachineFound:  # fmt: skip
     """The machine of a part's job.
 
@@ -87,6 +87,7 @@ def machine_found(
     records : of the machine's history, for its drift; ``None`` for none.
     seed : of the draws.
     stage : told of progress.
+    fits : refuses a machine on which the part cannot be measured, before anything is computed.
 
     Raises
     ------
@@ -99,6 +100,7 @@ def machine_found(
         stated = _certified(job, rerun=rerun, trust=trust, stage=stage)
     standing = _standing(job, stated, trusted=trust is not None)
     machine = _machine(job, stated.job)
+    fits(machine)
     state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
     state = replace(
         state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=_known_at(state, standing)

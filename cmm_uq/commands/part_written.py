@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.commands.written import REPORTS, RESULTS, Stage, silent
 from cmm_uq.documents.fonts import fonts_of
 from cmm_uq.documents.origin import file_name
+from cmm_uq.documents.provenance import FILE as PROVENANCE
+from cmm_uq.documents.provenance import Behind, provenance_of
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.origin import SIMULATED
 from cmm_uq.jobs.part.job import PartJob, read_part
@@ -69,7 +71,7 @@ def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
 
     return part_found(
         job, seed=asked.seed, trials=TRIALS if asked.trials is None else asked.trials, digits=asked.digits, rerun=asked.rerun,
-        trust=asked.trust, stage=stage,
+        trust=asked.trust, records=asked.records, stage=stage,
     )  # fmt: skip
 
 
@@ -124,7 +126,7 @@ def written(
     folder = REPORTS / facts.id if out is None else out
     names = [file_name(name, facts.origin) for name in DOCUMENTS]
     owner, inputs = Owner(COMMAND, facts.id, facts.origin), tuple(job.folder / name for name in job.inputs)
-    with staged(folder, owner, inputs=inputs, force=force, expected=(*names, RESULTS)) as place:
+    with staged(folder, owner, inputs=inputs, force=force, expected=(*names, RESULTS, PROVENANCE)) as place:
         one: PartFound = found()
         contents = contents_of(one, stage)
         stage(f"Writing: {len(contents)} files to {folder}", 0.95)
@@ -150,12 +152,21 @@ def contents_of(found: PartFound, stage: Stage = silent) -> dict[str, bytes]:
         raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / RESULTS),
                          fix="Put the machine's results into a folder of their own")  # fmt: skip
     html, pdf = (file_name(name, job.facts.job.origin) for name in DOCUMENTS)
-    data = as_json(part_results(found))
+    results = part_results(found)
+    data = as_json(results)
     stage("Composing the page", 0.88)
     document = document_of(found)
     stage("Rendering", 0.92)
-    further = {RESULTS: data}
-    return {html: render_html(document).encode(), pdf: render_pdf(document, {**job.inputs, **further}), **further}
+    page = render_html(document).encode()
+    further = {RESULTS: data, PROVENANCE: provenance_of(_behind(found), results, {html: page, RESULTS: data})}
+    return {html: page, pdf: render_pdf(document, {**job.inputs, **further}), **further, **found.files}
+
+
+def _behind(found: PartFound) -> Behind:
+    facts, standing = found.job.facts, found.standing
+    recording = "" if facts.recording is None else facts.recording.file
+    return Behind(COMMAND, facts.job, facts.laboratory, facts.job.origin, found.job.inputs, recording,
+                  (standing.number, standing.laboratory))  # fmt: skip
 
 
 def document_of(found: PartFound) -> Document:

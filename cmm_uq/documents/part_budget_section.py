@@ -19,8 +19,8 @@ from cmm_uq.units import unit
 DETAILED = 10
 """Characteristics whose budgets are listed line by line: those of least margin."""
 
-_LINES, _LEAST = 6, 0.01
-"""Lines of a budget that are listed at most, and the share from which on."""
+_LINES, _LEAST, _FACTOR = 6, 0.01, 0.05
+"""Lines of a budget that are listed at most, the share from which on, and that from which on a factor of one is."""
 
 _WAYS = 6
 """Characteristics for which every way is shown."""
@@ -139,7 +139,7 @@ def _factors(detailed: list[Figures]) -> Table:
     for one in detailed:
         within = budget.within[:, one.place]
         order = np.argsort(-np.abs(within), kind="stable").tolist()
-        kept = [f for f in order[:_LINES] if abs(within[f]) >= _LEAST]
+        kept = [f for f in order[:_LINES] if abs(within[f]) >= _FACTOR]
         rows += [
             (one.number, NOTHING if i else one.beside, line_words(budget.factors[f]), _percent(within[f]))
             for i, f in enumerate(kept)
@@ -239,6 +239,11 @@ def best_words(one: Figures) -> Text:
         )
     told = say("{way:capital} would reduce the uncertainty of {name} most, by {gain} %.", way=best.name, name=one.called,
                gain=number(100 * (1 - float(best.u[one.place]) / now), ".0f"))  # fmt: skip
-    helped = [other.called for other in figures_of(one.found)
+    helped = [other.name for other in figures_of(one.found)
               if other.place != one.place and best.u[other.place] < (1 - _GAIN) * planned.u[other.place]]  # fmt: skip
-    return after(told, say("It helps {names} too.", names=commas(helped)) if 0 < len(helped) <= _WAYS else NOTHING)
+    return after(told, _too(helped) if 0 < len(helped) <= _WAYS else NOTHING)
+
+
+def _too(names: list[Text]) -> Text:
+    return plural(len(names), one=say("It helps characteristic {names} too.", names=commas(names)),
+                  many=say("It helps characteristics {names} too.", names=commas(names)))  # fmt: skip

@@ -14,6 +14,7 @@ from cmm_uq.documents.part_methods import methods_section
 from cmm_uq.documents.part_overview import overview_of, part_words
 from cmm_uq.documents.part_pictured import errors_section, part_section
 from cmm_uq.documents.part_results_section import conformity_section, correlation_section, results_section
+from cmm_uq.documents.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.messages import NOTHING, Text, Verbatim, day, names, say
 
@@ -57,7 +58,7 @@ def part_document(found: PartFound) -> Document:
         sections=tuple(section for section in sections if section.blocks),
         statements=statements_of(facts.job) if measured else (),
         signatures=signatures_of(facts.laboratory) if measured else (),
-        attachments=(*names(found.job.inputs), Verbatim("results.json")),
+        attachments=(*names(found.job.inputs), Verbatim("results.json"), Verbatim(PROVENANCE)),
         produced_by=say("{program}, seed {seed}", program=program_words(), seed=found.seed),
         date=facts.job.issued or facts.job.date,
         end=say("End of report"),

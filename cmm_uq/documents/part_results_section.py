@@ -191,7 +191,7 @@ def _r(value: float, row: int, column: int) -> Text:
     """Of a matrix that is the same below and above its diagonal, the lower half."""
     if column > row:
         return DASH
-    return number(1) if column == row else signed(value, ".2f")
+    return number(1) if column == row else signed(round(value, 2) + 0.0, ".2f")
 
 
 def count_words(count: int) -> Text:

@@ -116,11 +116,22 @@ _NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
 _COORDINATES = re.compile(r'(?<= )(?:d|x|y|points|transform)="[^"]*"')
 _UNWANTED = re.compile(r'font-family: [^;"]*;? ?| transform="rotate\(-0 [^"]*"| xmlns:xlink="[^"]*"| version="1.1"')
 _TAG = re.compile(r"<[^>]*>")
+_ALONE = re.compile(r'(?<= d=")M (\S+) (\S+)(?: L \1 \2| M \1 \2)+ ?(?=")')
+"""Dots in one place: a path without extent, which some viewers of PDF leave out."""
 
 
 def _shorter(number: re.Match[str]) -> str:
-    text = f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
+    return _shorter_of(float(number[0]))
+
+
+def _shorter_of(value: float) -> str:
+    text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
+
+
+def _extended(alone: re.Match[str]) -> str:
+    x, y = float(alone[1]), alone[2]
+    return f"M {alone[1]} {y} L {_shorter_of(x + 0.01)} {y}"
 
 
 def as_svg(figure: Figure) -> str:
@@ -139,7 +150,7 @@ def as_svg(figure: Figure) -> str:
         tag = _UNWANTED.sub("", found[0]).replace("xlink:href", "href")
         tag = re.sub(r' id="([^"]*)"', lambda name: name[0] if name[1] in used else "", tag)
         tag = _COORDINATES.sub(lambda values: _NUMBER.sub(_shorter, values[0]), tag)
-        return re.sub(r"\s+", " ", tag).replace(' "', '"')
+        return _ALONE.sub(_extended, re.sub(r"\s+", " ", tag).replace(' "', '"'))
 
     svg = re.sub(r">\s+<", "><", _TAG.sub(clean, svg))
     while "<g></g>" in svg or "<defs></defs>" in svg:

@@ -14,11 +14,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote
 
 from cmm_uq.documents.installation import machine, packages
+from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.laboratory import Laboratory
 
 FILE = "provenance.json"
 PLATFORM = "cmm-uq:platform"
@@ -27,6 +30,36 @@ _RECORDING, _REPORT, _PROGRAM, _LABORATORY = "cmm-uq:recording", "cmm-uq:report"
 _CERTIFICATE, _REPLACED, _ARTEFACT = "cmm-uq:certificate", "cmm-uq:replaced", "cmm-uq:artefact-certificate"
 
 Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Behind:
+    """What is behind a certificate, of whatever.
+
+    Parameters
+    ----------
+    command : of ``cmm-uq`` that made it.
+    said, laboratory : as its job has them.
+    origin : of the recording.
+    inputs : of the job, by name.
+    recording : its file; empty where there is none.
+    rests_on : number and laboratory of the certificate that it goes by, of the artefact or of the machine; empty for none.
+    """
+
+    command: str
+    said: Identification
+    laboratory: Laboratory
+    origin: str
+    inputs: Mapping[str, bytes]
+    recording: str
+    rests_on: tuple[str, str] = ("", "")
+
+    @classmethod
+    def of(cls, job: Job) -> Behind:
+        """Behind the certificate of a machine."""
+        facts, chain = job.facts, job.facts.artefact.certificate
+        known = ("", "") if chain is None else (chain.number, chain.laboratory)
+        return cls("report", facts.job, facts.laboratory, facts.job.origin, job.inputs, facts.recording.file, known)
 
 
 def provenance(job: Job, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> bytes:
@@ -38,6 +71,11 @@ def provenance(job: Job, results: Mapping[str, Any], outputs: Mapping[str, bytes
     results : contents of results.json.
     outputs : what was made of it, by name.
     """
+    return provenance_of(Behind.of(job), results, outputs)
+
+
+def provenance_of(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> bytes:
+    """The file of any certificate; see :func:`provenance`."""
     graph = {
         "prefix": {"cmm-uq": _PREFIX, "file": f"{_PREFIX}file:", "package": f"{_PREFIX}package:"},
         "entity": _entities(job, results, outputs),
@@ -88,8 +126,8 @@ def _entities_of(graph: Any) -> dict[str, Record]:
     return {str(name): one for name, one in found.items() if isinstance(one, dict)} if isinstance(found, dict) else {}
 
 
-def _entities(job: Job, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> dict[str, Record]:
-    facts = job.facts
+def _entities(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> dict[str, Record]:
+    said = job.said
     found = {_file(name): _told(name, content, "input") for name, content in job.inputs.items()}
     found |= {_file(name): _told(name, content, "output") for name, content in outputs.items()}
     found |= {
@@ -97,45 +135,47 @@ def _entities(job: Job, results: Mapping[str, Any], outputs: Mapping[str, bytes]
         for name, version in {**packages(), **results["software"].get("plugins", {})}.items()
     }
     found[PLATFORM] = {"prov:type": "platform"} | {f"cmm-uq:{name}": told for name, told in machine().items()}
-    issued = {"cmm-uq:issued": _day(facts.job.issued.isoformat())} if facts.job.issued else {}
+    issued = {"cmm-uq:issued": _day(said.issued.isoformat())} if said.issued else {}
     found[_CERTIFICATE] = {
         "prov:type": _name("prov:Collection"),
-        "prov:label": facts.job.number or facts.job.id,
+        "prov:label": said.number or said.id,
         **issued,
     }
-    if replaced := facts.job.replaces:
+    if replaced := said.replaces:
         found[_REPLACED] = {"prov:label": replaced.number, "cmm-uq:issued": _day(replaced.date.isoformat())}
-    if (chain := facts.artefact.certificate) and chain.number:
-        found[_ARTEFACT] = {"prov:label": chain.number, "cmm-uq:laboratory": chain.laboratory}
+    number, laboratory = job.rests_on
+    if number:
+        found[_ARTEFACT] = {"prov:label": number, "cmm-uq:laboratory": laboratory}
     return found
 
 
-def _activities(job: Job, results: Mapping[str, Any]) -> dict[str, Record]:
-    facts, sampling = job.facts.job, results.get("sampling") or {}
+def _activities(job: Behind, results: Mapping[str, Any]) -> dict[str, Record]:
+    sampling = results.get("sampling") or results.get("simulation") or {}
     seed = {"cmm-uq:seed": sampling["seed"]} if "seed" in sampling else {}
     return {
-        _RECORDING: {"cmm-uq:origin": facts.origin, "cmm-uq:date": _day(facts.date.isoformat())},
-        _REPORT: {"prov:label": "cmm-uq report", **seed},
+        _RECORDING: {"cmm-uq:origin": job.origin, "cmm-uq:date": _day(job.said.date.isoformat())},
+        _REPORT: {"prov:label": f"cmm-uq {job.command}", **seed},
     }
 
 
-def _agents(job: Job, results: Mapping[str, Any]) -> dict[str, Record]:
+def _agents(job: Behind, results: Mapping[str, Any]) -> dict[str, Record]:
     own = results["software"]
     program = {"prov:type": _name("prov:SoftwareAgent"), "prov:label": own["name"], "cmm-uq:version": own["version"]}
-    laboratory = job.facts.laboratory.name
+    laboratory = job.laboratory.name
     organisation = {"prov:type": _name("prov:Organization"), "prov:label": laboratory}
     return {_PROGRAM: program, **({_LABORATORY: organisation} if laboratory else {})}
 
 
-def _relations(job: Job, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> dict[str, dict[str, Record]]:
+def _relations(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> dict[str, dict[str, Record]]:
     """What used, made, and followed from what."""
     entities = _entities(job, results, outputs)
     behind = [name for name in entities if name.startswith("package:") or name in (PLATFORM, _ARTEFACT)]
-    recording = job.facts.recording.file
-    measured = [] if recording not in job.inputs else [_linked("entity", _file(recording), "activity", _RECORDING)]
+    measured = (
+        [] if job.recording not in job.inputs else [_linked("entity", _file(job.recording), "activity", _RECORDING)]
+    )
     made = [_linked("entity", name, "activity", _REPORT) for name in (*map(_file, outputs), _CERTIFICATE)]
     agents = [_linked("activity", _REPORT, "agent", _PROGRAM)]
-    if job.facts.laboratory.name:
+    if job.laboratory.name:
         agents.append(_linked("activity", _RECORDING, "agent", _LABORATORY))
     revised = _linked("generatedEntity", _CERTIFICATE, "usedEntity", _REPLACED) | {"prov:type": _name("prov:Revision")}
     return {
@@ -145,7 +185,7 @@ def _relations(job: Job, results: Mapping[str, Any], outputs: Mapping[str, bytes
         "wasGeneratedBy": _numbered("g", measured + made),
         "wasAssociatedWith": _numbered("a", agents),
         "hadMember": _numbered("m", [_linked("collection", _CERTIFICATE, "entity", _file(name)) for name in outputs]),
-        **({"wasDerivedFrom": _numbered("d", [revised])} if job.facts.job.replaces else {}),
+        **({"wasDerivedFrom": _numbered("d", [revised])} if job.said.replaces else {}),
     }
 
 

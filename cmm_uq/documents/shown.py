@@ -27,9 +27,10 @@ def shown(sizes: Sequence[Floats], flagged: NDArray[np.bool_] | None = None, mos
     count = len(sizes[0])
     if count <= most:
         return np.arange(count)
-    each = _LARGEST // len(sizes)
+    largest = min(_LARGEST, most // 2)
+    each = largest // len(sizes)
     first = [np.argsort(-np.abs(size), kind="stable")[:each] for size in sizes]
-    marked = np.flatnonzero(flagged)[:_LARGEST] if flagged is not None else np.zeros(0, dtype=np.int64)
+    marked = np.flatnonzero(flagged)[:largest] if flagged is not None else np.zeros(0, dtype=np.int64)
     chosen = np.unique(np.concatenate([*first, marked]))
     rest = np.setdiff1d(np.arange(count), chosen, assume_unique=True)
     evenly = np.linspace(0, len(rest) - 1, most - len(chosen)).astype(np.int64)

@@ -19,12 +19,11 @@ from cmm_uq.documents.part_found import PartFound
 from cmm_uq.documents.part_results import part_results
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.beginning import TABLES
+from cmm_uq.messages import say
 from cmm_uq.parts.result import evaluated
-from tests.part_machines import MACHINE, by_certificate, by_results, plate_of, report
+from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report
 
 TRIALS = 4000
-THERE = {"machine_state": {"certificate": "machine",
-                           "travel_mm": {"x": [0.0, 900.0], "y": [0.0, 1200.0], "z": [-600.0, 0.0]}}}  # fmt: skip
 
 
 @cache
@@ -65,8 +64,9 @@ def test_chain_travel_and_place_are_the_certificates_where_the_job_leaves_them_o
     np.testing.assert_allclose((read.min(axis=0) + read.max(axis=0)) / 2, [450, 600, -300], atol=0.5)
 
 
-def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path) -> None:
+def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Draws of one posterior, of which a file has some in single precision: means and spreads agree to a few of a hundred."""
+    monkeypatch.setattr("cmm_uq.commands.part_machine._given", lambda state, job, seed: (state, say(""), False))
     from cmm_uq.jobs.part.job import read_part
     from tests.conftest import ROOT
     from tests.part_machines import plate_files
@@ -76,13 +76,13 @@ def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path) -> No
     files = plate_files({}, machine_state={"job": "../machine"})
     (tmp_path / "plate" / "job.toml").write_bytes(files["job.toml"])
     found = machine_found(read_part(tmp_path / "plate"))
-    state, stated = found.state, plain().given.machine
-    assert (found.standing.source, found.standing.verdict, found.standing.given_recording) == ("job", "ANALYSED", True)
+    state, stated = found.state, shifted().given.machine
+    assert (found.standing.source, found.standing.verdict) == ("job", "ANALYSED")
     assert [one.name for one in state.effects] == [one.name for one in stated.effects]
-    np.testing.assert_allclose(
-        state.corrects, stated.corrects, atol=0.05 * float(stated.draws[:, :6].std(axis=0).max())
-    )
-    np.testing.assert_allclose(state.draws.std(axis=0), stated.draws.std(axis=0), rtol=0.05)
+    spread = stated.draws.std(axis=0)
+    assert np.all(np.abs(state.mean - stated.mean) < 0.1 * spread)
+    np.testing.assert_allclose(state.draws.std(axis=0), spread, rtol=0.1)
+    np.testing.assert_allclose(state.noise.usual_mm, stated.noise.usual_mm, rtol=0.05)
 
 
 def test_a_value_is_what_was_measured_less_the_mean_error() -> None:

@@ -94,7 +94,9 @@ def test_it_stands_on_the_part_s_page(comparison: Comparison) -> None:
 
 
 def test_angles_are_in_degrees_and_seconds() -> None:
-    budget = Budget(say("b"), [Line(say("all"), 2 * ARCSECOND, REPEATS, unit=unit("rad"))], 0.0, unit("rad"), factor=2.0)
+    budget = Budget(
+        say("b"), [Line(say("all"), 2 * ARCSECOND, REPEATS, unit=unit("rad"))], 0.0, unit("rad"), factor=2.0
+    )
     figure = Figure("a", budget, float(np.radians(30.0)))
     stating = Stating("orientations", figure.value, figure.u, figure.U)
     one = Comparison((ByMethod("orientations", (figure,), (), {}),), (Compared("a", (stating,), (), ()),))

@@ -10,7 +10,7 @@ import pytest
 from cmm_uq.documents import part_views
 from cmm_uq.documents.part_budget_plot import shares_plots
 from cmm_uq.documents.part_correlation_plot import correlation_plot
-from cmm_uq.documents.part_errors_picture import errors_picture, form_picture
+from cmm_uq.documents.part_errors_picture import MOST, errors_picture, form_picture
 from cmm_uq.documents.part_margin_plot import A_PAGE, Margin, margin_plot, margin_plots
 from cmm_uq.documents.part_picture import part_picture
 from cmm_uq.documents.part_views import ABOVE, FRONT, OBLIQUE, SIDE, VIEWS, panels
@@ -204,3 +204,13 @@ def test_correlations_are_counted_and_the_largest_is_named() -> None:
     plot = correlation_plot([number(i + 1) for i in range(4)], r)
     assert plot.alternative == "2 of 6 correlations are 0.1 or larger in size; the largest, −0.83, is between 1 and 3."
     assert len(paths(plot.svg, "#0b5c7a")) == len(paths(plot.svg, "#a84e08")) == 1
+
+
+def test_of_very_many_points_the_largest_errors_are_drawn_and_the_caption_says_how_many() -> None:
+    many = Plan((plane("A", UP, [0.0, 0.0, 0.0], [[120.0, 0, 0], [0, 80.0, 0]], (20, 20)),), ())
+    mean = np.zeros((400, 3))
+    mean[137] = [0.0, 0.0, 9.0]
+    plot = errors_picture(many, errors(mean, np.ones((400, 3))))
+    assert f"Drawn are {MOST} of 400" in plot.caption
+    arrows = [path for path in re.findall(r'<path d="([^"]*)"[^>]*fill: #a84e08', plot.svg) if len(path) > 20]
+    assert len(arrows) == len(VIEWS)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.documents.document import Plot
-from cmm_uq.documents.plot_style import ACCENT, DIVERGING, MUTED
+from cmm_uq.documents.plot_style import ACCENT, DIVERGING, MUTED, WIDTH_MM, as_svg, dots, house_style, new_figure
 from cmm_uq.documents.plots import budget_bars, curve_with_band, length_plot, volume_plot
 from cmm_uq.errors import CmmUqError
 from tests.documents.samples import plots
@@ -194,3 +194,19 @@ def test_points_lie_on_the_curve_that_they_give() -> None:
     [curve] = [outlines(d)[0] for d in drawing.drawn(stroke=ACCENT, fill="none")]
     [dots] = [d for d in drawing.drawn(stroke=MUTED, stroke_linecap="round") if len(outlines(d)) == 11]
     np.testing.assert_allclose(strokes(dots)[:, 0], curve, atol=0.02)
+
+
+@pytest.mark.parametrize(("x", "path"), [
+    ([1.0], "M 10 5 L 10.01 5"), ([1.0, 1.0], "M 10 5 L 10.01 5"), ([1.0, 2.0], "M 10 5 L 10 5 M 20 5 L 20 5"),
+])  # fmt: skip
+def test_dots_in_one_place_have_an_extent_without_which_viewers_of_pdf_leave_them_out(
+    x: list[float], path: str
+) -> None:
+    """Seen with poppler 22.12: a path of no extent is not drawn, however wide and round its stroke."""
+    with house_style():
+        figure = new_figure(10 * 25.4 / 72)
+        ax = figure.add_axes((0, 0, 100 * 25.4 / 72 / WIDTH_MM, 1))
+        dots(ax, np.array(x), np.ones(len(x)), 4.0, ACCENT)
+        ax.set(xlim=(0, 10), ylim=(0, 2))
+        ax.axis("off")
+        assert f'd="{path}"' in as_svg(figure)

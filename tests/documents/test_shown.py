@@ -44,3 +44,11 @@ def test_every_picture_of_a_large_recording_says_how_many_it_draws_and_stays_sma
     for picture in pictures:
         assert picture.caption.startswith(f"Residuals. Drawn are {MOST} of {count}")
         assert len(picture.svg) < 500_000
+
+
+def test_of_few_that_are_drawn_half_are_the_largest() -> None:
+    sizes = np.zeros(1000)
+    sizes[[3, 500, 999]] = 5.0
+    rows = shown([sizes], most=20)
+    assert len(rows) == 20
+    assert {3, 500, 999} <= set(rows.tolist())

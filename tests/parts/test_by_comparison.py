@@ -99,9 +99,7 @@ def test_what_standards_correct_is_named() -> None:
     assert "Standards correct the calibrated part for errors of the machine, 64 %" in why(figure(), machine="corrected")
 
 
-@pytest.mark.parametrize(
-    ("scatter", "words"), [(4.5e-3, "more than chance"), (1.5e-3, "less than chance"), (3e-3, "which chance")]
-)
+@pytest.mark.parametrize(("scatter", "words"), [(4.5e-3, "more than chance"), (1.5e-3, "less than chance"), (3e-3, "which chance")])
 def test_scatter_is_judged_by_its_degrees_of_freedom(scatter: float, words: str) -> None:
     """χ² of 19: a standard deviation within 0.68 and 1.31 of the true one, 19 times of 20."""
     assert words in why(figure(scatter=scatter))
