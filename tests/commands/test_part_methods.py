@@ -17,7 +17,6 @@ from cmm_uq.commands.part_plan import plan_of
 from cmm_uq.documents.part_results import part_results
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.job import part_of
-from cmm_uq.parts.budget import budget
 from cmm_uq.parts.by_method import ByMethod
 from cmm_uq.parts.result import evaluated
 from tests.jobs.part.other_methods import (
@@ -158,7 +157,6 @@ def test_the_part_s_command_finds_them_and_check_says_what_they_lack(
 ) -> None:
     """By figures and draws of the machine, with few draws; what would make u smaller is not asked for."""
     monkeypatch.setattr("cmm_uq.commands.part.ways", lambda *_, **__: [])
-    monkeypatch.setattr("cmm_uq.commands.part.budget", lambda virtual, seed: budget(virtual, 512, seed))
     job = plate_files({**by_results(), **files()}, by_calibrated_part=CALIBRATED,
                       by_orientations={**ORIENTED, "points_varied": False}, machine_state=STATE)  # fmt: skip
     found = part_found(part_of(job), trials=1000)
