@@ -20,7 +20,7 @@ from cmm_uq import __version__  # noqa: E402
 CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "overview", "gallery"],
     "How to": [
-        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*",
+        "howto/laboratory", "howto/service", "howto/auditor", "howto/part", "howto/scheduled", "howto/python", "notebooks/*",
         "import/index", "import/*", "instruments/index", "instruments/*",
     ],
     "Records": ["records/index", "records/*"],
@@ -35,7 +35,7 @@ CONTENTS: dict[str, list[str]] = {
         "certificate", "verify", "languages", "dcc", "signing", "iso17025", "provenance", "qif",
         "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
-        "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features", "machine/parts",
+        "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features", "machine/parts", "machine/part-page",
         "machine/other-methods",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],

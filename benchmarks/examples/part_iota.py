@@ -3,10 +3,11 @@
     python -m benchmarks.examples.part_iota
 
 The machine is that of examples/iota-1102-20C, reported by this package from its twenty bars. Each distance is from a ball of
-one bar to a ball of another: no length that the calibration knew. Both bars were measured with the digitizer in one pose, since
-its offset would else be in the distance (docs/machine/harris-2004.md). Of each main direction and diagonal of the volume, the
-longest is taken that lies within 20° of it. What the same distances are by the recording that a laser interferometer's error map
-of this machine compensated (examples/iota-1102-20C-compensated) is not in the job: :mod:`benchmarks.parts.iota` compares.
+one bar to a ball of another: no length that the calibration knew. Both bars were measured with the digitizer in one pose,
+since its offset would else be in the distance (docs/machine/harris-2004.md). Of each main direction and diagonal of the
+volume, the longest is taken that lies within 20° of it. What the same distances are by the recording that a laser
+interferometer's error map of this machine compensated (examples/iota-1102-20C-compensated) is not in the job:
+:mod:`benchmarks.parts.iota` compares.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ SOURCE = (
 )
 REMARKS = (
     "Centres of spheres as the machine's laser digitizer reported them, uncompensated; each distance is between balls of two "
-    "different positions of the ballbar with the digitizer in one pose. The thesis gives year and month of publication, not the "
-    "day of the measurement."
+    "different positions of the ballbar with the digitizer in one pose. The thesis gives year and month of publication, "
+    "not the day of the measurement."
 )
 
 

@@ -14,6 +14,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.toml_file import as_toml
 from cmm_uq.kinds import kind_of
 from cmm_uq.messages import NOTHING, Text, commas, plural, say, semicolons, sentences
+from cmm_uq.parts.machine import FREE
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect
 
@@ -84,7 +85,7 @@ def _why_not(calibrated: Job, effect: Effect) -> Text | None:
     lacks = [name for name in effect.columns if name not in calibrated.points.columns]
     if not lacks:
         return None
-    return next((text for begin, text in _SHOWN_BY if lacks[0].startswith(begin)), say("another artefact shows it"))
+    return next((text for begin, text in _SHOWN_BY if lacks[0].startswith(begin)), say("another artefact may show it"))
 
 
 def _asked(calibrated: Job, names: Iterable[str]) -> list[str]:
@@ -109,14 +110,14 @@ _WISHES = {"criterion": "separation", "more": SET_UPS, "number": None, "candidat
 
 
 def _found_by(plan: Plan, wanted: Sequence[Effect]) -> tuple[str, ...]:
-    """Errors of which all parameters are then determined."""
+    """Errors that are then no longer left free: each parameter known to half of what physics allows."""
     if plan.better is None or plan.better.identifiability is None:
         return ()
-    status: dict[str, bool] = {}
+    seen: dict[str, bool] = {}
     for one in plan.better.identifiability.parameters:
         name = one.unknown.key[0]
-        status[name] = status.get(name, True) and one.status == "determined"
-    return tuple(one.name for one in wanted if status.get(one.name, False))
+        seen[name] = seen.get(name, True) and one.u_with_prior <= FREE * one.unknown.prior_sd
+    return tuple(one.name for one in wanted if seen.get(one.name, False))
 
 
 def _setups(plan: Plan | None, found: Sequence[str]) -> Text:
@@ -137,7 +138,7 @@ def _missed(calibrated: Job, missed: Sequence[str]) -> Text:
         return NOTHING
     told = [
         say("{title} ({how})", title=title_of(name),
-            how=_why_not(calibrated, every()[name]) or say("another artefact shows it"))
+            how=_why_not(calibrated, every()[name]) or say("another artefact, or more set-ups, may show it"))
         for name in missed
     ]  # fmt: skip
     return say("Set-ups of the artefact as it was recorded do not show: {effects}.", effects=commas(told))
