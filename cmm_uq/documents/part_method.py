@@ -41,21 +41,22 @@ _METHOD = say(
 
 _STANDARDS = (
     say(
-        "ISO/TS 15530-4 (uncertainty by simulation): its statements on what is simulated, and what is not, are made here. The "
-        "tests on the machine itself that it asks of such a program, with calibrated parts, are not made by this program; "
-        "those by reference data and by simulated machines are published with it."
+        "ISO/TS 15530-4 (uncertainty by simulation), by public descriptions of it: what is simulated, and what is not, is "
+        "said here. The tests on the machine itself that it asks of such a program, with calibrated parts, are not made by "
+        "this program; those by reference data and by simulated machines are published with it."
     ),
     say(
-        "VDI/VDE 2617-7 (uncertainty by simulation): its idea is followed; no conformity with it is claimed, since it was not "
-        "at hand when this was written."
+        "VDI/VDE 2617-7 (uncertainty by simulation): its idea is followed; no conformity with it is claimed, since its "
+        "text was not at hand when this was written."
     ),
     say(
         "VDI/VDE 2617-11 (uncertainty budgets): the budget here has shares of simulated variances in place of the lines that "
         "it sets up by hand; no conformity with it is claimed."
     ),
     say(
-        "Propagation of distributions by JCGM 101 and JCGM 102, features by ISO 17450-1, associations and zones by ISO 1101, "
-        "datums by ISO 5459, sizes by ISO 14405-1, as far as the association that is named with each feature goes."
+        "Propagation of distributions by JCGM 101 and JCGM 102. Characteristics are those of ISO 1101, ISO 5459 and ISO "
+        "14405-1 as far as the associations go that are named with the features: ISO 1101 asks for minimum zones, ISO 5459 "
+        "for tangent datums."
     ),
 )
 
@@ -151,5 +152,14 @@ def _unstated(found: PartFound) -> list[Text]:
         (bool(facts.part.u_cte_per_k), say("expansion of the part")),
         (bool(found.given.forms), say("form and roughness of the part")),
         (bool(facts.placing.u_fixture_um), say("clamping")),
+        (_operators(found), say("operators")),
     )
     return [what for stated, what in lacking if not stated]
+
+
+def _operators(found: PartFound) -> bool:
+    """Whether anything is stated of what operators do differently."""
+    facts = found.job.facts
+    return bool(facts.probing.u_operator_um) or any(
+        one.u_operator_um or one.u_operator_deg for one in facts.characteristic
+    )

@@ -16,10 +16,10 @@ from cmm_uq.geometry.exchange import MOST_EXCHANGES, ROUNDING
 from cmm_uq.geometry.shapes import Shape
 from cmm_uq.points import Floats, Ints
 
-SETTLED = 1e-11
-"""mm: what may be left to be gained."""
+SETTLED, ENOUGH = 1e-10, 1e-7
+"""mm: what may be left to be gained in a step; and after the most of them, where they wind along a curved valley."""
 
-MOST_STEPS = 80
+MOST_STEPS = 50
 _WIDE = 10.0
 """Times the form: the half width of the first box."""
 
@@ -30,7 +30,7 @@ _POOR, _GOOD, _WIDER, _NARROWER = 0.25, 0.75, 2.0, 0.25
 def held(shape: Shape, start: Floats, local: Floats, units: Floats, side: float) -> tuple[Floats, Ints]:
     """States (N, k) of the circumscribed (side 1) or inscribed (−1) features of points (d, N, n), and which did not settle.
 
-    Of several inscribed features that points hold it is the one that is reached from the start.
+    Of several features that points hold it is the one that is reached from the start, as it is of one measurement alone.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def held(shape: Shape, start: Floats, local: Floats, units: Floats, side: float)
     floor = ROUNDING * float(np.abs(local).max(initial=0.0))
     d, J = shape.distances(state, local)
     box, largest = _WIDE * np.ptp(d, axis=1), (side * d).max(axis=1)
-    pending, lost = np.arange(len(start)), np.zeros(len(start), dtype=np.bool_)
+    pending, lost = np.arange(len(start)), np.ones(len(start), dtype=np.bool_)
     for _ in range(MOST_STEPS):
         A = np.ascontiguousarray((side * J[:free] / units[:free, None, None]).transpose(1, 2, 0))
         try:
@@ -59,18 +59,20 @@ def held(shape: Shape, start: Floats, local: Floats, units: Floats, side: float)
         state[pending[better]] = trial[better]
         largest[pending] -= np.where(better, gained, 0.0)
         d, J = np.where(better[:, None], there, d), np.where(better[:, None], derivative, J)
-        lost[pending] = ~np.isfinite(foretold)
+        lost[pending] = ~(foretold <= ENOUGH)
         left = foretold > SETTLED
         pending, d, J = pending[left], d[left], J[:, left]
         if not len(pending):
             break
-    state[:, free] += side * largest
+    else:
+        pending = pending[:0]
     lost[pending] = True
+    state[:, free] += side * largest
     return state, np.flatnonzero(lost)
 
 
 def _boxed(A: Floats, b: Floats, box: Floats, floor: float) -> tuple[Floats, Floats]:
-    """X (N, k) within a box and t (N,) with the least t ≥ b + A·x for all rows (N, n); ``nan`` where exchanges find no end."""
+    """Steps x (N, k) within a box and the least t (N,) ≥ b + A·x for all rows (N, n); ``nan`` where exchanges find no end."""
     N, n, k = A.shape
     walls = np.broadcast_to(np.vstack([np.eye(k), -np.eye(k)]), (N, 2 * k, k))
     tops = np.concatenate([np.full((N, n, 1), -1.0), np.zeros((N, 2 * k, 1))], axis=1)

@@ -41,12 +41,18 @@ FAMILIES: Mapping[str, Text] = {
 
 _FACTORS: Mapping[str, Text] = {
     "noise: reading": say("Noise of a reading"), "noise: set-up": say("Noise that a set-up adds"),
-    "noise: slow": say("Slow noise"), "temperature: part": say("Temperature and expansion of the part"),
+    "noise: slow": say("Slow noise"), "noise: growing": say("Noise that grows with length"),
+    "temperature: part": say("Temperature and expansion of the part"),
     "temperature: gradient in the part": say("Gradient of temperature in the part"),
     "temperature: scale x": say("Temperature of the scale of X"),
     "temperature: scale y": say("Temperature of the scale of Y"),
     "temperature: scale z": say("Temperature of the scale of Z"),
-    "fixture: fixture": say("Clamping"),
+    "temperature: warming of the part": say("Warming of the part while it is probed"),
+    "temperature: warming of scale x": say("Warming of the scale of X while the part is probed"),
+    "temperature: warming of scale y": say("Warming of the scale of Y while the part is probed"),
+    "temperature: warming of scale z": say("Warming of the scale of Z while the part is probed"),
+    "fixture: fixture": say("Clamping"), "fixture: movement of the part": say("Movement of the part"),
+    "operator: reproducibility of points": say("Reproducibility of a point"),
 }  # fmt: skip
 
 _NAMED: Mapping[str, Callable[[Text], Text]] = {
@@ -55,6 +61,7 @@ _NAMED: Mapping[str, Callable[[Text], Text]] = {
     "stylus: lobing ": lambda name: say("Pre-travel over directions, {name}", name=name),
     "form: form of ": lambda name: say("Form of {name}", name=name),
     "form: roughness of ": lambda name: say("Roughness of {name}", name=name),
+    "operator: reproducibility of ": lambda name: say("Reproducibility of {name}", name=name),
 }
 """Beginnings of lines that go on with a name of the user's."""
 

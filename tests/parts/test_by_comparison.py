@@ -78,7 +78,8 @@ def test_the_sentences_say_what_is_systematic_and_what_scatters() -> None:
     told = why(figure())
     assert "u is 0.30 times that of the virtual measurements" in told
     assert "errors of the machine, 64 % of the variance of the virtual measurements, in its systematic error of 2.0 µm" in told
-    assert "would scatter by 2.8 µm by the virtual measurements; it scattered by 2.8 µm, which chance explains" in told
+    assert "What varied between its measurements would scatter by 2.8 µm by the virtual measurements" in told
+    assert "it scattered by 2.8 µm, which chance explains" in told
     assert "form" not in told  # 4 % matter too little
     assert "differ by more" not in told
 
