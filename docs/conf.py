@@ -35,8 +35,8 @@ CONTENTS: dict[str, list[str]] = {
         "certificate", "verify", "languages", "dcc", "signing", "iso17025", "provenance", "qif",
         "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
-        "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features", "machine/parts", "machine/part-page",
-        "machine/other-methods",
+        "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features", "machine/parts",
+        "machine/part-page", "machine/other-methods",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],
     "What it rests on": [
