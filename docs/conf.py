@@ -20,7 +20,7 @@ from cmm_uq import __version__  # noqa: E402
 CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "overview", "gallery"],
     "How to": [
-        "howto/laboratory", "howto/service", "howto/auditor", "howto/scheduled", "howto/python", "notebooks/*",
+        "howto/laboratory", "howto/service", "howto/auditor", "howto/part", "howto/scheduled", "howto/python", "notebooks/*",
         "import/index", "import/*", "instruments/index", "instruments/*",
     ],
     "Records": ["records/index", "records/*"],

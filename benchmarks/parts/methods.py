@@ -138,7 +138,7 @@ def _orientations(plan: Plan, values: Floats, turns: Sequence[Floats], state: Ma
         for i, one in enumerate(plan.characteristics):
             slope = Slopes(float(slopes.scale[i]), {"stylus": float(slopes.tips["stylus"][i])})
             found = by_orientations(one.name, values[i] + part[m, :, i], of, slope, standards)
-            held[m, i] = abs(found.value - values[i]) <= found.U  # type: ignore[operator]
+            held[m, i] = abs(found.value - values[i]) <= found.U
             u[m, i] = found.u
     return held, u
 
@@ -157,7 +157,7 @@ def _calibrated(plan: Plan, values: Floats, beside: float, state: MachineState, 
             found = by_calibrated_part(
                 one.name, values[i] + repeats[m, :, i], cycle, known, measured=values[i] + own[m, i]
             )
-            held[m, i] = abs(found.value - values[i]) <= found.U  # type: ignore[operator]
+            held[m, i] = abs(found.value - values[i]) <= found.U
             u[m, i] = found.u
     return held, u
 

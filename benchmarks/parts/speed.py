@@ -1,7 +1,8 @@
 """Speed and memory of virtual measurements: a plate of 100 points, ten least-squares characteristics, every kind of cause.
 
-Beside a plain NumPy loop over least squares (Gauss–Newton by ``numpy.linalg.lstsq``, one draw at a time) and the same with
-``scipy.optimize.least_squares``, on as many draws as fit into a few seconds; both are given the displaced points for nothing.
+Beside a plain NumPy loop over least squares (singular values, Gauss–Newton by ``numpy.linalg.lstsq``, one draw at a time) and
+the same with ``scipy.optimize.least_squares``, on as many draws as fit into a second; both are given the displaced points for
+nothing.
 
 Run: ``OPENBLAS_NUM_THREADS=1 python -m benchmarks.parts.speed``
 """
@@ -10,14 +11,17 @@ from __future__ import annotations
 
 import resource
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from cmm_uq.parts.machine import StatedNoise, unmodelled_errors
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
-from cmm_uq.parts.plan import Characteristic, Plan, Stylus
+from cmm_uq.parts.plan import Characteristic, Feature, Plan, Stylus
 from cmm_uq.parts.virtual import Circumstances, Virtual
+from cmm_uq.points import Floats
 from tests.parts_drawn import POSE, block, circle, machine, plane
 
 NAMES = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"]
@@ -53,24 +57,71 @@ def _loop(points: np.ndarray, start: np.ndarray) -> np.ndarray:
     return state
 
 
-def timed(virtual: Virtual, draws: int) -> float:
-    start = time.perf_counter()
-    virtual.simulated(draws)
-    return time.perf_counter() - start
+@contextmanager
+def told(what: str) -> Iterator[None]:
+    """Says how long it took: by the clock, and of all cores together."""
+    clock, cpu = time.perf_counter(), time.process_time()
+    yield
+    print(f"{what}: {time.perf_counter() - clock:.1f} s, {time.process_time() - cpu:.1f} s of CPU", flush=True)
+
+
+def memory() -> None:
+    """The most that was used so far."""
+    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB", flush=True)
+
+
+def by_numpy(plan: Plan, points: Floats) -> list[Floats]:
+    """All features of the plate, one measurement: planes by singular values, bores by Gauss and Newton."""
+    found = []
+    for feature in plan.features:
+        own = points[plan.rows[feature.name]]
+        if feature.kind == "plane":
+            found.append(np.linalg.svd(own - own.mean(axis=0), full_matrices=False)[2][2])
+        else:
+            found.append(_loop(own, _start(feature)))
+    return found
+
+
+def by_scipy(plan: Plan, points: Floats) -> list[Floats]:
+    """The same by ``scipy.optimize.least_squares``, planes as z of the other two coordinates."""
+    found = []
+    for feature in plan.features:
+        own = points[plan.rows[feature.name]]
+        if feature.kind == "plane":
+            up = int(np.argmax(np.abs(feature.normals[0])))
+            flat = np.column_stack([np.delete(own, up, axis=1), np.ones(len(own))])
+            found.append(least_squares(lambda x, a=flat, b=own[:, up]: a @ x - b, np.zeros(3)).x)
+        else:
+            found.append(least_squares(_cylinder, _start(feature), args=(own,), xtol=1e-12).x)
+    return found
+
+
+def _start(feature: Feature) -> Floats:
+    x, y, _ = feature.nominal.point
+    return np.array([x, y, 0.0, 0.0, 0.5 * (feature.nominal.diameter_mm or 0.0)])
 
 
 def peers(plan: Plan) -> None:
-    """Two bores of 24 points; the rest of the characteristics are left to them for nothing."""
-    points, random = plan.points[plan.rows["h1"]], np.random.default_rng(2)
-    start, moved = np.array([30.0, 40.0, 0, 0, 10.0]), points + 1e-3 * random.standard_normal((300, *points.shape))
-    begin = time.perf_counter()
-    ours = np.array([_loop(each, start) for each in moved])
-    loop = (time.perf_counter() - begin) / len(moved)
-    begin = time.perf_counter()
-    theirs = np.array([least_squares(_cylinder, start, args=(each,), xtol=1e-12).x for each in moved[:100]])
-    scipy = (time.perf_counter() - begin) / 100
-    print(f"one cylinder, one draw: NumPy loop {1e6 * loop:.0f} µs, scipy {1e6 * scipy:.0f} µs; "
-          f"they differ by {1e6 * np.abs(ours[:100] - theirs).max():.2g} nm")  # fmt: skip
+    """All features of the plate, draw by draw; displaced points and characteristics are left to them for nothing."""
+    random = np.random.default_rng(2)
+    for name, fit, draws in (("NumPy loop", by_numpy, 300), ("scipy", by_scipy, 60)):
+        moved = plan.points + 1e-3 * random.standard_normal((draws, *plan.points.shape))
+        start = time.process_time()
+        for each in moved:
+            fit(plan, each)
+        each_us = 1e6 * (time.process_time() - start) / draws
+        print(f"{name}: {each_us:.0f} µs of CPU a virtual measurement, so 10⁶ in {each_us:.0f} s", flush=True)
+
+
+def known(virtual: Virtual) -> None:
+    """How well u is known: by two independent runs as long as the digits that are asked for need, and of 10⁶."""
+    for digits in (1, 2):
+        with told(f"as many as {digits} digits of u need (JCGM 101, 7.9)"):
+            one = virtual.settled(digits=digits, seed=1)
+        other = virtual.settled(digits=digits, seed=2)
+        print(
+            f"  {one.trials} virtual measurements, u of two runs differs by {100 * np.max(np.abs(one.u / other.u - 1)):.2f} %"
+        )
 
 
 def main() -> None:
@@ -80,10 +131,13 @@ def main() -> None:
     coefficients = sum(len(cause.factors) for cause in virtual.places[0].causes)
     print(f"{len(plan.points)} points, {len(characteristics)} characteristics, {coefficients} coefficients")
     print(f"first order is off by {100 * virtual.off.max():.2f} % of u")
-    print(f"10⁶ virtual measurements: {timed(virtual, 1_000_000):.1f} s")
-    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
+    with told("10⁶ virtual measurements"):
+        virtual.simulated(1_000_000)
+    memory()
+    known(virtual)
     virtual.exact = True
-    print(f"10⁵ of them with every feature on its points: {timed(virtual, 100_000):.1f} s")
+    with told("10⁵ of them with every feature on its points"):
+        virtual.simulated(100_000)
     flat = Plan(
         (plane("A", [0, 0, 1], [0, 0, 0], [[200, 0, 0], [0, 100, 0]], (10, 10)), circle("c", [100, 50, 0], 20.0, 100)),
         (Characteristic("flat", "flatness", ("A",), association="minimum_zone"),
@@ -91,8 +145,9 @@ def main() -> None:
         styli(), times_s=3.0 * np.arange(200),
     )  # fmt: skip
     zones = Virtual(flat, circumstances())
-    print(f"10⁴ flatnesses and roundnesses of 100 points by minimum zone: {timed(zones, 10_000):.1f} s")
-    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
+    with told("10⁴ flatnesses and roundnesses of 100 points by minimum zone"):
+        zones.simulated(10_000)
+    memory()
     peers(plan)
 
 

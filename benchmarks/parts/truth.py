@@ -258,7 +258,7 @@ def cylinder(
 
 def characteristics(points: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Of the study's part, mm and rad, by the definitions of docs/machine/parts.md."""
-    (a, up), (b, front), (c, left), (d, right) = (
+    (a, up), (b, front), (c, left), (d, _) = (
         plane(points[name], np.array(sense)) for name, sense in
         (("A", (0.0, 0, 1)), ("B", (0.0, -1, 0)), ("C", (-1.0, 0, 0)), ("D", (1.0, 0, 0)))
     )  # fmt: skip
@@ -274,7 +274,8 @@ def characteristics(points: Mapping[str, np.ndarray]) -> dict[str, float]:
     found = {
         "d1": 2 * r1, "d2": 2 * r2, "ball": 2 * ball,
         "apart": float(np.linalg.norm(np.cross(p2 - p1, w1))),
-        "x1": float(frame[0] @ (p1 - corner)), "y2": float(frame[1] @ (p2 - corner)), "z ball": float(frame[2] @ (middle - corner)),
+        "x1": float(frame[0] @ (p1 - corner)), "y2": float(frame[1] @ (p2 - corner)),
+        "z ball": float(frame[2] @ (middle - corner)),
         "length": abs(float((d - c) @ left)),
         "upright": float(np.ptp(DEPTHS) * np.linalg.norm(np.cross(w1, up))),
         "corner": float(np.arccos(np.clip(front @ left, -1, 1))),

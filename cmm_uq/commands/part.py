@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cmm_uq.commands.part_further import further_of
 from cmm_uq.commands.part_machine import machine_found
 from cmm_uq.commands.part_methods import methods_of
 from cmm_uq.commands.part_plan import circumstances_of, doubled, origin_of, plan_of, poses_of
@@ -26,7 +27,6 @@ from cmm_uq.parts.displaced import displaced
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.placing import placed
 from cmm_uq.parts.plan import Plan
-from cmm_uq.parts.reducing import DRAWS as WAYS
 from cmm_uq.parts.reducing import ways
 from cmm_uq.parts.result import conforming, evaluated, stated
 from cmm_uq.parts.virtual import Circumstances, Virtual
@@ -43,6 +43,9 @@ TRIALS = 200_000
 KEPT = 100_000
 """Virtual measurements that are kept, for probabilities: one of 5 % is then known to 0.07 %."""
 
+COMPARED = 10_000
+"""Virtual measurements of each way that is compared: its u is then known to 0.7 %."""
+
 COVERAGE = 0.95
 
 
@@ -54,6 +57,7 @@ def part_found(
     digits: int | None = None,
     rerun: bool = False,
     trust: Iterable[Path] | None = None,
+    records: str | Path | None = None,
     stage: Stage = silent,
 ) -> PartFound:
     """What a part's job gives.
@@ -66,6 +70,7 @@ def part_found(
     digits : of u that are to be known: then so many are made as that needs (JCGM 101:2008, 7.9), ``trials`` at least.
     rerun : whether the machine's certificate is computed again from its inputs.
     trust : whose signatures on it are trusted; ``None`` where nothing need be signed.
+    records : of the machine's history, for its drift; ``None`` for none.
     stage : told of progress.
 
     Raises
@@ -80,7 +85,7 @@ def part_found(
         for pose in poses_of(job, PLACES, machine):
             placed(plan, pose, machine)
 
-    machine = machine_found(job, rerun=rerun, trust=trust, seed=seed, stage=stage)
+    machine = machine_found(job, rerun=rerun, trust=trust, records=records, seed=seed, stage=stage, fits=fits)
     given = circumstances_of(job, machine.state, plan, PLACES)
     if job.measured is not None:
         given = replace(given, measured=job.measured)
@@ -91,16 +96,20 @@ def part_found(
     shares = budget(virtual, min(SHARED, trials), seed)
     stage("What would change the uncertainty", 0.7)
     found_ways = ways(
-        plan, given, min(WAYS, trials), seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual
+        plan, given, min(COMPARED, trials), seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual
     )
+    stage("What to measure on the machine", 0.8)
+    unseen = _unseen(virtual, shares)
+    further = further_of(machine.job, unseen)
     stage("Decisions", 0.85)
     known = stated(simulated, measured)
     together = None if measured is None else conforming(plan, errors, measured)[1]
     return PartFound(
-        job, plan, given, virtual, simulated, known, measured, shares, _unseen(virtual, shares), None,
+        job, plan, given, virtual, simulated, known, measured, shares, unseen, None if further is None else further.further,
         judged(job, plan, errors, measured), None if together is None or np.isnan(together) else together, tuple(found_ways),
         displaced(virtual, seed=seed), _three(origin_of(job, machine.state.machine)),
         machine.standing, compared(known, shares, others), digits=digits, seed=seed, warnings=machine.warnings,
+        files={} if further is None else further.files,
     )  # fmt: skip
 
 

@@ -139,6 +139,8 @@ def _conditions_calibrated(facts: CalibratedPartFacts, repeats: Repeats) -> tupl
         Condition(say("The calibrated part is measured as the part is: points, styli, clamping"), facts.same_procedure),
         Condition(say("The calibrated part is like the part: size within 10 % (25 mm below 250 mm), angles within 5°, form, "
                       "roughness and material alike"), facts.similar),
+        Condition(say("The part is measured in place of the calibrated part, or both lie in many places"),
+                  True if facts.place_varied else facts.substitution),
         Condition(say("The repeats show what varies in use: times of day, temperatures, operators"), facts.conditions_varied),
         Condition(say("The calibrated part has a certificate that the job names"), bool(facts.certificate)),
     )  # fmt: skip

@@ -71,7 +71,7 @@ def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
 
     return part_found(
         job, seed=asked.seed, trials=TRIALS if asked.trials is None else asked.trials, digits=asked.digits, rerun=asked.rerun,
-        trust=asked.trust, stage=stage,
+        trust=asked.trust, records=asked.records, stage=stage,
     )  # fmt: skip
 
 
@@ -159,7 +159,7 @@ def contents_of(found: PartFound, stage: Stage = silent) -> dict[str, bytes]:
     stage("Rendering", 0.92)
     page = render_html(document).encode()
     further = {RESULTS: data, PROVENANCE: provenance_of(_behind(found), results, {html: page, RESULTS: data})}
-    return {html: page, pdf: render_pdf(document, {**job.inputs, **further}), **further}
+    return {html: page, pdf: render_pdf(document, {**job.inputs, **further}), **further, **found.files}
 
 
 def _behind(found: PartFound) -> Behind:

@@ -163,6 +163,7 @@ class PartFound:
     methods : other methods on this part beside this one; ``None`` where the job has none.
     digits : of u that were asked for; ``None`` where the number of draws was.
     seed : of everything random.
+    files : that come with the page, by name.
     warnings : what the reader must know before using a figure.
     """
 
@@ -186,6 +187,7 @@ class PartFound:
     digits: int | None = None
     seed: int = 0
     warnings: tuple[Text, ...] = ()
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def characteristics(self) -> list[CharacteristicFacts]:

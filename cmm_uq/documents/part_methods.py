@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite, log, radians
 
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.messages import DASH, NOTHING, Number, Text, Verbatim, number, plural, say, signed
+from cmm_uq.messages import DASH, NOTHING, Number, Text, Verbatim, number, plural, say, sentences, signed
 from cmm_uq.parts.by_comparison import METHODS
 from cmm_uq.parts.by_method import ByMethod, Compared, Comparison, Figure, Method, Seen
 from cmm_uq.parts.in_words import FAMILIES
@@ -51,7 +51,11 @@ def methods_section(comparison: Comparison | None) -> Section:
         own = [one for one in comparison.characteristics if _angle(comparison, one) == angle]
         if own:
             blocks.append(_figures(own, angle=angle))
-    blocks += [Paragraph(say("{name}: {why}", name=Verbatim(one.name), why=why)) for one in told for why in one.why]
+    blocks += [
+        Paragraph(say("Characteristic {name}: {why}", name=Verbatim(one.name), why=sentences(one.why)))
+        for one in told
+        if one.why
+    ]
     if len(told) < len(comparison.characteristics):
         count = len(told)
         blocks.append(Paragraph(plural(count, one=say("Told is of the characteristic whose methods differ most."), many=say(

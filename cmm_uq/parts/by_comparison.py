@@ -82,6 +82,9 @@ def _why(virtual: Stating, method: ByMethod, figure: Figure, shares: Mapping[str
     grouped = _grouped(method.seen, shares)
     yield say("By {method} u is {ratio} times that of the virtual measurements.", method=name,
               ratio=number(figure.u / virtual.u, ".2f"))  # fmt: skip
+    if figure.single is not None and figure.single > figure.u:
+        yield say("That is u of the mean of all its measurements; one of them alone would have {single}.",
+                  single=small(figure.single, angle=figure.angle))  # fmt: skip
     bias = abs((figure.systematic or 0.0) - virtual.error)
     if bias > virtual.U and method.method == "calibrated_part":
         yield say("Its systematic error differs from the mean error of the virtual measurements by {bias}, more than their U: "
@@ -94,9 +97,6 @@ def _why(virtual: Stating, method: ByMethod, figure: Figure, shares: Mapping[str
         yield say("{name} is the width of a zone and nearly nothing: errors make it larger on average, by a part of its "
                   "scatter that {method} does not take off.", name=Verbatim(figure.name), method=name)  # fmt: skip
     yield from _scatter(name, virtual, figure, sum(grouped.get("varied", {}).values()))
-    if figure.single is not None and figure.single > figure.u:
-        yield say("That is u of the mean of all its measurements; one of them alone would have {single}.",
-                  single=small(figure.single, angle=figure.angle))  # fmt: skip
 
 
 def _grouped(seen: Mapping[str, Seen], shares: Mapping[str, float]) -> dict[str, dict[str, float]]:
@@ -144,7 +144,8 @@ def _scatter(name: Text, virtual: Stating, figure: Figure, share: float) -> Iter
         return
     ratio, dof = (figure.scatter / expected) ** 2, figure.scatter_dof
     low, high = (float(chi2.ppf(p, dof)) / dof for p in (CHANCE / 2, 1 - CHANCE / 2))
-    told = say("What varied there would scatter by {expected} by the virtual measurements; it scattered by {seen}",
+    told = say("What varied between its measurements would scatter by {expected} by the virtual measurements; it scattered by "
+               "{seen}",
                expected=small(expected, angle=figure.angle), seen=small(figure.scatter, angle=figure.angle))  # fmt: skip
     if ratio > high:
         yield say(

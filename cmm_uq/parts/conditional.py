@@ -79,11 +79,11 @@ class Together:
         columns = np.hstack([np.zeros((len(own.observed), 0)), *shown]) * sd
         # what a placing reaches shows nothing
         left = own.reduce(columns) * own.noise_scale[:, None]
-        U, s, Vt = np.linalg.svd(left, full_matrices=False)
+        _, s, Vt = np.linalg.svd(np.linalg.qr(left, mode="r"), full_matrices=False)
         kept = s > max(_SMALLEST, _UNSEEN * estimate.least_squares.sigma_of_residuals)
         one = unit("1")
         combined = tuple(Unknown(("left out", str(j)), one, 0.0, 1.0, 1.0) for j in range(int(kept.sum())))
-        whole = replace(own, design=np.hstack([own.design, U[:, kept] * s[kept]]), unknowns=(*own.unknowns, *combined))
+        whole = replace(own, design=np.hstack([own.design, left @ Vt[kept].T]), unknowns=(*own.unknowns, *combined))
         value = np.append(estimate.least_squares.value, np.zeros(len(combined)))
         return cls(whole, replace(estimate.least_squares, value=value), which, effects, sd, Vt[kept])
 
@@ -152,7 +152,8 @@ def given_recording(
 
     Parameters
     ----------
-    state : as its certificate states it, its effects in the model's order; the model may have others, as of its artefact.
+    state : as its certificate states it, its effects in the model's order; the model may have others, as of its artefact. How
+        much the calibration bounds an error that it did not model is of no matter here: its recording says that again.
     model : of the calibration, without the observations that its certificate set aside.
     sigma_mm : standard deviation of one recorded coordinate, where the noise is known and white; else it is sampled.
 

@@ -14,8 +14,8 @@ from cmm_uq.points import Floats, Points
 
 MACHINE, NOISE = "machine", "noise"
 
-_SETTLED = 1e-9
-"""mm."""
+_SETTLED = 1e-7
+"""mm: the last step towards where the machine indicates; what is left is smaller by what errors change over a millimetre."""
 
 _ROUNDS = 12
 

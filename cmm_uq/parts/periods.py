@@ -1,9 +1,9 @@
 """An error with a period of which only bounds are known, as a linear one: each of its trial periods with a part of its prior.
 
-A period that nobody knows is any within its bounds, evenly in its logarithm. A sum over many trial periods, each with its share of
-the variance, has the same mean and nearly the same covariance between any two points; it is linear, so that it can be estimated and
-drawn together with everything else (a linear Bayes estimate: right in mean and covariance, normal where the truth is a mixture).
-Few trials would pretend to know the period: two points far apart would err alike.
+A period that nobody knows is any within its bounds, evenly in its logarithm. A sum over many trial periods, each with its
+share of the variance, has the same mean and nearly the same covariance between any two points; it is linear, so that it can be
+estimated and drawn together with everything else (a linear Bayes estimate: right in mean and covariance, normal where the
+truth is a mixture). Few trials would pretend to know the period: two points far apart would err alike.
 """
 
 from __future__ import annotations

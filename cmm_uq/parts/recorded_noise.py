@@ -24,9 +24,11 @@ def stated_noise(model: MeasurementModel, components: Components, sizes: Sizes) 
     duration = _duration(model)
     with np.errstate(divide="ignore"):
         time = duration / sizes.rate
+    # of a length both ends are noisy, of a point of a part the distance from the first is, and that has none itself
+    ends = np.sqrt(model.artefact.rows.shape[1])
     return StatedNoise(
         np.hypot(sizes.reading, components.display / np.sqrt(12)), sizes.placing, sizes.slow, time,
-        growth_mm=sizes.growth, longest_mm=float(lengths.max(initial=0.0)), walked_s=duration,
+        growth_mm=ends * sizes.growth, longest_mm=float(lengths.max(initial=0.0)), walked_s=duration,
     )  # fmt: skip
 
 

@@ -90,16 +90,26 @@ def ways(
             found.append(Way(name, spread(Virtual(*change(), first.known), draws, seed)))
     with suppress(CmmUqError):
         found += _elsewhere(plan, given, first, draws, seed)
-    pose = given.poses[0]
+    return found + _means(plan, given, first, draws, seed)
+
+
+def _means(plan: Plan, given: Circumstances, first: Virtual, draws: int, seed: int) -> list[Way]:
+    """Means of several measurements, in several orientations or in one place."""
+    found, still = list[Way](), np.eye(3)
+    places = {still.tobytes(): first.places[0]}
+    quarters = [still, _QUARTER_TURN, _HALF_TURN, _HALF_TURN @ _QUARTER_TURN]
     for name, turns in (
-        (say("mean of two measurements, the part turned by 180° about Z between them"), (np.eye(3), _HALF_TURN)),
-        (say("mean of four measurements, the part turned by 90° about Z each time"),
-         [np.linalg.matrix_power(_QUARTER_TURN, i) for i in range(4)]),
-        (say("mean of four measurements, the part set up anew in its place each time"), [np.eye(3)] * 4),
-    ):  # fmt: skip
-        with suppress(CmmUqError):
-            places = [AtPose(plan, given, _turned(pose, turn, plan), first.known) for turn in turns]
-            errors = mean_of_places(places, np.random.default_rng(seed), draws, exact=first.exact)
+        (say("mean of two measurements, the part turned by 180° about Z between them"), quarters[::2]),
+        (say("mean of four measurements, the part turned by 90° about Z each time"), quarters),
+        (say("mean of four measurements, the part set up anew in its place each time"), [still] * 4),
+    ):
+        with suppress(CmmUqError):  # beyond the travel
+            for turn in turns:
+                if turn.tobytes() not in places:
+                    pose = _turned(given.poses[0], turn, plan)
+                    places[turn.tobytes()] = AtPose(plan, given, pose, first.known)
+            several = [places[turn.tobytes()] for turn in turns]
+            errors = mean_of_places(several, np.random.default_rng(seed), draws, exact=first.exact)
             found.append(Way(name, errors.std(axis=0)))
     return found
 

@@ -205,7 +205,8 @@ def test_noise_of_the_readings_goes_through_to_the_diameter() -> None:
     """A least-squares diameter of n points in regular sections has u = 2σ/√n, to first order exactly."""
     sigma, n, count = 1e-3, 24, 20_000
     job = plate(stylus=[{"name": "down", "diameter_mm": 4.0, "offset_mm": [0.0, 0.0, -150.0]}], environment=None, form=None,
-                placing={"origin_mm": [0.0, 0.0, 0.0]}, part={"name": "plate"}, characteristic=[TABLES["characteristic"][0]])  # fmt: skip
+                placing={"origin_mm": [0.0, 0.0, 0.0]}, part={"name": "plate"},
+                characteristic=[TABLES["characteristic"][0]])  # fmt: skip
     found = plan_of(job)
     state = MachineState(Machine("CMM"), (), np.zeros((1, 0)), StatedNoise(np.full(3, sigma)))
     given = circumstances_of(job, state, found, 1)

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import re
 from math import sqrt
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from cmm_uq.commands.check import check_job
+from cmm_uq.commands.part import part_found
 from cmm_uq.commands.part_methods import lacking, methods_of
 from cmm_uq.commands.part_plan import plan_of
+from cmm_uq.documents.part_results import part_results
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.part.job import part_of
 from cmm_uq.parts.by_method import ByMethod
 from cmm_uq.parts.result import evaluated
 from tests.jobs.part.other_methods import (
@@ -28,6 +33,10 @@ from tests.jobs.part.other_methods import (
     with_methods,
 )
 from tests.jobs.part.parts import plate
+from tests.part_machines import by_results, plate_files
+
+STATE = {"certificate": "machine",
+         "travel_mm": {"x": [0.0, 900.0], "y": [0.0, 1200.0], "z": [-600.0, 0.0]}}  # fmt: skip
 
 
 def methods(**changes: Any) -> dict[str, ByMethod]:
@@ -99,6 +108,7 @@ def test_tests_that_lack_nothing_are_told_nothing_of() -> None:
 @pytest.mark.parametrize(("table", "change", "words"), [
     ("by_calibrated_part", {"similar": None}, "like the part.*: not stated"),
     ("by_calibrated_part", {"same_procedure": False}, "measured as the part is.*: not met"),
+    ("by_calibrated_part", {"substitution": False}, "in place of the calibrated part.*: not met"),
     ("by_calibrated_part", {"certificate": ""}, "certificate that the job names: not met"),
     ("by_orientations", {"length_standard": None}, "length standard.*: not met"),
     ("by_orientations", {"probe_standard": []}, "for the tips of down: not met"),
@@ -140,3 +150,34 @@ def test_what_a_method_sees_follows_from_how_it_was_done() -> None:
     assert found["orientations"].seen["form"] == "varied"
     moved = methods(by_calibrated_part={**CALIBRATED, "place_varied": True, "qualified_anew": True})["calibrated_part"]
     assert moved.seen["place on the table"] == moved.seen["stylus"] == "varied"
+
+
+def test_the_part_s_command_finds_them_and_check_says_what_they_lack(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By figures and draws of the machine, with few draws; what would make u smaller is not asked for."""
+    monkeypatch.setattr("cmm_uq.commands.part.ways", lambda *_, **__: [])
+    job = plate_files({**by_results(), **files()}, by_calibrated_part=CALIBRATED,
+                      by_orientations={**ORIENTED, "points_varied": False}, machine_state=STATE)  # fmt: skip
+    found = part_found(part_of(job), trials=1000)
+    assert found.methods is not None
+    assert [one.name for one in found.methods.characteristics] == [SIZE, ACROSS]
+    virtual, calibrated, turned = found.methods.characteristics[0].stated
+    assert virtual.u == found.stated[0].u
+    assert calibrated.value is None
+    assert turned.value == pytest.approx(30.0, abs=1e-9)
+    results = part_results(found)["other_methods"]
+    assert [one["method"] for one in results["methods"]] == ["calibrated_part", "orientations"]
+    for name, content in job.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    warned = [one for one in check_job(tmp_path).warnings if one.key == "[by_orientations]"]
+    assert [one.problem for one in warned] == [
+        "Other points in each orientation, so that the part's form is seen: not met"
+    ]
+
+
+def test_a_simulated_recording_in_a_measured_job_is_refused() -> None:
+    marked = {"calibrated.csv": b"# simulated by cmm-uq 1\n" + files()["calibrated.csv"]}
+    with pytest.raises(CmmUqError, match=r"calibrated\.csv"):
+        plate(marked, by_calibrated_part=CALIBRATED)

@@ -82,7 +82,7 @@ def test_of_a_zone_the_upper_limit_alone_has_a_guard_band(rule: Rule) -> None:
     assert accepted == (None if band is None else (None, pytest.approx(0.1 - band, abs=2e-5)))
 
 
-@pytest.mark.parametrize("rule", (*RULES, *BY_PRIOR), ids=str)
+@pytest.mark.parametrize("rule", [*RULES, *BY_PRIOR], ids=str)
 @pytest.mark.parametrize("zone", [False, True])
 def test_with_a_prior_too(rule: Rule, zone: bool) -> None:
     """Weighted draws and the normal posterior; the other method is an integral over panels, for Z540.3."""

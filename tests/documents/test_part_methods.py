@@ -61,8 +61,7 @@ def test_each_method_has_a_row_with_value_u_and_U(comparison: Comparison, sectio
 def test_why_is_said_for_each_characteristic(comparison: Comparison, section: Section) -> None:
     told = [block.text for block in section.blocks if isinstance(block, Paragraph)]
     for one in comparison.characteristics:
-        for why in one.why:
-            assert f"{one.name}: {why}" in told
+        assert f"Characteristic {one.name}: {' '.join(one.why)}" in told
 
 
 def test_conditions_and_what_is_seen(section: Section) -> None:

@@ -23,6 +23,7 @@ from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled, of_machi
 from cmm_uq.parts.periods import TRIED, EveryPeriod
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Characteristic, Plan
+from cmm_uq.parts.recorded_noise import stated_noise
 from cmm_uq.parts.stated import flat_draws, machine_stated
 from cmm_uq.parts.virtual import AtPose, Circumstances
 from cmm_uq.physics.catalogue import effects
@@ -139,6 +140,26 @@ def test_the_noise_is_found_together_with_what_was_left_out() -> None:
     low, high = np.quantile(found.draws[:, 6], [0.005, 0.995])
     assert low < 60.0 < high
     assert found.prior_share["rotation_x_x"] == pytest.approx(found.draws[:, 6].std() / 60.0)
+
+
+def test_components_of_a_recording_act_on_a_part_as_they_did_there() -> None:
+    """Variance of a bar as long as the longest: 2g², as of a distance from the first point; a wander that forgets after a
+    part of the recording's duration; steps of a display."""
+    model = repeated(3)
+    points = replace(model.artefact.points, columns={"time_s": 7.0 * np.arange(len(model.artefact.points))})
+    model = MeasurementModel(Ballbar(JOB.facts.artefact, points), effects(MODELLED))
+    one = np.ones(1)
+    sizes = Sizes(2e-3 * np.ones((1, 3)), 3e-3 * one, 4e-3 * one, 5e-3 * one, 10 * one)
+    components = replace(noise_of(model), display=1e-3)
+    found = stated_noise(model, components, sizes)
+    np.testing.assert_allclose(found.coordinate_mm, np.hypot(2e-3, 1e-3 / np.sqrt(12)))
+    assert float(np.asarray(found.growth_mm)[0]) == pytest.approx(4e-3 * np.sqrt(2))
+    ends = model.artefact.points.xyz[model.artefact.rows]
+    assert found.longest_mm == pytest.approx(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).max(), abs=0.5)
+    duration = 7.0 * (len(points) - 2)  # between the middles of the first and of the last bar
+    assert np.asarray(found.slow_time_s)[0] == pytest.approx(duration / 10)
+    assert found.walked_s == pytest.approx(duration)
+    assert (np.asarray(found.placing_mm)[0], np.asarray(found.slow_mm)[0]) == pytest.approx((3e-3, 5e-3))
 
 
 def test_a_noise_that_could_as_well_be_errors_left_out_is_that_of_the_certificate(

@@ -44,8 +44,8 @@ def squares(values: list[float], times: int) -> float:
 def law() -> MeasurementModel:
     """Errors of the characteristics, mm and rad.
 
-    A scale acts on lengths along x, a squareness on those along x by their y, the tip's size on the hole alone, expansion on all
-    lengths. A circle of n points has a radius of σ/√n; a plane at a place has the leverage 1/n + Δ²/S, its slope 1/S.
+    A scale acts on lengths along x, a squareness on those along x by their y, the tip's size on the hole alone, expansion on
+    all lengths. A circle of n points has a radius of σ/√n; a plane at a place has the leverage 1/n + Δ²/S, its slope 1/S.
     """
     height = SIGMA * np.sqrt(1 + 1 / 16 + 50**2 / squares([0, 200 / 3, 400 / 3, 200], 4))
     slopes = 1 / squares([0, 100 / 3, 200 / 3, 100], 4) + 1 / squares([0, -10, -20], 4)

@@ -308,6 +308,16 @@ def test_a_position_that_is_off_errs_to_both_sides() -> None:
         assert found.mean() == pytest.approx(mean, abs=5e-5)
 
 
+@pytest.mark.parametrize(("digits", "least"), [(1, 100_000), (3, 200_000)])
+def test_as_many_are_drawn_as_the_digits_need(digits: int, least: int) -> None:
+    """u of a distance by two readings, √2 · 1 µm, to better than 1 %, by a hundred thousand at least (JCGM 101:2008, 7.9)."""
+    found = Virtual(pair(), Circumstances(machine(noise_um=1.0), (POSE,))).settled(digits=digits)
+    assert found.trials >= least
+    assert found.u[0] == pytest.approx(np.sqrt(2) * 1e-3, rel=0.01)
+    low, high = found.interval[0]
+    assert 0.5 * (high - low) == pytest.approx(1.96 * np.sqrt(2) * 1e-3, rel=0.02)
+
+
 def test_a_seed_gives_the_same_bytes() -> None:
     """In blocks that are drawn by two threads too."""
     plan, given = Plan(*block()), Circumstances(machine(noise_um=1.0), (POSE,))

@@ -71,6 +71,8 @@ class CalibratedPartFacts(Table):
     alike."""
     conditions_varied: bool | None = None
     """Whether the repeats lie far enough apart to show what varies in use: times of day, temperatures, operators."""
+    substitution: bool | None = None
+    """Whether the part is measured in place of the calibrated part: where it lay, turned as it was, soon after it."""
     place_varied: bool = False
     """Whether it lay in another place in each set-up, as parts do."""
     qualified_anew: bool = False

@@ -58,7 +58,8 @@ def files() -> dict[str, bytes]:
 
 
 CALIBRATED: dict[str, Any] = {
-    "file": "calibrated.csv", "certificate": "K-7", "same_procedure": True, "similar": True, "conditions_varied": True,
+    "file": "calibrated.csv", "certificate": "K-7", "same_procedure": True, "substitution": True, "similar": True,
+    "conditions_varied": True,
     "characteristic": [{"name": SIZE, "value_mm": 30.002, "u_um": 0.4, "u_part_um": 0.3}],
 }  # fmt: skip
 ORIENTED: dict[str, Any] = {

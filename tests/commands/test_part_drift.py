@@ -1,0 +1,65 @@
+"""How far a machine has moved since its calibration, by its records: drawn where they say so, said where they do not."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.commands.part_drift import with_drift
+from cmm_uq.errors import CmmUqError
+from cmm_uq.parts.machine import MachineState
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.points import Machine
+from tests.cli.test_due import recorded
+from tests.cli.test_history import scale
+from tests.records.histories import certificate
+
+CALIBRATED, ON = dt.date(2026, 3, 2), dt.date(2027, 3, 2)
+STATE = MachineState(Machine("1102"), effects(["scale_x", "scale_y"]), np.zeros((1, 2)), calibrated=CALIBRATED)
+
+
+@pytest.fixture
+def records(tmp_path: Path) -> Path:
+    """One ppm a year, each known to 0.5 ppm."""
+    return recorded(
+        tmp_path, *(certificate("1102", dt.date(2021 + i, 3, 2), scale(float(i))) for i in range(6))
+    )  # fmt: skip
+
+
+def test_without_records_the_age_is_told_and_nothing_is_drawn() -> None:
+    found = with_drift(STATE, "1102", ON, None, "job.toml")
+    assert "365 days since the calibration is not known" in found.told
+    assert not found.state.drift.any()
+    assert found.state.drift_unknown == ("scale_x", "scale_y")
+
+
+def test_on_the_day_of_the_calibration_nothing_has_changed() -> None:
+    assert "on the day of the measurement" in with_drift(STATE, "1102", CALIBRATED, None, "job.toml").told
+
+
+def test_a_steady_drift_goes_on_by_its_rate_and_more(records: Path) -> None:
+    """A year at 1 ppm a year: the rate, its uncertainty and some wandering; of scale_y there is nothing."""
+    found = with_drift(STATE, "1102", ON, records, "job.toml")
+    assert 1.0 < found.state.drift[0] < 3.0
+    assert found.state.drift[1] == 0
+    assert "They say nothing of Scale error of Y" in found.told
+    sooner = with_drift(STATE, "1102", CALIBRATED + dt.timedelta(days=90), records, "job.toml")
+    assert sooner.state.drift[0] < 0.6 * found.state.drift[0]
+
+
+def test_a_machine_that_was_adjusted_since_is_refused(tmp_path: Path) -> None:
+    since = certificate("1102", dt.date(2026, 9, 1), scale(0.0), adjusted_since="2026-06-01")
+    kept = recorded(tmp_path, certificate("1102", CALIBRATED, scale(5.0)), since)
+    with pytest.raises(CmmUqError, match="adjusted on 2026-06-01, after its calibration of 2026-03-02"):
+        with_drift(STATE, "1102", ON, kept, "job.toml")
+    later = replace(STATE, calibrated=dt.date(2026, 9, 1))
+    assert with_drift(later, "1102", ON, kept, "job.toml").state.calibrated == dt.date(2026, 9, 1)
+
+
+def test_a_machine_that_is_not_in_the_records_is_refused(records: Path) -> None:
+    with pytest.raises(CmmUqError, match="1103"):
+        with_drift(STATE, "1103", ON, records, "job.toml")

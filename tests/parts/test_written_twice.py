@@ -1,0 +1,83 @@
+"""The measurement of a part, written a second time without the package (benchmarks/parts/truth.py), is the engine's.
+
+So the study of hidden machines compares the engine with something else than itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.parts import truth
+from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, joined, parted, plan
+from cmm_uq.parts.evaluating import characteristics_of
+from cmm_uq.parts.machine import MachineState, StatedNoise
+from cmm_uq.parts.placing import Pose, WithStyli
+from cmm_uq.parts.virtual import AtPose, Circumstances
+from cmm_uq.physics.catalogue import effects
+from cmm_uq.physics.superposition import Superposition
+from cmm_uq.points import AXES, Floats, Points
+
+PAIRS = [(a, b) for a in AXES for b in AXES]
+NAMES = (
+    *truth.SIX, *(f"straightness_{a}_{b}" for a, b in PAIRS if a != b), *(f"rotation_{a}_{b}" for a, b in PAIRS),
+    *(f"hysteresis_{a}" for a in AXES), *(f"periodic_scale_{a}" for a in AXES),
+)  # fmt: skip
+EFFECTS = effects(NAMES)
+TURN = np.array([[np.cos(0.7), -np.sin(0.7), 0], [np.sin(0.7), np.cos(0.7), 0], [0, 0, 1]])
+POSE = Pose(TURN, np.array([400.0, 200.0, -300.0]))
+
+
+def coefficients(of: truth.Truth) -> Floats:
+    off = [of.bow[AXES.index(a), AXES.index(b)] for a, b in PAIRS if a != b]
+    return np.array([*of.scale, *of.squareness, *off, *of.turn.ravel(), *of.gap, *of.wave.ravel()])
+
+
+def shapes(of: truth.Truth) -> dict[str, tuple[float, ...]]:
+    return {f"periodic_scale_{a}": (float(of.period[i]),) for i, a in enumerate(AXES)}
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_errors_of_points_are_the_same(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    hidden, n = truth.Truth.drawn(random), 50
+    read, approach = random.uniform(*truth.TRAVEL.T, (n, 3)), random.integers(-1, 2, (n, 3)).astype(float)
+    columns = {f"tip_{a}_mm": np.full(n, truth.TIP[i]) for i, a in enumerate(AXES)}
+    columns |= {f"approach_{a}": approach[:, i] for i, a in enumerate(AXES)}
+    ones = np.ones(n, dtype=np.int64)
+    points = Points(read + truth.TIP, ones, np.arange(n), ones, WithStyli.of(MACHINE), columns, start_s=0.0)
+    found = Superposition(EFFECTS, shapes(hidden)).errors(points, coefficients(hidden))
+    np.testing.assert_allclose(found, hidden.true(read, truth.TIP, approach) - read - truth.TIP, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_characteristics_of_a_made_part_are_the_same(seed: int) -> None:
+    """To the square of a tilt over a place that the definitions leave open: where on its axis or face a feature is."""
+    part = truth.made_part(np.random.default_rng(seed))
+    expected = truth.characteristics(part)
+    for one, value in zip(CHARACTERISTICS, characteristics_of(plan(), joined(part)), strict=True):
+        assert abs(value - expected[one.name]) < 5e-6, one.name
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_measurement_without_noise_errs_the_same(seed: int) -> None:
+    """The engine takes the qualification of the tip to first order: off by (60 µm)² over the radius of 14.5 mm at most."""
+    random = np.random.default_rng(seed)
+    hidden = truth.Truth.drawn(random)
+    found = coefficients(hidden)
+    corrected = truth.Truth.of_six(
+        dict(zip(truth.SIX, found[:6] + random.standard_normal(6) * [5, 5, 5, 3, 3, 3], strict=True))
+    )
+    points = {name: each for name, (each, _) in truth.nominal_part().items()}
+    normals = np.concatenate([each for _, each in truth.nominal_part().values()])
+    measuring = truth.Measuring(hidden, corrected, TURN, POSE.translation_mm, 0.0, 0.0, 0.0)
+    measured = truth.characteristics(parted(measuring.measured(joined(points), normals, random)))
+    still = truth.characteristics(points)
+    state = MachineState(
+        MACHINE, EFFECTS, found[None], StatedNoise(), shapes(hidden), corrections=coefficients(corrected)
+    )
+    at = AtPose(plan(), Circumstances(state), POSE)
+    errors = at.errors([np.zeros_like(drawn) for drawn in at.drawn(random, 1)], exact=True)[0]
+    for one, error in zip(CHARACTERISTICS, errors, strict=True):
+        tolerance = 2.5e-4 if one.what != "angle" else 1e-7
+        assert abs(error - (measured[one.name] - still[one.name])) < tolerance, one.name
