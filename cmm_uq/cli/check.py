@@ -70,7 +70,12 @@ def _summary(found: Checked) -> Summary:
     count = len(found.problems)
     stops = plural(count, one=say("1 problem"), many=say("{count} problems", count=count))
     verdict = (
-        Verdict("SOUND", "good", Verbatim(found.job), (say("nothing would stop report"),))
+        Verdict(
+            "SOUND",
+            "good",
+            Verbatim(found.job),
+            (say("nothing would stop {command}", command=Verbatim(found.command)),),
+        )
         if found.sound
         else Verdict("STOPS", "bad", Verbatim(found.job), (stops,))
     )

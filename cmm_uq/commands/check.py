@@ -25,6 +25,7 @@ from cmm_uq.jobs.file_names import inside
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.part.job import is_part, read_part
+from cmm_uq.jobs.reading import PART
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.kinds import kind_of
 from cmm_uq.notebook import html_table
@@ -87,19 +88,21 @@ class Checked:
     Parameters
     ----------
     job : its folder, or its job.toml.
-    problems : that would stop ``report``.
+    problems : that would stop the command.
     warnings : that the certificate would state, or that what stands there is not a measurement.
     clauses : of ISO/IEC 17025:2017, 7.8, with what of each the certificate will state; none where there will be none.
+    command : that the job is for.
     """
 
     job: str
     problems: tuple[Problem, ...]
     warnings: tuple[Problem, ...]
     clauses: tuple[Clause, ...] = ()
+    command: str = "report"
 
     @property
     def sound(self) -> bool:
-        """Whether nothing would stop ``report``."""
+        """Whether nothing would stop the command."""
         return not self.problems
 
     def as_data(self) -> dict[str, Any]:
@@ -151,6 +154,7 @@ def _of_a_part(path: Path) -> bool:
 
 def _check_part(folder: Path, path: Path) -> Checked:
     """The job of a part: what its readers refuse, and that its figures are an example's."""
+    from cmm_uq.commands.part_machine import refuse_machine
     from cmm_uq.commands.part_methods import lacking
     from cmm_uq.commands.part_plan import refuse_unfit  # the virtual measurement, which no other job needs
 
@@ -163,11 +167,12 @@ def _check_part(folder: Path, path: Path) -> Checked:
         ]
     if job is not None:
         with wrong.going_on():
-            read_part(folder)  # with the files that state the machine
+            whole = read_part(folder)  # with the files that state the machine
+            refuse_machine(whole)
         if (origin := job.facts.job.origin) != MEASURED:
             said = f"the figures are {origin}, and all that is made of them says so"
             warnings.append(Problem(said, str(path), key="[job] origin", fix="Put in your own, and take origin away"))
-    return Checked(str(folder), _once(Problem.of(error) for error in wrong.problems), tuple(warnings))
+    return Checked(str(folder), _once(Problem.of(error) for error in wrong.problems), tuple(warnings), command=PART)
 
 
 @naming_package()

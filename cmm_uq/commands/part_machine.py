@@ -113,6 +113,19 @@ def machine_found(
     return MachineFound(state, standing, stated.job, tuple(_warnings(job, standing, stated.job)))
 
 
+def refuse_machine(job: PartJob) -> None:
+    """Refuse what :func:`machine_found` refuses of a certificate, without its errors; a job to be analysed is let through.
+
+    Raises
+    ------
+    CmmUqError : see :func:`machine_found`.
+    """
+    if job.facts.machine_state.job is None:
+        stated = _certified(job, rerun=False, trust=None, stage=silent)
+        _standing(job, stated, trusted=False)
+        _machine(job, stated.job)
+
+
 def _certified(job: PartJob, *, rerun: bool, trust: Iterable[Path] | None, stage: Stage) -> _Stated:
     """What a certificate states that verifies.
 

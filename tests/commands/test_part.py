@@ -239,3 +239,17 @@ def test_temperatures_outside_of_the_calibrations_are_told() -> None:
     warm = {"scales_c": [23.0, 23.0, 23.0]}
     told = machine_found(plate_of(by_results(), environment=warm, **THERE)).warnings
     assert any("23 to 23 °C; the temperature of the calibration is not known" in text for text in told)
+
+
+def test_a_check_says_what_would_stop_the_command(tmp_path: Path) -> None:
+    """Of the machine's certificate too, without drawing anything."""
+    from cmm_uq.commands.check import check_job
+    from tests.part_machines import plate_files
+
+    for name, content in plate_files(other_draws(), **THERE).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    found = check_job(tmp_path)
+    assert ["does not verify" in one.problem for one in found.problems] == [True]
+    (tmp_path / "machine" / "posterior-simulated.npz").write_bytes(report()["posterior-simulated.npz"])
+    assert (check_job(tmp_path).sound, check_job(tmp_path).command) == (True, "part")
