@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -82,3 +82,20 @@ def plate_files(machine: Mapping[str, bytes], points: Floats | None = None, **ch
 def plate_of(machine: Mapping[str, bytes], points: Floats | None = None, **changes: Any) -> PartJob:
     """The same as it is read."""
     return part_of(plate_files(machine, points, **changes))
+
+
+_ANY = {"inputs_sha256": "FILE", "seen": "CAUSE"}
+"""Tables of results.json whose keys are names, and what the reference writes for them."""
+
+
+def results_keys(data: Any, path: str = "") -> Iterator[str]:
+    """Keys of results.json as the reference writes them."""
+    if isinstance(data, dict):
+        own = _ANY.get(path.rpartition(".")[2])
+        for key, value in data.items():
+            yield from results_keys(value, f"{path}.{own or key}".lstrip("."))
+    elif isinstance(data, list) and data and isinstance(data[0], dict):
+        for one in data:
+            yield from results_keys(one, f"{path}[]")
+    else:
+        yield path

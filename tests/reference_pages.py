@@ -13,6 +13,7 @@ from typer.models import ArgumentInfo, CommandInfo
 from cmm_uq.cli.commands import app
 from cmm_uq.commands.new import known
 from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
+from cmm_uq.documents.part_results_keys import PART_RESULTS
 from cmm_uq.documents.proof_results import KEYS as PROOF
 from cmm_uq.documents.proof_results import RATE
 from cmm_uq.documents.results_keys import QUANTITY, RESULTS
@@ -60,6 +61,7 @@ def files() -> dict[Path, str]:
         "columns": columns(),
         "commands": commands(),
         "results": results(),
+        "part-results": part_results(),
         "prove": prove(),
     }
     schemas[PAGES.parent / "instruments" / "ready.md"] = ready_profiles()
@@ -315,6 +317,17 @@ def results() -> str:
         "own (`shift`, `error_map`) has some of them only.",
         "A *quantity* is a table of", table(("key", "meaning"), [(f"`{name}`", told) for name, told in QUANTITY.items()]),
         "## Keys", table(("key", "unit", "meaning"), rows),
+    )  # fmt: skip
+
+
+def part_results() -> str:
+    """Every key of results.json of a part."""
+    rows = [(f"`{name}`", unit or "–", told) for name, (unit, told) in PART_RESULTS.items()]
+    return page(
+        "results.json of `cmm-uq part`, key by key",
+        "Schema `cmm-uq/part/1`. A part in capitals stands for any name, `[]` for each entry of a list. Numbers are finite; "
+        "what has no value is `null`. Shares and probabilities go from 0 to 1.",
+        table(("key", "unit", "meaning"), rows),
     )  # fmt: skip
 
 

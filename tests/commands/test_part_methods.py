@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import datetime as dt
+import io
 import re
 from math import sqrt
 from pathlib import Path
@@ -10,13 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.examples.part_methods_job import BESIDE_MM, LARGER_MM, TABLES, made
+from benchmarks.examples.part_methods_job import FOLDER as EXAMPLE
+from benchmarks.examples.part_methods_job import files as example_files
 from cmm_uq.commands.check import check_job
 from cmm_uq.commands.part import part_found
 from cmm_uq.commands.part_methods import lacking, methods_of
 from cmm_uq.commands.part_plan import plan_of
 from cmm_uq.documents.part_results import part_results
+from cmm_uq.documents.part_results_keys import PART_RESULTS
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.part.job import part_of
+from cmm_uq.jobs.part.job import part_of, read_part
+from cmm_uq.jobs.toml_file import as_toml
 from cmm_uq.parts.by_method import ByMethod
 from cmm_uq.parts.result import evaluated
 from tests.jobs.part.other_methods import (
@@ -33,7 +40,7 @@ from tests.jobs.part.other_methods import (
     with_methods,
 )
 from tests.jobs.part.parts import plate
-from tests.part_machines import by_results, plate_files
+from tests.part_machines import by_results, plate_files, results_keys
 
 STATE = {"certificate": "machine",
          "travel_mm": {"x": [0.0, 900.0], "y": [0.0, 1200.0], "z": [-600.0, 0.0]}}  # fmt: skip
@@ -186,3 +193,51 @@ def test_a_simulated_recording_in_a_measured_job_is_refused() -> None:
     marked = {"calibrated.csv": b"# simulated by cmm-uq 1\n" + files()["calibrated.csv"]}
     with pytest.raises(CmmUqError, match=r"calibrated\.csv"):
         plate(marked, by_calibrated_part=CALIBRATED)
+
+
+def example_truth() -> dict[str, float]:
+    """True values of the example's part, mm."""
+    bare = part_of({"job.toml": as_toml({"job": {"id": "true", "date": dt.date(2026, 3, 2), "origin": "simulated"}, **TABLES},
+                                        "job.toml")}, machine=False)  # fmt: skip
+    plan = plan_of(bare)
+    values = evaluated(plan, made(plan, LARGER_MM, BESIDE_MM)).tolist()
+    return dict(zip([one.name for one in plan.characteristics], values, strict=True))
+
+
+def test_the_example_is_what_its_script_draws() -> None:
+    """Its true values follow from how its bores are made, and stand in its remarks.
+
+    To the last digit where no form is drawn, whose signs another library of linear algebra may choose otherwise.
+    """
+    drawn = example_files()
+    assert {path.name for path in EXAMPLE.iterdir()} == set(drawn)
+    for name, content in drawn.items():
+        stored = (EXAMPLE / name).read_bytes()
+        if name in ("job.toml", "bar.csv", "ring.csv"):
+            assert stored == content, name
+        else:
+            rows, again = (np.genfromtxt(io.BytesIO(text), delimiter=",", skip_header=2) for text in (stored, content))
+            np.testing.assert_allclose(rows, again, atol=0.005, err_msg=name)
+    truth = example_truth()
+    assert truth == pytest.approx({"1": 29.991, "2": np.hypot(70 - 0.027, 0.012), "3": 40.02, "4": 25.012}, abs=1e-9)
+    told = ", ".join(f"{name}: {value:.4f} mm" for name, value in truth.items())
+    assert told in read_part(EXAMPLE).facts.job.remarks
+
+
+def test_the_example_has_all_methods_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With few draws; eleven of its twelve intervals hold the true value, and E_n beyond 1 tells of the twelfth."""
+    monkeypatch.setattr("cmm_uq.commands.part.ways", lambda *_, **__: [])
+    assert not [one for one in check_job(EXAMPLE).warnings if one.key.startswith("[by_")]
+    found, truth = part_found(read_part(EXAMPLE), trials=1000), example_truth()
+    assert found.methods is not None
+    beyond = {
+        (one.name, by.method)
+        for one in found.methods.characteristics for by in one.stated
+        if by.value is not None and abs(by.value - truth[one.name]) > by.U
+    }  # fmt: skip
+    assert beyond == {("3", "calibrated_part")}
+    apart = {(one.name, pair.one, pair.other) for one in found.methods.characteristics for pair in one.pairs
+             if abs(pair.normalised) > 1}  # fmt: skip
+    assert apart == {("3", "calibrated_part", "orientations")}
+    told = {key for key in PART_RESULTS if key.startswith("other_methods.")}
+    assert set(results_keys(part_results(found)["other_methods"], "other_methods")) == told
