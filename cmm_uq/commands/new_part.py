@@ -37,6 +37,7 @@ _NAMED = ("name", "kind", "what", "features", "datums", "not_measured", "drawing
 """Keys whose values are no figures."""
 
 _LISTS = ("stylus", "feature", "characteristic")
+_OTHER_METHODS = ("by_calibrated_part", "by_orientations")
 
 
 def part_files(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
@@ -154,12 +155,22 @@ def _text(tables: Mapping[str, Any], marked: Collection[str], opened: Mapping[st
         alone = {"properties": {name: one}}
         if name not in _LISTS:
             given = {name: tables[name]} if name in tables else {}
-            parts.append(commented(alone, given, examples=_marks(name, tables.get(name), marked, {})))
+            inner = _inner(name, one, given.get(name, {}))
+            parts.append(commented(alone, given, inner, examples=_marks(name, tables.get(name), marked, {})))
+            parts += [commented({"properties": {key: table}}, {}) for key, table in inner.items()]
             continue
         for i, said in enumerate(tables[name]):
             marks = _marks(name, said, marked, opened)
             parts.append(commented(alone, {name: [said]}, examples=marks) if i == 0 else _short(name, said, marks))
     return "\n".join([parts[0], "", *parts[1:]])
+
+
+def _inner(name: str, table: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables within one of another method's, by dotted name, whose keys are explained each on a line of its own."""
+    if name not in _OTHER_METHODS:
+        return {}
+    keys = {f"{name}.{key}": one for key, one in table["properties"].items() if key not in given}
+    return {key: one for key, one in keys.items() if "properties" in one.get("items", one)}
 
 
 def _marks(name: str, said: Any, marked: Collection[str], opened: Mapping[str, Collection[str]]) -> set[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from cmm_uq.commands.part_plan import (
     surroundings_of,
 )
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.schemas import shipped
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import ASSOCIATIONS
 from cmm_uq.jobs.part import characteristic, feature
@@ -35,6 +38,7 @@ from tests.jobs.part.parts import plate
 from tests.jobs.part.test_drawing_dmis import BORE, EDGE, HEAD, TOP
 from tests.jobs.part.test_drawing_qif import document
 
+TABLES_WITHIN = ("characteristic", "length_standard", "probe_standard")
 LEFT_OUT = {"part": {"not_measured": ["*"]}}
 PROGRAM = f"{HEAD}{TOP}{EDGE}{BORE}ENDFIL\n".encode()
 
@@ -58,6 +62,23 @@ def test_its_examples_are_refused_once_it_says_that_it_was_measured(tmp_path: Pa
     assert "tolerance_mm is still an example's" in told
     assert "cte_per_k is still an example's" in told
     assert "name is still an example's" not in told
+
+
+@pytest.mark.parametrize("name", ["by_calibrated_part", "by_orientations"])
+def test_it_offers_every_key_of_other_methods_as_a_comment(name: str, tmp_path: Path) -> None:
+    """Without the marks of comments they are TOML with each key that there is and its sentence, tables within included."""
+    text = write_new("part", tmp_path / "plate", {})["job.toml"].read_text(encoding="utf-8")
+    offered = tomllib.loads(text[text.index("# [by_calibrated_part]") :].replace("\n# ", "\n").removeprefix("# "))[name]
+    schema = json.loads(shipped("part"))["properties"][name]["properties"]
+    assert set(offered) == set(schema)
+    inner = {
+        key: one["items"] if one["type"] == "array" else one for key, one in schema.items() if key in TABLES_WITHIN
+    }
+    for key, one in inner.items():
+        (table,) = offered[key] if isinstance(offered[key], list) else [offered[key]]
+        assert set(table) == set(one["properties"])
+        assert all(f"# {each['description']}" in text for each in one["properties"].values())
+    assert inner
 
 
 def test_it_is_no_job_of_a_machine(tmp_path: Path) -> None:
