@@ -1,6 +1,8 @@
 """Writes examples/part-methods-simulated: a plate with two bores, by a virtual measurement and by both other methods.
 
-    python -m benchmarks.examples.part_methods_job
+    python -m benchmarks.examples.part_methods_job [TESTS]
+
+With a number, so many such tests of other seeds are drawn instead, and how often their intervals hold is printed.
 
 The machine is that of examples/bryan-simulated, with the true errors that its recording was drawn from and that its remarks
 state; nothing corrects them. It measures with one tip, whose effective diameter is wrong,
@@ -17,6 +19,7 @@ orientation, where other points are probed. Each calibrated value is off by a dr
 from __future__ import annotations
 
 import datetime as dt
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.examples.simulated_jobs import MACHINE, bryan
+from cmm_uq.commands.part_methods import methods_of
 from cmm_uq.commands.part_plan import forms_of, plan_of, surroundings_of
 from cmm_uq.jobs.origin import SIMULATED
 from cmm_uq.jobs.part.job import PartJob, part_of
@@ -189,17 +193,17 @@ def standards(plan: Plan) -> tuple[Plan, Plan]:
     )
 
 
-def files() -> dict[str, bytes]:
+def files(seed: int = SEED) -> dict[str, bytes]:
     """Every file of the folder, by name."""
     bare = part_of({"job.toml": as_toml({"job": _said(""), **TABLES}, "job.toml")}, machine=False)
-    plan, bench = plan_of(bare), Bench(bare, np.random.default_rng(SEED))
+    plan, bench = plan_of(bare), Bench(bare, np.random.default_rng(seed))
     part, calibrated = made(plan, LARGER_MM, BESIDE_MM), made(plan, CALIBRATED_LARGER_MM, CALIBRATED_BESIDE_MM)
     names = [one.name for one in plan.characteristics]
     truth, known = evaluated(plan, part), evaluated(plan, calibrated)
     told = (
         f"Simulated, no part was measured. True values: {_listed(names, truth)}; of the calibrated plate "
         f"{_listed(names, known)}. The machine errs as the remarks of {MACHINE_JOB} say, uncorrected, with noise of "
-        f"{bryan().noise_um:g} µm; the tip is {TIP_UM:g} µm larger than it was qualified to; seed {SEED}."
+        f"{bryan().noise_um:g} µm; the tip is {TIP_UM:g} µm larger than it was qualified to; seed {seed}."
     )
     (points,) = bench.points(plan, part + bench.form(plan), turned(0), 1)
     own = calibrated + bench.form(plan)
@@ -281,8 +285,29 @@ def _standard_csv(column: str, found: Sequence[Sequence[Floats]]) -> str:
     ])  # fmt: skip
 
 
+def study(tests: int) -> None:
+    """Print how often |value − truth| ≤ U, and by how much values are off, of so many tests with seeds from 1000 on."""
+    off: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for seed in range(1000, 1000 + tests):
+        job = part_of(files(seed), machine=False)
+        plan = plan_of(job)
+        assert job.measured is not None
+        truth, measured = evaluated(plan, made(plan, LARGER_MM, BESIDE_MM)), evaluated(plan, job.measured)
+        for method in methods_of(job, plan, measured):
+            for figure, true in zip(method.figures, truth.tolist(), strict=True):
+                off.setdefault((method.method, figure.name), []).append((figure.value - true, figure.U))
+    for (name, characteristic), pairs in off.items():
+        error, expanded = 1e3 * np.array(pairs).T
+        held, rms = 100 * np.mean(np.abs(error) <= expanded), np.sqrt(np.mean(error**2))
+        print(f"{name:16} {characteristic}  holds {held:3.0f} %  mean error {error.mean():+.2f} µm  rms {rms:.2f} µm  "
+              f"U {expanded.mean():.2f} µm")  # fmt: skip
+
+
 def main() -> None:
-    """Write the folder anew."""
+    """Write the folder anew, or study its tests."""
+    if len(sys.argv) > 1:
+        study(int(sys.argv[1]))
+        return
     FOLDER.mkdir(parents=True, exist_ok=True)
     for name, content in files().items():
         (FOLDER / name).write_bytes(content)

@@ -102,15 +102,14 @@ def _calibrated(
         i = place[one.name]
         length = 0.0 if plan.characteristics[i].what in _NO_LENGTH else float(slopes.scale[i])
         try:
-            figures.append(
-                by_calibrated_part(
-                    one.name, values[one.name], repeats.group, _certified(one, length), warm,
-                    measured=None if measured is None else float(measured[i]), corrected=facts.corrected,
-                )
+            figure = by_calibrated_part(
+                one.name, values[one.name], repeats.group, _certified(one, length), warm,
+                measured=None if measured is None else float(measured[i]), corrected=facts.corrected,
             )  # fmt: skip
         except CmmUqError as error:
             where = f"{job.folder / 'job.toml'}: [by_calibrated_part]"
             raise CmmUqError(error.problem, where=where, fix=error.fix) from error
+        figures.append(replace(figure, zone=plan.characteristics[i].what in ZONES))
     seen: dict[str, Seen] = {
         MACHINE: "systematic", NOISE: "varied", STYLUS: "varied" if facts.qualified_anew else "systematic",
         TEMPERATURE: "stated", FORM: "stated" if any(one.u_part_um or one.u_part_arcsec for one in facts.characteristic)

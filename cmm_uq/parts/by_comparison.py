@@ -93,10 +93,21 @@ def _why(virtual: Stating, method: ByMethod, figure: Figure, shares: Mapping[str
     for seen, words in (("unseen", _unseen), ("systematic", _systematic), ("corrected", _corrected)):
         if (share := sum(grouped.get(seen, {}).values())) >= MATTERS:
             yield words(name, _named(grouped[seen]), _percent(share), figure)
-    if figure.zone and figure.value is not None and figure.value < NEAR * figure.scatter:
+    yield from _zone(name, method, figure)
+    yield from _scatter(name, virtual, figure, sum(grouped.get("varied", {}).values()))
+
+
+def _zone(name: Text, method: ByMethod, figure: Figure) -> Iterable[Text]:
+    """What errors do to the width of a zone, which is a size without direction."""
+    if not figure.zone:
+        return
+    if method.method == "calibrated_part":
+        if abs(figure.systematic or 0.0) > figure.u:
+            yield say("{name} is the width of a zone: its systematic error is that of a part which deviates as the calibrated "
+                      "part does, in size and direction, and is wrong for another.", name=Verbatim(figure.name))  # fmt: skip
+    elif figure.value is not None and figure.value < NEAR * figure.scatter:
         yield say("{name} is the width of a zone and nearly nothing: errors make it larger on average, by a part of its "
                   "scatter that {method} does not take off.", name=Verbatim(figure.name), method=name)  # fmt: skip
-    yield from _scatter(name, virtual, figure, sum(grouped.get("varied", {}).values()))
 
 
 def _grouped(seen: Mapping[str, Seen], shares: Mapping[str, float]) -> dict[str, dict[str, float]]:

@@ -241,3 +241,28 @@ def test_the_example_has_all_methods_compared(monkeypatch: pytest.MonkeyPatch) -
     assert apart == {("3", "calibrated_part", "orientations")}
     told = {key for key in PART_RESULTS if key.startswith("other_methods.")}
     assert set(results_keys(part_results(found)["other_methods"], "other_methods")) == told
+
+
+def test_a_position_s_systematic_error_has_the_sign_of_the_direction_that_its_part_deviates_in() -> None:
+    """A bore is read 5 µm too far along x: where it is off along x its position is 10 µm too large, else as much too small."""
+    job = plate()
+    plan = plan_of(job)
+    along, bore = np.array([1e-2, 0.0, 0.0]), plan.rows["bore"]
+    place = [one.name for one in plan.characteristics].index("2")
+
+    def position(off: Any) -> float:
+        points = plan.points.copy()
+        points[bore] += off
+        return float(evaluated(plan, points)[place])
+
+    found = []
+    for sign in (1, -1):
+        rows = ["cycle,characteristic,value_mm"]
+        rows += [f"{i},2,{position(sign * along + 0.5 * along) + 1e-4 * (-1) ** i!r}" for i in range(1, 21)]
+        known = {"name": "2", "value_mm": position(sign * along), "u_um": 0.1}
+        own = plate({"c.csv": "\n".join(rows).encode()},
+                    by_calibrated_part={**CALIBRATED, "file": "c.csv", "characteristic": [known]})  # fmt: skip
+        (one,) = methods_of(own, plan_of(own), None)
+        assert one.figures[0].zone
+        found.append(one.figures[0].systematic)
+    assert found == pytest.approx([10e-3, -10e-3], abs=1e-9)

@@ -135,9 +135,22 @@ def test_a_systematic_error_beyond_what_the_machine_is_known_by_is_told() -> Non
 
 
 def test_a_zone_that_is_nearly_nothing_is_told_to_be_too_large() -> None:
-    assert "d is the width of a zone" in why(figure(zone=True, value=8e-3))
-    assert "width of a zone" not in why(figure(zone=True, value=9e-3))
-    assert "width of a zone" not in why(figure(value=8e-3))
+    def by_orientations(**changes: object) -> str:
+        return " ".join(found(ByMethod("orientations", (figure(**changes),), (), {})).characteristics[0].why)
+
+    assert "d is the width of a zone" in by_orientations(zone=True, value=8e-3)
+    assert "width of a zone" not in by_orientations(zone=True, value=9e-3)
+    assert "width of a zone" not in by_orientations(value=8e-3)
+
+
+@pytest.mark.parametrize("systematic", [2e-3, -2e-3])
+def test_a_zone_s_systematic_error_is_told_to_be_of_one_direction(systematic: float) -> None:
+    """Where it is larger than u, 1.5 µm."""
+    assert "deviates as the calibrated part does, in size and direction" in why(
+        figure(zone=True, systematic=systematic)
+    )
+    assert "width of a zone" not in why(figure(zone=True, systematic=0.7 * systematic, value=1e-3))
+    assert "width of a zone" not in why(figure(systematic=systematic))
 
 
 @pytest.mark.parametrize(("error", "told"), [(-3e-3, True), (3e-3, False)])
