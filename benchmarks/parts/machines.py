@@ -5,8 +5,8 @@ code with the package. Every machine has all common errors, as large as physics 
 the machine corrects its estimates; parts are measured on the truth, and their intervals stated given the recording, as
 ``cmm-uq part`` does.
 
-Run: ``python -m benchmarks.parts.machines FOLDER [--machines N] [--only WORDS]``; ``--page`` prints the tables of what is
-there.
+Run: ``python -m benchmarks.parts.machines FOLDER [--machines N] [--only WORDS]``; ``--page`` writes the table of the page
+of what is there.
 Every machine is appended to ``FOLDER/<cell>.jsonl`` as it is done: a run can be stopped and taken up again.
 """
 
@@ -42,6 +42,8 @@ from cmm_uq.parts.virtual import Circumstances, Virtual
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats
 
+PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
+BEGIN, END = "<!-- written by benchmarks.parts.machines -->", "<!-- end -->"
 TRIALS = 2000
 NAMED = effects(truth.SIX)
 UNMODELLED = tuple(one for one in unmodelled_errors(truth.SIX, {}) if "time_s" not in one.effect.columns)
@@ -181,6 +183,12 @@ def tables(folder: Path) -> str:
     return "\n".join([*lines, "", f"{len(records) - len(done)} faults; {seconds:.2f} s of CPU a machine"])
 
 
+def written(folder: Path, page: Path = PAGE) -> None:
+    """The page with its table anew; what is said of it in words is by hand."""
+    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
+    page.write_text(f"{before}{BEGIN}\n\n{tables(folder)}.\n\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+
+
 def _in(cell: str, words: tuple[str, ...]) -> bool:
     return any(cell.startswith(word) if word.endswith(", ") else word in cell for word in words)
 
@@ -193,7 +201,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=[], help="words of the cells' names")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--seed", type=int, default=2026)
-    parser.add_argument("--page", action="store_true", help="run nothing")
+    parser.add_argument("--page", action="store_true", help="write the table of the page, and run nothing")
     chosen = parser.parse_args()
     if not chosen.page:
         some = [cell for cell in CELLS if not chosen.only or any(word in cell.name for word in chosen.only)]
@@ -204,6 +212,8 @@ def main() -> None:
         ]
         tasks.sort(key=lambda task: task[2] / task[0].share)
         measure(tasks, chosen.folder, chosen.processes, measured)
+    else:
+        written(chosen.folder)
     print(tables(chosen.folder))
 
 
