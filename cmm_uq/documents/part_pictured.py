@@ -19,7 +19,6 @@ from cmm_uq.messages import (
     in_a_row,
     names,
     number,
-    plural,
     say,
     semicolons,
     signed,
@@ -121,8 +120,3 @@ def _forms(plan: Plan, deviations: Floats) -> Table:
             rows.append((number(i + 1), Verbatim(feature.name), *(signed(each, ".1f") for each in figures)))
     note = say("Noise of the machine and its errors are in these distances too; no form is stated here.")
     return Table(say("Distances of the points from their features"), columns, tuple(rows), (note,))
-
-
-def points_words(count: int) -> Text:
-    """How many points."""
-    return plural(count, one=say("one point"), many=say("{count} points", count=count))

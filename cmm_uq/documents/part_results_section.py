@@ -10,7 +10,7 @@ from cmm_uq.documents.part_figures import Figures, figures_of
 from cmm_uq.documents.part_found import PartFound
 from cmm_uq.documents.part_margin_plot import Margin, margin_plots
 from cmm_uq.documents.wording import OUTCOME_WORDS, probability
-from cmm_uq.messages import DASH, Text, number, plural, say, signed
+from cmm_uq.messages import DASH, Text, number, say, signed
 from cmm_uq.parts.evaluating import characteristics_of
 
 FEW = 8
@@ -192,8 +192,3 @@ def _r(value: float, row: int, column: int) -> Text:
     if column > row:
         return DASH
     return number(1) if column == row else signed(round(value, 2) + 0.0, ".2f")
-
-
-def count_words(count: int) -> Text:
-    """How many characteristics."""
-    return plural(count, one=say("one characteristic"), many=say("{count} characteristics", count=count))
