@@ -14,7 +14,7 @@ from functools import lru_cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from traceback import walk_tb
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from cmm_uq.errors import CmmUqError
 
@@ -109,10 +109,14 @@ def offered(group: str, of: type[Of]) -> tuple[Of, ...]:
     return tuple(of(*((e.dist.name, e.dist.version) if e.dist else (e.module, "")), e) for e in found)
 
 
-# What is installed follows from where packages are looked for, so that is the key; looking takes milliseconds.
-@lru_cache(maxsize=12)
 def _entries(group: str, path: tuple[str, ...]) -> EntryPoints:
-    return entry_points(group=group)
+    return cast("EntryPoints", _installed(path).select(group=group))
+
+
+# What is installed follows from where packages are looked for, so that is the key; looking takes a hundredth of a second.
+@lru_cache(maxsize=3)
+def _installed(path: tuple[str, ...]) -> Any:
+    return entry_points()
 
 
 def named(plugins: Iterable[Of], name: str) -> Of | None:

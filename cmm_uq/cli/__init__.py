@@ -11,7 +11,6 @@ import gc
 import os
 import sys
 import warnings
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -35,13 +34,14 @@ NOT_VERIFIED, NOT_WHOLLY_CHECKED = 1, 3
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Matrices here are small: more threads cost more than they gain, and how many there are would show in the last digits."""
 
-_NEW_OBJECTS = 100_000
-"""Between two looks for what refers to itself: by default every 700, a twentieth of a report's time for a few megabytes."""
+_NEW_OBJECTS = 1_000_000
+"""Between two looks for what refers to itself: by default every 700, a fifteenth of a report's time for a megabyte."""
 
 
 def main() -> None:
     """Run the command; whatever happens ends with one line and a documented exit code, never with a traceback."""
     from cmm_uq.cli.encoding import any_character
+    from cmm_uq.cli.lighter import lighten
     from cmm_uq.writing.interruption import done, watch
 
     watch()
@@ -49,7 +49,7 @@ def main() -> None:
         os.environ.setdefault(variable, "1")
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # what matters is an error or a warning of the report, not a line of a library
-    _without_kde()
+    lighten()
     any_character()
     gc.set_threshold(_NEW_OBJECTS)
     code = _ended()
@@ -64,14 +64,8 @@ def main() -> None:
         tell(closed(), code)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter would complain once more at its end
     done()
+    gc.freeze()  # or Python looks through all that there is before it ends, for a tenth of a report
     sys.exit(code)
-
-
-def _without_kde() -> None:
-    """Put a stand-in where emcee has its KDE move, which needs all of scipy.stats, a fifth of a report, and is not used."""
-    module = ModuleType("emcee.moves.kde")
-    module.__dict__["KDEMove"] = None
-    sys.modules.setdefault(module.__name__, module)
 
 
 def _ended() -> int:

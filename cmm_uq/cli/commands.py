@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from copy import copy
 from typing import Annotated, Any
 
 import typer
@@ -127,7 +129,7 @@ def run() -> int:
     except OSError:
         raise CmmUqError("the working folder is gone", fix="Change to a folder that exists") from None
     try:
-        code = app(prog_name="cmm-uq", standalone_mode=False)
+        code = _called(sys.argv[1:2])(prog_name="cmm-uq", standalone_mode=False)
     except typer.Abort:
         raise CmmUqError("the answer did not come") from None
     except SystemExit as ended:  # of completion, which has said why
@@ -137,6 +139,16 @@ def run() -> int:
             raise
         raise _misread(error) from None
     return code if isinstance(code, int) else 0
+
+
+def _called(first: list[str]) -> typer.Typer:
+    """The app with no command but the one that is called, so that only its options are made ready; else all of it."""
+    alone = [info for info in app.registered_commands if [info.name] == first]
+    if not alone:
+        return app
+    called = copy(app)
+    called.registered_commands, called.registered_groups = alone, []
+    return called
 
 
 def _misread(error: Any) -> CmmUqError:

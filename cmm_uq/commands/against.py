@@ -21,8 +21,6 @@ from cmm_uq.model.kind import Observe
 from cmm_uq.model.machine_maps import maps_named
 from cmm_uq.model.predicted_errors import SAME, PredictedErrors, predicted_errors
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.physics.compensation import compensate_points, machine_compensation
-from cmm_uq.physics.map_interpolation import ErrorMaps
 from cmm_uq.points import Floats, Points
 from cmm_uq.screening.screened import Finding
 from cmm_uq.units import MICROMETRE
@@ -116,6 +114,9 @@ def _of_a_file(job: Job, facts: SimulationFacts, artefact: Artefact) -> Predicte
 
 def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedErrors:
     """The errors that maps give at the recorded positions."""
+    from cmm_uq.physics.compensation import compensate_points, machine_compensation
+    from cmm_uq.physics.map_interpolation import ErrorMaps
+
     where = f"job.toml {KEY} map"
     compensation = machine_compensation(points, ErrorMaps(maps_named(job, facts.map, None, where)))
     try:

@@ -13,7 +13,6 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
-from cmm_uq.commands.simulate import to_fill_in
 from cmm_uq.conformity.consequences import consequences, costs
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
 from cmm_uq.diagnosis.power import ALLOWED
@@ -188,6 +187,8 @@ def _usual(kind: Kind) -> Recipe:
 
 
 def _outcome(found: Diagnosed) -> Outcome:
+    from cmm_uq.commands.simulate import to_fill_in
+
     plan = found.next_plan
     files = {} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)}
     return replace(diagnosed_outcome(found), files=files)

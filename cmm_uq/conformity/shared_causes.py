@@ -18,7 +18,6 @@ from cmm_uq.jobs.circumstances import Circumstances
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.budget import Budget
-from cmm_uq.uncertainty.budgets.machine import length_test_uncertainty
 from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 
 _SETTINGS = 4096
@@ -74,6 +73,8 @@ def length_budget(
     ----------
     u_mm : of all calibration, that of a short gauge beside it (``u_beside_mm``) included.
     """
+    from cmm_uq.uncertainty.budgets.machine import length_test_uncertainty
+
     stated = circumstances.uncertainty
     return length_test_uncertainty(
         length_mm,

@@ -16,12 +16,13 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Forms
-from cmm_uq.uncertainty.budgets.machine import probing_test_uncertainty
 from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 
 
 def form_error(test: Test) -> Statement:
     """Range of the radial distances of each sphere from its least-squares sphere."""
+    from cmm_uq.uncertainty.budgets.machine import probing_test_uncertainty
+
     probed = _probed(test)
     form = probed.certified / MICROMETRE
     budget = probing_test_uncertainty(probed.certified, test.circumstances.uncertainty.u_form_um * MICROMETRE)

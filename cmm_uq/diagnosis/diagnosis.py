@@ -14,13 +14,14 @@ from cmm_uq.diagnosis.comparison.search import Found, ModelComparison, search, w
 from cmm_uq.diagnosis.held_out import Improvement, improvement
 from cmm_uq.diagnosis.joint import Joint, joint_posterior
 from cmm_uq.diagnosis.location import Place, located
-from cmm_uq.diagnosis.noise import named
+from cmm_uq.diagnosis.noise import heavy, named
 from cmm_uq.diagnosis.periods import Mode, modes_of
 from cmm_uq.diagnosis.rivals import Remaining, remaining
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.inference.noise import Components
 from cmm_uq.inference.posterior import NoisyPosterior, Progress
+from cmm_uq.inference.studentised import studentised
 from cmm_uq.messages import Text
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.display import of_last_digit
@@ -287,28 +288,16 @@ def _noise(found: Found, joint: Joint, stated: float | None) -> NoiseFound:
     """The noise, given what is modelled; a kind is named when it has nine parts of ten."""
     sizes, weight = joint.posterior.sizes, found.last.noise_posterior().sum(axis=1)
     estimate = found.model.estimate()
-    residuals = joint.components.white(sizes.typical)(estimate.least_squares.residuals[:, None])[:, 0]
+    residuals = studentised(estimate.linear, joint.components, sizes.typical, estimate.least_squares.residuals)
     likeliest = int(weight.argmax())  # quick noise is no other noise than a reading's for who states that
     squares = found.last.squares[likeliest] * found.last.kinds[likeliest].scatter ** 2
     return NoiseFound(
         Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
         Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
         float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
-        named(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or _heavy(residuals),
+        named(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or heavy(residuals),
         stated is not None and _contradicts(stated, squares, found.last.degrees_of_freedom),
     )  # fmt: skip
-
-
-def _heavy(z: Floats) -> bool:
-    """Whether Student's t with four degrees of freedom describes residuals e⁴ times better than a normal distribution."""
-    deviation = float(z.std())
-    if len(z) < 15 or deviation == 0:
-        return False
-    z = z / deviation
-    scales = np.geomspace(0.3, 1.2, 40)
-    t = np.outer(1 / scales, z)
-    log_t = (special.gammaln(2.5) - special.gammaln(2) - 0.5 * np.log(4 * np.pi) - 2.5 * np.log1p(t**2 / 4)).sum(axis=1)
-    return bool((log_t - len(z) * np.log(scales)).max() - (-0.5 * len(z) * (np.log(2 * np.pi) + 1)) > 4.0)
 
 
 def _contradicts(stated: float, squares: float, count: int) -> bool:

@@ -21,6 +21,12 @@ _TAILS_DOF = 4.0
 _SHRINK = (_TAILS_DOF - 2) / _TAILS_DOF
 """Square of the t distribution's scale over its standard deviation."""
 
+_FEWEST, _BETTER = 15, 4.0
+"""Residuals of which tails can be told, and logarithm of the ratio of likelihoods from which they are."""
+
+_SCALES = np.geomspace(0.3, 1.2, 40)
+"""Of the t distribution, over the residuals' root mean square, that are tried."""
+
 _NANOMETRE = 1e-6
 """mm: of residuals that are smaller, as of exact figures, the last bits say nothing of tails."""
 
@@ -102,6 +108,22 @@ def tails(residual: Floats) -> Kind:
     log_whitening = 0.5 * float(np.log(weight / _SHRINK).sum())
     whitening = sparse.csr_array(sparse.diags_array(np.sqrt(weight / _SHRINK)))
     return Kind("tails", whitening, log_whitening, TAILS, log_factor=float(np.sum(log_t - normal)))
+
+
+def heavy(residuals: Floats) -> bool:
+    """Whether Student's t with four degrees of freedom describes residuals (n,) e⁴ times better than a normal distribution.
+
+    Parameters
+    ----------
+    residuals : each of the same variance, as :func:`~cmm_uq.inference.studentised.studentised` gives them.
+    """
+    if len(residuals) < _FEWEST or not np.any(residuals):
+        return False
+    z = residuals / np.sqrt(np.mean(residuals**2))
+    t = np.outer(1 / _SCALES, z)
+    log_t = (special.gammaln(2.5) - special.gammaln(2) - 0.5 * np.log(4 * np.pi) - 2.5 * np.log1p(t**2 / 4)).sum(axis=1)
+    normal = -0.5 * len(z) * (np.log(2 * np.pi) + 1)
+    return bool((log_t - len(z) * np.log(_SCALES)).max() - normal > _BETTER)
 
 
 def sigma_grid(stated: float | None, residual: float, least: float = 0.0) -> tuple[Floats, Floats]:

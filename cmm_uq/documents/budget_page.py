@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from cmm_uq import __version__
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.plots import budget_bars
 from cmm_uq.messages import Text, Verbatim, commas, foreign, say
 from cmm_uq.uncertainty.budget import HEADINGS, Budget
 from cmm_uq.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
-from cmm_uq.uncertainty.evaluation import Evaluation, Stated
-from cmm_uq.uncertainty.model_file import ModelFile
-from cmm_uq.uncertainty.ready_budget import ReadyBudget
+
+if TYPE_CHECKING:  # a certificate shows budgets, and evaluates no model
+    from cmm_uq.uncertainty.evaluation import Evaluation, Stated
+    from cmm_uq.uncertainty.model_file import ModelFile
+    from cmm_uq.uncertainty.ready_budget import ReadyBudget
 
 _TEXT = {"Quantity", "Unit", "Distribution", "Origin", "Method", "Interval"}
 

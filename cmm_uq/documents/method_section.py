@@ -69,7 +69,7 @@ def method(result: Result) -> Section:
             NOTHING if ls.residual_sd is None else say("{sd:.1f} µm", sd=ls.residual_sd * 1e3),
         ),
         (say("Standard uncertainty of a coordinate"), spread),
-        (say("Noise"), noise_found(noise)),
+        (say("Noise"), noise_found(noise, heavy_tails=result.diagnosed.diagnosis.noise.heavy_tails)),
         (say("Sampler"), sampler),
         (say("Convergence"), _convergence(posterior)),
         (say("Averaged"), _averaged(result)),

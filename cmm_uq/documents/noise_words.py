@@ -11,9 +11,17 @@ _SHOWN = 0.8
 _WIDER = 1.05
 
 
-def noise_found(noise: Noise) -> Text:
-    """What was found, what could not show, and what it does to the uncertainties."""
+def noise_found(noise: Noise, *, heavy_tails: bool) -> Text:
+    """What was found, what could not show, and what it does to the uncertainties.
+
+    Parameters
+    ----------
+    noise : as estimated.
+    heavy_tails : whether the diagnosis found heavy tails, which are no component of the estimate.
+    """
     there = _found(noise)
+    if heavy_tails:
+        there.append(say("heavier tails than those of the normal distribution that the estimate assumes"))
     found: Text = (
         say("independent readings, and {what}", what=listed(there))
         if there

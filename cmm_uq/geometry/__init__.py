@@ -8,18 +8,22 @@ the same nominal points at once. This room knows points and nothing of machines.
 
 from __future__ import annotations
 
-from cmm_uq.geometry.association import Associated, Association, associate
-from cmm_uq.geometry.ball_form import BallForm
-from cmm_uq.geometry.circle import Circle, fit_circle
-from cmm_uq.geometry.cone import Cone, fit_cone
-from cmm_uq.geometry.cylinder import Cylinder, fit_cylinder
-from cmm_uq.geometry.directions import cap_directions
-from cmm_uq.geometry.feature import Feature
-from cmm_uq.geometry.line import Line, fit_line
-from cmm_uq.geometry.placed import FeatureKind
-from cmm_uq.geometry.plane import Plane, fit_plane
-from cmm_uq.geometry.repeated import Drawn, Repeated
-from cmm_uq.geometry.sphere import Sphere, fit_sphere
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cmm_uq.geometry.association import Associated, Association, associate
+    from cmm_uq.geometry.ball_form import BallForm
+    from cmm_uq.geometry.circle import Circle, fit_circle
+    from cmm_uq.geometry.cone import Cone, fit_cone
+    from cmm_uq.geometry.cylinder import Cylinder, fit_cylinder
+    from cmm_uq.geometry.directions import cap_directions
+    from cmm_uq.geometry.feature import Feature
+    from cmm_uq.geometry.line import Line, fit_line
+    from cmm_uq.geometry.placed import FeatureKind
+    from cmm_uq.geometry.plane import Plane, fit_plane
+    from cmm_uq.geometry.repeated import Drawn, Repeated
+    from cmm_uq.geometry.sphere import Sphere, fit_sphere
 
 __all__ = [
     "Associated",
@@ -44,3 +48,56 @@ __all__ = [
     "fit_plane",
     "fit_sphere",
 ]
+
+_PLACES = {
+    "association": (
+        "Associated",
+        "Association",
+        "associate",
+    ),
+    "ball_form": ("BallForm",),
+    "circle": (
+        "Circle",
+        "fit_circle",
+    ),
+    "cone": (
+        "Cone",
+        "fit_cone",
+    ),
+    "cylinder": (
+        "Cylinder",
+        "fit_cylinder",
+    ),
+    "directions": ("cap_directions",),
+    "feature": ("Feature",),
+    "line": (
+        "Line",
+        "fit_line",
+    ),
+    "placed": ("FeatureKind",),
+    "plane": (
+        "Plane",
+        "fit_plane",
+    ),
+    "repeated": (
+        "Drawn",
+        "Repeated",
+    ),
+    "sphere": (
+        "Sphere",
+        "fit_sphere",
+    ),
+}
+
+
+def __getattr__(name: str) -> object:
+    """Loaded when it is first used: whoever needs a rotation needs no fit of a cone."""
+    place = next((module for module, names in _PLACES.items() if name in names), None)
+    if place is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = found = getattr(import_module(f"{__name__}.{place}"), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+from scipy import linalg, sparse
 
 from cmm_uq.points import Floats, Ints
 
@@ -56,6 +56,12 @@ class Freedoms:
     def over(self, scale: Floats) -> Freedoms:
         """Divided by the noise scale (m,) of the observations."""
         return Freedoms(self.columns / scale[:, None], self.index, self.blocks)
+
+    def turned(self, turn: sparse.csr_array) -> Freedoms:
+        """Of observations mixed by a matrix (m, m); one block where it mixes those of several."""
+        among = turn.tocoo()
+        whole = Freedoms.of(self.dense()) if np.any(self.index[among.row] != self.index[among.col]) else self
+        return Freedoms(np.asarray(turn @ whole.columns), whole.index, whole.blocks)
 
     @cached_property
     def rows(self) -> list[Ints]:

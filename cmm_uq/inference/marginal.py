@@ -7,7 +7,7 @@ class of observations with equal variance, so that the density at new sizes cost
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -58,11 +58,8 @@ class Marginal:
     @cached_property
     def _freedoms(self) -> Freedoms:
         """Orthonormal columns of what each placing reaches, turned as the observations are, in units of the noise."""
-        basis = self.model.freedoms.reached
-        turn = self.noise.turn.tocoo()
-        if np.any(basis.index[turn.row] != basis.index[turn.col]):
-            basis = Freedoms.of(basis.dense())
-        return Freedoms(np.asarray(self.noise.turn @ basis.columns) * self._scale, basis.index, basis.blocks)
+        turned = self.model.freedoms.reached.turned(self.noise.turn)
+        return replace(turned, columns=turned.columns * self._scale)
 
     @cached_property
     def _length(self) -> Floats:

@@ -6,7 +6,6 @@ from collections.abc import Collection
 
 import numpy as np
 
-from cmm_uq.jobs.importing.imported import imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.recording import REQUIRED, points_of, read_recording
@@ -34,6 +33,8 @@ def read_recording_file(
     """
     if not keys.asked and is_own(content):
         return read_recording(content, where, machine, without), None
+    from cmm_uq.jobs.importing.imported import imported
+
     found = imported(content, where, keys, reach_mm=_reach(machine))
     return points_of(found.columns, found.lines.tolist(), where, machine), found.recognised
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.importing.imported import imported_references
 from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.recording import LARGEST_NUMBER, largest
 from cmm_uq.points import AXES, Points
@@ -48,6 +47,8 @@ def with_references(
     twice = next((name for name in REFERENCES if name in points.columns), None)
     if twice is not None:
         raise CmmUqError(f"has {twice}, and so has {chain.file}", where=where, fix="Leave one of them out")
+    from cmm_uq.jobs.importing.imported import imported_references
+
     found = imported_references(inputs[chain.file], place, chain)
     if "point" not in found.columns:
         raise CmmUqError("does not number its values", where=place,

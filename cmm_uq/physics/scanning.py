@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.messages import say
-from cmm_uq.physics.digitizer import euler_313
 from cmm_uq.physics.effect import FURTHER, Effect, Parameter
 from cmm_uq.physics.probing import normals_of
 from cmm_uq.points import Floats, Points
@@ -97,6 +96,8 @@ def attitudes(points: Points) -> Floats:
     right = np.full(len(points), 90.0)
     alpha, beta = (np.radians(points.columns.get(name, right)) for name in ("alpha_deg", "beta_deg"))
     gamma = np.radians(points.column("gamma_deg"))
+    from cmm_uq.physics.digitizer import euler_313  # with maps and fits that no other effect needs
+
     return np.moveaxis(euler_313(alpha, beta, gamma), 2, 0)
 
 

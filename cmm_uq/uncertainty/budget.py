@@ -17,15 +17,15 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import NOTHING, Number, Text, Verbatim, foreign, say, signed
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.degrees_of_freedom import coverage_factor
-from cmm_uq.uncertainty.distributions import Distribution
-from cmm_uq.uncertainty.propagation import Propagated
 from cmm_uq.uncertainty.rounding import figure, rounded, significant
 from cmm_uq.units import unit_as_written
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from cmm_uq.uncertainty.distributions import Distribution
     from cmm_uq.uncertainty.measurement_model import MeasurementModel
+    from cmm_uq.uncertainty.propagation import Propagated
 
 CERTIFICATE, SPECIFICATION = say("certificate"), say("specification")
 REPEATS, JUDGEMENT = say("repeats"), say("judgement")

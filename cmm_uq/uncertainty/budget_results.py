@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import NOTHING, Number, Text, Verbatim, in_a_row, number, say
 from cmm_uq.uncertainty.budget import Budget
-from cmm_uq.uncertainty.evaluation import Evaluation, Stated
-from cmm_uq.uncertainty.monte_carlo import Simulated
-from cmm_uq.uncertainty.propagation import Propagated
 from cmm_uq.uncertainty.rounding import figure, rounded, significant
+
+if TYPE_CHECKING:
+    from cmm_uq.uncertainty.evaluation import Evaluation, Stated
+    from cmm_uq.uncertainty.monte_carlo import Simulated
+    from cmm_uq.uncertainty.propagation import Propagated
 
 SCHEMA = "cmm-uq/budget/1"
 

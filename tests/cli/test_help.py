@@ -51,7 +51,10 @@ def test_alone_the_command_shows_the_three_most_used_calls() -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (("diagnoes", "x"), "No such command 'diagnoes'. Did you mean 'diagnose'? cmm-uq --help lists commands and options"),
+        (
+            ("diagnoes", "x"),
+            "No such command 'diagnoes'. Did you mean 'diagnose'? cmm-uq --help lists commands and options",
+        ),
         (
             ("report", "x", "--seeed", "3"),
             "No such option: --seeed. Did you mean --seed? cmm-uq report --help lists its options",

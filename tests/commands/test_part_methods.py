@@ -109,6 +109,7 @@ def test_tests_that_lack_nothing_are_told_nothing_of() -> None:
     ("by_calibrated_part", {"similar": None}, "like the part.*: not stated"),
     ("by_calibrated_part", {"same_procedure": False}, "measured as the part is.*: not met"),
     ("by_calibrated_part", {"substitution": False}, "in place of the calibrated part.*: not met"),
+    ("by_calibrated_part", {"substitution": None}, "in place of the calibrated part.*: not stated"),
     ("by_calibrated_part", {"certificate": ""}, "certificate that the job names: not met"),
     ("by_orientations", {"length_standard": None}, "length standard.*: not met"),
     ("by_orientations", {"probe_standard": []}, "for the tips of down: not met"),
@@ -123,6 +124,10 @@ def test_what_a_test_lacks_is_named(table: str, change: dict[str, Any], words: s
     assert named == table
     assert re.search(words, said)
     assert fix
+
+
+def test_a_calibrated_part_in_many_places_need_not_lie_where_the_part_does() -> None:
+    assert lacking(with_methods(by_calibrated_part={**CALIBRATED, "substitution": False, "place_varied": True})) == ()
 
 
 def test_three_orientations_are_too_few_for_the_method_but_have_a_figure() -> None:

@@ -107,6 +107,19 @@ def test_angles_are_in_degrees_and_seconds() -> None:
     assert data["u"] == pytest.approx(degrees(2 * ARCSECOND))
 
 
+def test_of_many_characteristics_those_are_explained_whose_methods_differ_most() -> None:
+    """Eight, of which the first two agree: the other six are told of, in the order of the plan."""
+    many = []
+    for i in range(8):
+        apart = 1.0 if i < 2 else 2.0 + i
+        stated = (Stating("virtual", None, 1e-3, 2e-3), Stating("calibrated_part", None, apart * 1e-3, 3e-3))
+        many.append(Compared(f"c{i}", stated, (), (say("Because."),)))
+    section = methods_section(Comparison((ByMethod("calibrated_part", (), (), {}),), tuple(many)))
+    told = [block.text for block in section.blocks if isinstance(block, Paragraph) and "Because" in block.text]
+    assert told == [f"Characteristic c{i}: Because." for i in range(2, 8)]
+    assert any("6 characteristics whose methods differ most" in getattr(block, "text", "") for block in section.blocks)
+
+
 def test_results_have_every_figure(comparison: Comparison) -> None:
     data = methods_data(comparison)
     assert data is not None
@@ -115,7 +128,13 @@ def test_results_have_every_figure(comparison: Comparison) -> None:
     assert one["systematic_error"] == pytest.approx(3e-3)
     assert one["k"] == 2.0
     assert sum(line["share"] for line in one["budget"] if line["depth"] == 0) == pytest.approx(1.0)
-    assert data["compared"][0]["normalised_errors"][0]["one"] == "virtual"
+    pair = comparison.characteristics[0].pairs[0]
+    assert data["compared"][0]["normalised_errors"][0] == {
+        "one": "virtual",
+        "other": pair.other,
+        "E_n": pair.normalised,
+    }
+    assert pair.normalised != 0
 
 
 def test_every_text_can_be_translated(section: Section) -> None:

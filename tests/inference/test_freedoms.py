@@ -44,6 +44,17 @@ def test_what_they_leave_of_columns_is_what_the_whole_matrix_leaves(freedoms: Fr
     np.testing.assert_allclose(freedoms.without(columns), complement(freedoms.dense()) @ columns, atol=1e-12)
 
 
+@given(placings(), st.booleans())
+def test_observations_mixed_have_the_columns_of_the_whole_matrix_mixed(freedoms: Freedoms, within: bool) -> None:
+    """Among those of one placing, which keeps its columns to itself, or of several."""
+    m = len(freedoms.index)
+    turn = np.random.default_rng(2).standard_normal((m, m))
+    turn = np.where(freedoms.index[:, None] == freedoms.index, turn, 0.0 if within else turn)
+    found = freedoms.turned(sparse.csr_array(turn))
+    np.testing.assert_allclose(found.dense(), turn @ freedoms.dense(), atol=1e-12)
+    assert found.blocks == (6 if within or np.all(freedoms.index == freedoms.index[0]) else 1)
+
+
 @given(placings())
 def test_their_rank_is_that_of_the_whole_matrix(freedoms: Freedoms) -> None:
     assert freedoms.rank == np.linalg.matrix_rank(freedoms.dense(), tol=1e-9)

@@ -77,7 +77,10 @@ def test_what_is_not_tested_is_not_compared() -> None:
 def test_the_sentences_say_what_is_systematic_and_what_scatters() -> None:
     told = why(figure())
     assert "u is 0.30 times that of the virtual measurements" in told
-    assert "errors of the machine, 64 % of the variance of the virtual measurements, in its systematic error of 2.0 µm" in told
+    assert (
+        "errors of the machine, 64 % of the variance of the virtual measurements, in its systematic error of 2.0 µm"
+        in told
+    )
     assert "What varied between its measurements would scatter by 2.8 µm by the virtual measurements" in told
     assert "it scattered by 2.8 µm, which chance explains" in told
     assert "form" not in told  # 4 % matter too little
@@ -99,7 +102,9 @@ def test_what_standards_correct_is_named() -> None:
     assert "Standards correct the calibrated part for errors of the machine, 64 %" in why(figure(), machine="corrected")
 
 
-@pytest.mark.parametrize(("scatter", "words"), [(4.5e-3, "more than chance"), (1.5e-3, "less than chance"), (3e-3, "which chance")])
+@pytest.mark.parametrize(
+    ("scatter", "words"), [(4.5e-3, "more than chance"), (1.5e-3, "less than chance"), (3e-3, "which chance")]
+)
 def test_scatter_is_judged_by_its_degrees_of_freedom(scatter: float, words: str) -> None:
     """χ² of 19: a standard deviation within 0.68 and 1.31 of the true one, 19 times of 20."""
     assert words in why(figure(scatter=scatter))
@@ -133,3 +138,11 @@ def test_a_zone_that_is_nearly_nothing_is_told_to_be_too_large() -> None:
     assert "d is the width of a zone" in why(figure(zone=True, value=8e-3))
     assert "width of a zone" not in why(figure(zone=True, value=9e-3))
     assert "width of a zone" not in why(figure(value=8e-3))
+
+
+@pytest.mark.parametrize(("error", "told"), [(-3e-3, True), (3e-3, False)])
+def test_it_is_the_mean_error_from_which_a_systematic_error_differs(error: float, told: bool) -> None:
+    """8 µm are 11 µm from −3 µm, beyond U = 10 µm, and 5 µm from 3 µm."""
+    comparison = compared((replace(STATED, error=error),), SHARES, (method(figure(systematic=8e-3)),))
+    assert comparison is not None
+    assert any("by 11 µm, more than their U" in text for text in comparison.characteristics[0].why) is told

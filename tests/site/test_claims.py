@@ -13,7 +13,7 @@ from tests.conftest import ROOT
 from tests.site.pages import snippets
 
 DOCS = ROOT / "docs"
-VALIDATION = (DOCS / "validation.md").read_text(encoding="utf-8")
+VALIDATION = "\n".join((DOCS / name).read_text(encoding="utf-8") for name in ("validation.md", "validation-parts.md"))
 ROWS = [line for line in VALIDATION.splitlines() if line.startswith("|") and "**" in line]
 GALLERY = (DOCS / "gallery.md").read_text(encoding="utf-8")
 

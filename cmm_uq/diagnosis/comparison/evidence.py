@@ -52,8 +52,19 @@ class _Noise:
 
     def __call__(self, columns: Floats) -> Floats:
         """Precision times columns (m, b)."""
-        whole = self._transposed @ (self.whitening @ columns)
+        if self._diagonal is None:
+            whole = self._transposed @ (self.whitening @ columns)
+        else:
+            whole = self._diagonal * (self._diagonal * columns)
         return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
+
+    @cached_property
+    def _diagonal(self) -> Floats | None:
+        """Of the whitening (m, 1), where it mixes no observations."""
+        each = np.arange(self.whitening.shape[0])
+        if self.whitening.nnz != len(each) or not np.array_equal(self.whitening.indices, each):
+            return None
+        return self.whitening.diagonal()[:, None]
 
     @cached_property
     def _transposed(self) -> sparse.csc_array:

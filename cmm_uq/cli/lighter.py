@@ -1,0 +1,40 @@
+"""Libraries without what a command never uses of them: modules that are opened only to be named.
+
+numpy's compiler of Fortran and its test tools are opened by scipy, which asks numpy for everything that it has, and a table
+of letters by matplotlib, for TeX. Here such modules are loaded when something of them is first used. What is computed or drawn
+is the same; only the command's own process does so, never whoever imports the package.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.util import LazyLoader
+from types import ModuleType
+
+LATER = ("fontTools.agl", "h5py", "numpy.core", "numpy.ctypeslib", "numpy.f2py", "numpy.testing")
+"""Modules that are loaded when something of them is first used."""
+
+
+def lighten() -> None:
+    """Have the libraries that are not loaded yet come without what is not used of them."""
+    kde = ModuleType("emcee.moves.kde")  # the move needs all of scipy.stats, a fifth of a report
+    kde.__dict__["KDEMove"] = None
+    sys.modules.setdefault(kde.__name__, kde)
+    sys.meta_path.insert(0, _Lighter())
+
+
+class _Lighter(MetaPathFinder):
+    """Finds what Python would find, and has it loaded later."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:  # fmt: skip
+        if fullname not in LATER:
+            return None
+        spec = PathFinder.find_spec(fullname, path, target)
+        if spec is not None and spec.loader is not None:
+            spec.loader = LazyLoader(spec.loader)
+        return spec
