@@ -27,7 +27,7 @@ CONTENTS: dict[str, list[str]] = {
     "Reference": [
         "reference/job", "reference/part", "reference/columns", "reference/plan", "reference/truth", "reference/budget",
         "reference/instrument", "reference/schedule",
-        "reference/commands", "reference/results", "reference/prove", "running",
+        "reference/commands", "reference/results", "reference/part-results", "reference/prove", "running",
         "api", "reference/python", "uncertainty/model-file",
         "machine/effects", "limits", "words",
     ],

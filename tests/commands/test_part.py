@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import re
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.beginning import TABLES
 from cmm_uq.messages import say
 from cmm_uq.parts.result import evaluated
+from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report
 
 TRIALS = 4000
@@ -68,7 +71,6 @@ def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path, monke
     """Draws of one posterior, of which a file has some in single precision: means and spreads agree to a few of a hundred."""
     monkeypatch.setattr("cmm_uq.commands.part_machine._given", lambda state, job, seed: (state, say(""), False))
     from cmm_uq.jobs.part.job import read_part
-    from tests.conftest import ROOT
     from tests.part_machines import plate_files
 
     (tmp_path / "plate").mkdir()
@@ -161,6 +163,29 @@ def test_results_say_what_was_found_with_hashes_of_all_inputs() -> None:
     assert data["simulation"]["virtual_measurements"] == TRIALS
     matrix = np.array(data["covariance"]["matrix"])
     np.testing.assert_allclose(np.sqrt(np.diagonal(matrix)), [each["u"] for each in data["characteristics"]])
+
+
+def keys(data: Any, path: str = "") -> Iterator[str]:
+    """Of results.json, as the reference writes them."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield from keys(value, f"{path}.{'FILE' if path.endswith('sha256') else key}".lstrip("."))
+    elif isinstance(data, list) and data and isinstance(data[0], dict):
+        for one in data:
+            yield from keys(one, f"{path}[]")
+    else:
+        yield path
+
+
+def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
+    page = (ROOT / "docs" / "reference" / "part-results.md").read_text(encoding="utf-8")
+    cells = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
+    told = {key for cell in cells for key in re.findall(r"`([^`]+)`", cell)}
+    there = set(keys(json.loads(as_json(part_results(shifted())))))
+    empty = {"further", "simulation.not_drawn"}  # here
+    assert {key for key in there - told - empty if not key.startswith("other_methods")} == set()
+    sometimes = ("job.number", "job.language", "simulation.not_drawn[]", "further")
+    assert {key for key in told - there if not key.startswith(sometimes)} == set()
 
 
 def test_angles_are_in_degrees_in_results() -> None:
