@@ -1,4 +1,4 @@
-"""Do 95 % intervals of parts hold? Machines with a hidden truth, calibrated and certified, then measuring a part as made.
+"""Do 95 % intervals of parts hold? Machines with a hidden truth, calibrated and corrected, then measuring a part as made.
 
 Truth, recordings, the measured part and what a drawing asks of it come from :mod:`benchmarks.parts.truth`, which shares no
 code with the package. Every machine has all common errors, as large as physics allows. The calibration models six of them;

@@ -102,7 +102,7 @@ def part_found(
     unseen = _unseen(virtual, shares)
     further = further_of(machine.job, unseen)
     stage("Decisions", 0.85)
-    known = stated(simulated, measured)
+    known = stated(simulated, measured, plan, errors)
     together = None if measured is None else conforming(plan, errors, measured)[1]
     return PartFound(
         job, plan, given, virtual, simulated, known, measured, shares, unseen, None if further is None else further.further,

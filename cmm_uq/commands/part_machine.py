@@ -15,6 +15,7 @@ import numpy as np
 from cmm_uq.commands.diagnosing import screened_model
 from cmm_uq.commands.estimation import with_noise
 from cmm_uq.commands.part_drift import with_drift
+from cmm_uq.commands.part_machine_warnings import machine_warnings, temperatures
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.documents.clauses import draft
@@ -22,11 +23,10 @@ from cmm_uq.documents.part_found import Checked, Source, Standing
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.reading import sha256 as hashes
 from cmm_uq.kinds import kind_of
-from cmm_uq.messages import NOTHING, Text, Verbatim, day, say
+from cmm_uq.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.parts.conditional import given_recording
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.stated import machine_stated
@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from cmm_uq.commands.verify import Verification
 
 WHERE = "job.toml [machine_state]"
-NORMAL_C = 20.0
-"""°C to which lengths are referred (ISO 1)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,7 @@ def machine_found(
     stage("The machine's errors, given the recording of its calibration", 0.15)
     state, path, given = _given(state, stated.job, seed)
     standing = replace(standing, path=path, drift=since.told, given_recording=given)
-    return MachineFound(state, standing, stated.job, tuple(_warnings(job, standing, stated.job)))
+    return MachineFound(state, standing, stated.job, tuple(machine_warnings(job, standing, stated.job)))
 
 
 def refuse_machine(job: PartJob) -> None:
@@ -216,7 +214,7 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
     if until is not None and on > until:
         raise CmmUqError(f"the machine's certificate has expired: it held until {until}, and the part was measured on {on}",
                          where=where, fix="Calibrate the machine, or give the certificate that held on that day")  # fmt: skip
-    temperatures = _temperatures(stated.job)
+    recorded = temperatures(stated.job)
     return Standing(
         stated.source, stated.files, number=str(said.get("number") or (own and own.job.number) or said["id"]),
         laboratory="" if own is None else own.laboratory.name, machine=str(said["machine"]),
@@ -225,7 +223,7 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
         draft=stated.job is not None and draft(stated.job),
         given_recording=False,
         path=NOTHING, drift=NOTHING,
-        temperature_c=None if temperatures is None else float(np.mean(temperatures)),
+        temperature_c=None if recorded is None else float(np.mean(recorded)),
         inputs_sha256=dict(said["inputs_sha256"]) if stated.job is None else hashes(stated.job.inputs),
     )  # fmt: skip
 
@@ -296,58 +294,3 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
         "All errors are drawn together, given the recording of the calibration, those included that it did not model."
     )
     return together, text, True
-
-
-def _temperatures(job: Job | None) -> Floats | None:
-    """What the calibration recorded of the temperatures of the scales, °C."""
-    if job is None:
-        return None
-    columns = [f"temp_{axis}_c" for axis in AXES if f"temp_{axis}_c" in job.points.columns]
-    return np.concatenate([job.points.columns[name] for name in columns]) if columns else None
-
-
-def _warnings(job: PartJob, standing: Standing, calibrated: Job | None) -> Iterable[Text]:
-    if standing.origin != MEASURED:
-        yield say(
-            "The machine's calibration is {origin}: nobody measured this machine.", origin=Verbatim(standing.origin)
-        )
-    if standing.draft:
-        yield say("The machine's certificate is a draft: it does not state all that ISO/IEC 17025:2017 asks for.")
-    if standing.source == "results":
-        yield say(
-            "The machine is taken from its figures and draws alone: its recording is not at hand and was not verified."
-        )
-    if standing.valid_until is None:
-        yield say("The machine's certificate of {date} does not say until when it holds.", date=day(standing.date))
-    yield from _thermal(job, calibrated)
-    if calibrated is not None and calibrated.facts.circumstances.probe.sensing == "optical" and _touches(job):
-        yield say(
-            "The machine was calibrated with a probe that does not touch; the noise of one that does may be another."
-        )
-
-
-def _touches(job: PartJob) -> bool:
-    return any(stylus.diameter_mm > 0 for stylus in job.facts.stylus)
-
-
-def _thermal(job: PartJob, calibrated: Job | None) -> Iterable[Text]:
-    """Temperatures of the scales beside those of the calibration, and those for which the machine is rated."""
-    given, known = job.facts.environment.scales_c, _temperatures(calibrated)
-    low, high = min(given), max(given)
-    if known is not None and (low < known.min() or high > known.max()):
-        yield say(
-            "The scales were at {low:.4g} to {high:.4g} °C, and at {coldest:.4g} to {warmest:.4g} °C when the machine was "
-            "calibrated: how its errors change between is not known.",
-            low=low, high=high, coldest=float(known.min()), warmest=float(known.max()),
-        )  # fmt: skip
-    elif known is None and (low, high) != (NORMAL_C, NORMAL_C):
-        yield say(
-            "The scales were at {low:.4g} to {high:.4g} °C; the temperature of the calibration is not known.",
-            low=low, high=high,
-        )  # fmt: skip
-    rated = None if calibrated is None else calibrated.circumstances.rated.temperature_c
-    if rated is not None and (low < rated[0] or high > rated[1]):
-        yield say(
-            "The scales were at {low:.4g} to {high:.4g} °C, outside of the {coldest:.4g} to {warmest:.4g} °C for which the "
-            "machine is rated.", low=low, high=high, coldest=rated[0], warmest=rated[1],
-        )  # fmt: skip

@@ -72,7 +72,7 @@ class Limits:
     ----------
     lower, upper : limits, one at least.
     errors : (N,) draws of the error of a value, less their mean, ascending.
-    zone : whether the value is a width that is never negative.
+    zone : whether the value is a width that is never negative: probabilities are those given that it is not.
     prior : what is known of the true value beforehand; of a zone the part above zero.
     """
 
@@ -104,10 +104,12 @@ class Limits:
             found += self._below(value - self.upper)
         if self.lower is not None:
             found += self._above(value - self.lower)
-        return min(1.0, found)
+        return min(1.0, found / self._possible(value))
 
     def within(self, value: float) -> float:
         """Probability of the true value inside, with its digits where it is small."""
+        if self.zone:
+            return self._within_zone(value)
         if self.upper is None or self.lower is None:
             only = (
                 self._above(value - self.upper) if self.upper is not None else self._below(value - (self.lower or 0.0))
@@ -118,6 +120,15 @@ class Limits:
         if value > self.upper:
             return max(0.0, self._above(value - self.upper) - self._above(value - self.lower))
         return max(0.0, self._below(value - self.lower) - self._below(value - self.upper))
+
+    def _within_zone(self, value: float) -> float:
+        if self.upper is None or self.lower is not None or value <= self.upper:
+            return 1.0 - self.beyond(value)
+        return max(0.0, self._above(value - self.upper) - self._above(value)) / self._possible(value)
+
+    def _possible(self, value: float) -> float:
+        """Probability of a true value that can be."""
+        return max(self._below(value), np.finfo(np.float64).tiny) if self.zone else 1.0
 
     def _below(self, error: float) -> float:
         """Probability of a smaller error."""

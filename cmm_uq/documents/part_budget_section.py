@@ -13,6 +13,7 @@ from cmm_uq.documents.part_figures import Figures, by_margin, critical, figures_
 from cmm_uq.documents.part_found import PartFound, Unseen
 from cmm_uq.messages import DASH, NOTHING, Number, Text, Verbatim, after, commas, number, plural, say, signed
 from cmm_uq.parts.in_words import FAMILIES, family_of, line_in_words
+from cmm_uq.parts.reducing import DRAWS
 from cmm_uq.points import Floats
 from cmm_uq.units import unit
 
@@ -100,9 +101,15 @@ def _lines(detailed: list[Figures], count: int) -> Table:
         )
     ]
     if len(detailed) < count:
-        notes.append(say("Listed are the {count} characteristics with the least margin; results.json has all.",
-                         count=len(detailed)))  # fmt: skip
+        notes.append(after(_chosen(detailed), say("results.json has all.")))
     return Table(say("Budget by cause"), columns, tuple(rows), tuple(notes))
+
+
+def _chosen(shown: list[Figures]) -> Text:
+    """Which characteristics are shown of more."""
+    if shown[0].found.nearest is None:
+        return say("Shown are the first {count} characteristics.", count=len(shown))
+    return say("Shown are the {count} characteristics with the least margin.", count=len(shown))
 
 
 def _budget(one: Figures) -> Iterable[tuple[Text, ...]]:
@@ -218,9 +225,12 @@ def ways_section(found: PartFound) -> Section:
     )  # fmt: skip
     rows = tuple((say("{way:capital}", way=way.name), *(one.small(float(way.u[one.place])) for one in shown))
                  for way in found.ways)  # fmt: skip
-    notes = [say("Each way alone, by virtual measurements of its own; u is known to half a percent.")]
+    known = number(100 / np.sqrt(2 * DRAWS), ".1g")
+    notes: list[Text] = [
+        say("Each way alone, by virtual measurements of its own; u is known to {known} %.", known=known)
+    ]
     if len(shown) < len(found.stated):
-        notes.append(say("Shown are the {count} characteristics with the least margin.", count=len(shown)))
+        notes.append(_chosen(shown))
     told = [Paragraph(words)] if (words := best_words(critical(found))) else []
     return Section(
         say("What would reduce it"), (*told, Table(say("Ways to measure"), columns, rows, tuple(notes)))

@@ -44,13 +44,17 @@ def certificate_rows(standing: Standing) -> tuple[tuple[Text, Text], ...]:
         (say("Machine"), commas(text for text in (Verbatim(standing.machine), serial) if text)),
         (say("Certificate of the machine"), number_of),
         (say("Issued by"), Verbatim(standing.laboratory)),
-        (say("Calibrated on"), say("{date}, {age} before", date=day(standing.date), age=_days(standing.age.days))),
+        (say("Calibrated on"), _calibrated(standing)),
         (say("Valid until"), day(standing.valid_until) if standing.valid_until else NOTHING),
     )
 
 
-def _days(count: int) -> Text:
-    return plural(count, one=say("one day"), many=say("{count} days", count=count))
+def _calibrated(standing: Standing) -> Text:
+    days, date = standing.age.days, day(standing.date)
+    if not days:
+        return say("{date}, the day of the measurement", date=date)
+    age = plural(days, one=say("one day"), many=say("{count} days", count=days))
+    return say("{date}, {age} before", date=date, age=age)
 
 
 def verified_words(standing: Standing) -> Text:

@@ -10,7 +10,7 @@ from cmm_uq.documents.document import Plot
 from cmm_uq.documents.part_views import draw_outlines, label, panels, segments, span_of
 from cmm_uq.documents.plot_style import ACCENT, DIVERGING, WIDTH_MM, dots, drawn, house_style
 from cmm_uq.documents.shown import shown, told
-from cmm_uq.messages import Text, plural, say
+from cmm_uq.messages import NOTHING, Text, after, plural, say
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Plan
 from cmm_uq.points import Floats
@@ -35,7 +35,10 @@ def part_picture(plan: Plan, pose: Pose, names: Sequence[Text]) -> Plot:
     everything = np.vstack([points, points + _NORMAL * largest * normals, tips, roots])
     count = plural(len(points), one=say("one point"), many=say("{count} points", count=len(points)))
     caption = told(
-        say("The part as it is probed, {count}: dots are points with their normals, brown lines are styli.", count=count),
+        after(
+            say("The part as it is probed, {count}: dots are points with their normals.", count=count),
+            say("Brown lines are styli.") if np.any(tips != roots) else NOTHING,
+        ),
         len(rows), len(points),
     )  # fmt: skip
     with house_style():

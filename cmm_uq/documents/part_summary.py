@@ -7,10 +7,11 @@ from math import degrees
 
 from cmm_uq.conformity.decision import Outcome
 from cmm_uq.documents.document import Standing
+from cmm_uq.documents.effect_words import titles
 from cmm_uq.documents.in_short import Figure, Summary, Verdict
-from cmm_uq.documents.part_found import PartFound
+from cmm_uq.documents.part_found import Further, PartFound
 from cmm_uq.documents.wording import probability
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, number, say
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, number, plural, say
 from cmm_uq.parts.in_words import CHARACTERISTICS
 from cmm_uq.uncertainty.rounding import rounded, significant
 from cmm_uq.units import unit
@@ -80,5 +81,18 @@ def _remarks(found: PartFound) -> list[Text]:
             share=100 * share, characteristic=Verbatim(characteristic), title=title,
         ))  # fmt: skip
     if found.further is not None:
-        told.append(found.further.text)
+        told.append(_further(found.further))
     return told
+
+
+def _further(further: Further) -> Text:
+    """What to measure on the machine, its set-ups left to the page and to their file."""
+    if not further.setups:
+        return say("No further set-up of the artefact as it was recorded shows what the calibration did not see.")
+    shown = commas(titles(name for name in further.effects if name not in further.missed))
+    return plural(
+        further.setups,
+        one=say("One further set-up of the artefact shows {effects}: {file}.", effects=shown, file=Verbatim(further.file)),
+        many=say("{count} further set-ups of the artefact show {effects}: {file}.",
+                 count=further.setups, effects=shown, file=Verbatim(further.file)),
+    )  # fmt: skip

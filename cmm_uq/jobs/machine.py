@@ -169,6 +169,17 @@ class DigitizerFacts(Table):
         return self
 
 
+def check_carriages(chain: str) -> None:
+    """Refuse a chain without each of its three carriages once.
+
+    Raises
+    ------
+    ValueError : it has others.
+    """
+    if sorted(chain.replace("F", "", 1)) != ["X", "Y", "Z"]:
+        raise ValueError(f"chain = {chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves")
+
+
 class MachineFacts(Table):
     """``[machine]``."""
 
@@ -212,8 +223,5 @@ class MachineFacts(Table):
 
     @model_validator(mode="after")
     def _three_carriages(self) -> Self:
-        if sorted(self.chain.replace("F", "", 1)) != ["X", "Y", "Z"]:
-            raise ValueError(
-                f"chain = {self.chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves"
-            )
+        check_carriages(self.chain)
         return self

@@ -38,6 +38,9 @@ RUNOUTS = ("circular_runout", "total_runout")
 WHATS = (*SIZES, *FORMS, *RELATIONS, *ORIENTATIONS, *LOCATIONS, *RUNOUTS)
 """Kinds of characteristic; see :mod:`cmm_uq.parts.characteristics` for what each means."""
 
+ZONES = (*FORMS, *ORIENTATIONS, "position", "coaxiality", *RUNOUTS)
+"""Those of them that are widths of a zone, which is never negative."""
+
 _UNIT = 1e-6
 """By how much the length of a unit vector may differ from one."""
 

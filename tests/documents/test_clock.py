@@ -26,6 +26,7 @@ CLOCKS = {
 }
 READ = {
     "cmm_uq/writing/staging.py": {"monotonic"}, "cmm_uq/commands/new.py": {"now"},
+    "cmm_uq/commands/new_part.py": {"now"},
     "cmm_uq/instruments/source.py": {"time_ns"}, "cmm_uq/instruments/simulated/line.py": {"monotonic"},
     "cmm_uq/records/entries.py": {"now"}, "cmm_uq/cli/records.py": {"now"},
     "cmm_uq/commands/due.py": {"now"}, "cmm_uq/commands/history.py": {"now"},

@@ -435,3 +435,26 @@ def test_the_pdf_is_made_of_the_same(every_kind: PartFound) -> None:
     (table, *_) = tables(page(every_kind), "Results")
     for row in table.rows:
         assert row[2] in text
+
+
+def test_a_machine_that_was_calibrated_on_the_same_day(measured: PartFound) -> None:
+    same = replace(CERTIFICATE, age=dt.timedelta(0))
+    assert "2026-03-01, the day of the measurement" in said(machine_section(replace(measured, standing=same)).blocks)
+
+
+def test_of_many_characteristics_those_nearest_to_their_limits_are_told_of_in_detail() -> None:
+    """Twelve limits on one diameter, the tightest last: of the first two there is no budget, and of the first six no way."""
+    many = [
+        {"name": f"D{i}", "what": "size", "features": ["bore"], "upper_mm": 30.07 - 0.005 * i} for i in range(1, 13)
+    ]
+    job = plate(characteristic=many)
+    found = found_of(job, points=measured_points(job))
+    (lines, *_) = tables(page(found), "What the uncertainty is made of")
+    assert {int(row[0]) for row in lines.rows} == set(range(3, 13))
+    assert lines.notes[-1].startswith("Shown are the 10 characteristics with the least margin.")
+    (ways,) = tables(page(found), "What would reduce it")
+    assert [column.heading for column in ways.columns[1:]] == [f"u of No. {i}" for i in range(7, 13)]
+    assert tables(page(found), "Correlations") == []
+    assert "66 of 66 correlations" in said(section(page(found), "Correlations").blocks)
+    without = replace(found, judged=(None,) * 12)
+    assert in_section(ways_section(without))[0].notes[-1] == "Shown are the first 6 characteristics."

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from cmm_uq.files.limits import LISTED
 from cmm_uq.jobs.conformity import Prior, Rule, needs_prior
 from cmm_uq.jobs.identification import Identification
-from cmm_uq.jobs.machine import Travel
+from cmm_uq.jobs.machine import Travel, check_carriages
 from cmm_uq.jobs.origin import MEASURED, Origin
 from cmm_uq.jobs.part.feature import Count
 from cmm_uq.jobs.table import Table, Temperature, Triple, Uncertainty
@@ -86,10 +86,7 @@ class MachineStateFacts(Table):
 
     @model_validator(mode="after")
     def _three_carriages(self) -> Self:
-        if sorted(self.chain.replace("F", "", 1)) != ["X", "Y", "Z"]:
-            raise ValueError(
-                f"chain = {self.chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves"
-            )
+        check_carriages(self.chain)
         return self
 
 

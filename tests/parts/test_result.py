@@ -1,0 +1,73 @@
+"""What is stated of a zone is what a width can be: not below zero, in value, interval and probability."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from cmm_uq.conformity.limits import Limits
+from cmm_uq.parts.plan import Characteristic, Plan
+from cmm_uq.parts.result import Stated, conforming, stated, zones_of
+from cmm_uq.uncertainty.monte_carlo import Source, from_source
+from tests.parts_drawn import block, circle, spot
+
+PLAN = Plan(
+    (circle("hole", [0, 0, 0], 20.0, 8), spot("o", [0, 0, 0])),
+    (Characteristic("zone", "roundness", ("hole",), upper=1.5), Characteristic("size", "size", ("hole",), upper=1.5)),
+)
+DRAWS = np.random.default_rng(11).standard_normal((200_000, 1)) + 0.25
+"""Errors of 0.25 on average, in standard deviations."""
+ERRORS = np.repeat(DRAWS, 2, axis=1)
+
+
+def of(value: float) -> tuple[Stated, ...]:
+    """What is stated of a zone and a size of the same value, measured 0.25 above it."""
+    blocks = iter(np.split(ERRORS.T, 20, axis=1))
+    simulated = from_source(Source(["zone", "size"], lambda random, n: next(blocks).copy()), len(ERRORS))
+    return stated(simulated, np.full(2, value + 0.25), PLAN, ERRORS)
+
+
+@pytest.mark.parametrize("value", [-1.0, 0.0, 1.0, 2.5])
+def test_the_interval_of_a_zone_is_the_shortest_one_above_zero(value: float) -> None:
+    """A normal distribution cut at zero (scipy's): from zero where it is densest there, else about its mode."""
+    zone, size = of(value)
+    cut = stats.truncnorm(-value, np.inf, value, 1.0)
+    shortest = 0.0, float(cut.ppf(0.95))
+    if cut.pdf(shortest[1]) > cut.pdf(0.0):
+        half = stats.norm.ppf(0.5 + 0.5 * 0.95 * stats.norm.cdf(value))
+        shortest = value - half, value + half
+    assert zone.interval == pytest.approx(shortest, abs=0.04)
+    assert zone.value == pytest.approx(max(0.0, value), abs=0.01)
+    assert zone.k == pytest.approx(0.5 * (shortest[1] - shortest[0]), abs=0.03)
+    assert size.interval == pytest.approx((value - 1.96, value + 1.96), abs=0.06)
+    assert size.value == pytest.approx(value, abs=0.01)
+
+
+def test_a_zone_far_below_zero_is_zero_and_no_wider_than_its_error() -> None:
+    """With none of 200 000 draws possible: what is left of a normal distribution beyond 6 sigma is far narrower than 3.92."""
+    zone, _ = of(-6.0)
+    assert (zone.value, zone.interval[0]) == (0.0, 0.0)
+    assert zone.interval[1] == pytest.approx(2 * 1.96, abs=0.05)
+    assert stats.truncnorm(6.0, np.inf, -6.0, 1.0).ppf(0.95) < zone.interval[1]
+
+
+@pytest.mark.parametrize("value", [-0.5, 0.0, 1.0, 2.0])
+def test_a_zone_conforms_with_the_probability_given_that_it_is_not_negative(value: float) -> None:
+    """A normal distribution cut at zero again; of the size the whole of it. A decision has the same probability."""
+    cut, whole = stats.truncnorm(-value, np.inf, value, 1.0).cdf(1.5), stats.norm(value).cdf(1.5)
+    each, together = conforming(PLAN, ERRORS, np.full(2, value + 0.25))
+    np.testing.assert_allclose(each, [cut, whole], atol=0.004)
+    assert together == pytest.approx(cut, abs=0.004)  # both err alike, and the zone's draws are those that are possible
+    for zone, expected in ((True, cut), (False, whole)):
+        inside, outside = Limits(None, 1.5, DRAWS[:, 0] - DRAWS.mean(), zone).knowing(value)
+        assert (inside, outside) == pytest.approx((expected, 1 - expected), abs=0.004)
+
+
+def test_widths_are_zones_and_what_has_a_sign_or_a_size_is_none() -> None:
+    _, characteristics = block()
+    features, _ = block()
+    zones = zones_of(Plan(features, characteristics)).tolist()
+    assert dict(zip((one.what for one in characteristics), zones, strict=True)) == {
+        one.what: one.what not in ("size", "distance", "angle", "x", "y", "z") for one in characteristics
+    }
