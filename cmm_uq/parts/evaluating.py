@@ -7,15 +7,15 @@ features in both: a position is not linear where it is small.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from cmm_uq.geometry.association import Association
 from cmm_uq.parts.associating import VALUES, Features, ProbedFeature
-from cmm_uq.parts.causes import Cause
+from cmm_uq.parts.causes import Cause, Drawn, Rows
 from cmm_uq.parts.characteristics import Evaluation, Key, Measured
 from cmm_uq.parts.datums import BEST_FIT, BestFit, DatumSystem
 from cmm_uq.parts.plan import Plan
@@ -27,7 +27,10 @@ Known = dict[tuple[str, Association, bytes], ProbedFeature]
 EXACT: Association = "least_squares"
 """The association whose values have a derivative everywhere."""
 
-Coefficients = Sequence[Floats | None]
+_WORTH = 3
+"""A block of a third as many draws as a table has rows is worth following the whole table once."""
+
+Coefficients = Sequence[Drawn | None]
 """(N, K) of each cause; ``None`` of one that does not act."""
 
 
@@ -78,6 +81,7 @@ class Evaluator:
     ) -> None:  # fmt: skip
         self.plan, self.base, self.causes = plan, base, causes
         self._known: Known = {} if known is None else known
+        self._followed: dict[object, tuple[Floats, Floats]] = {}
         asked = [name for one in plan.characteristics for name in (*one.features, *one.datums)]
         self.nominal = {name: self._nominal(name) for name in dict.fromkeys((*asked, *plan.alignment.datums))}
         self.evaluations = [Evaluation(one, plan, self.nominal) for one in plan.characteristics]
@@ -181,23 +185,38 @@ class Evaluator:
         """(N, …) changes of what is taken to first order."""
         columns = VALUES * len(self.linear) + (0 if self.best_fit is None else len(self.best_fit.derivative))
         change = np.zeros((_count(coefficients), columns))
-        for drawn, transfer in zip(coefficients, self.transfers, strict=True):
+        for i, (drawn, transfer) in enumerate(zip(coefficients, self.transfers, strict=True)):
             if transfer is not None and drawn is not None:
-                change += drawn @ transfer
+                change += self._follow(i, drawn, partial(_through, transfer))
         return change
 
     def moved(self, coefficients: Coefficients, rows: slice) -> Floats:
         """(N, m, 3) displacements of some points by all causes, beyond ``base``, mm."""
         found = np.zeros((_count(coefficients), len(self.plan.points[rows]), 3))
-        for cause, drawn in zip(self.causes, coefficients, strict=True):
+        for i, (cause, drawn) in enumerate(zip(self.causes, coefficients, strict=True)):
             if cause is not None and drawn is not None:
-                found += cause.moved(drawn, rows)
+                key = i, rows.start, rows.stop
+                found += self._follow(key, drawn, partial(cause.moved, rows=rows))
         return found
+
+    def _follow(self, key: object, drawn: Drawn, follow: Callable[[Floats], Floats]) -> Floats:
+        """What follows linearly from coefficients; of many rows of a table, from the whole table once."""
+        if not isinstance(drawn, Rows) or _WORTH * len(drawn) < len(drawn.table):
+            return follow(np.asarray(drawn))
+        table, followed = self._followed.get(key, (None, None))
+        if followed is None or table is not drawn.table:
+            followed = follow(drawn.table)
+            self._followed[key] = drawn.table, followed
+        return np.asarray(followed[drawn.rows])
 
 
 def characteristics_of(plan: Plan, points: Floats, known: Known | None = None) -> Floats:
     """Characteristics (c,) of points (n, 3) in the frame of the part, mm."""
     return np.asarray(Evaluator(plan, points - plan.points, [], known)([], exact=True)[0])
+
+
+def _through(transfer: Floats, coefficients: Floats) -> Floats:
+    return np.asarray(coefficients @ transfer)
 
 
 def _count(coefficients: Coefficients) -> int:

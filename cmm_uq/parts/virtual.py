@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.messages import Text
-from cmm_uq.parts.causes import Cause, Scatter
+from cmm_uq.parts.causes import Cause, Drawn, Scatter
 from cmm_uq.parts.characteristics import is_of_points
 from cmm_uq.parts.evaluating import Evaluator, Known, characteristics_of
 from cmm_uq.parts.machine import MachineState
@@ -124,11 +124,11 @@ class AtPose:
             still: list[Cause | None] = [None] * (len(self.causes) - len(own))
             self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface], known)
 
-    def drawn(self, random: np.random.Generator, n: int) -> list[Floats]:
+    def drawn(self, random: np.random.Generator, n: int) -> list[Drawn]:
         """Coefficients (n, K) of each cause."""
         return [cause.draw(random, n) for cause in self.causes]
 
-    def errors(self, coefficients: Sequence[Floats], *, exact: bool = False) -> Floats:
+    def errors(self, coefficients: Sequence[Drawn], *, exact: bool = False) -> Floats:
         """(n, c) errors of the characteristics.
 
         Where points were measured as x, mean errors b are taken off: q = x − b. A range of
@@ -145,10 +145,10 @@ class AtPose:
             found[:, self.apart] = self.found - self._true(self.likely, coefficients, exact=exact)
         for cause, drawn in zip(self.causes, coefficients, strict=True):
             if isinstance(cause, Beside):
-                found += drawn @ cause.adds
+                found += np.asarray(drawn) @ cause.adds
         return found
 
-    def _true(self, likely: Evaluator, coefficients: Sequence[Floats], *, exact: bool) -> Floats:
+    def _true(self, likely: Evaluator, coefficients: Sequence[Drawn], *, exact: bool) -> Floats:
         """What is true of all but ranges of points, about what was measured."""
         each = [isinstance(cause, Scatter) or cause.name == FORM for cause in self.causes]
         common = [None if own else drawn for drawn, own in zip(coefficients, each, strict=True)]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.parts.causes import Scatter
+from cmm_uq.parts.causes import Rows, Scatter
 from cmm_uq.parts.evaluating import Evaluator, characteristics_of
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, placed
@@ -83,7 +83,7 @@ def test_one_tip_errs_alike_on_both_sides() -> None:
     plan = Plan(features, characteristics, (Stylus("stylus", u_diameter_um=2.0),))
     virtual = AtPose(plan, Circumstances(machine()), POSE)
     drawn = virtual.drawn(np.random.default_rng(1), 50)
-    delta = 1e-3 * drawn[1][:, 0]
+    delta = 1e-3 * np.asarray(drawn[1])[:, 0]
     found = dict(zip((one.name for one in characteristics), virtual.errors(drawn, exact=True).T, strict=True))
     np.testing.assert_allclose(found["d1"], -delta, atol=1e-9)
     np.testing.assert_allclose(found["length"], delta, atol=1e-9)
@@ -279,6 +279,22 @@ def test_characteristics_that_err_together_conform_together() -> None:
     each, together = conforming(plan, errors_of, np.array([200.0, 400.0, 200.0]))
     np.testing.assert_allclose(each, [0.8413, 0.8413, np.nan], atol=0.006)
     assert together == pytest.approx(each[0], abs=1e-9)
+
+
+def test_rows_of_a_table_that_is_followed_once_err_as_they_do_on_their_own() -> None:
+    """300 draws out of 500 rows of a posterior, against the coefficients themselves: to first order and on the points."""
+    names = ["scale_x", "squareness_xy", "straightness_x_z"]
+    state = machine(names, np.random.default_rng(2).standard_normal((500, 3)) * 5, 1.0)
+    flat = Characteristic("flat", "flatness", ("A",))
+    features, characteristics = block()
+    at = AtPose(Plan(features, (*characteristics, flat)), Circumstances(state), POSE)
+    for seed in (0, 1):  # the second time it is looked up
+        drawn = at.drawn(np.random.default_rng(seed), 300)
+        assert isinstance(drawn[0], Rows)
+        for exact in (True, False):
+            alone = at.errors([np.asarray(one) for one in drawn], exact=exact)
+            np.testing.assert_allclose(at.errors(drawn, exact=exact), alone, atol=1e-12)
+    assert alone[:, -1].std() > 1e-4
 
 
 def test_form_alone_needs_no_first_order() -> None:
