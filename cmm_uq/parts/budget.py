@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.messages import Text
-from cmm_uq.parts.causes import Cause
+from cmm_uq.parts.causes import Cause, Drawn
 from cmm_uq.parts.virtual import AtPose, Virtual
 from cmm_uq.points import Floats
 
@@ -107,11 +107,11 @@ def budget(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Budget:
     )
 
 
-def _errors(places: Sequence[AtPose], coefficients: Sequence[Sequence[Floats]], exact: bool) -> Floats:
+def _errors(places: Sequence[AtPose], coefficients: Sequence[Sequence[Drawn]], exact: bool) -> Floats:
     return np.concatenate([place.errors(given, exact=exact) for place, given in zip(places, coefficients, strict=True)])
 
 
-def _exchanged(A: Sequence[Floats], B: Sequence[Floats], causes: Sequence[Cause], line: str) -> list[Floats]:
+def _exchanged(A: Sequence[Drawn], B: Sequence[Drawn], causes: Sequence[Cause], line: str) -> list[Drawn]:
     """The first coefficients with those of one line from the second."""
     return [b if line_of(cause) == line else a for a, b, cause in zip(A, B, causes, strict=True)]
 

@@ -14,13 +14,37 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from cmm_uq.messages import Text
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 
-Draw = Callable[[np.random.Generator, int], Floats]
-"""Coefficients (N, K) of so many draws."""
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Coefficients (N, K) that are rows of a table: what follows from them linearly needs following once a row of it.
+
+    Parameters
+    ----------
+    table : (M, K).
+    rows : (N,) of it.
+    """
+
+    table: Floats
+    rows: Ints
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:
+        return np.asarray(self.table[self.rows], dtype=dtype)
+
+
+Drawn = Floats | Rows
+"""Coefficients (N, K)."""
+
+Draw = Callable[[np.random.Generator, int], Drawn]
+"""Coefficients of so many draws."""
 
 _NOTHING = 1e-12
 """Part of the largest variance below which a component of a random field is rounding."""
@@ -95,7 +119,7 @@ class Scatter(Cause):
         def draw(random: np.random.Generator, n: int) -> Floats:
             drawn = random.standard_normal((n, *size.shape))
             if scale is not None:
-                drawn *= scale(random, n)[:, None, :]
+                drawn *= np.asarray(scale(random, n))[:, None, :]
             return drawn.reshape(n, -1)
 
         axes = np.eye(3) if turn is None else turn

@@ -118,10 +118,7 @@ class Evaluation:
     @property
     def of_points(self) -> bool:
         """Whether it is of measured points, and not of features alone."""
-        one, first = self.characteristic, self.plan.feature(self.characteristic.features[0])
-        if one.what in FORMS or one.what in RUNOUTS:
-            return True
-        return first.kind == "plane" and one.what in (*ORIENTATIONS, "position")
+        return is_of_points(self.characteristic, self.plan)
 
     def __call__(self, measured: Measured) -> Floats:
         """Values (N,), mm or rad."""
@@ -190,6 +187,13 @@ class Evaluation:
         u = np.cross(datum, normal)
         u /= np.linalg.norm(u)
         return np.array([u, np.cross(u, datum)])
+
+
+def is_of_points(one: Characteristic, plan: Plan) -> bool:
+    """Whether a characteristic is a range of measured points, and not of features alone."""
+    if one.what in FORMS or one.what in RUNOUTS:
+        return True
+    return plan.feature(one.features[0]).kind == "plane" and one.what in (*ORIENTATIONS, "position")
 
 
 def _size(of: Evaluation, measured: Measured) -> Floats:

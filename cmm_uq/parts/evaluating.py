@@ -7,14 +7,15 @@ features in both: a position is not linear where it is small.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 
 from cmm_uq.geometry.association import Association
 from cmm_uq.parts.associating import VALUES, Features, ProbedFeature
-from cmm_uq.parts.causes import Cause
+from cmm_uq.parts.causes import Cause, Drawn, Rows
 from cmm_uq.parts.characteristics import Evaluation, Key, Measured
 from cmm_uq.parts.datums import BEST_FIT, BestFit, DatumSystem
 from cmm_uq.parts.plan import Plan
@@ -25,6 +26,39 @@ Known = dict[tuple[str, Association, bytes], ProbedFeature]
 
 EXACT: Association = "least_squares"
 """The association whose values have a derivative everywhere."""
+
+_WORTH = 3
+"""A block of a third as many draws as a table has rows is worth following the whole table once."""
+
+Coefficients = Sequence[Drawn | None]
+"""(N, K) of each cause; ``None`` of one that does not act."""
+
+
+@dataclass(frozen=True, eq=False)
+class Displaced:
+    """What N draws of causes move, beyond the base of an :class:`Evaluator`.
+
+    Parameters
+    ----------
+    change : (N, …) of what is taken to first order.
+    points : by feature that is taken on its points, (N, m, 3) of these, mm.
+    whole : (N, n, 3) of all points for an exact best fit, or none.
+    """
+
+    change: Floats
+    points: Mapping[str, Floats]
+    whole: Floats | None = None
+
+    def __add__(self, other: Displaced) -> Displaced:
+        return Displaced(
+            self.change + other.change,
+            {name: moved + other.points[name] for name, moved in self.points.items()},
+            None if self.whole is None or other.whole is None else self.whole + other.whole,
+        )
+
+    def __neg__(self) -> Displaced:
+        points = {name: -moved for name, moved in self.points.items()}
+        return Displaced(-self.change, points, None if self.whole is None else -self.whole)
 
 
 class Evaluator:
@@ -47,6 +81,7 @@ class Evaluator:
     ) -> None:  # fmt: skip
         self.plan, self.base, self.causes = plan, base, causes
         self._known: Known = {} if known is None else known
+        self._followed: dict[object, tuple[Floats, Floats]] = {}
         asked = [name for one in plan.characteristics for name in (*one.features, *one.datums)]
         self.nominal = {name: self._nominal(name) for name in dict.fromkeys((*asked, *plan.alignment.datums))}
         self.evaluations = [Evaluation(one, plan, self.nominal) for one in plan.characteristics]
@@ -105,21 +140,24 @@ class Evaluator:
             whole = np.concatenate([whole, self.best_fit.derivative])
         return [None if cause is None else cause.through(whole) for cause in self.causes]
 
-    def __call__(self, coefficients: Sequence[Floats], *, exact: bool = False) -> Floats:
+    def __call__(self, coefficients: Coefficients, *, exact: bool = False) -> Floats:
         """Characteristics (N, c), mm and rad, for coefficients (N, K) of each cause; one row where there is none.
 
         Parameters
         ----------
         exact : all features on their points, none to first order.
         """
+        return self.of(self.displaced(coefficients, exact=exact), exact=exact)
+
+    def of(self, displaced: Displaced, *, exact: bool = False) -> Floats:
+        """Characteristics (N, c) of what was :meth:`displaced`, mm and rad."""
         features: dict[Key, Features] = {}
-        change = np.zeros((_count(coefficients), 0)) if exact else self._changes(coefficients)
+        change = displaced.change
         for i, key in enumerate([] if exact else self.linear):
             features[key] = self.associated[key].to_first_order(change[:, VALUES * i : VALUES * (i + 1)])
         for key in self.keys:
             if key not in features:
-                moved = self.moved(coefficients, self.plan.rows[key[0]])
-                features[key] = self.associated[key].of(moved, with_points=key in self.of_points)
+                features[key] = self.associated[key].of(displaced.points[key[0]], with_points=key in self.of_points)
         frames = {
             names: system.frames([features[name, self.plan.feature(name).association] for name in names])
             for names, system in self.frames.items()
@@ -127,29 +165,49 @@ class Evaluator:
         if self.best_fit is not None:
             start = self.best_fit.motion(self.base[None])[0]
             frames[BEST_FIT] = self.best_fit.frame(
-                self.best_fit.motion(self.base + self.moved(coefficients, slice(None)))
-                if exact
-                else start + change[:, VALUES * len(self.linear) :]
+                start + change[:, VALUES * len(self.linear) :]
+                if displaced.whole is None
+                else self.best_fit.motion(self.base + displaced.whole)
             )
         measured = Measured(features, frames)
         return np.column_stack([one(measured) for one in self.evaluations])
 
-    def _changes(self, coefficients: Sequence[Floats]) -> Floats:
+    def displaced(self, coefficients: Coefficients, *, exact: bool = False) -> Displaced:
+        """What coefficients move of all that the characteristics are of."""
+        on_points = dict.fromkeys(name for name, how in self.keys if exact or not self.to_first_order((name, how)))
+        return Displaced(
+            np.zeros((_count(coefficients), 0)) if exact else self._changes(coefficients),
+            {name: self.moved(coefficients, self.plan.rows[name]) for name in on_points},
+            self.moved(coefficients, slice(None)) if exact and self.best_fit is not None else None,
+        )
+
+    def _changes(self, coefficients: Coefficients) -> Floats:
         """(N, …) changes of what is taken to first order."""
         columns = VALUES * len(self.linear) + (0 if self.best_fit is None else len(self.best_fit.derivative))
         change = np.zeros((_count(coefficients), columns))
-        for drawn, transfer in zip(coefficients, self.transfers, strict=True):
-            if transfer is not None:
-                change += drawn @ transfer
+        for i, (drawn, transfer) in enumerate(zip(coefficients, self.transfers, strict=True)):
+            if transfer is not None and drawn is not None:
+                change += self._follow(i, drawn, partial(_through, transfer))
         return change
 
-    def moved(self, coefficients: Sequence[Floats], rows: slice) -> Floats:
+    def moved(self, coefficients: Coefficients, rows: slice) -> Floats:
         """(N, m, 3) displacements of some points by all causes, beyond ``base``, mm."""
         found = np.zeros((_count(coefficients), len(self.plan.points[rows]), 3))
-        for cause, drawn in zip(self.causes, coefficients, strict=True):
-            if cause is not None:
-                found += cause.moved(drawn, rows)
+        for i, (cause, drawn) in enumerate(zip(self.causes, coefficients, strict=True)):
+            if cause is not None and drawn is not None:
+                key = i, rows.start, rows.stop
+                found += self._follow(key, drawn, partial(cause.moved, rows=rows))
         return found
+
+    def _follow(self, key: object, drawn: Drawn, follow: Callable[[Floats], Floats]) -> Floats:
+        """What follows linearly from coefficients; of many rows of a table, from the whole table once."""
+        if not isinstance(drawn, Rows) or _WORTH * len(drawn) < len(drawn.table):
+            return follow(np.asarray(drawn))
+        table, followed = self._followed.get(key, (None, None))
+        if followed is None or table is not drawn.table:
+            followed = follow(drawn.table)
+            self._followed[key] = drawn.table, followed
+        return np.asarray(followed[drawn.rows])
 
 
 def characteristics_of(plan: Plan, points: Floats, known: Known | None = None) -> Floats:
@@ -157,6 +215,10 @@ def characteristics_of(plan: Plan, points: Floats, known: Known | None = None) -
     return np.asarray(Evaluator(plan, points - plan.points, [], known)([], exact=True)[0])
 
 
-def _count(coefficients: Sequence[Floats]) -> int:
+def _through(transfer: Floats, coefficients: Floats) -> Floats:
+    return np.asarray(coefficients @ transfer)
+
+
+def _count(coefficients: Coefficients) -> int:
     """Of draws; one where nothing is drawn."""
-    return len(coefficients[0]) if coefficients else 1
+    return next((len(drawn) for drawn in coefficients if drawn is not None), 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.messages import say
-from cmm_uq.parts.causes import Cause, Common, Draw, Scatter, field_along
+from cmm_uq.parts.causes import Cause, Common, Draw, Drawn, Rows, Scatter, field_along
 from cmm_uq.parts.machine import MachineState, Unmodelled
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.qualifying import Qualified
@@ -49,9 +49,11 @@ def modelled(state: MachineState, qualified: Qualified, pose: Pose) -> Common:
     factors = tuple(effect.name for effect in state.effects for _ in effect.coefficients)
     deviations = state.draws - state.mean
 
-    def draw(random: np.random.Generator, n: int) -> Floats:
-        drawn = deviations[random.integers(len(deviations), size=n)]
-        return drawn + random.standard_normal(drawn.shape) * state.drift if state.drift.any() else drawn
+    def draw(random: np.random.Generator, n: int) -> Drawn:
+        drawn = Rows(deviations, random.integers(len(deviations), size=n))
+        if not state.drift.any():
+            return drawn
+        return np.asarray(drawn) + random.standard_normal((n, len(state.drift))) * state.drift
 
     why = dict.fromkeys(state.free, say("the calibration left it to what physics allows"))
     return Common(name=MACHINE, factors=factors, draw=draw, named=why, basis=-_in_part(qualified.left(columns), pose))

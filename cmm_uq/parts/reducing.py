@@ -60,7 +60,7 @@ def mean_of_places(places: Sequence[AtPose], random: np.random.Generator, n: int
     Noise, and what comes of operators and fixtures, is drawn anew in each (:data:`ANEW`).
     """
     common = places[0].drawn(random, n)
-    found = np.zeros((n, len(places[0].measured.evaluations)))
+    found = np.zeros((n, len(places[0].still)))
     for place in places:
         drawn = [
             cause.draw(random, n) if cause.name in ANEW else same

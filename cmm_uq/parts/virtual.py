@@ -2,22 +2,27 @@
 
 The error is what is measured less what is true: of the nominal part, or, where a form is known on the whole surface, of the
 part with the form that was drawn. A characteristic that was measured as y is then y less the errors.
+
+Of measured points what is true is drawn (:meth:`AtPose.errors`), which matters where a characteristic is not linear: a zone
+is never negative, and what adds to its width does so whatever its sign.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.messages import Text
-from cmm_uq.parts.causes import Cause
+from cmm_uq.parts.causes import Cause, Drawn, Scatter
+from cmm_uq.parts.characteristics import is_of_points
 from cmm_uq.parts.evaluating import Evaluator, Known, characteristics_of
 from cmm_uq.parts.machine import MachineState
-from cmm_uq.parts.of_form import Form, forms, whole_surfaces
+from cmm_uq.parts.of_form import FORM, Form, forms, whole_surfaces
 from cmm_uq.parts.of_machine import mean_errors, modelled, noise, not_modelled
 from cmm_uq.parts.of_operator import Beside
 from cmm_uq.parts.of_stylus import styli
@@ -57,7 +62,7 @@ class Circumstances:
     repeats : of each point, of whose readings the mean is taken.
     further : causes of another kind, of the plan's points.
     measured : (n, 3) points of the part as they were measured, in its frame, mm, about which errors are then drawn: a position
-        that is off errs as a distance does, one of zero only to one side. The nominal points without them, and of a part whose
+        that is off errs as a distance does. The nominal points without them, and of a part whose
         whole surfaces are drawn.
     """
 
@@ -104,26 +109,53 @@ class AtPose:
         drawn = any(len(feature.surface) for feature in plan.features)
         # what was measured has the mean errors in it: the part itself is without them
         self.part = part = plan.points if drawn or given.measured is None else given.measured - base
-        self.measured = Evaluator(plan, base + part - plan.points, self.causes, known)
         self.still = characteristics_of(plan, part, known)
+        self.apart = np.zeros(len(plan.characteristics), dtype=bool)
+        if given.measured is not None and not drawn:
+            self.apart = np.array([not is_of_points(one, plan) for one in plan.characteristics], dtype=bool)
+        self.measured = Evaluator(_some(plan, ~self.apart), base + part - plan.points, self.causes, known)
+        self.likely: Evaluator | None = None
+        if self.apart.any():
+            self.likely = Evaluator(_some(plan, self.apart), part - plan.points, self.causes, known)
+            self.found = characteristics_of(self.likely.plan, part + base, known)
         self.true: Evaluator | None = None
         if drawn:
             true = whole_surfaces(plan)
             still: list[Cause | None] = [None] * (len(self.causes) - len(own))
             self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface], known)
 
-    def drawn(self, random: np.random.Generator, n: int) -> list[Floats]:
+    def drawn(self, random: np.random.Generator, n: int) -> list[Drawn]:
         """Coefficients (n, K) of each cause."""
         return [cause.draw(random, n) for cause in self.causes]
 
-    def errors(self, coefficients: Sequence[Floats], *, exact: bool = False) -> Floats:
-        """(n, c) errors of the characteristics."""
-        true = self.still if self.true is None else self.true(coefficients, exact=exact)
-        found = np.asarray(self.measured(coefficients, exact=exact) - true)
+    def errors(self, coefficients: Sequence[Drawn], *, exact: bool = False) -> Floats:
+        """(n, c) errors of the characteristics.
+
+        Where points were measured as x, mean errors b are taken off: q = x − b. A range of
+        points (:func:`is_of_points`) has many freedoms of its own, the form, which errors d only ever enlarge: it errs by
+        f(x + d) − f(q). Everything else has few, a direction and a place, of which any is as likely before: it is f(q − s)
+        with the errors s that points have in common, less by how much their own errors n enlarge it, f(q − s + n) − f(q − s).
+        What is linear is the same by both.
+        """
+        found = np.zeros((len(coefficients[0]), len(self.apart)))
+        if not self.apart.all():
+            true = self.still[~self.apart] if self.true is None else self.true(coefficients, exact=exact)
+            found[:, ~self.apart] = self.measured(coefficients, exact=exact) - true
+        if self.likely is not None:
+            found[:, self.apart] = self.found - self._true(self.likely, coefficients, exact=exact)
         for cause, drawn in zip(self.causes, coefficients, strict=True):
             if isinstance(cause, Beside):
-                found += drawn @ cause.adds
+                found += np.asarray(drawn) @ cause.adds
         return found
+
+    def _true(self, likely: Evaluator, coefficients: Sequence[Drawn], *, exact: bool) -> Floats:
+        """What is true of all but ranges of points, about what was measured."""
+        each = [isinstance(cause, Scatter) or cause.name == FORM for cause in self.causes]
+        common = [None if own else drawn for drawn, own in zip(coefficients, each, strict=True)]
+        alone = [drawn if own else None for drawn, own in zip(coefficients, each, strict=True)]
+        less = -likely.displaced(common, exact=exact)
+        read = less + likely.displaced(alone, exact=exact)
+        return np.asarray(2 * likely.of(less, exact=exact) - likely.of(read, exact=exact))
 
     def off(self, seed: int = 0, count: int = CHECKED) -> Floats:
         """(c,) root mean square difference of first order from exact errors, of their standard deviation."""
@@ -132,6 +164,12 @@ class AtPose:
         apart = self.errors(drawn) - exact
         spread = np.maximum(exact.std(axis=0), ROUNDING)
         return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / spread)
+
+
+def _some(plan: Plan, chosen: NDArray[np.bool_]) -> Plan:
+    """The plan with some of its characteristics."""
+    kept = (one for one, own in zip(plan.characteristics, chosen, strict=True) if own)
+    return replace(plan, characteristics=tuple(kept))
 
 
 class Virtual:

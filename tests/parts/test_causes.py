@@ -109,7 +109,7 @@ def test_an_error_with_a_period_has_one_period_a_draw() -> None:
     )
     state = machine(unmodelled=tuple(u for u in unmodelled_errors([], {}) if u.effect.name == "periodic_scale_x"))
     at = AtPose(plan, Circumstances(state), POSE)
-    coefficients = at.drawn(np.random.default_rng(0), 1000)[1].reshape(1000, -1, 2)
+    coefficients = np.asarray(at.drawn(np.random.default_rng(0), 1000)[1]).reshape(1000, -1, 2)
     assert (np.count_nonzero(np.any(coefficients != 0, axis=2), axis=1) == 1).all()
     assert coefficients[coefficients != 0].std() == pytest.approx(10.0, rel=0.05)
     assert list(at.lacking) == []

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.parts.causes import Rows, Scatter
 from cmm_uq.parts.evaluating import Evaluator, characteristics_of
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, placed
@@ -82,7 +83,7 @@ def test_one_tip_errs_alike_on_both_sides() -> None:
     plan = Plan(features, characteristics, (Stylus("stylus", u_diameter_um=2.0),))
     virtual = AtPose(plan, Circumstances(machine()), POSE)
     drawn = virtual.drawn(np.random.default_rng(1), 50)
-    delta = 1e-3 * drawn[1][:, 0]
+    delta = 1e-3 * np.asarray(drawn[1])[:, 0]
     found = dict(zip((one.name for one in characteristics), virtual.errors(drawn, exact=True).T, strict=True))
     np.testing.assert_allclose(found["d1"], -delta, atol=1e-9)
     np.testing.assert_allclose(found["length"], delta, atol=1e-9)
@@ -280,6 +281,22 @@ def test_characteristics_that_err_together_conform_together() -> None:
     assert together == pytest.approx(each[0], abs=1e-9)
 
 
+def test_rows_of_a_table_that_is_followed_once_err_as_they_do_on_their_own() -> None:
+    """300 draws out of 500 rows of a posterior, against the coefficients themselves: to first order and on the points."""
+    names = ["scale_x", "squareness_xy", "straightness_x_z"]
+    state = machine(names, np.random.default_rng(2).standard_normal((500, 3)) * 5, 1.0)
+    flat = Characteristic("flat", "flatness", ("A",))
+    features, characteristics = block()
+    at = AtPose(Plan(features, (*characteristics, flat)), Circumstances(state), POSE)
+    for seed in (0, 1):  # the second time it is looked up
+        drawn = at.drawn(np.random.default_rng(seed), 300)
+        assert isinstance(drawn[0], Rows)
+        for exact in (True, False):
+            alone = at.errors([np.asarray(one) for one in drawn], exact=exact)
+            np.testing.assert_allclose(at.errors(drawn, exact=exact), alone, atol=1e-12)
+    assert alone[:, -1].std() > 1e-4
+
+
 def test_form_alone_needs_no_first_order() -> None:
     """A flatness of noise of 1 µm at 100 points by both associations: the zone is narrower, in every draw."""
     face = plane("A", [0, 0, 1], [0, 0, 0], [[200, 0, 0], [0, 100, 0]], (10, 10))
@@ -306,6 +323,73 @@ def test_a_position_that_is_off_errs_to_both_sides() -> None:
         found = Virtual(plan, given).errors(np.random.default_rng(0), 50_000)[:, 0]
         assert found.std() == pytest.approx(u, rel=0.02)
         assert found.mean() == pytest.approx(mean, abs=5e-5)
+
+
+@pytest.mark.parametrize(("common", "own", "mean", "u"), [
+    (1.0, 0.0, -2e-3 * np.sqrt(np.pi / 2), 2e-3 * np.sqrt(2 - np.pi / 2)),
+    (0.0, 1.0, 2e-3 * np.sqrt(np.pi / 2), 2e-3 * np.sqrt(2 - np.pi / 2)),
+    (1.0, 1.0, (np.sqrt(2) - 2) * 2e-3 * np.sqrt(np.pi / 2), None),
+])  # fmt: skip
+def test_what_points_have_in_common_moves_the_true_place_and_their_own_noise_only_adds(
+    common: float, own: float, mean: float, u: float | None
+) -> None:
+    """A hole that was measured in its very place. Moved as a whole by s, it truly lies |s| beside it (Rayleigh); with noise n
+    of its centre it lies in its place, |n| is what the noise added. Both: E(2|s| − |n − s|) of two independent ones."""
+    hole, ends = circle("hole", [50, 50, 0], 5.0, 4), (spot("o", [0, 0, 0]), spot("a", [100, 0, 0]))
+    tip = Stylus("tip", u_offset_um=np.array([common, common, 0.0]))
+    plan = Plan((replace(hole, stylus="tip"), *ends, spot("up", [0, 100, 0])),
+                (Characteristic("p", "position", ("hole",), ("o", "a", "up")),), (Stylus("stylus"), tip))  # fmt: skip
+    # the centre is the mean of two of four points along each axis with weight 1/2: u of each reading over √2
+    size = np.sqrt(2) * 1e-3 * own * np.tile((plan.stylus_of == 1)[:, None], (1, 3))
+    noise = Scatter.of("noise", "reading", size)
+    given = Circumstances(machine(), (POSE,), further=(noise,), measured=plan.points)
+    found = Virtual(plan, given).errors(np.random.default_rng(0), 50_000)[:, 0]
+    assert found.mean() == pytest.approx(mean, abs=5e-5)
+    if u is not None:
+        assert found.std() == pytest.approx(u, rel=0.02)
+
+
+def test_what_is_linear_errs_alike_about_measured_and_nominal_points() -> None:
+    """The same draws of scale, tip and noise: with both signs, to squares of micrometres over millimetres."""
+    features, characteristics = block()
+    sizes = tuple(one for one in characteristics if one.what in ("size", "distance", "angle", "x", "y"))
+    plan = Plan(features, sizes, (Stylus("stylus", u_diameter_um=2.0),))
+    given = Circumstances(machine(["scale_x", "squareness_xy"], [[10.0, 5.0], [-10.0, -5.0]], 1.0), (POSE,))
+    nominal, measured = AtPose(plan, given, POSE), AtPose(plan, replace(given, measured=plan.points), POSE)
+    drawn = nominal.drawn(np.random.default_rng(0), 100)
+    for exact in (True, False):
+        expected = nominal.errors(drawn, exact=exact)
+        np.testing.assert_allclose(measured.errors(drawn, exact=exact), expected, atol=3e-5)
+        assert (expected.std(axis=0)[[one.what != "angle" for one in sizes]] > 3e-4).all()
+
+
+@pytest.mark.parametrize("bow", [10.0, -10.0])
+def test_a_form_that_was_measured_errs_only_to_be_larger(bow: float) -> None:
+    """A face that was measured flat, by a straightness that may be off by ±10 µm: larger by as much, never smaller."""
+    face = plane("A", [0, 0, 1], [0, 0, 0], [[200, 0, 0], [0, 100, 0]], (5, 3))
+    plan = Plan((face,), (Characteristic("f", "flatness", ("A",)),))
+    state = machine(["straightness_x_z"], [[bow], [-bow]])
+    off = AtPose(plan, Circumstances(state, (POSE,), measured=plan.points), POSE)
+    along = 0.01 * (1 - (2 * (300.0 + np.linspace(0, 200, 5)) / 900 - 1) ** 2)
+    line = np.polynomial.Polynomial.fit(np.arange(5), along, 1)(np.arange(5))
+    np.testing.assert_allclose(off.errors([np.array([[bow], [-bow]])], exact=True), np.ptp(along - line), rtol=1e-3)
+
+
+@pytest.mark.parametrize("what", ["position", "flatness"])
+def test_a_mean_error_is_taken_off_what_was_measured_once(what: str) -> None:
+    """Of a machine whose errors are known, uncorrected: measured less error is the characteristic of the part as it is."""
+    hole, ends = circle("hole", [50, 50, 0], 5.0, 4), (spot("o", [0, 0, 0]), spot("a", [100, 0, 0]))
+    face = plane("A", [0, 0, 1], [0, 0, 0], [[200, 0, 0], [0, 100, 0]], (5, 3))
+    of, datums = (("hole",), ("o", "a", "up")) if what == "position" else (("A",), ())
+    plan = Plan((hole, *ends, spot("up", [0, 100, 0]), face), (Characteristic("c", what, of, datums),))
+    state = machine(["scale_x", "straightness_x_z"], [[100.0, 20.0]], corrected=False)
+    at = AtPose(plan, Circumstances(state, (POSE,)), POSE)
+    true = plan.points + np.random.default_rng(1).normal(0, 0.01, plan.points.shape)
+    measured = true + at.measured.base
+    found = AtPose(plan, Circumstances(state, (POSE,), measured=measured), POSE)
+    left = evaluated(plan, measured) - found.errors([np.zeros((1, 2))], exact=True)[0]
+    np.testing.assert_allclose(left, characteristics_of(plan, true), atol=1e-9)
+    assert np.abs(evaluated(plan, measured) - left).max() > 1e-4
 
 
 @pytest.mark.parametrize(("digits", "least"), [(1, 100_000), (3, 200_000)])
