@@ -108,9 +108,8 @@ class Figures:
 
     @property
     def expanded(self) -> float:
-        """Half of the shortest 95 % interval, mm or rad."""
-        low, high = self.stated.interval
-        return 0.5 * (high - low)
+        """Half of the shortest 95 % interval of the errors, mm or rad."""
+        return self.stated.U
 
     @property
     def factor(self) -> Text:

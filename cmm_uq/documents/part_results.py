@@ -96,7 +96,7 @@ def _characteristic(found: PartFound, i: int) -> dict[str, Any]:
         "association": found.plan.characteristics[i].association, "unit": unit_of(facts),
         "measured": None if found.measured is None else _in(facts, float(found.measured[i])),
         "mean_error": _in(facts, stated.error), "value": None if stated.value is None else _in(facts, stated.value),
-        "u": _in(facts, stated.u), "U": 0.5 * (high - low), "k": stated.k if isfinite(stated.k) else None,
+        "u": _in(facts, stated.u), "U": _in(facts, stated.U), "k": stated.k if isfinite(stated.k) else None,
         "interval95": [low, high], "worst_cause": found.budget.worst(facts.name),
         "limits": None if judged is None else _limits(facts, judged),
         "decision": None if judged is None or judged.outcome is None else {

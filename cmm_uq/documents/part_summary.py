@@ -61,7 +61,7 @@ def _figure(found: PartFound, i: int) -> Figure:
     angle = facts.asks.limits == "angles"
     own = unit("°") if angle else unit("mm")
     factor = degrees(1.0) if angle else 1.0
-    U = factor * 0.5 * (stated.interval[1] - stated.interval[0])
+    U = factor * stated.U
     k = say("k = {k}", k=number(stated.k, ".2f")) if stated.u else NOTHING
     if stated.value is None:
         return _named(found, i), say("U = {u} {unit}", u=significant(U), unit=own), k

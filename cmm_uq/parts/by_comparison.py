@@ -47,7 +47,7 @@ def compared(stated: Sequence[Stated], shares: Budget, methods: Sequence[ByMetho
         figures = [(other, figure) for other in methods if (figure := other.of(one.name)) is not None]
         if not figures:
             continue
-        virtual = Stating("virtual", one.value, one.u, 0.5 * (one.interval[1] - one.interval[0]), one.error)
+        virtual = Stating("virtual", one.value, one.u, one.U, one.error)
         all_stated = (virtual, *(Stating(other.method, figure.value, figure.u, figure.U) for other, figure in figures))
         pairs = tuple(_pairs(all_stated))
         by_family = family_shares(shares, one.name)

@@ -37,7 +37,7 @@ class Stated:
     error : mean of the errors: by how much such a measurement is off on average, mm or rad.
     u : standard uncertainty, mm or rad.
     interval : shortest coverage interval of the value; of its error, with the opposite sign, where nothing was measured.
-    k : half of the interval over u.
+    k : half of the shortest interval of the errors over u.
     """
 
     name: str
@@ -46,6 +46,11 @@ class Stated:
     u: float
     interval: tuple[float, float]
     k: float
+
+    @property
+    def U(self) -> float:  # noqa: N802
+        """Half of the shortest interval of the errors, mm or rad: of a zone near zero more than half of its own interval."""
+        return self.k * self.u if self.u else 0.5 * (self.interval[1] - self.interval[0])
 
 
 def stated(
@@ -70,7 +75,7 @@ def stated(
             value = max(0.0, value)
             if errors is not None:
                 interval = _possible(at - errors[:, i], interval, simulated.coverage)
-        k = 0.5 * (interval[1] - interval[0]) / u if u else float("nan")
+        k = 0.5 * (high - low) / u if u else float("nan")
         found.append(Stated(name, value, error, u, interval, k))
     return tuple(found)
 

@@ -158,7 +158,9 @@ def test_results_say_what_was_found_with_hashes_of_all_inputs() -> None:
     one, stated = data["characteristics"][1], found.stated[1]
     assert (one["unit"], one["value"], one["u"]) == ("mm", pytest.approx(stated.value), pytest.approx(stated.u))
     assert one["measured"] - one["mean_error"] == pytest.approx(one["value"])
-    assert one["U"] == pytest.approx((one["interval95"][1] - one["interval95"][0]) / 2)
+    low, high = found.simulated.interval[found.stated.index(stated)]
+    assert one["U"] == pytest.approx((high - low) / 2)  # of the errors; the interval of a zone ends at zero
+    assert one["interval95"] == pytest.approx(stated.interval)
     assert data["decision"]["outcome"] == found.outcome
     assert data["simulation"]["virtual_measurements"] == TRIALS
     matrix = np.array(data["covariance"]["matrix"])

@@ -39,7 +39,7 @@ def test_the_interval_of_a_zone_is_the_shortest_one_above_zero(value: float) -> 
         shortest = value - half, value + half
     assert zone.interval == pytest.approx(shortest, abs=0.04)
     assert zone.value == pytest.approx(max(0.0, value), abs=0.01)
-    assert zone.k == pytest.approx(0.5 * (shortest[1] - shortest[0]), abs=0.03)
+    assert (zone.U, zone.k, size.U) == pytest.approx((1.96, 1.96, 1.96), abs=0.04)  # of the measurement, cut or not
     assert size.interval == pytest.approx((value - 1.96, value + 1.96), abs=0.06)
     assert size.value == pytest.approx(value, abs=0.01)
 
