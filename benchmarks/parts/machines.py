@@ -41,6 +41,7 @@ from cmm_uq.parts.result import evaluated, stated
 from cmm_uq.parts.virtual import Circumstances, Virtual
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.monte_carlo import Source, from_source
 
 PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
 BEGIN, END = "<!-- written by benchmarks.parts.machines -->", "<!-- end -->"
@@ -152,9 +153,11 @@ def _measured(cell: Cell, random: np.random.Generator) -> dict[str, Any]:
     points = measuring.measured(joined(part), normals, random)
     true = truth.characteristics(part)
     how = Circumstances(state, (pose,), Surroundings(PART), measured=points)
-    simulated = Virtual(plan(), how).simulated(TRIALS, seed=int(random.integers(2**31)))
+    virtual = Virtual(plan(), how)
+    errors = virtual.errors(random, TRIALS)
+    simulated = from_source(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)
     rows = {one.name: [true[one.name], one.value, one.u, *one.interval]
-            for one in stated(simulated, evaluated(plan(), points))}  # fmt: skip
+            for one in stated(simulated, evaluated(plan(), points), plan(), errors)}  # fmt: skip
     return {"intervals": rows, "sigma_um": round(1e3 * sigma, 3), "offset_um": round(1e3 * offset, 3)}
 
 
