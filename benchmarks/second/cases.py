@@ -223,9 +223,8 @@ def _attempt(random: np.random.Generator, kind: str, number: int) -> Case | None
     what = _design(kind, noise_kind, number)
     placed = DESIGNS[what](random)
     noise = noises.drawn(random, noise_kind, placed)
-    gone = [
-        columns for columns in _COLUMNS if random.random() < 0.35 and not (noise_kind == "slow" and "time_s" in columns)
-    ]
+    timed = noise_kind in noises.IN_TIME
+    gone = [columns for columns in _COLUMNS if random.random() < 0.35 and not (timed and "time_s" in columns)]
     before = placed.recorded
     covariance = noises.of_observations(noises.of_coordinates(noise, placed), placed)
     placed.recorded = {k: v for k, v in before.items() if not any(k in columns for columns in gone)}

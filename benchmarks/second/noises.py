@@ -11,9 +11,12 @@ import numpy as np
 
 from benchmarks.second.artefacts import Placed
 
-KINDS = ("white", "axis", "set-up", "growing", "slow", "tails", "display", "real")
+KINDS = ("white", "axis", "set-up", "growing", "slow", "walk", "tails", "display", "real")
 """White; one axis reads worse; an offset of each point of each set-up; noise that grows with the distance from the first
-point of a set-up; an Ornstein–Uhlenbeck process in time; Student's t; steps of a display; residuals of real bars."""
+point of a set-up; in time, an Ornstein–Uhlenbeck process or a random walk; Student's t; steps of a display; residuals of real
+bars."""
+IN_TIME = ("slow", "walk")
+"""Kinds whose recordings have the time in them."""
 TAILS = (3.0, 4.0)
 
 
@@ -26,7 +29,7 @@ class Noise:
     kind : of :data:`KINDS`.
     sigma : standard deviation of a reading of one coordinate, mm.
     axis, times : the axis that reads worse, and by how much.
-    ratio : of the other component's standard deviation to ``sigma``.
+    ratio : of the other component's standard deviation to ``sigma``; of a walk, of what it has at the end.
     forgets : time, s, over which slow noise forgets.
     dof : degrees of freedom of Student's t.
     step : of the display, mm.
@@ -55,6 +58,8 @@ def drawn(random: np.random.Generator, kind: str, placed: Placed) -> Noise:
         whole = float(np.ptp(placed.recorded["time_s"]))
         forgets = whole * float(np.exp(random.uniform(np.log(0.02), np.log(0.5))))
         return Noise(kind, sigma, ratio=float(random.uniform(1.0, 4.0)), forgets=forgets)
+    if kind == "walk":
+        return Noise(kind, sigma, ratio=float(random.uniform(1.0, 4.0)))
     if kind == "tails":
         return Noise(kind, sigma, dof=float(random.choice(TAILS)))
     if kind == "display":
@@ -94,6 +99,10 @@ def of_coordinates(noise: Noise, placed: Placed) -> np.ndarray:
     elif noise.kind == "slow":
         time = placed.recorded["time_s"]
         found += noise.ratio**2 * np.exp(-np.abs(time[:, None] - time) / noise.forgets)
+    elif noise.kind == "walk":
+        time = placed.recorded["time_s"]
+        passed = (time - time.min()) / np.ptp(time)
+        found += noise.ratio**2 * np.minimum(passed[:, None], passed)
     return noise.sigma**2 * found + noise.step**2 / 12 * np.eye(n)
 
 

@@ -82,6 +82,7 @@ def shapes(case: Case) -> list[Shape]:
         whole = float(np.ptp(placed.recorded["time_s"]))
         tried += [Noise("slow", 1.0, ratio=ratio, forgets=part * whole) for ratio in (1.0, 2.0, 4.0)
                   for part in (0.02, 0.06, 0.2, 0.6)]  # fmt: skip
+        tried += [Noise("walk", 1.0, ratio=ratio) for ratio in (1.0, 2.0, 4.0)]
     found = [Shape(noises.of_observations(noises.of_coordinates(noise, placed), placed)) for noise in tried]
     return [*found, replace(found[0], heavy=True)]
 
