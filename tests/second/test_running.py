@@ -13,7 +13,7 @@ from benchmarks.second.running import diagnosed, done, kept, lines, sealed, task
 
 
 def test_a_part_of_a_run_has_some_of_every_kind(tmp_path: Path) -> None:
-    first = [task[2] for task in tasks(tmp_path, 0, 6, 30, "make")[:153]]
+    first = [task[2] for task in tasks(tmp_path, 0, 6, 30, "make")[:168]]
     assert {kind: first.count(kind) for kind in KINDS} == {**dict.fromkeys(NOTHING, 15), **dict.fromkeys(CAUSES, 3)}
 
 
