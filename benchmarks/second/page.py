@@ -37,8 +37,8 @@ of the package.
 - **Noise**: *white*; *axis*, one reads 1.5 to 3.5 times worse; *set-up*, an offset of each point of each set-up of 0.5 to 2
   of the reading noise; *growing*, one to three times it at the longest distance; *slow*, an Ornstein–Uhlenbeck process of one
   to four times it that forgets over a fiftieth to a half of the recording; *walk*, a random walk that ends at one to four
-  times it; *tails*, t of 3 or 4 degrees of freedom; *display*, steps of 0.8 to 2.5 of it; *real*: what the six factors leave of
-  the real bars (two recordings, 11 µm), dealt to other positions with other signs.
+  times it; *tails*, t of 3 or 4 degrees of freedom; *display*, steps of 0.8 to 2.5 of it; *real*: what the six factors
+  leave of the real bars (two recordings, 11 µm), dealt to other positions with other signs.
 - **Hidden** with √λ, the length of the signal over its noise once all else is projected out: *one* or *two* effects, *real
   one* in the real bars, *simulation* beyond a prediction, *shuffled* (the same rows in two orders), each 4.5 to 10;
   *unresolved period*, a gauge of twelve equal steps, whose periods have aliases; faults of the artefact (6 to 15): a pattern
