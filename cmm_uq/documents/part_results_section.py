@@ -63,20 +63,15 @@ def _row(one: Figures, *, measured: bool) -> tuple[Text, ...]:
 def _notes(every: Sequence[Figures]) -> tuple[Text, ...]:
     notes: list[Text] = [
         say(
-            "u: standard uncertainty. 95 % interval: the shortest that holds 95 % of the virtual measurements; U = k · u is "
-            "half of it, and the value lies in its middle only where errors to both sides are alike."
+            "u: standard uncertainty. 95 % interval: the shortest that holds 95 % of the virtual measurements; that of a "
+            "form, an orientation or a location is never below zero. U = k · u is half of the errors' interval; the value "
+            "lies in the middle only where errors to both sides are alike."
         )
     ]
     if every[0].stated.value is None:
         notes.append(say("The interval is that of the true value less the indicated one."))
         return tuple(notes)
     notes.append(say("Values are stated less the mean of their errors."))
-    if any(one.zone and (one.stated.value or 0.0) < 0 for one in every):
-        notes.append(
-            say(
-                "A zone below zero is one so small that the mean error of its measurement is larger than what was measured."
-            )
-        )
     return tuple(notes)
 
 

@@ -382,14 +382,6 @@ def test_pictures_show_what_was_found_of_the_points(measured: PartFound) -> None
     assert "standard uncertainties of up to 3.0 µm" in said(errors_section(found).blocks)
 
 
-def test_a_zone_that_was_measured_below_zero_is_explained(measured: PartFound) -> None:
-    below = tuple(replace(one, value=-1e-3) if i == 3 else one for i, one in enumerate(measured.stated))
-    note = "A zone below zero"
-    assert note in said(results_section(replace(measured, stated=below)).blocks)
-    above = tuple(replace(one, value=1e-3) if i == 3 else one for i, one in enumerate(measured.stated))
-    assert note not in said(results_section(replace(measured, stated=above)).blocks)
-
-
 def test_what_no_cause_moves_has_no_uncertainty_and_a_page_all_the_same(measured: PartFound) -> None:
     still = replace(measured.stated[0], u=0.0, interval=(30.0, 30.0), k=float("nan"), value=30.0)
     judged = Judged(29.95, 30.05, "pass", 1.0, 0.0, (29.95, 30.05), say("rule"))
