@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,22 +25,19 @@ from benchmarks.coverage.measuring import kept
 from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import truth
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
-from cmm_uq.geometry.repeated import Repeated
 from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
-from cmm_uq.parts import associating
 from cmm_uq.parts.conditional import given_recording, joint_posterior
+from cmm_uq.parts.evaluating import Evaluator, Known
 from cmm_uq.parts.machine import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose
-from cmm_uq.parts.plan import FeatureKind
 from cmm_uq.parts.result import evaluated, stated
 from cmm_uq.parts.virtual import Circumstances, Virtual
 from cmm_uq.physics.catalogue import effects
-from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Source, from_source
 
 PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
@@ -86,17 +83,12 @@ CELLS = tuple(
 )
 
 
-@lru_cache(maxsize=64)
-def _repeated(kind: FeatureKind, shape: tuple[int, ...], points: bytes) -> Repeated:
-    return Repeated(kind, np.frombuffer(points).reshape(shape))
-
-
-def _remembered(kind: FeatureKind, points: Floats) -> Repeated:
-    """A feature of points that were seen before, as nominal ones are by every machine, is not prepared again."""
-    return _repeated(kind, points.shape, points.tobytes())
-
-
-associating.Repeated = _remembered  # type: ignore[assignment, misc]
+@cache
+def _nominal() -> Known:
+    """The part's features at their nominal points, which are those of every machine."""
+    known: Known = {}
+    Evaluator(plan(), np.zeros_like(plan().points), (), known)
+    return known
 
 
 def calibrated(cell: Cell, hidden: truth.Truth, sigma: float, offset: float, random: np.random.Generator) -> Artefact:
@@ -153,7 +145,7 @@ def _measured(cell: Cell, random: np.random.Generator) -> dict[str, Any]:
     points = measuring.measured(joined(part), normals, random)
     true = truth.characteristics(part)
     how = Circumstances(state, (pose,), Surroundings(PART), measured=points)
-    virtual = Virtual(plan(), how)
+    virtual = Virtual(plan(), how, dict(_nominal()))
     errors = virtual.errors(random, TRIALS)
     simulated = from_source(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)
     rows = {one.name: [true[one.name], one.value, one.u, *one.interval]

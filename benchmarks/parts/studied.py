@@ -10,7 +10,9 @@ from benchmarks.parts import truth
 from cmm_uq.parts.plan import Characteristic, Feature, FeatureKind, Nominal, Plan, Stylus
 from cmm_uq.points import Floats, Machine, Points
 
-KINDS: Mapping[str, FeatureKind] = dict.fromkeys("ABCD", "plane") | {"h1": "cylinder", "h2": "cylinder", "S": "sphere"}  # type: ignore[assignment]
+KINDS: Mapping[str, FeatureKind] = {
+    "A": "plane", "B": "plane", "C": "plane", "D": "plane", "h1": "cylinder", "h2": "cylinder", "S": "sphere",
+}  # fmt: skip
 MACHINE = Machine("hidden", travel_mm=truth.TRAVEL)
 U_TIP_UM = 0.6
 _ABC = ("A", "B", "C")
