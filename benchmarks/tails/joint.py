@@ -26,7 +26,7 @@ from scipy import special
 from cmm_uq.inference.draws import Draws
 from cmm_uq.inference.noise import AXES, GROWTH, PLACING, Components, Sizes
 from cmm_uq.model.measurement import MeasurementModel
-from cmm_uq.model.noise import _machine_axes, _squares, growing_lengths, noise_of, repeated_quantity, sensitivities
+from cmm_uq.model.noise import axis_variances, growing_lengths, machine_axes, noise_of, repeated_quantity, sensitivities
 from cmm_uq.units import unit
 
 DOF = np.array([2.5, 3.0, 4.0, 6.0, 10.0, 20.0, np.inf])
@@ -91,7 +91,7 @@ class Readings:
             raise ValueError("slow noise and steps are not reckoned with")
         linear, fitted = estimate.linear, estimate.least_squares
         xyz = model.placed(estimate.about)
-        turn, along = _machine_axes(model.artefact.rows[used], sensitivities(model, xyz)[used])
+        turn, along = machine_axes(model.artefact.rows[used], sensitivities(model, xyz)[used])
         length = growing_lengths(model, xyz)[used]
         scale = linear.noise_scale
         rows, given = linear.priors
@@ -105,7 +105,7 @@ class Readings:
         size = np.sqrt(np.sum(whole**2, axis=0) / sigma**2 + np.sum(known**2, axis=0))
         size[-1] = 1.0
         return cls(
-            (whole / size)[order], known / size, _squares(along, scale)[order],
+            (whole / size)[order], known / size, axis_variances(along, scale)[order],
             (scale**2 * (length / max(length.max(), 1e-9)) ** 2)[order], scale[order],
             repeated_quantity(model, used)[order], noise, fitted.value, size[: len(fitted.value)], sigma,
         )  # fmt: skip

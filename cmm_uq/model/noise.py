@@ -55,11 +55,11 @@ def noise_of(
     xyz = model.placed(values)
     sensitivity = sensitivities(model, xyz)[chosen]
     rows = artefact.rows[chosen]
-    turn, along = _machine_axes(rows, sensitivity)
+    turn, along = machine_axes(rows, sensitivity)
     block = repeated_quantity(model, chosen)
     helmert, count = _helmert(block)
     turn = sparse.csr_array(helmert @ turn)
-    axes = np.asarray(abs(helmert).power(2) @ _squares(along, artefact.noise_scale[chosen]))
+    axes = np.asarray(abs(helmert).power(2) @ axis_variances(along, artefact.noise_scale[chosen]))
     reading = axes.sum(axis=1)
     length = growing_lengths(model, xyz)[chosen]
     growth = np.asarray(
@@ -106,7 +106,7 @@ def sensitivities(model: MeasurementModel, xyz: Floats) -> Floats:
     return found
 
 
-def _machine_axes(rows: Ints, sensitivity: Floats) -> tuple[sparse.csr_array, Floats]:
+def machine_axes(rows: Ints, sensitivity: Floats) -> tuple[sparse.csr_array, Floats]:
     """Turns observations of one point among themselves so that each sees the noise of one axis, as nearly as that goes.
 
     Returns
@@ -194,7 +194,7 @@ def _contrasts(n: int) -> Floats:
     return np.asarray(rows / np.sqrt(i * (i + 1))[:, None])
 
 
-def _squares(along: Floats, noise_scale: Floats) -> Floats:
+def axis_variances(along: Floats, noise_scale: Floats) -> Floats:
     """Shares (m, 3) of the axes' variances in each observation, which sum up to its noise scale's square."""
     squares = np.sum(along**2, axis=1)
     total = squares.sum(axis=1, keepdims=True)
