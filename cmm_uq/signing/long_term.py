@@ -13,8 +13,8 @@ from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.signing.adapter import translated
+from cmm_uq.signing.appending import appending
 from cmm_uq.signing.found import Trust
-from cmm_uq.signing.pdf import appending
 from cmm_uq.signing.signer import ONE_DIGEST, Signer
 from cmm_uq.signing.time_server import Server
 

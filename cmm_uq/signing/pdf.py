@@ -6,12 +6,12 @@ The date of the metadata stays that of the document. The same document, key and 
 from __future__ import annotations
 
 import datetime as dt
-import hashlib
 import io
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.signing.appending import appending
 from cmm_uq.signing.extra import installed, ran
 from cmm_uq.signing.found import NOBODY, Trust
 from cmm_uq.signing.signer import ONE_DIGEST, Signer
@@ -122,33 +122,6 @@ def sign_pdf(
     server = Server(stamping.server)
     pdf_signer = signers.PdfSigner(metadata, adapted, timestamper=server, stamp_style=style)
     return ran(_stamped(pdf_signer, writer, signer, stamping, at))
-
-
-def appending(pdf: bytes) -> IncrementalPdfFileWriter:
-    """A writer that appends a revision, and draws nothing at random.
-
-    Raises
-    ------
-    CmmUqError : it cannot be read as a PDF.
-    """
-    with installed():
-        from pyhanko.pdf_utils import generic
-        from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
-        from pyhanko.pdf_utils.misc import PdfError
-
-    class Appending(IncrementalPdfFileWriter):  # type: ignore[misc]
-        def _update_meta(self) -> None:
-            """Metadata stay: they are of the document, and PDF/A asks that both its copies agree."""
-
-        @classmethod
-        def _handle_id(cls, prev: Any) -> Any:
-            drawn = generic.ByteStringObject(hashlib.sha256(pdf).digest()[:16])
-            return generic.ArrayObject([prev.trailer["/ID"][0] if "/ID" in prev.trailer else drawn, drawn])
-
-    try:
-        return Appending(io.BytesIO(pdf))
-    except (PdfError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise CmmUqError(f"cannot be read as a PDF: {error}", fix="Name a PDF that is whole") from None
 
 
 def _field(writer: IncrementalPdfFileWriter) -> tuple[str, int]:
