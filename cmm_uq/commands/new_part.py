@@ -19,6 +19,7 @@ from cmm_uq.jobs.importing.format import HEAD
 from cmm_uq.jobs.importing.xml_files import begins_with
 from cmm_uq.jobs.origin import EXAMPLE, SIMULATED
 from cmm_uq.jobs.part.beginning import TABLES
+from cmm_uq.jobs.part.common import members
 from cmm_uq.jobs.part.drawing import KEY, Drawing, Unknown
 from cmm_uq.jobs.part.drawing_dmis import drawing_of_dmis
 from cmm_uq.jobs.part.drawing_qif import drawing_of_qif
@@ -103,7 +104,7 @@ def _aligned(drawing: Drawing) -> dict[str, Any]:
     features = {one["name"]: _probed(one) for one in drawing.features}
     asked = [drawing.datums, *(one.get("datums", []) for one in drawing.characteristics)]
     for datums in asked:
-        if datums and not freedoms([features[name] for name in datums]):
+        if datums and not freedoms([tuple(features[each] for each in members(name, features)) for name in datums]):
             return {"alignment": {"datums": datums}}
     return {"alignment": {"best_fit": True}}
 

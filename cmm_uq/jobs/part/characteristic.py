@@ -81,7 +81,8 @@ class CharacteristicFacts(Table):
     features: Annotated[list[Feature], Field(max_length=2)] = []
     """Names of the features that it is of: two of a distance and an angle, one of all else."""
     datums: Annotated[list[Feature], Field(max_length=6)] = []
-    """Names of the features that are its datums, in order; where it needs some and has none, those of `[alignment]`."""
+    """Names of the features that are its datums, in order, `"A-B"` of a common datum on both; where it needs some and has
+    none, those of `[alignment]`."""
     tolerance_mm: Length | None = None
     """Width of the tolerance zone, of form, orientation, location and runout; of a position its diameter."""
     lower_mm: Position | None = None
