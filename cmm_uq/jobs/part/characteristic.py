@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from cmm_uq.jobs.part.feature import Association, Kind
+from cmm_uq.jobs.part.not_modelled import refuse_not_modelled
 from cmm_uq.jobs.table import Length, Position, Table, Uncertainty
 
 What = Literal[
@@ -104,6 +105,11 @@ class CharacteristicFacts(Table):
     def asks(self) -> Asks:
         """What it is of."""
         return ASKS[self.what]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _modelled(cls, table: Any) -> Any:
+        return refuse_not_modelled(table)
 
     @model_validator(mode="after")
     def _of_features(self) -> Self:

@@ -123,12 +123,21 @@ _Check = Callable[[CharacteristicFacts, Mapping[str, Probed]], tuple[str, str, s
 
 
 def _characteristics(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
-    checks: tuple[_Check, ...] = (_of_its_kinds, _nominal_orientation, _limits_of_the_value, _frame_of_a_coordinate)
     for i, one in enumerate(facts.characteristic):
-        found = next((found for check in checks if (found := check(one, features))), None)
-        if found:
+        if found := unfit(one, features):
             problem, key, fix = found
             yield CmmUqError(problem, where=places.of("characteristic", key, i), fix=fix)
+
+
+def unfit(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+    """What keeps a characteristic from being evaluated: the problem, the key, and what mends it.
+
+    Parameters
+    ----------
+    features : by name; all of its own are there.
+    """
+    checks: tuple[_Check, ...] = (_of_its_kinds, _nominal_orientation, _limits_of_the_value, _frame_of_a_coordinate)
+    return next((found for check in checks if (found := check(one, features))), None)
 
 
 def _of_its_kinds(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Annotated, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from cmm_uq.files.limits import LISTED
 from cmm_uq.jobs.part.form import FormFacts
+from cmm_uq.jobs.part.not_modelled import refuse_not_modelled
 from cmm_uq.jobs.table import Length, Table, Triple
 
 Kind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
@@ -107,6 +108,11 @@ class Strategy(Table):
     margin_mm: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     """What stays free at each end and edge."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _modelled(cls, table: Any) -> Any:
+        return refuse_not_modelled(table)
+
     @model_validator(mode="after")
     def _what_the_pattern_needs(self) -> Self:
         needed = _NEEDED[self.pattern]
@@ -158,6 +164,11 @@ class FeatureFacts(Table):
     """In place of a pattern, its contact points on the nominal surface; normals follow from it."""
     form: FormFacts | None = None
     """Its own form and roughness, in place of `[form]`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _modelled(cls, table: Any) -> Any:
+        return refuse_not_modelled(table)
 
     @field_validator("direction", "along", "normal")
     @classmethod
