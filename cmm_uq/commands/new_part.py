@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
+from cmm_uq.commands.new_part_answers import Answers
 from cmm_uq.commands.schemas import shipped
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
@@ -53,6 +54,34 @@ def part_files(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     tables = _with({name: _copied(table) for name, table in TABLES.items()}, given, id)
     marked = {f"{name}.{key}" for name, table in TABLES.items() for key in _keys(table)}
     return _files(tables, marked - _given_keys(given), {})
+
+
+def part_of_answers(answers: Answers, *, id: str) -> dict[str, bytes]:  # noqa: A002
+    """Contents of every file of a new job of a part as its user described it; what was not said is that of the example.
+
+    Raises
+    ------
+    CmmUqError : the readers of a job refuse what was said.
+    """
+    tables = {name: _copied(table) for name, table in TABLES.items()}
+    own: dict[str, Any] = {PART: answers.part, "machine_state": {"certificate": answers.certificate}}
+    tables["stylus"] = [{**tables["stylus"][0], **answers.stylus}]
+    if answers.features:
+        own["alignment"] = answers.alignment
+        tables |= {"feature": answers.features, "alignment": {}}
+    if answers.characteristics:
+        tables["characteristic"] = answers.characteristics
+    elif answers.features:  # something has to be asked of them: where the first one is
+        tables["characteristic"] = [{"name": "1", **_of_the_first(answers)}]
+    said = ("feature",) if answers.features else ()
+    marked = {f"{name}.{key}" for name, table in TABLES.items() if name not in said for key in _keys(table)}
+    marked -= _given_keys(own) | {f"stylus.{key}" for key in answers.stylus}
+    marked -= {f"characteristic.{key}" for key in _keys(TABLES["characteristic"])} if answers.characteristics else set()
+    return {**_files(_with(tables, own, id), marked, {}), **answers.machine}
+
+
+def _of_the_first(answers: Answers) -> dict[str, Any]:
+    return {"what": "position", "features": [answers.features[0]["name"]], "tolerance_mm": 0.1}
 
 
 def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
