@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts, with_article
 from cmm_uq.jobs.part.common import as_one, members
 from cmm_uq.jobs.part.file import PartFile
 from cmm_uq.jobs.part.freedoms import freedoms
@@ -142,15 +142,17 @@ def unfit(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str
 
 def _of_its_kinds(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
     """That it is of features, and about datums, that can have it."""
+    alone = len(one.features) < one.asks.features
+    said_of, own = ("of one feature is of", one.asks.alone) if alone else ("is of", one.asks.kinds)
     for names, kinds, key, of in (
-        (one.features, one.asks.kinds, "features", "is of"), (one.datums, one.asks.datum_kinds, "datums", "is about"),
+        (one.features, own, "features", said_of), (one.datums, one.asks.datum_kinds, "datums", "is about"),
     ):  # fmt: skip
         for name in names:
-            own = _named(name, features)
-            kind = own[0].facts.kind if len(own) == 1 else as_one(own)[0]
+            parts = _named(name, features)
+            kind = parts[0].facts.kind if len(parts) == 1 else as_one(parts)[0]
             if kind not in kinds:
-                said = f"a {kind}" if len(own) == 1 else _AS_ONE[kind]
-                return (f"a {one.what} {of} a {' or '.join(kinds)}, and {name!r} is {said}", key,
+                said = f"a {kind}" if len(parts) == 1 else _AS_ONE[kind]
+                return (f"{with_article(one.what)} {of} a {' or '.join(kinds)}, and {name!r} is {said}", key,
                         "Name another feature, or another characteristic")  # fmt: skip
     return None
 
