@@ -14,7 +14,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
-from cmm_uq.geometry.repeated import Drawn, Repeated
+from cmm_uq.geometry.repeated import Drawn, Repeated, one_by_one
 from cmm_uq.parts.plan import DIRECTED, Feature
 from cmm_uq.points import Floats
 
@@ -183,9 +183,11 @@ class ProbedFeature:
 
     def by_differences(self, values: Callable[[Floats], Floats]) -> Floats:
         """(8, n, 3) derivative of values (N, 8) of displacements (N, n, 3) by the coordinates of each point."""
-        steps = _STEP * np.eye(3 * self.n).reshape(-1, self.n, 3)
-        change: Floats = (values(steps) - values(-steps)) / (2 * _STEP)
-        return np.asarray(change.T, dtype=np.float64).reshape(VALUES, self.n, 3)
+        found = []
+        for unit in one_by_one(self.n, 3):
+            steps = _STEP * unit
+            found.append((values(steps) - values(-steps)) / (2 * _STEP))
+        return np.concatenate(found).T.reshape(VALUES, self.n, 3)
 
     @property
     def undisturbed(self) -> Features:
