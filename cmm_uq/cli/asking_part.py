@@ -82,24 +82,24 @@ def _until_sound(ask: Callable[[], dict[str, Any]], take: Callable[[dict[str, An
 
 def _feature(name: str) -> dict[str, Any]:
     from cmm_uq.jobs.part.drawing import usual_strategy
-    from cmm_uq.jobs.part.feature import DIRECTED, FEWEST, ROUND
+    from cmm_uq.jobs.part.feature import DIRECTED, FEWEST, KEYS, ROUND
 
-    kind = _asked(f"What it is: {', '.join(FEWEST)}", "plane", _one_of(tuple(FEWEST)))
+    kind = _asked(f"What it is: {', '.join(FEWEST)}", KEYS["width_mm"][0], _one_of(tuple(FEWEST)))
     found: dict[str, Any] = {"name": name, "kind": kind}
     found["point_mm"] = _asked("A point of it, its centre or the middle of its axis, x y z in mm", "0 0 0", _three)
     if kind in DIRECTED:
         what = "Its axis" if kind in ROUND else "Along it" if kind == "line" else "Its normal, out of the material"
         found["direction"] = _asked(f"{what}, x y z", "0 0 1", _three)
-    if kind == "line":
+    if kind in KEYS["normal"]:
         found["normal"] = _asked("Normal of its surface, out of the material, x y z", "1 0 0", _three)
     if kind in ROUND:
         found["diameter_mm"] = _asked("Its diameter in mm", "", float)
         found["inner"] = _asked("Whether it is a hole, y or n", "y", _yes)
-    if kind == "cone":
+    if kind in KEYS["angle_deg"]:
         found["angle_deg"] = _asked("Its whole angle in °", "60", float)
-    if kind in ("line", "plane", "cylinder", "cone"):
+    if kind in KEYS["length_mm"]:
         found["length_mm"] = _asked("Its length in mm", "20", float)
-    if kind == "plane":
+    if kind in KEYS["width_mm"]:
         found["width_mm"] = _asked("Its width in mm", "20", float)
     if kind != "point":
         usual = {"pattern": "points", "points": usual_strategy(kind, 24 if kind == "cylinder" else None)["points"]}

@@ -45,7 +45,7 @@ _ASSOCIATIONS: Mapping[Kind, tuple[Association, ...]] = {
     "cone": get_args(Association)[:2],
 }  # fmt: skip
 
-_KEYS: Mapping[str, tuple[Kind, ...]] = {
+KEYS: Mapping[str, tuple[Kind, ...]] = {
     "diameter_mm": (*ROUND, "plane"), "inner_diameter_mm": ("plane",), "angle_deg": ("cone",), "inner": ROUND,
     "length_mm": ("line", "plane", "cylinder", "cone"), "width_mm": ("plane",), "normal": ("line",),
     "along": ("plane", "circle", "sphere", "cylinder", "cone"),
@@ -177,7 +177,7 @@ class FeatureFacts(Table):
 
     @model_validator(mode="after")
     def _keys_of_its_kind(self) -> Self:
-        for key, kinds in _KEYS.items():
+        for key, kinds in KEYS.items():
             if key in self.model_fields_set and self.kind not in kinds:
                 raise ValueError(f"a {self.kind} has no {key}: leave it out")
         if self.kind in DIRECTED and self.direction is None:
