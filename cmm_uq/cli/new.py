@@ -19,6 +19,7 @@ from cmm_uq.cli.printing import put_data, say
 from cmm_uq.errors import CmmUqError
 
 if TYPE_CHECKING:
+    from cmm_uq.commands.new_part_answers import Answers
     from cmm_uq.jobs.importing.keys import ImportKeys
 
 EXAMPLES = examples("new", "new step_gauge my-gauge", "new ballbar --machine 'CMM 3' --set artefact.length_mm=500")
@@ -69,7 +70,8 @@ def command(
 ) -> None:
     """Begin a job: job.toml with every key explained, and a simulated recording to be replaced by your own.
 
-    On a terminal it asks for machine, artefact and limits, unless one of the options gives something.
+    On a terminal it asks for machine, artefact and limits, of a part for the machine's certificate, features, datums and
+    tolerances, unless one of the options gives something.
     """
     defer_scipy()
     from cmm_uq.commands.new import BUDGET, PART, check_empty, known, titles, write_new
@@ -97,12 +99,22 @@ def command(
         from cmm_uq.cli.asking import answers
 
         given = answers(kind)
-    files = write_new(kind, target, given, drawing=export)
+    described = _described() if kind == PART and not (export or given or quiet or json) else None
+    files = write_new(kind, target, given, drawing=export, answers=described)
     if json:
         put_manifest(files)
     elif not quiet:
         say(f"{target}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
         say(f"What to do next: {target / 'README.md'}. What is missing or wrong: cmm-uq check {target}")
+
+
+def _described() -> Answers | None:
+    """What a user at a terminal says of a part; ``None`` where there is none."""
+    if not _asked_on_a_terminal():
+        return None
+    from cmm_uq.cli.asking_part import part_answers
+
+    return part_answers()
 
 
 def _of_export(

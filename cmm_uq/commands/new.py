@@ -28,7 +28,8 @@ from cmm_uq.commands.new_folder import (
     kind_or_refused,
     read_new,
 )
-from cmm_uq.commands.new_part import PART, part_files, part_of_drawing
+from cmm_uq.commands.new_part import PART, part_files, part_of_answers, part_of_drawing
+from cmm_uq.commands.new_part_answers import Answers
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.beginning import MACHINE, Beginning
 from cmm_uq.jobs.derived_job import PROGRAM
@@ -154,7 +155,9 @@ def new_plan(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     return job_files(kind.name, tables, {}, example_keys(tables, given), begin=replace(begin, command=PLAN))
 
 
-def write_new(name: str, folder: Path, given: Tables, *, drawing: Path | None = None) -> dict[str, Path]:
+def write_new(
+    name: str, folder: Path, given: Tables, *, drawing: Path | None = None, answers: Answers | None = None
+) -> dict[str, Path]:
     """Write the folder of a new job, of a part or of a new budget; never over anything.
 
     Parameters
@@ -163,6 +166,7 @@ def write_new(name: str, folder: Path, given: Tables, *, drawing: Path | None = 
     folder : that does not exist, or is empty.
     given : see :func:`new_job`.
     drawing : QIF plan or DMIS program that a part begins from.
+    answers : what the user described of a part.
 
     Returns
     -------
@@ -182,7 +186,7 @@ def write_new(name: str, folder: Path, given: Tables, *, drawing: Path | None = 
             raise CmmUqError("a new budget has no machine, artefact or job", where="--set", fix="Leave it out")
         files, origin = budget_files(), MEASURED
     elif name == PART:
-        files, origin = part_of_drawing(drawing, given, id=id) if drawing else part_files(given, id=id), SIMULATED
+        files, origin = _part(given, drawing, answers, id), SIMULATED
     elif name == PLAN:
         files, origin = new_plan(given, id=id), MEASURED
     else:
@@ -190,6 +194,12 @@ def write_new(name: str, folder: Path, given: Tables, *, drawing: Path | None = 
     with staged(folder, Owner("new", id, origin), expected=files) as place:
         check_empty(folder, but=".unfinished-")
         return place.write(files)
+
+
+def _part(given: Tables, drawing: Path | None, answers: Answers | None, id: str) -> dict[str, bytes]:  # noqa: A002
+    if answers is not None:
+        return part_of_answers(answers, id=id)
+    return part_of_drawing(drawing, given, id=id) if drawing else part_files(given, id=id)
 
 
 def job_id(folder: Path, given: Tables, otherwise: str = "job") -> str:

@@ -8,8 +8,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
+from cmm_uq.commands.new_part_answers import Answers
 from cmm_uq.commands.schemas import shipped
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
@@ -19,13 +18,13 @@ from cmm_uq.jobs.importing.format import HEAD
 from cmm_uq.jobs.importing.xml_files import begins_with
 from cmm_uq.jobs.origin import EXAMPLE, SIMULATED
 from cmm_uq.jobs.part.beginning import TABLES
+from cmm_uq.jobs.part.common import members
 from cmm_uq.jobs.part.drawing import KEY, Drawing, Unknown
+from cmm_uq.jobs.part.drawing_checked import probed_of, set_aside_unsound
 from cmm_uq.jobs.part.drawing_dmis import drawing_of_dmis
 from cmm_uq.jobs.part.drawing_qif import drawing_of_qif
-from cmm_uq.jobs.part.feature import FeatureFacts
 from cmm_uq.jobs.part.freedoms import freedoms
 from cmm_uq.jobs.part.job import part_of
-from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.toml_file import as_toml
 from cmm_uq.jobs.toml_text import commented, written
 
@@ -57,6 +56,34 @@ def part_files(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     return _files(tables, marked - _given_keys(given), {})
 
 
+def part_of_answers(answers: Answers, *, id: str) -> dict[str, bytes]:  # noqa: A002
+    """Contents of every file of a new job of a part as its user described it; what was not said is that of the example.
+
+    Raises
+    ------
+    CmmUqError : the readers of a job refuse what was said.
+    """
+    tables = {name: _copied(table) for name, table in TABLES.items()}
+    own: dict[str, Any] = {PART: answers.part, "machine_state": {"certificate": answers.certificate}}
+    tables["stylus"] = [{**tables["stylus"][0], **answers.stylus}]
+    if answers.features:
+        own["alignment"] = answers.alignment
+        tables |= {"feature": answers.features, "alignment": {}}
+    if answers.characteristics:
+        tables["characteristic"] = answers.characteristics
+    elif answers.features:  # something has to be asked of them: where the first one is
+        tables["characteristic"] = [{"name": "1", **_of_the_first(answers)}]
+    said = ("feature",) if answers.features else ()
+    marked = {f"{name}.{key}" for name, table in TABLES.items() if name not in said for key in _keys(table)}
+    marked -= _given_keys(own) | {f"stylus.{key}" for key in answers.stylus}
+    marked -= {f"characteristic.{key}" for key in _keys(TABLES["characteristic"])} if answers.characteristics else set()
+    return {**_files(_with(tables, own, id), marked, {}), **answers.machine}
+
+
+def _of_the_first(answers: Answers) -> dict[str, Any]:
+    return {"what": "position", "features": [answers.features[0]["name"]], "tolerance_mm": 0.1}
+
+
 def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     """Contents of every file of a new job of a part whose plan another program wrote.
 
@@ -82,12 +109,13 @@ def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]: 
     without = given.get(PART, {}).get("not_measured", [])
     if not (isinstance(without, list) and all(isinstance(name, str) for name in without)):
         raise CmmUqError("must be a list of names", where=KEY, fix='Write it as \'["NAME", "NAME"]\'')
+    set_aside_unsound(drawing, where)
     left_out = drawing.settled(without, where)
     example = {name: _copied(TABLES[name]) for name in ("machine_state", "stylus", "environment", "form")}
     whole: dict[str, Any] = example | {
         PART: {"name": path.stem[:100], **({"not_measured": left_out} if left_out else {})},
         "feature": drawing.features, "characteristic": drawing.characteristics, **_aligned(drawing),
-        **({"stylus": drawing.styli} if drawing.styli else {}),
+        "stylus": drawing.styli or _that_fits(example["stylus"], drawing),
     }  # fmt: skip
     said = {name: dict(keys) for name, keys in given.items()}
     said.get(PART, {}).pop("not_measured", None)
@@ -98,25 +126,20 @@ def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]: 
     return _files(_with(whole, said, id), marked - _given_keys(said), opened, drawing.unknown)
 
 
+def _that_fits(styli: list[dict[str, Any]], drawing: Drawing) -> list[dict[str, Any]]:
+    """The example's stylus, with a tip of half of the smallest hole where its own does not go in."""
+    holes = [one["diameter_mm"] for one in drawing.features if one.get("inner") and one.get("diameter_mm")]
+    return [{**one, "diameter_mm": round(min([one["diameter_mm"], *(hole / 2 for hole in holes)]), 3)} for one in styli]
+
+
 def _aligned(drawing: Drawing) -> dict[str, Any]:
     """The first datums of the drawing that fix the part; else a best fit, which nobody has asked for."""
-    features = {one["name"]: _probed(one) for one in drawing.features}
+    features = {one["name"]: probed_of(one) for one in drawing.features}
     asked = [drawing.datums, *(one.get("datums", []) for one in drawing.characteristics)]
     for datums in asked:
-        if datums and not freedoms([features[name] for name in datums]):
+        if datums and not freedoms([tuple(features[each] for each in members(name, features)) for name in datums]):
             return {"alignment": {"datums": datums}}
     return {"alignment": {"best_fit": True}}
-
-
-def _probed(given: Mapping[str, Any]) -> Probed:
-    where = f"feature {given['name']!r}"
-    try:
-        facts = FeatureFacts.model_validate(dict(given))
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise CmmUqError(f"{'.'.join(map(str, first['loc']))}: {first['msg'].removeprefix('Value error, ')}", where=where,
-                         fix=f"Leave it out knowingly: --set part.not_measured='[\"{given['name']}\"]'") from None  # fmt: skip
-    return probed(facts, where)
 
 
 def _with(tables: dict[str, Any], given: Tables, id: str) -> dict[str, Any]:  # noqa: A002

@@ -8,6 +8,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.common import as_one, members
 from cmm_uq.jobs.part.form import FormFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.placing import readings, rotation
@@ -20,7 +21,7 @@ from cmm_uq.parts.of_form import Form
 from cmm_uq.parts.of_operator import of_points, reproducibility
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, around
-from cmm_uq.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan, Stylus
+from cmm_uq.parts.plan import Alignment, Characteristic, CommonDatum, Feature, Nominal, Plan, Stylus
 from cmm_uq.parts.virtual import Circumstances
 from cmm_uq.points import Floats, Machine
 from cmm_uq.units import MICROMETRE
@@ -48,7 +49,21 @@ def plan_of(job: PartJob) -> Plan:
         Alignment(tuple(facts.alignment.datums), facts.alignment.best_fit),
         rows.astype(np.int64),
         times,
+        _common(job),
     )  # fmt: skip
+
+
+def _common(job: PartJob) -> tuple[CommonDatum, ...]:
+    """Datums on several features, which alignment and characteristics name."""
+    features = {one.facts.name: one for one in job.features}
+    named = [*job.facts.alignment.datums, *(name for one in job.facts.characteristic for name in one.datums)]
+    found = []
+    for name in dict.fromkeys(named):
+        own = members(name, features)
+        if len(own) > 1:
+            kind, point, direction = as_one([features[each] for each in own])
+            found.append(CommonDatum(name, own, kind, Nominal(point, direction)))
+    return tuple(found)
 
 
 def refuse_unfit(job: PartJob) -> None:

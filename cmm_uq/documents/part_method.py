@@ -133,8 +133,8 @@ def not_covered(found: PartFound) -> tuple[Text, ...]:
     told.append(
         say(
             "The noise of a reading is that of the calibration's points; a point that is probed in another way scatters "
-            "otherwise. Scanning and its filters, parts that bend when they are held or probed, datums on more than one "
-            "feature, material conditions and profiles of surfaces are not modelled."
+            "otherwise. Scanning and its filters, parts that bend when they are held or probed, material conditions and "
+            "profiles of surfaces are not modelled."
         )
     )
     told.append(

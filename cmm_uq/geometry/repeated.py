@@ -31,8 +31,22 @@ MOST_STEPS = 60
 BLOCK = 12_000
 """Points worked on together: a dozen arrays of them stay in the cache of a core."""
 
+TOGETHER = 9_000_000
+"""Coordinates of unit displacements held at once, 72 MB: all of a feature of a thousand points."""
+
 CONDITION = 1e7
 """Condition of nominal points from which they do not determine the feature with errors of micrometres."""
+
+
+def one_by_one(n: int, d: int) -> Iterator[Floats]:
+    """Unit displacements (b, n, d) of one coordinate of one point at a time, all n·d of them in blocks of bounded memory."""
+    count = n * d
+    size = max(1, TOGETHER // count)
+    for start in range(0, count, size):
+        rows = np.arange(start, min(start + size, count))
+        steps = np.zeros((len(rows), count))
+        steps[np.arange(len(rows)), rows] = 1.0
+        yield steps.reshape(len(rows), n, d)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,10 +206,12 @@ class Repeated:
 
     def _first_order(self) -> Floats:
         """(n·d, k) by which the state follows each coordinate, by a step of a millionth of the extent: where to begin."""
-        n, d = self.points.shape
         small = 1e-6 * self.placed.extent
-        local = self._local(small * np.eye(n * d).reshape(n * d, n, d), 0)
-        return np.asarray(-self._step(np.tile(self.placed.state, (n * d, 1)), local)[0] / small)
+        followed = []
+        for steps in one_by_one(*self.points.shape):
+            local = self._local(small * steps, 0)
+            followed.append(-self._step(np.tile(self.placed.state, (len(steps), 1)), local)[0] / small)
+        return np.concatenate(followed)
 
     def _descended(self, local: Floats, errors: Floats, first: int) -> tuple[Floats, Floats]:
         """States (B, k) of the least-squares features, and distances (B, n)."""

@@ -6,6 +6,7 @@ is from the association itself is looked at in every run (:mod:`cmm_uq.parts.vir
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
-from cmm_uq.geometry.repeated import Drawn, Repeated
+from cmm_uq.geometry.repeated import Drawn, Repeated, one_by_one
 from cmm_uq.parts.plan import DIRECTED, Feature
 from cmm_uq.points import Floats
 
@@ -36,11 +37,13 @@ class Features:
     values : (N, 8) position, direction, diameter, half angle; zero where there is none.
     form : (N,) form deviation, mm; (0,) where it was not asked for.
     points : (N, n, 3) measured; (0, 0, 3) where they were not asked for.
+    members : of a common datum, each as what it fixes.
     """
 
     values: Floats
     form: Floats = field(default_factory=lambda: np.zeros(0))
     points: Floats = field(default_factory=lambda: np.zeros((0, 0, 3)))
+    members: tuple[Features, ...] = ()
 
     @property
     def position(self) -> Floats:
@@ -176,9 +179,20 @@ class ProbedFeature:
     @cached_property
     def derivative(self) -> Floats:
         """(8, n, 3) of the values by the coordinates of each point."""
-        steps = _STEP * np.eye(3 * self.n).reshape(-1, self.n, 3)
-        change: Floats = (self.of(steps).values - self.of(-steps).values) / (2 * _STEP)
-        return np.asarray(change.T, dtype=np.float64).reshape(VALUES, self.n, 3)
+        return self.by_differences(lambda displacements: self.of(displacements).values)
+
+    def by_differences(self, values: Callable[[Floats], Floats]) -> Floats:
+        """(8, n, 3) derivative of values (N, 8) of displacements (N, n, 3) by the coordinates of each point."""
+        found = []
+        for unit in one_by_one(self.n, 3):
+            steps = _STEP * unit
+            found.append((values(steps) - values(-steps)) / (2 * _STEP))
+        return np.concatenate(found).T.reshape(VALUES, self.n, 3)
+
+    @property
+    def undisturbed(self) -> Features:
+        """The feature without any draw."""
+        return Features(self.base[None])
 
     def to_first_order(self, change: Floats) -> Features:
         """Features of first-order changes (N, 8) of the values."""

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.associating import Features
-from cmm_uq.parts.plan import Feature, FeatureKind
+from cmm_uq.parts.plan import Feature, FeatureKind, as_datum
 from cmm_uq.points import Floats
 
 _ACROSS = 0.1
@@ -118,17 +118,19 @@ class DatumSystem:
 
     Parameters
     ----------
-    features : of the datums, in order.
-    nominal : (8,) values of each without any error, which say how the frame is made.
+    features : of the datums, in order; a common datum stands for its members, which it moves as one.
+    nominal : each without any error, which says how the frame is made.
 
     Raises
     ------
     CmmUqError : they do not fix the frame.
     """
 
-    def __init__(self, features: Sequence[Feature], nominal: Sequence[Floats]) -> None:
-        self.features = tuple(features)
-        self.nominal = [Features(values[None]) for values in nominal]
+    def __init__(self, features: Sequence[Feature], nominal: Sequence[Features]) -> None:
+        self.features = tuple(
+            each for one in features for each in (map(as_datum, one.members) if one.members else (one,))
+        )
+        self.nominal = _members(nominal)
         self._first: int | None = None
         self._second: tuple[int, int | None] = 0, None
         self._choose()
@@ -139,8 +141,9 @@ class DatumSystem:
 
     def frames(self, measured: Sequence[Features]) -> Frame:
         """The frames of measured datums, in the order of the datums."""
-        turn = self._rotations(measured)
-        return Frame(np.swapaxes(turn, 1, 2) @ self._turn, self._origins(measured, turn), self._to)
+        each = _members(measured)
+        turn = self._rotations(each)
+        return Frame(np.swapaxes(turn, 1, 2) @ self._turn, self._origins(each, turn), self._to)
 
     def _choose(self) -> None:
         """The datum that fixes two rotations, and what fixes the third: a direction, or where one lies from one before."""
@@ -225,6 +228,11 @@ class DatumSystem:
                 return np.asarray(origin + step[:, None] * directions)
             return np.asarray(origin + np.linalg.solve(A, b[:, :, None])[:, :, 0] @ directions)
         return np.asarray(origin + (gap @ directions.T) @ directions)
+
+
+def _members(given: Sequence[Features]) -> list[Features]:
+    """Features, of common datums their members'."""
+    return [each for one in given for each in one.members or (one,)]
 
 
 def _fixed(kind: FeatureKind, direction: Floats) -> Floats:

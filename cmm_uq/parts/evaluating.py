@@ -17,8 +17,9 @@ from cmm_uq.geometry.association import Association
 from cmm_uq.parts.associating import VALUES, Features, ProbedFeature
 from cmm_uq.parts.causes import Cause, Drawn, Rows
 from cmm_uq.parts.characteristics import Evaluation, Key, Measured
+from cmm_uq.parts.common_datums import ProbedCommon
 from cmm_uq.parts.datums import BEST_FIT, BestFit, DatumSystem
-from cmm_uq.parts.plan import Plan
+from cmm_uq.parts.plan import Feature, Plan
 from cmm_uq.points import Floats
 
 Known = dict[tuple[str, Association, bytes], ProbedFeature]
@@ -93,7 +94,7 @@ class Evaluator:
         self.frames = {
             one.frame_of: DatumSystem(
                 [plan.feature(name) for name in one.frame_of],
-                [self.nominal[name].values[0] for name in one.frame_of],
+                [self.nominal[name] for name in one.frame_of],
             )
             for one in self.evaluations
             if one.frame_of and one.frame_of != BEST_FIT
@@ -102,19 +103,19 @@ class Evaluator:
         self.best_fit = BestFit(plan.points, plan.normals) if fitted else None
 
     def _nominal(self, name: str) -> Features:
-        return Features(self._probed(name, EXACT, self.plan.feature(name).points).base[None])
+        return self._probed(name, EXACT, self.plan.feature(name).points).undisturbed
 
     def _associated(self, name: str, how: Association) -> ProbedFeature:
-        return self._probed(name, how, self.plan.feature(name).points + self.base[self.plan.rows[name]])
+        return self._probed(name, how, self.plan.feature(name).points + self.base[self.plan.rows_of(name)])
 
     def _probed(self, name: str, how: Association, points: Floats) -> ProbedFeature:
         feature = self.plan.feature(name)
         first = name, EXACT, feature.points.tobytes()
         if first not in self._known:
-            self._known[first] = ProbedFeature(feature, feature.points, EXACT)
+            self._known[first] = _of(feature, feature.points, EXACT)
         key = name, how, points.tobytes()
         if key not in self._known:
-            self._known[key] = ProbedFeature(feature, points, how, self._known[first])
+            self._known[key] = _of(feature, points, how, self._known[first])
         return self._known[key]
 
     def to_first_order(self, key: Key) -> bool:
@@ -135,7 +136,7 @@ class Evaluator:
         count = len(self.plan.points)
         whole = np.zeros((VALUES * len(self.linear), count, 3))
         for i, key in enumerate(self.linear):
-            whole[VALUES * i : VALUES * (i + 1), self.plan.rows[key[0]]] = self.associated[key].derivative
+            whole[VALUES * i : VALUES * (i + 1), self.plan.rows_of(key[0])] = self.associated[key].derivative
         if self.best_fit is not None:
             whole = np.concatenate([whole, self.best_fit.derivative])
         return [None if cause is None else cause.through(whole) for cause in self.causes]
@@ -177,9 +178,15 @@ class Evaluator:
         on_points = dict.fromkeys(name for name, how in self.keys if exact or not self.to_first_order((name, how)))
         return Displaced(
             np.zeros((_count(coefficients), 0)) if exact else self._changes(coefficients),
-            {name: self.moved(coefficients, self.plan.rows[name]) for name in on_points},
+            {name: self._moved_of(coefficients, name) for name in on_points},
             self.moved(coefficients, slice(None)) if exact and self.best_fit is not None else None,
         )
+
+    def _moved_of(self, coefficients: Coefficients, name: str) -> Floats:
+        """(N, m, 3) displacements of the points of a feature or common datum."""
+        rows = [self.plan.rows[member] for member in self.plan.members(name)]
+        moved = [self.moved(coefficients, each) for each in rows]
+        return moved[0] if len(moved) == 1 else np.concatenate(moved, axis=1)
 
     def _changes(self, coefficients: Coefficients) -> Floats:
         """(N, …) changes of what is taken to first order."""
@@ -208,6 +215,10 @@ class Evaluator:
             followed = follow(drawn.table)
             self._followed[key] = drawn.table, followed
         return np.asarray(followed[drawn.rows])
+
+
+def _of(feature: Feature, points: Floats, how: Association, looked_at: ProbedFeature | None = None) -> ProbedFeature:
+    return ProbedCommon(feature, points) if feature.members else ProbedFeature(feature, points, how, looked_at)
 
 
 def characteristics_of(plan: Plan, points: Floats, known: Known | None = None) -> Floats:

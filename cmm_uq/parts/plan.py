@@ -7,7 +7,7 @@ material, so that they point to the axis of a hole and away from that of a shaft
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -104,6 +104,7 @@ class Feature:
     surface : (m, 3) points so close on the whole surface that they stand for it, for what a part's form does between
         the points that are probed; none where this is not asked for.
     surface_normals : (m, 3) of these.
+    members : of a common datum, whose points are theirs.
 
     Raises
     ------
@@ -119,6 +120,7 @@ class Feature:
     association: Association = "least_squares"
     surface: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     surface_normals: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    members: tuple[Feature, ...] = ()
 
     def __post_init__(self) -> None:
         where = f"feature {self.name!r}"
@@ -149,6 +151,36 @@ class Feature:
         if self.nominal.direction is not None:
             out = out - np.outer(out @ self.nominal.direction, self.nominal.direction)
         return bool(np.einsum("ni,ni->", out, self.normals) < 0)
+
+
+def as_datum(one: Feature) -> Feature:
+    """A member of a common datum as what it fixes: a circle its axis, a sphere its centre, a point the plane there."""
+    if one.kind == "point":
+        return replace(one, kind="plane", points=np.repeat(one.points, FEWEST["plane"], axis=0),
+                       normals=np.repeat(one.normals, FEWEST["plane"], axis=0),
+                       nominal=replace(one.nominal, direction=one.normals[0]))  # fmt: skip
+    if one.kind == "sphere":
+        return replace(one, kind="point", nominal=replace(one.nominal, direction=None))
+    return replace(one, kind="line") if one.kind == "circle" else one
+
+
+@dataclass(frozen=True, eq=False)
+class CommonDatum:
+    """A datum on several features, which are associated at once (ISO 5459): ``A-B`` of a drawing.
+
+    Parameters
+    ----------
+    name : as characteristics and alignment name it.
+    features : names of its members; points, planes, circles, spheres, cylinders or cones.
+    kind : what the whole is as a datum: ``line`` where all members lie on one axis, ``plane`` where all are parallel faces;
+        else ``point``, which aligns a part and is the datum of nothing else.
+    nominal : a point of it, and its direction, which a ``point`` has not.
+    """
+
+    name: str
+    features: tuple[str, ...]
+    kind: FeatureKind
+    nominal: Nominal
 
 
 @dataclass(frozen=True)
@@ -201,6 +233,7 @@ class Plan:
     alignment : for characteristics without datums of their own.
     order : (n,) rows of the points of all features, in the order in which they are probed; as they stand by default.
     times_s : (n,) time of each point, in the rows' order, s since the start; none where no time is known.
+    common : datums on several features.
 
     Raises
     ------
@@ -213,22 +246,27 @@ class Plan:
     alignment: Alignment = field(default_factory=Alignment)
     order: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     times_s: Floats = field(default_factory=lambda: np.zeros(0))
+    common: tuple[CommonDatum, ...] = ()
 
     def __post_init__(self) -> None:
-        for what, named in (
-            ("feature", self.features),
-            ("stylus", self.styli),
-            ("characteristic", self.characteristics),
+        for what, names in (
+            ("feature", [*(one.name for one in self.features), *(one.name for one in self.common)]),
+            ("stylus", [one.name for one in self.styli]),
+            ("characteristic", [one.name for one in self.characteristics]),
         ):
-            _refuse_twice(what, [one.name for one in named])
+            _refuse_twice(what, names)
         known = [feature.name for feature in self.features]
         for feature in self.features:
             _refuse_unknown([feature.stylus], [s.name for s in self.styli], f"feature {feature.name!r}", "stylus")
-        _refuse_unknown(self.alignment.datums, known, "alignment", "feature")
+        for datum in self.common:
+            _refuse_common(datum, [self.feature(name) for name in datum.features])
+        may_be_datums = [*known, *(datum.name for datum in self.common)]
+        _refuse_unknown(self.alignment.datums, may_be_datums, "alignment", "feature")
         for one in self.characteristics:
             where = f"characteristic {one.name!r}"
             _refuse_unknown([one.what], WHATS, where, "kind of characteristic")
-            _refuse_unknown((*one.features, *one.datums), known, where, "feature")
+            _refuse_unknown(one.features, known, where, "feature")
+            _refuse_unknown(one.datums, may_be_datums, where, "feature")
         n = len(self.points)
         if len(self.order) and not np.array_equal(np.sort(self.order), np.arange(n)):
             raise CmmUqError(f"the order does not name each of {n} points once", where="plan")
@@ -262,13 +300,27 @@ class Plan:
         """(n, 3) offset of the tip that probes each point, mm."""
         return np.array([stylus.offset_mm for stylus in self.styli])[self.stylus_of]
 
+    def rows_of(self, name: str) -> Ints:
+        """(n,) rows of the points of a feature or of a common datum, among those of all."""
+        rows = [self.rows[member] for member in self.members(name)]
+        return np.concatenate([np.arange(each.start, each.stop) for each in rows])
+
+    def members(self, name: str) -> tuple[str, ...]:
+        """Names of the members of a common datum; of a feature its own."""
+        return next((datum.features for datum in self.common if datum.name == name), (name,))
+
     def feature(self, name: str) -> Feature:
-        """A feature by its name.
+        """A feature by its name, or a common datum as one.
 
         Raises
         ------
         CmmUqError : there is none.
         """
+        for datum in self.common:
+            if datum.name == name:
+                parts = tuple(self.feature(each) for each in datum.features)
+                points, normals = np.vstack([one.points for one in parts]), np.vstack([one.normals for one in parts])
+                return Feature(name, datum.kind, points, normals, parts[0].stylus, datum.nominal, members=parts)
         _refuse_unknown([name], list(self.rows), "plan", "feature")
         return next(feature for feature in self.features if feature.name == name)
 
@@ -281,6 +333,18 @@ def _refuse_ill_shaped(points: Floats, normals: Floats, where: str) -> None:
         raise CmmUqError("a point has a coordinate that is no finite number", where=where, fix="Correct or remove it")
     if not np.all(np.abs(np.linalg.norm(normals, axis=1) - 1) < _UNIT):
         raise CmmUqError("a normal is no unit vector", where=where, fix="Divide each by its length")
+
+
+def _refuse_common(datum: CommonDatum, members: Sequence[Feature]) -> None:
+    where = f"common datum {datum.name!r}"
+    for one in members:
+        if one.kind == "line":
+            raise CmmUqError(f"{one.name!r} is a line, which stands in no common datum", where=where,
+                             fix="Probe a plane, or name lines as datums of their own")  # fmt: skip
+        if one.association != "least_squares":
+            said = one.association.replace("_", " ")
+            raise CmmUqError(f"is associated by least squares, and {one.name!r} by {said}", where=where,
+                             fix=f"Leave the association of {one.name!r} out, and give it to its characteristics")  # fmt: skip
 
 
 def _refuse_twice(what: str, names: Sequence[str]) -> None:

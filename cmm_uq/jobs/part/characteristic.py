@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from cmm_uq.jobs.part.feature import Association, Kind
+from cmm_uq.jobs.part.not_modelled import refuse_not_modelled
 from cmm_uq.jobs.table import Length, Position, Table, Uncertainty
 
 What = Literal[
@@ -39,6 +40,7 @@ class Asks:
     datums : how many of them at least.
     limits : how the drawing limits it: by a ``zone``, by ``lengths`` or by ``angles``.
     framed : whether it needs the alignment where it has no datums of its own.
+    alone : kinds of features of which it may be with one of them only.
     """
 
     kinds: tuple[Kind, ...]
@@ -47,13 +49,14 @@ class Asks:
     datums: int = 0
     limits: Literal["zone", "lengths", "angles"] = "zone"
     framed: bool = False
+    alone: tuple[Kind, ...] = ()
 
 
 ASKS: Mapping[What, Asks] = {
     "size": Asks(("circle", "sphere", "cylinder"), limits="lengths"),
     "straightness": Asks(("line",)), "flatness": Asks(("plane",)), "roundness": Asks(("circle",)),
     "cylindricity": Asks(("cylinder",)), "sphericity": Asks(("sphere",)),
-    "distance": Asks(EVERY, 2, limits="lengths"), "angle": Asks(TURNED, 2, limits="angles"),
+    "distance": Asks(EVERY, 2, limits="lengths"), "angle": Asks(TURNED, 2, limits="angles", alone=("cone",)),
     "parallelism": Asks(TURNED, 1, DIRECTED, 1), "perpendicularity": Asks(TURNED, 1, DIRECTED, 1),
     "angularity": Asks(TURNED, 1, DIRECTED, 1),
     "position": Asks(EVERY, 1, EVERY, framed=True), "coaxiality": Asks(("circle", *AXIAL), 1, AXIAL, 1),
@@ -62,6 +65,18 @@ ASKS: Mapping[What, Asks] = {
     "total_runout": Asks(("plane", "cylinder"), 1, AXIAL, 1),
 }  # fmt: skip
 """Of each kind of characteristic (ISO 1101, ISO 5459, ISO 14405-1)."""
+
+_ARTICLES = {
+    "angle": "an angle",
+    "angularity": "an angularity",
+    **{axis: f"a coordinate {axis}" for axis in ("x", "y", "z")},
+}
+
+
+def with_article(what: str) -> str:
+    """A characteristic in a sentence: ``an angle``."""
+    return _ARTICLES.get(what, f"a {what}")
+
 
 LIMITS: Mapping[str, tuple[str, ...]] = {
     "zone": ("tolerance_mm",), "lengths": ("lower_mm", "upper_mm"), "angles": ("lower_deg", "upper_deg"),
@@ -79,9 +94,10 @@ class CharacteristicFacts(Table):
     what: What
     """What is asked for."""
     features: Annotated[list[Feature], Field(max_length=2)] = []
-    """Names of the features that it is of: two of a distance and an angle, one of all else."""
+    """Names of the features that it is of: two of a distance and an angle, one of all else and of the angle of a cone."""
     datums: Annotated[list[Feature], Field(max_length=6)] = []
-    """Names of the features that are its datums, in order; where it needs some and has none, those of `[alignment]`."""
+    """Names of the features that are its datums, in order, `"A-B"` of a common datum on both; where it needs some and has
+    none, those of `[alignment]`."""
     tolerance_mm: Length | None = None
     """Width of the tolerance zone, of form, orientation, location and runout; of a position its diameter."""
     lower_mm: Position | None = None
@@ -104,16 +120,23 @@ class CharacteristicFacts(Table):
         """What it is of."""
         return ASKS[self.what]
 
+    @model_validator(mode="before")
+    @classmethod
+    def _modelled(cls, table: Any) -> Any:
+        return refuse_not_modelled(table)
+
     @model_validator(mode="after")
     def _of_features(self) -> Self:
         count = self.asks.features
         if not self.features:
             example = ", ".join(['"…"'] * count)
             raise ValueError(f"names no feature: give features = [{example}], whose {self.what} it is")
-        if len(self.features) != count:
-            raise ValueError(f"a {self.what} is of {count} {'features' if count > 1 else 'feature'}: give so many")
-        if len(set(self.features)) < count:
-            raise ValueError(f"a {self.what} is of two features: {self.features[0]!r} stands there twice")
+        if len(self.features) != count and not (self.asks.alone and len(self.features) == 1):
+            raise ValueError(
+                f"{with_article(self.what)} is of {count} {'features' if count > 1 else 'feature'}: give so many"
+            )
+        if len(set(self.features)) < len(self.features):
+            raise ValueError(f"{with_article(self.what)} is of two features: {self.features[0]!r} stands there twice")
         if self.datums and not self.asks.datum_kinds:
             raise ValueError(f"{self.what} has no datums: leave them out")
         if len(self.datums) < self.asks.datums:
@@ -128,10 +151,10 @@ class CharacteristicFacts(Table):
         own = LIMITS[self.asks.limits]
         for key in (key for keys in LIMITS.values() for key in keys):
             if getattr(self, key) is not None and key not in own:
-                raise ValueError(f"a {self.what} has no {key}: its limits are {' and '.join(own)}")
+                raise ValueError(f"{with_article(self.what)} has no {key}: its limits are {' and '.join(own)}")
         other = "u_operator_um" if self.asks.limits == "angles" else "u_operator_deg"
         if getattr(self, other):
-            raise ValueError(f"a {self.what} has no {other}: give the other one")
+            raise ValueError(f"{with_article(self.what)} has no {other}: give the other one")
         for low, high in ((self.lower_mm, self.upper_mm), (self.lower_deg, self.upper_deg)):
             if low is not None and high is not None and not low < high:
                 raise ValueError(

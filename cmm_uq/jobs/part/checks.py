@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts, with_article
+from cmm_uq.jobs.part.common import as_one, members
 from cmm_uq.jobs.part.file import PartFile
 from cmm_uq.jobs.part.freedoms import freedoms
 from cmm_uq.jobs.part.located import Places
@@ -41,10 +42,10 @@ def check_names(facts: PartFile, places: Places, wrong: Gathered) -> None:
             where = places.of("feature", "stylus", i)
             wrong.add(CmmUqError(said, where=where, fix=f"Give stylus = {styli[0]!r} or another"))
         _known([feature.stylus] if feature.stylus else [], styli, "stylus", places.of("feature", "stylus", i), wrong)
-    _known(facts.alignment.datums, features, "feature", places.of("alignment", "datums"), wrong)
+    _datums(facts.alignment.datums, features, places.of("alignment", "datums"), wrong)
     for i, one in enumerate(facts.characteristic):
-        for key in ("features", "datums"):
-            _known(getattr(one, key), features, "feature", places.of("characteristic", key, i), wrong)
+        _known(one.features, features, "feature", places.of("characteristic", "features", i), wrong)
+        _datums(one.datums, features, places.of("characteristic", "datums", i), wrong)
     order = facts.probing.order
     _known(order, features, "feature", places.of("probing", "order"), wrong)
     left = [name for name in features if name not in order]
@@ -57,6 +58,21 @@ def _known(names: Sequence[str], known: Sequence[str], what: str, where: str, wr
     for name in names:
         if name not in known:
             wrong.add(CmmUqError(f"there is no {what} {name!r}", where=where, fix=suggestion(name, known)))
+
+
+def _datums(names: Sequence[str], known: Sequence[str], where: str, wrong: Gathered) -> None:
+    """Datums are features, or common datums of features, each of which stands in one of them."""
+    taken: list[str] = []
+    for name in names:
+        try:
+            own = members(name, known)
+        except CmmUqError as error:
+            wrong.add(CmmUqError(error.problem, where=where, fix=error.fix))
+            continue
+        twice = next((each for each in own if each in taken), None)
+        if twice is not None:
+            wrong.add(CmmUqError(f"{twice!r} stands in two of these datums", where=where, fix="Name it in one of them"))
+        taken += own
 
 
 def check_plan(facts: PartFile, features: Mapping[str, Probed], places: Places, wrong: Gathered) -> None:
@@ -83,7 +99,7 @@ def _tips(facts: PartFile, features: Mapping[str, Probed], places: Places) -> It
 def _alignment(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
     given = facts.alignment
     if given.datums:
-        if free := freedoms([features[name] for name in given.datums]):
+        if free := freedoms([_named(name, features) for name in given.datums]):
             yield _unfixed(free, places.of("alignment", "datums"))
     elif not given.best_fit:
         asking = [(i, one) for i, one in enumerate(facts.characteristic) if one.asks.framed and not one.datums]
@@ -99,41 +115,67 @@ def _unfixed(free: Sequence[str], where: str) -> CmmUqError:
                       fix="Add a feature that fixes it, as a plane, a line across it and a point: 3-2-1")  # fmt: skip
 
 
+def _named(datum: str, features: Mapping[str, Probed]) -> tuple[Probed, ...]:
+    return tuple(features[name] for name in members(datum, features))
+
+
 _Check = Callable[[CharacteristicFacts, Mapping[str, Probed]], tuple[str, str, str] | None]
 
 
 def _characteristics(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
-    checks: tuple[_Check, ...] = (_of_its_kinds, _nominal_orientation, _limits_of_the_value, _frame_of_a_coordinate)
     for i, one in enumerate(facts.characteristic):
-        found = next((found for check in checks if (found := check(one, features))), None)
-        if found:
+        if found := unfit(one, features):
             problem, key, fix = found
             yield CmmUqError(problem, where=places.of("characteristic", key, i), fix=fix)
 
 
+def unfit(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+    """What keeps a characteristic from being evaluated: the problem, the key, and what mends it.
+
+    Parameters
+    ----------
+    features : by name; all of its own are there.
+    """
+    checks: tuple[_Check, ...] = (_of_its_kinds, _nominal_orientation, _limits_of_the_value, _frame_of_a_coordinate)
+    return next((found for check in checks if (found := check(one, features))), None)
+
+
 def _of_its_kinds(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
     """That it is of features, and about datums, that can have it."""
+    alone = len(one.features) < one.asks.features
+    said_of, own = ("of one feature is of", one.asks.alone) if alone else ("is of", one.asks.kinds)
     for names, kinds, key, of in (
-        (one.features, one.asks.kinds, "features", "is of"), (one.datums, one.asks.datum_kinds, "datums", "is about"),
+        (one.features, own, "features", said_of), (one.datums, one.asks.datum_kinds, "datums", "is about"),
     ):  # fmt: skip
         for name in names:
-            kind = features[name].facts.kind
+            parts = _named(name, features)
+            kind = parts[0].facts.kind if len(parts) == 1 else as_one(parts)[0]
             if kind not in kinds:
-                return (f"a {one.what} {of} a {' or '.join(kinds)}, and {name!r} is a {kind}", key,
+                said = f"a {kind}" if len(parts) == 1 else _AS_ONE[kind]
+                return (f"{with_article(one.what)} {of} a {' or '.join(kinds)}, and {name!r} is {said}", key,
                         "Name another feature, or another characteristic")  # fmt: skip
     return None
+
+
+_AS_ONE = {
+    "line": "an axis",
+    "plane": "a plane",
+    "point": "neither one axis nor one plane by the nominals of its features",
+}
+"""What a common datum is."""
 
 
 def _nominal_orientation(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
     """That what is to be parallel or perpendicular to its datum is so by its nominal."""
     if one.what not in ("parallelism", "perpendicularity"):
         return None
-    feature, datum = features[one.features[0]], features[one.datums[0]]
-    if feature.direction is None or datum.direction is None:
+    feature, own = features[one.features[0]], _named(one.datums[0], features)
+    kind, _, direction = (own[0].facts.kind, None, own[0].direction) if len(own) == 1 else as_one(own)
+    if feature.direction is None or direction is None:
         return None
-    one_normal = (feature.facts.kind in _NORMAL) != (datum.facts.kind in _NORMAL)
-    cosine = abs(float(feature.direction @ datum.direction))
-    sine = float(np.linalg.norm(np.cross(feature.direction, datum.direction)))
+    one_normal = (feature.facts.kind in _NORMAL) != (kind in _NORMAL)
+    cosine = abs(float(feature.direction @ direction))
+    sine = float(np.linalg.norm(np.cross(feature.direction, direction)))
     along = (one.what == "parallelism") != one_normal
     if (sine if along else cosine) <= _NEARLY:
         return None
@@ -165,7 +207,7 @@ def _frame_of_a_coordinate(one: CharacteristicFacts, features: Mapping[str, Prob
     """That a coordinate with datums of its own has a whole frame."""
     if one.what not in AXES or not one.datums:
         return None
-    free = freedoms([features[name] for name in one.datums])
+    free = freedoms([_named(name, features) for name in one.datums])
     told = _unfixed(free, "")
     return (told.problem, "datums", told.fix or "") if free else None
 

@@ -5,14 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cmm_uq.jobs.part.characteristic import ASKS, What
+from cmm_uq.jobs.part.common import BETWEEN
 from cmm_uq.jobs.part.dmis_frames import numbers_of, reference
 from cmm_uq.jobs.part.drawing import Facts, NotUnderstoodError, limits, refuse_other_kind
+from cmm_uq.jobs.part.not_modelled import (
+    FREE_STATE,
+    LEAST_MATERIAL,
+    LINE_PROFILE,
+    MAXIMUM_MATERIAL,
+    POINT_PROFILE,
+    PROJECTED,
+    SURFACE_PROFILE,
+    TWO_POINT,
+)
 
 _TOLERANCES: Mapping[str, What] = {
     "FLAT": "flatness", "STRGHT": "straightness", "CIRLTY": "roundness", "CYLCTY": "cylindricity", "DIAM": "size",
     "POS": "position", "PARLEL": "parallelism", "PERP": "perpendicularity", "CONCEN": "coaxiality",
     "CRNOUT": "circular_runout", "TRNOUT": "total_runout",
 }  # fmt: skip
+
+_REFUSED: Mapping[str, str] = {
+    "PROFL": LINE_PROFILE, "PROFS": SURFACE_PROFILE, "PROFP": POINT_PROFILE, "MMC": MAXIMUM_MATERIAL, "LMC": LEAST_MATERIAL,
+    "LP": TWO_POINT, "FREE": FREE_STATE, "PROJ": PROJECTED,
+}  # fmt: skip
+"""Words that change what a tolerance means, refused in words of their own."""
 
 _PLAIN = ("RFS", "2D", "3D")
 """Words that leave a tolerance as it is, or say what its feature says already."""
@@ -34,10 +51,13 @@ def toleranced(words: list[str], feature: Facts, millimetres: float, datums: Map
     """
     sort = words[0].upper() if words else ""
     if sort not in _TOLERANCES:
-        raise NotUnderstoodError(f"is a tolerance {sort or 'of no kind'}, which is not read")
+        raise NotUnderstoodError(_REFUSED.get(sort) or f"is a tolerance {sort or 'of no kind'}, which is not read")
     what, kind = _TOLERANCES[sort], feature["kind"]
     refuse_other_kind(what, kind)
     plain = [word.upper() for word in words[1:] if not reference(word)[0]]
+    refused = next((_REFUSED[word] for word in plain if word in _REFUSED), None)
+    if refused:
+        raise NotUnderstoodError(refused)
     number = numbers_of([word for word in plain if word not in _PLAIN])
     if what == "size":
         if len(number) < 2:
@@ -63,4 +83,7 @@ def _datum(label: str, datums: Mapping[str, str]) -> str:
         return datums[label]
     if label in datums.values():
         return label
+    parts = label.split(BETWEEN)
+    if len(parts) > 1:
+        return BETWEEN.join(_datum(each.strip(), datums) for each in parts)
     raise NotUnderstoodError(f"is about the datum {label}, which is no feature that is read")

@@ -6,17 +6,21 @@ read and correct. What such a file leaves open (how a feature is probed, how lon
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from cmm_uq.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.jobs.part.characteristic import ASKS, What
+from cmm_uq.jobs.part.common import members
 
 Facts = dict[str, Any]
 
 _DIGITS = 9
 """Decimals of a limit: a picometre, which the sum of a size and a deviation keeps."""
+
+_TOLD = 3
+"""Reasons that are told where nothing is left."""
 
 ALL = "*"
 """In place of names: everything that is not understood."""
@@ -94,7 +98,8 @@ class Drawing:
         self._without_their_features()
         for table, what in ((self.features, "feature"), (self.characteristics, "tolerance")):
             if not table:
-                raise CmmUqError(f"holds no {what} that is understood", where=where,
+                why = "; ".join(f"{one.name!r} {one.why}" for one in self.unknown[:_TOLD])
+                raise CmmUqError(f"holds no {what} that is understood{': ' if why else ''}{why}", where=where,
                                  fix="Write the job by hand: cmm-uq new part")  # fmt: skip
         return list(dict.fromkeys([*(one.name for one in self.unknown), *(name for name in without if name != ALL)]))
 
@@ -102,10 +107,18 @@ class Drawing:
         """Leave out characteristics whose feature or datum was left out, by name."""
         there = {one["name"] for one in self.features}
         for one in list(self.characteristics):
-            if not there.issuperset([*one["features"], *one.get("datums", ())]):
+            if not (there.issuperset(one["features"]) and all_there(one.get("datums", ()), there)):
                 self.characteristics.remove(one)
                 self.unknown.append(Unknown(one["name"], "is of a feature that was left out", ""))
-        self.datums[:] = self.datums if there.issuperset(self.datums) else []
+        self.datums[:] = self.datums if all_there(self.datums, there) else []
+
+
+def all_there(datums: Sequence[str], features: Collection[str]) -> bool:
+    """Whether all features of datums are there, of common ones too."""
+    try:
+        return all(members(name, features) for name in datums)
+    except CmmUqError:
+        return False
 
 
 def limits(what: str, low: float, high: float) -> Facts:

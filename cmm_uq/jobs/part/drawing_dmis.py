@@ -8,7 +8,6 @@ settings say nothing of a plan and are passed over.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -18,31 +17,14 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.importing.dmis import statements
 from cmm_uq.jobs.importing.encodings import decoded, report_lines
+from cmm_uq.jobs.part.common import BETWEEN
 from cmm_uq.jobs.part.dmis_frames import Frame, numbers_of, reference, words_of
+from cmm_uq.jobs.part.dmis_statements import DEGREES, KINDS, MILLIMETRES, NUMBERS, PASSED
 from cmm_uq.jobs.part.dmis_tolerances import toleranced
-from cmm_uq.jobs.part.drawing import Drawing, Facts, NotUnderstoodError, Unknown, usual_strategy
+from cmm_uq.jobs.part.drawing import Drawing, Facts, NotUnderstoodError, Unknown, all_there, usual_strategy
+from cmm_uq.jobs.part.not_modelled import SCANNED
 
 PROGRAM = "DMIS program"
-
-_MILLIMETRES = {"MM": 1.0, "CM": 10.0, "M": 1000.0, "INCH": 25.4, "FEET": 304.8}
-_DEGREES = {"ANGDEC": 1.0, "ANGRAD": math.degrees(1.0)}
-_KINDS = {
-    "POINT": "point",
-    "LINE": "line",
-    "PLANE": "plane",
-    "CIRCLE": "circle",
-    "SPHERE": "sphere",
-    "CYLNDR": "cylinder",
-}
-_NUMBERS = {"point": 6, "line": 9, "plane": 6, "circle": 7, "sphere": 4, "cylinder": 7}
-"""That a feature has at least: its place, its direction, its diameter."""
-
-_PASSED = (
-    "DMISMN", "DMISMD", "DISPLY", "FILNAM", "PRCOMP", "SNSET", "SNSMNT", "OPEN", "CLOSE", "GOTO", "MODE", "TEXT", "SAVE",
-    "ENDFIL", "FEDRAT", "ACLRAT", "DECPL", "FINPOS", "RAPID", "FROM", "GOHOME", "CRSLCT", "TECOMP", "WKPLAN", "DEVICE",
-    "DID", "VFORM", "REPORT", "FLY", "BADTST", "CALIB", "UNITS", "ENDMES", "PTMEAS",
-)  # fmt: skip
-"""First words of statements that say nothing of what is measured, or that are read elsewhere."""
 
 _LABELLED = re.compile(r"^(?P<of>\w+)\s*\((?P<name>[^)]*)\)\s*=\s*(?P<major>\w+)\s*/\s*(?P<rest>.*)$")
 _PLAIN = re.compile(r"^(?P<major>\w+)\s*(?:/\s*(?P<rest>.*))?$")
@@ -80,6 +62,8 @@ class _Program:
         self.stylus = ""
         self.measuring: tuple[str, int, list[list[float]]] | None = None
         self.given: list[tuple[int, str, str]] = []
+        self.scanning = False
+        self.scanned: set[str] = set()
 
     def read(self, said: list[tuple[int, str]]) -> Drawing:
         """See :func:`drawing_of_dmis`."""
@@ -119,36 +103,36 @@ class _Program:
             self.styli[name] = self._stylus(name, words)
         elif of == "D":
             self._frame(major, words, place)
-        elif of not in _PASSED and major not in _PASSED:
+        elif of not in PASSED and major not in PASSED:
             raise NotUnderstoodError(f"is a statement {of}(…)={major}/, which is not read")
 
     def _plain(self, major: str, words: list[str], line: int, place: str) -> None:
         read: Mapping[str, Callable[[list[str], int, str], None]] = {
-            "UNITS": self._units, "SNSMNT": self._mounted, "SNSLCT": self._selected, "MEAS": self._begun,
-            "PTMEAS": self._point, "ENDMES": self._ended, "DATDEF": self._datum, "OUTPUT": self._output, "EVAL": self._output,
-            "CONST": self._constructed,
+            "SCNMOD": self._scanning, "PAMEAS": self._scanned, "UNITS": self._units, "SNSMNT": self._mounted,
+            "SNSLCT": self._selected, "MEAS": self._begun, "PTMEAS": self._point, "ENDMES": self._ended,
+            "DATDEF": self._datum, "OUTPUT": self._output, "EVAL": self._output, "CONST": self._constructed,
         }  # fmt: skip
         if major in read:
             read[major](words, line, place)
-        elif major not in _PASSED:
+        elif major not in PASSED:
             raise NotUnderstoodError(f"is a statement {major}, which is not read")
 
     def _units(self, words: list[str], line: int, place: str) -> None:
         length, angle = (*words, "ANGDEC")[:2]
-        if length.upper() not in _MILLIMETRES or angle.upper() not in _DEGREES:
+        if length.upper() not in MILLIMETRES or angle.upper() not in DEGREES:
             raise CmmUqError(f"UNITS/{','.join(words)} is not read", where=place,
-                             fix=f"Write it in {', '.join(_MILLIMETRES)} and {' or '.join(_DEGREES)}")  # fmt: skip
+                             fix=f"Write it in {', '.join(MILLIMETRES)} and {' or '.join(DEGREES)}")  # fmt: skip
         if self.nominal:
             raise CmmUqError(
                 "the unit changes after features were defined", where=place, fix="Say UNITS once, at first"
             )
-        self.frame = replace(self.frame, millimetres=_MILLIMETRES[length.upper()], degrees=_DEGREES[angle.upper()])
+        self.frame = replace(self.frame, millimetres=MILLIMETRES[length.upper()], degrees=DEGREES[angle.upper()])
 
     def _feature(self, name: str, words: list[str]) -> Facts:
         sort = words[0].upper() if words else ""
-        if sort not in _KINDS:
+        if sort not in KINDS:
             raise NotUnderstoodError(f"is a feature {sort or 'of no kind'}, which is not read")
-        kind, rest = _KINDS[sort], words[1:]
+        kind, rest = KINDS[sort], words[1:]
         found: Facts = {"name": name, "kind": kind}
         sides = [word.upper() for word in rest if word.upper() in ("INNER", "OUTER", "BND", "UNBND")]
         if "CART" not in (word.upper() for word in rest):
@@ -156,8 +140,8 @@ class _Program:
         number = numbers_of([word for word in rest if word.upper() not in (*sides, "CART")])
         if "BND" in sides:
             raise NotUnderstoodError("is a line with ends (BND), which is not read")
-        if len(number) < _NUMBERS[kind]:
-            raise NotUnderstoodError(f"has {len(number)} of the {_NUMBERS[kind]} numbers that a {kind} has")
+        if len(number) < NUMBERS[kind]:
+            raise NotUnderstoodError(f"has {len(number)} of the {NUMBERS[kind]} numbers that a {kind} has")
         return found | self._nominal(kind, number) | _side(kind, sides)
 
     def _nominal(self, kind: str, number: list[float]) -> Facts:
@@ -201,6 +185,13 @@ class _Program:
             )
         self.stylus = name
 
+    def _scanning(self, words: list[str], line: int, place: str) -> None:
+        self.scanning = bool(words) and words[0].upper() == "ON"
+
+    def _scanned(self, words: list[str], line: int, place: str) -> None:
+        if self.measuring is not None:
+            self.scanned.add(self.measuring[0])
+
     def _begun(self, words: list[str], line: int, place: str) -> None:
         _, name = reference(words[1] if len(words) > 1 else "")
         if name not in self.nominal:
@@ -223,6 +214,9 @@ class _Program:
             return
         name, _, points = self.measuring
         self.measuring = None
+        if name in self.scanned or self.scanning:
+            self.drawing.unknown.append(Unknown(name, SCANNED, place))
+            return
         found: Facts = {**self.nominal[name], "stylus": self.stylus}
         if found["kind"] == "point":
             found["point_mm"] = points[0] if points else found["point_mm"]
@@ -242,6 +236,9 @@ class _Program:
     def _datum(self, words: list[str], line: int, place: str) -> None:
         features = [name for of, name in map(reference, words) if of in ("FA", "F")]
         labels = [name for of, name in map(reference, words) if of == "DAT"]
+        if len(labels) == 1 and len(features) > 1:
+            self.datums[labels[0]] = BETWEEN.join(features)
+            return
         for feature, label in zip(features, labels, strict=False):
             self.datums[label] = feature
 
@@ -265,7 +262,7 @@ class _Program:
             if feature not in features:
                 raise NotUnderstoodError(f"is a tolerance of {feature!r}, which is not read")
             place = f"{self.where} line {self.tolerances[tolerance][0]}"
-            datums = {label: name for label, name in self.datums.items() if name in features}
+            datums = {label: name for label, name in self.datums.items() if all_there([name], features)}
             found = toleranced(self.tolerances[tolerance][1], features[feature], self.frame.millimetres, datums)
             same = [one["name"] for one in self.drawing.characteristics]
             name = tolerance if tolerance not in same else f"{tolerance} {feature}"

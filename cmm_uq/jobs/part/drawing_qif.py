@@ -2,19 +2,18 @@
 
 Read are points, lines, planes, circles, spheres, cylinders and cones that are to be measured, sizes, forms, orientations,
 positions, coaxiality, runouts, distances and angles, with datums regardless of material. Where a datum does not name its
-feature, the feature that is named as the datum is taken (``A``, ``DATUM A``, ``DATUM_A``).
+feature, the feature that is named as the datum is taken (``A``, ``DATUM A``, ``DATUM_A``). A model with product information
+(PMI) plans no measurement: of it nominal features are taken that a datum or a characteristic is of.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping
-from xml.etree.ElementTree import Element
+from copy import copy
+from xml.etree.ElementTree import Element, SubElement
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.importing.qif import child, length_unit, three
-from cmm_uq.jobs.importing.units import UNITS
+from cmm_uq.jobs.importing.qif import child
 from cmm_uq.jobs.importing.xml_files import local, root_of
 from cmm_uq.jobs.part.characteristic import ASKS, What
 from cmm_uq.jobs.part.drawing import (
@@ -26,7 +25,11 @@ from cmm_uq.jobs.part.drawing import (
     refuse_other_kind,
     usual_strategy,
 )
-from cmm_uq.jobs.part.qif_elements import direction, inside, is_inner, number_of, radians_of
+from cmm_uq.jobs.part.not_modelled import SCANNED
+from cmm_uq.jobs.part.qif_datums import datums_of
+from cmm_uq.jobs.part.qif_elements import direction, inside, is_inner, numbers_in, referred
+from cmm_uq.jobs.part.qif_refused import SORTS, refuse_besides, refuse_condition, refuse_zone
+from cmm_uq.jobs.part.qif_units import QifUnits
 
 PROGRAM = "QIF plan"
 
@@ -42,8 +45,6 @@ _ASSOCIATIONS = {
     "LEASTSQUARES": "least_squares", "MINMAX": "minimum_zone", "MAXINSCRIBED": "maximum_inscribed",
     "MINCIRCUMSCRIBED": "minimum_circumscribed",
 }  # fmt: skip
-_PLAIN = ("", "NONE", "REGARDLESS", "NOT_APPLICABLE")
-"""Modifiers that leave a tolerance or a datum as it is."""
 
 
 def drawing_of_qif(content: bytes, where: str) -> Drawing:
@@ -69,17 +70,7 @@ class _Document:
     """The elements of a document by their numbers."""
 
     def __init__(self, root: Element, where: str) -> None:
-        unit = length_unit(root, where)
-        if unit is None:
-            raise CmmUqError("does not say its unit of length", where=where, fix="Export the plan with FileUnits")
-        name = UNITS[unit.casefold()]
-        self.millimetres = name.up / name.down
-        try:
-            self.degrees = math.degrees(radians_of(root))
-        except NotUnderstoodError as error:
-            raise CmmUqError(
-                f"the unit of angle {error}", where=f"{where}: FileUnits", fix="Export the plan again"
-            ) from None
+        self.units = QifUnits(root, where)
         self.root, self.where = root, where
         self.by_id = {element.get("id", ""): element for element in root.iter() if element.get("id")}
         self.names: dict[str, str] = {}
@@ -88,19 +79,51 @@ class _Document:
 
     def drawing(self) -> Drawing:
         """Features first: characteristics name them."""
-        for item in self._all("FeatureItem"):
-            self._named(item, "feature", self._feature)
-        for item in self._all("CharacteristicItem"):
-            self._named(item, "characteristic", self._characteristic)
+        planned = list(self._all("FeatureItem"))
+        labels = {} if planned else self._asked()
+        for item in planned or [one for one in self._all("FeatureNominal") if one.get("id", "") in labels]:
+            self._named(item, "feature", self._feature, labels.get(item.get("id", ""), ""))
+        for item in self._all("CharacteristicItem" if planned else "CharacteristicNominal"):
+            ids = numbers_in(inside(item, "FeatureNominalIds"))
+            if planned or len(ids) < 2 or self._features_of(item) > 1:
+                self._named(item, "characteristic", self._characteristic)
+                continue
+            for number in ids:  # a pattern of features: each of them
+                one = copy(item)
+                for group in [each for each in one if local(each) == "FeatureNominalIds"]:
+                    one.remove(group)
+                    only = SubElement(one, "FeatureNominalIds")
+                    SubElement(only, "Id").text = number
+                self._named(one, "characteristic", self._characteristic, f"{child(item, 'Name')} {number}".strip())
         return self.drawing_
+
+    def _asked(self) -> dict[str, str]:
+        """Numbers of nominal features that a datum or a characteristic is of, with the label of their datum."""
+        found = {number: "" for one in self._all("CharacteristicNominal") for number in self._numbers(one)}
+        for datum in self._all("DatumDefinition"):
+            numbers = self._numbers(datum)
+            found |= dict.fromkeys(numbers, child(datum, "DatumLabel") if len(numbers) == 1 else "")
+        return found
+
+    @staticmethod
+    def _numbers(element: Element) -> list[str]:
+        """Of nominal features that an element names, alone or in pairs."""
+        pairs = inside(element, "FeatureNominalPairs")
+        return [*numbers_in(inside(element, "FeatureNominalIds")),
+                *(number for pair in ([] if pairs is None else pairs) for number in numbers_in(pair))]  # fmt: skip
+
+    @staticmethod
+    def _features_of(item: Element) -> int:
+        what = _WHATS.get(local(item).removesuffix("CharacteristicNominal"))
+        return 1 if what is None else ASKS[what].features
 
     def _all(self, ending: str) -> Iterator[Element]:
         return (element for element in self.root.iter() if local(element).endswith(ending))
 
-    def _named(self, item: Element, what: str, read: Callable[[Element, str, str], Facts]) -> None:
+    def _named(self, item: Element, what: str, read: Callable[[Element, str, str], Facts], name: str = "") -> None:
         """Read an item, or keep what of it is not understood."""
         number = item.get("id", "")
-        name = child(item, "FeatureName") or child(item, "Name") or f"{what} {number}"
+        name = name or child(item, "FeatureName") or child(item, "Name") or f"{what} {number}"
         place = f"{self.where}: {local(item)} id {number}"
         taken = self.drawing_.features if what == "feature" else self.drawing_.characteristics
         try:
@@ -111,12 +134,14 @@ class _Document:
             self.drawing_.unknown.append(Unknown(name, str(error), place))
 
     def _feature(self, item: Element, name: str, place: str) -> Facts:
-        sort = local(item).removesuffix("FeatureItem")
+        sort = local(item).removesuffix("FeatureItem").removesuffix("FeatureNominal")
         if sort not in _KINDS:
             raise NotUnderstoodError(f"is a feature of kind {sort}, which is not read")
+        if any(local(element) == "FromScan" and (element.text or "").strip() != "false" for element in item.iter()):
+            raise NotUnderstoodError(SCANNED)
         if any(local(element) == "Constructed" for element in item.iter()):
             raise NotUnderstoodError("is constructed of other features, which is not read")
-        nominal = self._referred(item, "FeatureNominalId")
+        nominal = item if local(item).endswith("FeatureNominal") else self._referred(item, "FeatureNominalId")
         definition = self._referred(nominal, "FeatureDefinitionId")
         if inside(nominal, "PointList") is not None:
             raise NotUnderstoodError("has a list of points of its own (PointList), which is not read")
@@ -142,10 +167,10 @@ class _Document:
         if kind in ("cylinder", "cone"):
             if axis is None:
                 raise NotUnderstoodError("has no axis")
-            found |= {"point_mm": self._place(child(axis, "AxisPoint"), place),
+            found |= {"point_mm": self.units.place(inside(axis, "AxisPoint"), place),
                       "direction": direction(child(axis, "Direction"), place)}  # fmt: skip
         else:
-            found |= {"point_mm": self._place(child(nominal, "Location"), place)}
+            found |= {"point_mm": self.units.place(inside(nominal, "Location"), place)}
         if kind in ("plane", "circle", "point"):
             found["direction"] = direction(child(nominal, "Normal"), place)
         if kind == "line":
@@ -154,29 +179,29 @@ class _Document:
         if kind in ("circle", "sphere", "cylinder", "cone"):
             found |= {"diameter_mm": self._length(definition, "Diameter"), "inner": is_inner(definition)}
         if kind == "cone":
-            half, whole = child(definition, "HalfAngle"), child(definition, "FullAngle")
-            if not (half or whole):
+            half, whole = inside(definition, "HalfAngle"), inside(definition, "FullAngle")
+            angle = half if half is not None else whole
+            if angle is None:
                 raise NotUnderstoodError("does not say its angle")
-            found["angle_deg"] = self.degrees * (2 * number_of(half) if half else number_of(whole))
+            found["angle_deg"] = self.units.degrees(angle) * (1 if half is None else 2)
         if kind in ("line", "cylinder", "cone"):
-            length = child(
-                nominal if kind == "line" else definition, "LargeEndDistance" if kind == "cone" else "Length"
-            )
-            self._between_its_ends(found, length, child(definition, "SmallEndDistance"))
+            key = "LargeEndDistance" if kind == "cone" else "Length"
+            length = inside(nominal if kind == "line" else definition, key)
+            self._between_its_ends(found, length, inside(definition, "SmallEndDistance"))
         return found
 
-    def _between_its_ends(self, found: Facts, length: str, small: str) -> None:
+    def _between_its_ends(self, found: Facts, length: Element | None, small: Element | None) -> None:
         """Put the point of a line, cylinder or cone from its start, or from anywhere on its axis, to its middle.
 
         A cone without a small end ends at its tip. A length that is not said is an example.
         """
         start = 0.0
         slope = math.tan(math.radians(found["angle_deg"] / 2)) if found["kind"] == "cone" else 0.0
-        if slope and length:
-            start = self.millimetres * number_of(small) if small else -0.5 * found["diameter_mm"] / slope
-        if not length:
+        if slope and length is not None:
+            start = self.units.mm(small) if small is not None else -0.5 * found["diameter_mm"] / slope
+        if length is None:
             self.drawing_.open_keys[found["name"]] = ["length_mm", "point_mm"]
-        end = self.millimetres * number_of(length) if length else found.get("diameter_mm", _LENGTH_MM) / 2
+        end = self.units.mm(length) if length is not None else found.get("diameter_mm", _LENGTH_MM) / 2
         middle = 0.5 * (start + end)
         way = middle / (math.hypot(*found["direction"]) or 1.0)
         found["length_mm"] = end - start
@@ -198,17 +223,22 @@ class _Document:
         return found
 
     def _characteristic(self, item: Element, name: str, place: str) -> Facts:
-        sort = local(item).removesuffix("CharacteristicItem")
-        nominal = self._referred(item, "CharacteristicNominalId")
+        sort = local(item).removesuffix("CharacteristicItem").removesuffix("CharacteristicNominal")
+        alone = local(item).endswith("CharacteristicNominal")
+        nominal = item if alone else self._referred(item, "CharacteristicNominalId")
         definition = self._referred(nominal, "CharacteristicDefinitionId")
         what = self._what(sort, nominal)
         features = self._features(item, what)
         for kind in (one["kind"] for one in self.drawing_.features if one["name"] in features):
             refuse_other_kind(what, kind)
         found: Facts = {"name": name, "what": what, "features": features}
-        self._refuse_modified(definition, what, features)
-        frame = child(definition, "DatumReferenceFrameId")
-        datums = self._datums(frame) if frame and ASKS[what].datum_kinds else []
+        refuse_besides(definition)
+        refuse_besides(nominal)
+        refuse_condition(definition)
+        of = next((one["kind"] for one in self.drawing_.features if one["name"] in features), "")
+        refuse_zone(definition, what, about_an_axis=of in ("circle", "cylinder", "cone", "line"))
+        frame = self.by_id.get(child(definition, "DatumReferenceFrameId"))
+        datums = datums_of(frame, self.by_id, self.of_nominal, self.drawing_.features) if ASKS[what].datum_kinds else []
         if len(datums) < ASKS[what].datums:
             raise NotUnderstoodError("names no datum")
         found |= {"datums": datums} if datums else {}
@@ -224,15 +254,14 @@ class _Document:
                 raise NotUnderstoodError(f"is a coordinate along {direction or 'no axis'}, which is not read")
             return axes[direction]
         if sort not in _WHATS:
-            raise NotUnderstoodError(f"is a characteristic of kind {sort}, which is not read")
+            raise NotUnderstoodError(SORTS.get(sort) or f"is a characteristic of kind {sort}, which is not read")
         mode = child(nominal, "AnalysisMode")
         if sort == "DistanceBetween" and mode not in ("", "THREEDIMENSIONAL"):
             raise NotUnderstoodError(f"is a distance in the analysis {mode}, which is not read")
         return _WHATS[sort]
 
     def _features(self, item: Element, what: What) -> list[str]:
-        ids = inside(item, "FeatureItemIds")
-        given = [] if ids is None else [(element.text or "").strip() for element in ids]
+        given = numbers_in(inside(item, "FeatureItemIds")) or self._numbers(item)
         if len(given) != ASKS[what].features:
             raise NotUnderstoodError(f"is a {what} of {len(given) or 'no'} features")
         unread = [number for number in given if number not in self.names]
@@ -244,77 +273,32 @@ class _Document:
         item = self.by_id.get(number)
         return number if item is None else child(item, "FeatureName") or number
 
-    def _refuse_modified(self, definition: Element, what: What, features: list[str]) -> None:
-        condition = child(definition, "MaterialCondition")
-        if condition not in _PLAIN:
-            raise NotUnderstoodError(f"holds at {condition.lower()} material condition, which is not read")
-        zone = inside(definition, "ZoneShape")
-        shape = "" if zone is None or not len(zone) else local(zone[0])
-        round_feature = any(one["name"] in features and one["kind"] in ("circle", "cylinder", "cone", "line")
-                            for one in self.drawing_.features)  # fmt: skip
-        usual = {"position": ("DiametricalZone", "SphericalZone")}.get(
-            what, ("DiametricalZone",) if round_feature else ("PlanarZone",)
-        )
-        if shape and shape not in usual:
-            raise NotUnderstoodError(f"has a tolerance zone of shape {shape}, which is not read")
-
-    def _datums(self, frame: str) -> list[str]:
-        found: list[str] = []
-        reference = self.by_id.get(frame)
-        for datum in [] if reference is None else [each for each in reference.iter() if local(each) == "Datum"]:
-            simple = inside(datum, "SimpleDatum")
-            if simple is None:
-                raise NotUnderstoodError("has a compound datum, which is not read")
-            modifier = child(simple, "MaterialModifier")
-            if modifier not in _PLAIN:
-                raise NotUnderstoodError(f"has a datum at {modifier.lower()} material condition, which is not read")
-            found.append(self._datum(self._referred(simple, "DatumDefinitionId")))
-        return found
-
-    def _datum(self, definition: Element) -> str:
-        label = child(definition, "DatumLabel")
-        ids = inside(definition, "FeatureNominalIds")
-        named = [] if ids is None else [(element.text or "").strip() for element in ids]
-        if len(named) == 1 and named[0] in self.of_nominal:
-            return self.of_nominal[named[0]]
-        pattern = re.compile(rf"(datum[ _-]?)?{re.escape(label)}", re.IGNORECASE)
-        same = [one["name"] for one in self.drawing_.features if pattern.fullmatch(one["name"])]
-        if named or len(same) != 1:
-            raise NotUnderstoodError(f"is about the datum {label}, which names no feature that is read")
-        return str(same[0])
-
     def _limits(self, what: What, nominal: Element, definition: Element) -> Facts:
         if ASKS[what].limits == "zone":
-            width = child(definition, "ToleranceValue")
-            if not width or number_of(width) <= 0:
+            width = inside(definition, "ToleranceValue")
+            if width is None or self.units.mm(width, pmi=True) <= 0:
                 raise NotUnderstoodError("has no tolerance above 0")
-            return {"tolerance_mm": self.millimetres * number_of(width)}
+            return {"tolerance_mm": self.units.mm(width, pmi=True)}
         tolerance = inside(definition, "Tolerance")
         if tolerance is None:
             return {}
-        scale = self.degrees if ASKS[what].limits == "angles" else self.millimetres
-        low, high = child(tolerance, "MinValue"), child(tolerance, "MaxValue")
-        if not (low and high):
+        value = self.units.degrees if ASKS[what].limits == "angles" else self.units.mm
+        low, high = inside(tolerance, "MinValue"), inside(tolerance, "MaxValue")
+        if low is None or high is None:
             raise NotUnderstoodError("has a tolerance without two limits, which is not read")
-        target = child(nominal, "TargetValue")
+        target = inside(nominal, "TargetValue")
         about = 0.0
         if child(tolerance, "DefinedAsLimit") != "true":
-            if not target:
+            if target is None:
                 raise NotUnderstoodError("has limits about a value that is not there")
-            about = number_of(target)
-        return limits(what, scale * (about + number_of(low)), scale * (about + number_of(high)))
+            about = value(target, pmi=True)
+        return limits(what, about + value(low, pmi=True), about + value(high, pmi=True))
 
     def _length(self, element: Element, name: str) -> float:
-        text = child(element, name)
-        if not text:
+        given = inside(element, name)
+        if given is None:
             raise NotUnderstoodError(f"does not say its {name}")
-        return self.millimetres * number_of(text)
-
-    def _place(self, text: str, place: str) -> list[float]:
-        return [self.millimetres * number_of(word) for word in three(text, place)]
+        return self.units.mm(given)
 
     def _referred(self, element: Element, name: str) -> Element:
-        found = self.by_id.get(child(element, name))
-        if found is None:
-            raise NotUnderstoodError(f"refers by {name} to nothing that is there")
-        return found
+        return referred(element, name, self.by_id)

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Annotated, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from cmm_uq.files.limits import LISTED
 from cmm_uq.jobs.part.form import FormFacts
+from cmm_uq.jobs.part.not_modelled import refuse_not_modelled
 from cmm_uq.jobs.table import Length, Table, Triple
 
 Kind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
@@ -44,7 +45,7 @@ _ASSOCIATIONS: Mapping[Kind, tuple[Association, ...]] = {
     "cone": get_args(Association)[:2],
 }  # fmt: skip
 
-_KEYS: Mapping[str, tuple[Kind, ...]] = {
+KEYS: Mapping[str, tuple[Kind, ...]] = {
     "diameter_mm": (*ROUND, "plane"), "inner_diameter_mm": ("plane",), "angle_deg": ("cone",), "inner": ROUND,
     "length_mm": ("line", "plane", "cylinder", "cone"), "width_mm": ("plane",), "normal": ("line",),
     "along": ("plane", "circle", "sphere", "cylinder", "cone"),
@@ -107,6 +108,11 @@ class Strategy(Table):
     margin_mm: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     """What stays free at each end and edge."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _modelled(cls, table: Any) -> Any:
+        return refuse_not_modelled(table)
+
     @model_validator(mode="after")
     def _what_the_pattern_needs(self) -> Self:
         needed = _NEEDED[self.pattern]
@@ -159,6 +165,11 @@ class FeatureFacts(Table):
     form: FormFacts | None = None
     """Its own form and roughness, in place of `[form]`."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _modelled(cls, table: Any) -> Any:
+        return refuse_not_modelled(table)
+
     @field_validator("direction", "along", "normal")
     @classmethod
     def _directions(cls, vector: list[float] | None) -> list[float] | None:
@@ -166,7 +177,7 @@ class FeatureFacts(Table):
 
     @model_validator(mode="after")
     def _keys_of_its_kind(self) -> Self:
-        for key, kinds in _KEYS.items():
+        for key, kinds in KEYS.items():
             if key in self.model_fields_set and self.kind not in kinds:
                 raise ValueError(f"a {self.kind} has no {key}: leave it out")
         if self.kind in DIRECTED and self.direction is None:

@@ -17,10 +17,17 @@ _FREE = 1e-3
 """Singular value below which a motion counts as free: datums that lean by less than a twentieth of a degree are one."""
 
 
-def freedoms(datums: Sequence[Probed]) -> tuple[str, ...]:
-    """What the datums leave free, in words; nothing where they fix the frame."""
-    centre, size = _about(datums)
-    rows = np.concatenate([np.zeros((0, 6)), *(_fixed(one, centre, size) for one in datums)])
+def freedoms(datums: Sequence[tuple[Probed, ...]]) -> tuple[str, ...]:
+    """What the datums leave free, in words; nothing where they fix the frame.
+
+    Parameters
+    ----------
+    datums : in order, each the features that it is on: several of a common datum.
+    """
+    every = [one for datum in datums for one in datum]
+    centre, size = _about(every)
+    fixed = [_fixed(one, centre, size, alone=len(datum) == 1) for datum in datums for one in datum]
+    rows = np.concatenate([np.zeros((0, 6)), *fixed])
     free = _null(rows)
     shifts = _null(np.concatenate([rows, np.eye(6)[3:]]))
     named = [f"shift along {axis}" for i, axis in enumerate(AXES) if np.linalg.norm(shifts[:, i]) > _FREE]
@@ -45,11 +52,16 @@ def _null(rows: Floats) -> Floats:
     return np.asarray(motions[~seen])
 
 
-def _fixed(one: Probed, centre: Floats, size: float) -> Floats:
-    """(r, 6) of what a feature fixes: shifts of it and rotations, of a motion (shift, rotation about the centre)."""
+def _fixed(one: Probed, centre: Floats, size: float, *, alone: bool = True) -> Floats:
+    """(r, 6) of what a feature fixes: shifts of it and rotations, of a motion (shift, rotation about the centre).
+
+    A point alone fixes all three shifts; in a common datum it holds the others' plane or face, along its normal.
+    """
     arm = (np.array(one.facts.point_mm) - centre) / size
     # the shift of the feature's point is t + r × arm
     place = np.hstack([np.eye(3), -_cross(arm)])
+    if one.facts.kind == "point" and not alone:
+        return np.asarray(one.normals[:1] @ place)
     if one.direction is None:
         return place
     w = one.direction

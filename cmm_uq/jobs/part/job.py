@@ -154,7 +154,7 @@ def _read(source: Source, *, machine: bool) -> PartJob:
     wrong.refuse()
     inputs, stated_by = {"job.toml": content}, files_of_the_machine(facts.machine_state, source) if machine else ()
     if machine:
-        fix = f"Put it into the job's folder, or mend its name in {path}: [machine_state]"
+        fix = f"Put the machine's certificate (PDF) or its report's files there, or mend its name in {path}: [machine_state]"
         for name in stated_by:
             with wrong.going_on():
                 inputs[name] = source.content(name, TABLE_BYTES, fix, written=True)

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from xml.etree.ElementTree import Element
 
 from cmm_uq.jobs.importing.qif import child, three
 from cmm_uq.jobs.importing.xml_files import local
 from cmm_uq.jobs.part.drawing import NotUnderstoodError
-
-
-def radians_of(root: Element) -> float:
-    """Radians in the unit of angle; QIF's own is the radian."""
-    unit = next((element for element in root.iter() if local(element) == "AngularUnit"), None)
-    text = "" if unit is None else next((e.text or "" for e in unit.iter() if local(e) == "Factor"), "")
-    return number_of(text or "1")
 
 
 def number_of(text: str) -> float:
@@ -32,6 +26,24 @@ def number_of(text: str) -> float:
 def inside(element: Element, name: str) -> Element | None:
     """The first element of this name in another; ``None`` where there is none."""
     return next((inner for inner in element if local(inner) == name), None)
+
+
+def referred(element: Element, name: str, by_id: Mapping[str, Element]) -> Element:
+    """The element to which another refers by a number.
+
+    Raises
+    ------
+    NotUnderstoodError : there is none.
+    """
+    found = by_id.get(child(element, name))
+    if found is None:
+        raise NotUnderstoodError(f"refers by {name} to nothing that is there")
+    return found
+
+
+def numbers_in(element: Element | None) -> list[str]:
+    """Numbers of elements that a list of them names."""
+    return [] if element is None else [(one.text or "").strip() for one in element]
 
 
 def direction(text: str, place: str) -> list[float]:

@@ -114,7 +114,7 @@ class AlignmentFacts(Table):
     """``[alignment]``: how coordinates of the part follow from measured points."""
 
     datums: Annotated[list[Name], Field(max_length=6)] = []
-    """Names of features in order: each fixes what those before it left free (3-2-1)."""
+    """Names of features in order: each fixes what those before it left free (3-2-1). `"A-B"` is a common datum on both."""
     best_fit: bool = False
     """By least squares of all points from the nominal surfaces instead."""
 

@@ -136,14 +136,22 @@ def test_a_frame_before_the_first_feature_places_the_part() -> None:
     assert placed.features == read(TOP, BORE).features
 
 
+ROUND = "F(C)=FEAT/CIRCLE,INNER,CART,0,0,0,0,0,1,30\nP(ARC)=PATH/ARC,CART,0,0,0,0,0,1,15,0,360\n"
+
+
 @pytest.mark.parametrize(("statements", "name", "why"), [
     ("F(C)=FEAT/CONE,INNER,CART,0,0,0,0,0,1,30\n", "C", "is a feature CONE, which is not read"),
     ("F(C)=FEAT/CIRCLE,INNER,POL,0,0,0,0,0,1,30\n", "C", "is not given in Cartesian coordinates"),
     ("F(C)=FEAT/CIRCLE,CART,0,0,0,0,0,1,30\n", "C", "does not say INNER or OUTER"),
     ("F(C)=FEAT/CIRCLE,INNER,CART,0,0,0,0,0,1,30\n", "C", "is a feature that is not measured"),
     ("T(X)=TOL/FLAT,0.1\n", "X", "is a tolerance without a feature"),
-    ("T(X)=TOL/PROFS,0.1\nOUTPUT/FA(TOP),TA(X)\n", "X", "is a tolerance PROFS, which is not read"),
-    ("T(X)=TOL/POS,2D,0.1,MMC,DAT(A)\nOUTPUT/FA(BORE),TA(X)\n", "X", "has 'MMC' where numbers belong|which is not read"),
+    ("T(X)=TOL/PROFS,0.1\nOUTPUT/FA(TOP),TA(X)\n", "X", "is the profile of a surface, which is not modelled"),
+    ("T(X)=TOL/POS,2D,0.1,MMC,DAT(A)\nOUTPUT/FA(BORE),TA(X)\n", "X", "holds at maximum material condition"),
+    ("T(X)=TOL/POS,2D,0.1,RFS,DAT(A),LMC\nOUTPUT/FA(BORE),TA(X)\n", "X", "holds at least material condition"),
+    ("T(X)=TOL/DIAM,-0.1,0.1,LP\nOUTPUT/FA(BORE),TA(X)\n", "X", "is a two-point size"),
+    ("T(X)=TOL/PROFL,0.1\nOUTPUT/FA(TOP),TA(X)\n", "X", "is the profile of a line"),
+    (f"{ROUND}MEAS/CIRCLE,F(C),1\nPAMEAS/DISTANCE,0.1,P(ARC),0,0,1\nENDMES\n", "C", "is scanned: what scanning adds"),
+    (f"{ROUND}SCNMOD/ON\nMEAS/CIRCLE,F(C),1\nPTMEAS/CART,15,0,0,-1,0,0\nENDMES\n", "C", "is scanned: what scanning adds"),
     ("T(X)=TOL/PERP,0.1,DAT(B)\nOUTPUT/FA(BORE),TA(X)\n", "X", "is about the datum B, which is no feature"),
     ("T(X)=TOL/DIAM,-0.1,0.1\nOUTPUT/FA(TOP),TA(X)\n", "X", "is a size of a plane, which is not read"),
     ("T(X)=TOL/FLAT,0.1,DAT(A)\nOUTPUT/FA(TOP),TA(X)\n", "X", "is a flatness with a datum, which has none"),
@@ -168,6 +176,17 @@ def test_what_is_not_understood_is_told_by_name(statements: str, name: str, why:
 def test_a_frame_that_cannot_be_followed_ends_the_reading(change: str) -> None:
     with pytest.raises(CmmUqError, match=r"plate\.dmi line 15: a frame"):
         read(TOP, change, BORE)
+
+
+BELOW = TOP.replace("TOP", "LOW").replace("DAT(A)", "DAT(L)").replace(",30,", ",0,").replace(",30, ", ",0, ")
+
+
+@pytest.mark.parametrize(("defined", "datum"), [("", "L-A"), ("DATDEF/FA(LOW),FA(TOP),DAT(E)\n", "E")])
+def test_a_datum_on_two_features_is_one_on_both(defined: str, datum: str) -> None:
+    """Named by its parts in the tolerance, or defined on both."""
+    found = read(TOP, BELOW, defined, BORE, f"T(X)=TOL/PERP,0.1,DAT({datum})\nOUTPUT/FA(BORE),TA(X)\n")
+    assert not found.unknown
+    assert named(found.characteristics)["X"]["datums"] == ["LOW-TOP"]
 
 
 def test_what_was_left_out_takes_along_what_is_of_it() -> None:

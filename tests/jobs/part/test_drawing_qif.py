@@ -185,14 +185,26 @@ NURBS = feature(6, "Plane", "bent", "<SubstituteFeatureAlgorithm>NURBS</Substitu
 MAXIMUM = "<MaterialCondition>MAXIMUM</MaterialCondition>"
 
 
+PROJECTED = "<ProjectedToleranceZoneValue>12</ProjectedToleranceZoneValue>"
+SCAN = feature(8, "Circle", "scan", "<Location>4 5 6</Location><Normal>0 0 1</Normal>", HOLE,
+               "<Constructed><FromScan/></Constructed>")  # fmt: skip
+
+
 @pytest.mark.parametrize(("kind", "item", "name", "why"), [
     ("Features", SLOT, "slot", "is a feature of kind OppositeParallelLines"),
     ("Features", NO_SIDE, "open", "does not say whether it is a hole or a shaft"),
     ("Features", MADE, "made", "is constructed of other features"),
     ("Features", NURBS, "bent", "is to be associated by NURBS"),
-    ("Asked", characteristic(7, "PointProfile", "8", [4], zone(1.0)), "8", "is a characteristic of kind PointProfile"),
+    ("Asked", characteristic(7, "PointProfile", "8", [4], zone(1.0)), "8", "is the profile of a surface at a point"),
     ("Asked", characteristic(7, "Position", "8", [2], zone(0.5, 4, MAXIMUM)), "8", "holds at maximum material condition"),
     ("Asked", characteristic(7, "Position", "8", [2], zone(0.0, 4)), "8", "has no tolerance above 0"),
+    ("Asked", characteristic(7, "SurfaceProfile", "8", [0], zone(0.5)), "8", "is the profile of a surface,"),
+    ("Asked", characteristic(7, "LineProfile", "8", [0], zone(0.5)), "8", "is the profile of a line, which is not"),
+    ("Asked", characteristic(7, "Flatness", "8", [0], zone(0.5, None, "<FreeState>true</FreeState>")), "8", "the free state"),
+    ("Asked", characteristic(7, "Flatness", "8", [0], zone(0.5, None, "<ToleranceZonePerUnitArea/>")), "8", "per unit of"),
+    ("Asked", characteristic(7, "Position", "8", [2], zone(0.5, 4, PROJECTED)), "8", "has a projected tolerance zone"),
+    ("Asked", characteristic(7, "Flatness", "8", [0], zone(0.5, None, "<Unheard>1</Unheard>")), "8", "says Unheard, which is"),
+    ("Features", SCAN, "scan", "is scanned: what scanning adds"),
     ("Asked", characteristic(7, "Flatness", "8", [1], zone(0.5)), "8", "is a flatness of a cylinder, which is not read"),
     ("Asked", characteristic(7, "Parallelism", "8", [1], zone(0.5)), "8", "names no datum"),
     ("Asked", characteristic(7, "DistanceBetween", "8", [0], tolerance(-1, 1)), "8", "is a distance of 1 features"),
@@ -234,3 +246,47 @@ def test_a_damaged_plan_is_read_or_refused_in_words(at: int, cut: int, put: str)
         found.settled(["*"], "plate.qif")
         assert found.features
         assert found.characteristics
+
+
+COMMON = """<DatumReferenceFrame id="5"><Datums n="2">
+<Datum><SimpleDatum><DatumDefinitionId>1</DatumDefinitionId></SimpleDatum><Precedence><PrecedenceEnum>SECONDARY</PrecedenceEnum>
+</Precedence></Datum>
+<Datum><CompoundDatum n="2">
+<Datum><SimpleDatum><DatumDefinitionId>2</DatumDefinitionId></SimpleDatum><SequenceNumber>1</SequenceNumber></Datum>
+<Datum><SimpleDatum><DatumDefinitionId>6</DatumDefinitionId></SimpleDatum></Datum>
+</CompoundDatum><Precedence><PrecedenceEnum>PRIMARY</PrecedenceEnum></Precedence></Datum></Datums></DatumReferenceFrame>
+<DatumDefinition id="6"><DatumLabel>C</DatumLabel><FeatureNominalIds><Id>122</Id></FeatureNominalIds></DatumDefinition>"""
+
+
+def test_a_compound_datum_is_a_common_one_and_datums_stand_by_their_precedence() -> None:
+    whole = document(characteristic(7, "Position", "8", [5], zone(0.5, 5)), kind="Asked").decode()
+    found = drawing_of_qif(
+        whole.replace("</DatumReferenceFrames>", COMMON + "</DatumReferenceFrames>").encode(), "plate.qif"
+    )
+    assert not found.unknown
+    assert found.characteristics[-1]["datums"] == ["pin-hole", "DATUM_A"]
+
+
+def test_a_value_may_name_a_unit_of_its_own() -> None:
+    """A tolerance of half an inch in a plan in mm; an unexplained unit is told."""
+    width = '<ToleranceValue linearUnit="{}">0.5</ToleranceValue>'
+    found = read(characteristic(7, "Flatness", "8", [0], width.format("inch")), kind="Asked")
+    assert found.characteristics[-1]["tolerance_mm"] == pytest.approx(12.7)
+    strange = read(characteristic(7, "Flatness", "8", [0], width.format("cubit")), kind="Asked")
+    assert [one.why for one in strange.unknown] == ["has the unit 'cubit', which the document does not explain"]
+
+
+def test_a_model_with_product_information_gives_what_its_datums_and_tolerances_are_of() -> None:
+    """Without items that plan a measurement: nominals, each of a pattern on its own; datum features by label."""
+    hole = "<Location>{} 5 6</Location><Normal>0 0 1</Normal>"
+    ids = "<Name>holes</Name><FeatureNominalIds><Id>122</Id><Id>129</Id></FeatureNominalIds><TargetValue>9.5</TargetValue>"
+    features = [*FEATURES, feature(9, "Circle", "", hole.format(40), HOLE)]
+    asked = characteristic(7, "Diameter", "", [], tolerance(-0.1, 0.1), ids)
+    parts = [UNITS.format(unit="mm", factor="0.001"), DATUMS.format(modifier="NONE")]
+    parts += [text for definition, nominal, _ in [*features, asked] for text in (definition, nominal)]
+    found = drawing_of_qif(f"<QIFDocument>{''.join(parts)}</QIFDocument>".encode(), "model.qif")
+    assert not found.unknown
+    assert [(one["name"], one["kind"]) for one in found.features] == [
+        ("B", "cylinder"), ("feature 122", "circle"), ("feature 129", "circle")]  # fmt: skip
+    assert [(one["name"], one["features"]) for one in found.characteristics] == [
+        ("holes 122", ["feature 122"]), ("holes 129", ["feature 129"])]  # fmt: skip

@@ -51,10 +51,10 @@ STOP = feature("point", point_mm=[-40.0, 0.0, 0.0], direction=[-1.0, 0.0, 0.0])
     ((TOP, plane(0, 0, 1, at=(0, 0, -20))), ("shift along x", "shift along y", "rotation about z")),
 ])  # fmt: skip
 def test_what_datums_leave_free(datums: tuple[Probed, ...], free: tuple[str, ...]) -> None:
-    assert freedoms(datums) == free
+    assert freedoms([(datum,) for datum in datums]) == free
 
 
 def test_it_does_not_matter_where_the_part_has_its_origin() -> None:
     moved = [plane(0, 0, 1, at=(3000, -2000, 500)), bore(3000, -2000), bore(3050, -2000)]
-    assert freedoms(moved) == ()
-    assert freedoms(moved[:2]) == ("rotation about z",)
+    assert freedoms([(one,) for one in moved]) == ()
+    assert freedoms([(one,) for one in moved[:2]]) == ("rotation about z",)
