@@ -61,6 +61,9 @@ class Unchecked:
         return f"{self.what}: {self.why}"
 
 
+AGAIN = "computing again"
+"""What is left where the inputs are not computed again."""
+
 CHECKS = {
     "files": "the files are what cmm-uq writes, with nothing active, hidden or further in them",
     "signatures": "signatures are intact and cover the whole file; whom one must trust for them is trusted, or named above",
