@@ -97,7 +97,7 @@ def _particulars(found: PartFound) -> tuple[Facts, ...]:
             (say("Serial number"), part.serial),
             (say("Owner"), part.owner),
             (say("Material"), part.material),
-            (say("Coefficient of thermal expansion"), expansion),
+            (say("Thermal expansion"), expansion),
             (say("Place"), job.place),
         ),
         certificate_rows(found.standing),
