@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from cmm_uq.verification.again import beyond_sampling, differences
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.html_page import read_html
 from cmm_uq.verification.part_decided import check_part_decisions
@@ -112,3 +113,15 @@ def test_a_page_that_states_another_figure_is_named(path: str, value: Any, place
 
     assert not stated(data())
     assert place in stated(changed(path, value))
+
+
+def test_figures_of_other_kernels_are_held_to_what_draws_and_digits_allow() -> None:
+    """All a little off is another processor; what is off by half of its u besides is a finding."""
+    drawn, should = data(), data()
+    for one in drawn["characteristics"]:
+        for key in ("value", "u", "U", "mean_error", "k", "measured"):
+            one[key] *= 1 + 1e-10
+    drawn["budget"]["causes"][0]["total"][0] += 1e-3
+    drawn["characteristics"][0]["value"] += 0.5 * drawn["characteristics"][0]["u"]
+    found = [path for path, _, _ in beyond_sampling(drawn, should, differences(drawn, should))]
+    assert found == ["characteristics[0].value"]
