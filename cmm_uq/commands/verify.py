@@ -16,7 +16,7 @@ from cmm_uq import __version__
 from cmm_uq.errors import CmmUqError
 from cmm_uq.languages.language import ENGLISH, Code
 from cmm_uq.verification.digital import check_schema, open_digital
-from cmm_uq.verification.found import AGAIN, Inquiry
+from cmm_uq.verification.found import AGAIN, NOT_ASKED, Inquiry
 from cmm_uq.verification.given import PART_SCHEMA, RESULTS, RESULTS_SCHEMA, Given, check_files, read_given
 from cmm_uq.verification.signed import check_signatures
 
@@ -113,7 +113,7 @@ def verify_given(
         check_schema(inquiry, given, schema)
     alike = False
     if not rerun:
-        inquiry.left(AGAIN, "not asked for (--no-rerun)")
+        inquiry.left(AGAIN, NOT_ASKED)
     elif part is not None:
         alike = _compute_part_again(inquiry, given, part, trust, stage)
     elif job is not None:

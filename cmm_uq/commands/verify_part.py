@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.languages.language import ENGLISH, Code
-from cmm_uq.verification.found import AGAIN, Finding, Inquiry
+from cmm_uq.verification.found import AGAIN, NOT_ASKED, Finding, Inquiry
 from cmm_uq.verification.given import RESULTS, Given
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ def _merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:
             Finding(one.check, _within(where, one.file), one.place, one.problem, one.stands, one.should)
         )
     for left in inner.unchecked:
-        if left.what != AGAIN or "--no-rerun" not in left.why:
+        if (left.what, left.why) != (AGAIN, NOT_ASKED):
             inquiry.left(f"{where}: {left.what}", left.why)
     inquiry.notes += [f"{where}: {note}" for note in inner.notes]
     for check, count in inner.done.items():
@@ -215,10 +215,15 @@ def part_again(
         inquiry.left("how the machine's errors changed since its calibration", why)
     asked = Asked(
         _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"],
-        bool(said["computed_again"]), tuple(trust or ()) if held else None, None, changes,
+        _asked_again(said), tuple(trust or ()) if held else None, None, changes,
     )  # fmt: skip
     found = found_of(job, asked, stage)
     return contents_of(found, stage, finished=finished), tuple(found.files)
+
+
+def _asked_again(said: Mapping[str, Any]) -> bool:
+    """Whether the machine's certificate was to be computed again, with ``--rerun``; another version may have made it."""
+    return {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]
 
 
 def _whole(value: Any, key: str) -> int:

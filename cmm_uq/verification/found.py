@@ -61,8 +61,8 @@ class Unchecked:
         return f"{self.what}: {self.why}"
 
 
-AGAIN = "computing again"
-"""What is left where the inputs are not computed again."""
+AGAIN, NOT_ASKED = "computing again", "not asked for (--no-rerun)"
+"""What is left where the inputs are not computed again, and why where nobody wished it."""
 
 CHECKS = {
     "files": "the files are what cmm-uq writes, with nothing active, hidden or further in them",

@@ -17,9 +17,12 @@ from typer.testing import CliRunner
 
 from cmm_uq.cli import NOT_VERIFIED, NOT_WHOLLY_CHECKED
 from cmm_uq.commands.part import part_found
+from cmm_uq.commands.part_machine import machine_found
 from cmm_uq.commands.part_written import Asked, contents_of, write_part
 from cmm_uq.commands.verify import Verification, verify
+from cmm_uq.commands.verify_part import _asked_again
 from cmm_uq.documents.part_found import PartFound
+from cmm_uq.documents.part_results import standing_data
 from cmm_uq.errors import CmmUqError
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of
@@ -180,3 +183,11 @@ def test_exit_codes_are_those_of_a_machines_certificate(tmp_path: Path) -> None:
     (tmp_path / "results.json").write_text('{"schema": "cmm-uq/part/1"}', encoding="utf-8")
     with pytest.raises(CmmUqError, match="is neither cmm-uq/results/1 nor cmm-uq/part/1"):
         verify([tmp_path / "results.json"])
+
+
+@pytest.mark.parametrize("rerun", [False, True])
+def test_a_report_that_was_to_compute_its_machine_again_is_made_again_so(rerun: bool) -> None:
+    """Whether or not that could be done: the report says of both what was asked."""
+    said = standing_data(machine_found(plate_of(by_results(), **THERE), rerun=rerun).standing)
+    assert not said["computed_again"]
+    assert _asked_again(said) == rerun
