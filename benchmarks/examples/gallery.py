@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/gallery.md: of each kind the artefact in its machine, and the first page of its certificate.
+"""Draws the pictures of docs/gallery.md: of each kind the artefact in its machine, of a part its points; and a first page.
 
     python -m benchmarks.examples.gallery [KIND ...]
 
@@ -37,10 +37,12 @@ EXAMPLES = {
     "shift": "shift-simulated",
     "shift_plate": "shift-plate-simulated",
     "error_map": "iota-1102-maps",
+    "part": "part-plate-simulated",
 }
 PLANNED = {"ballbar": "plan-ballbar", "step_gauge": "plan-step-gauge"}  # jobs that have no recording yet
 LENGTHS = {"bryan": "\n[plan]\nlength_mm = 300.0\n", "gauge_blocks": "\n[plan]\nlengths_mm = [100.0, 300.0, 500.0]\n"}
-NOT_PLANNED = ("plate_two_dates", "shift_plate", "error_map")
+NOT_PLANNED = ("plate_two_dates", "shift_plate", "error_map", "part")
+MAIN_FIGURE = {"part": 1}  # of the page, where it is not the first
 
 
 def first_page(kind: str, folder: Path) -> None:
@@ -48,8 +50,11 @@ def first_page(kind: str, folder: Path) -> None:
     if kind == "error_map":
         cmm_uq.diagnose(ROOT / "examples" / EXAMPLES[kind]).write(folder)
         return
-    cmm_uq.report(ROOT / "examples" / EXAMPLES[kind]).write(folder)
-    (pdf,) = folder.glob("certificate*.pdf")
+    if kind == "part":
+        cmm_uq.part(ROOT / "examples" / EXAMPLES[kind]).write(folder)
+    else:
+        cmm_uq.report(ROOT / "examples" / EXAMPLES[kind]).write(folder)
+    (pdf,) = (*folder.glob("certificate*.pdf"), *folder.glob("part*.pdf"))
     first_page_of(pdf, PICTURES / f"{kind}.png")
 
 
@@ -73,7 +78,7 @@ def placings(kind: str, folder: Path) -> None:
             text.replace('origin = "simulated"\n', "") + LENGTHS.get(kind, ""), encoding="utf-8"
         )
         page = cmm_uq.plan(job, power=False).write(folder / "plan")["plan.html"]
-    drawn = re.findall(r"<svg.*?</svg>", page.read_text(encoding="utf-8"), re.DOTALL)[0]
+    drawn = re.findall(r"<svg.*?</svg>", page.read_text(encoding="utf-8"), re.DOTALL)[MAIN_FIGURE.get(kind, 0)]
     paper = re.sub(
         r"(<svg.*?>)", r'\1<rect width="100%" height="100%" fill="#fff"/>', drawn, count=1
     )  # for dark screens

@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.cli import NOT_CONFORMING
 from cmm_uq.cli.completion import job_folders
 from cmm_uq.cli.options import Force, Json, Language, Quiet, Seed, Verbose, examples, out
-from cmm_uq.cli.printing import put_json, show_summary
+from cmm_uq.cli.printing import conclude
 from cmm_uq.cli.progress import shown
 
 EXAMPLES = examples(
@@ -75,14 +74,4 @@ def command(
 
         asked = Asked(seed, trials, digits, rerun, None if trust is None else tuple(trust), records)
         written = write_part(job, out, asked=asked, force=force, stage=stage or silent, language=language)
-    if json:
-        put_json(written.results.decode())
-    elif not quiet:
-        from cmm_uq.documents.origin import BANNERS
-        from cmm_uq.documents.part_summary import part_summary
-
-        facts = written.found.job.facts.job
-        told, banner = part_summary(written.found), BANNERS.get(facts.origin, "")
-        show_summary(told, written.files, verbose=verbose, name=facts.id, banner=banner)
-    if strict and not written.found.conforming:
-        raise typer.Exit(NOT_CONFORMING)
+    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)

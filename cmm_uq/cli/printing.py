@@ -8,7 +8,7 @@ import shutil
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, Protocol, TextIO
 
 import typer
 
@@ -19,7 +19,6 @@ from cmm_uq.writing.interruption import written
 
 if TYPE_CHECKING:
     from cmm_uq.cli.layout import Layout, Line
-    from cmm_uq.commands.written import Written
     from cmm_uq.documents.in_short import Summary
 
 WIDEST = 120
@@ -159,7 +158,39 @@ def show_summary(
     show(layout(verbose=verbose).screen(summary, name=name, banner=banner, files=rows, folder=folder))
 
 
-def conclude(ended: Written, *, json: bool, quiet: bool, strict: bool, verbose: bool) -> None:
+class Ended(Protocol):
+    """What a command wrote and found."""
+
+    @property
+    def results(self) -> bytes:
+        """Contents of results.json."""
+
+    @property
+    def files(self) -> Mapping[str, Path]:
+        """What was written, by name."""
+
+    @property
+    def summary(self) -> Summary:
+        """In a few lines."""
+
+    @property
+    def conforming(self) -> bool:
+        """Whether nothing that was decided is anything but a pass."""
+
+    @property
+    def name(self) -> str:
+        """Id of the job."""
+
+    @property
+    def origin(self) -> str:
+        """Of the recording."""
+
+    @property
+    def recorded(self) -> str:
+        """Where it was recorded, in a sentence; empty where it was not."""
+
+
+def conclude(ended: Ended, *, json: bool, quiet: bool, strict: bool, verbose: bool) -> None:
     """How a command ends that wrote an outcome: results.json or a summary, unless it is to be quiet.
 
     Raises
@@ -172,13 +203,9 @@ def conclude(ended: Written, *, json: bool, quiet: bool, strict: bool, verbose: 
     elif not quiet:
         from cmm_uq.documents.origin import BANNERS
 
-        job = ended.found.job
-        banner = BANNERS.get(job.origin, "")
-        show_summary(ended.summary, ended.files, verbose=verbose, name=job.facts.job.id, banner=banner)
-        if ended.records:
-            nameless = (
-                "" if job.facts.machine.serial else "; the machine has no [machine] serial and is known by its name"
-            )
-            say(f"Recorded in {ended.records}{nameless}.")
+        banner = BANNERS.get(ended.origin, "")
+        show_summary(ended.summary, ended.files, verbose=verbose, name=ended.name, banner=banner)
+        if ended.recorded:
+            say(ended.recorded)
     if strict and not ended.conforming:
         raise typer.Exit(NOT_CONFORMING)

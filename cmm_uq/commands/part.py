@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from cmm_uq.commands.part_further import further_of
-from cmm_uq.commands.part_machine import machine_found
+from cmm_uq.commands.part_machine import machine_found, with_calibration
 from cmm_uq.commands.part_methods import methods_of
 from cmm_uq.commands.part_plan import circumstances_of, doubled, origin_of, plan_of, poses_of
 from cmm_uq.commands.written import Stage, silent
@@ -58,6 +58,7 @@ def part_found(
     rerun: bool = False,
     trust: Iterable[Path] | None = None,
     records: str | Path | None = None,
+    changes: Mapping[str, float | None] | None = None,
     stage: Stage = silent,
 ) -> PartFound:
     """What a part's job gives.
@@ -71,6 +72,7 @@ def part_found(
     rerun : whether the machine's certificate is computed again from its inputs.
     trust : whose signatures on it are trusted; ``None`` where nothing need be signed.
     records : of the machine's history, for its drift; ``None`` for none.
+    changes : what records said of the drift at an earlier time, by parameter; then they are not asked.
     stage : told of progress.
 
     Raises
@@ -85,7 +87,10 @@ def part_found(
         for pose in poses_of(job, PLACES, machine):
             placed(plan, pose, machine)
 
-    machine = machine_found(job, rerun=rerun, trust=trust, records=records, seed=seed, stage=stage, fits=fits)
+    machine = machine_found(
+        job, rerun=rerun, trust=trust, records=records, changes=changes, seed=seed, stage=stage, fits=fits
+    )
+    job = with_calibration(job, machine.job)
     given = circumstances_of(job, machine.state, plan, PLACES)
     if job.measured is not None:
         given = replace(given, measured=job.measured)
@@ -108,7 +113,7 @@ def part_found(
         job, plan, given, virtual, simulated, known, measured, shares, unseen, None if further is None else further.further,
         judged(job, plan, errors, measured), None if together is None or np.isnan(together) else together, tuple(found_ways),
         displaced(virtual, seed=seed), _three(origin_of(job, machine.state.machine)),
-        machine.standing, compared(known, shares, others), digits=digits, seed=seed, warnings=machine.warnings,
+        machine.standing, compared(known, shares, others), digits=digits, seed=seed, asked=trials, warnings=machine.warnings,
         files={} if further is None else further.files,
     )  # fmt: skip
 

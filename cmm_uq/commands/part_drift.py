@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,13 +24,17 @@ _COLUMNS = ("day", "value", "u", "u_artefact", "artefact", "entry", "adjusted_si
 
 @dataclass(frozen=True, eq=False)
 class Aged:
-    """A machine on the day of a part's measurement, and what is known of its changes, in a sentence."""
+    """A machine on the day of a part's measurement, what is known of its changes, in a sentence, and in figures."""
 
     state: MachineState
     told: Text
+    changes: Mapping[str, float | None] | None = None
 
 
-def with_drift(state: MachineState, serial: str, on: dt.date, records: str | Path | None, where: str) -> Aged:
+def with_drift(
+    state: MachineState, serial: str, on: dt.date, records: str | Path | None, where: str, *,
+    known: Mapping[str, float | None] | None = None,
+) -> Aged:  # fmt: skip
     """The state of a machine on a day.
 
     Parameters
@@ -39,26 +44,41 @@ def with_drift(state: MachineState, serial: str, on: dt.date, records: str | Pat
     on : day of the part's measurement.
     records : of its history; ``None`` for none.
     where : names the certificate, for messages.
+    known : change of each reported parameter, as records said at an earlier time; ``None`` where these are to be asked.
 
     Raises
     ------
     CmmUqError : the records cannot be read, or the machine was adjusted after its calibration.
     """
+    if known is not None:
+        return _aged(state, on, lambda name, days: known.get(name))
     if records is None:
         found = aged(state, on)
         return Aged(found, _not_known(found))
     from cmm_uq.commands.history import history_of
 
-    known = history_of(serial, records, on=on)
+    past = history_of(serial, records, on=on)
     since = state.calibrated or on
-    late = max((day for day in known.machine.adjusted if since < day <= on), default=None)
+    late = max((day for day in past.machine.adjusted if since < day <= on), default=None)
     if late is not None:
         raise CmmUqError(
             f"the machine was adjusted on {late}, after its calibration of {since}: its certificate no longer holds",
             where=where, fix="Calibrate the machine, or give the certificate of after the adjustment",
         )  # fmt: skip
-    found = aged(state, on, _change(known, since))
-    return Aged(found, _known(found))
+    return _aged(state, on, _change(past, since))
+
+
+def _aged(state: MachineState, on: dt.date, change: Change) -> Aged:
+    """With changes of ten digits, as ``results.json`` has them, so that they give the same figures once more."""
+    changes: dict[str, float | None] = {}
+
+    def kept(name: str, days: float) -> float | None:
+        found = change(name, days)
+        changes[name] = None if found is None else float(f"{found:.10g}")
+        return changes[name]
+
+    found = aged(state, on, kept)
+    return Aged(found, _known(found), changes)
 
 
 def _change(known: MachineHistory, calibrated: dt.date) -> Change:

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cmm_uq import __version__
 from cmm_uq.commands.diagnosing import screened_model
 from cmm_uq.commands.estimation import with_noise
 from cmm_uq.commands.part_drift import with_drift
 from cmm_uq.commands.part_machine_warnings import machine_warnings, temperatures
-from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.documents.clauses import draft
 from cmm_uq.documents.part_found import Checked, Source, Standing
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
     from cmm_uq.commands.verify import Verification
 
 WHERE = "job.toml [machine_state]"
+
+CALIBRATION = "machine-job/"
+"""Before the names of inputs of the machine's own job, where they are attached to a part's report."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +73,13 @@ class _Stated:
     verdict: str
     checked: tuple[Checked, ...]
     again: bool = False
+    not_again: Text = NOTHING
 
 
 def machine_found(
     job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None, records: str | Path | None = None,
-    seed: int = 0, stage: Stage = silent, fits: Callable[[Machine], None] = lambda machine: None,
+    changes: Mapping[str, float | None] | None = None, seed: int = 0, stage: Stage = silent,
+    fits: Callable[[Machine], None] = lambda machine: None,
 ) -> MachineFound:  # fmt: skip
     """The machine of a part's job.
 
@@ -83,6 +89,7 @@ def machine_found(
     rerun : whether the certificate's figures are computed again from its inputs.
     trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
     records : of the machine's history, for its drift; ``None`` for none.
+    changes : what records said of the drift at an earlier time, by parameter; then they are not asked.
     seed : of the draws.
     stage : told of progress.
     fits : refuses a machine on which the part cannot be measured, before anything is computed.
@@ -95,7 +102,8 @@ def machine_found(
     if job.facts.machine_state.job is not None:
         stated = _analysed(job, seed, stage)
     else:
-        stated = _certified(job, rerun=rerun, trust=trust, stage=stage)
+        stage("Verifying the machine's certificate", 0.02)
+        stated = _certified(job, verified(job, rerun=rerun, trust=trust), rerun=rerun)
     standing = _standing(job, stated, trusted=trust is not None)
     machine = _machine(job, stated.job)
     fits(machine)
@@ -103,12 +111,17 @@ def machine_found(
     state = replace(
         state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=_known_at(state, standing)
     )
-    since = with_drift(state, standing.serial or standing.machine, job.facts.job.date, records, _where(job))
+    since = with_drift(
+        state, standing.serial or standing.machine, job.facts.job.date, records, _where(job), known=changes
+    )
     state = since.state
     stage("The machine's errors, given the recording of its calibration", 0.15)
     state, path, given = _given(state, stated.job, seed)
-    standing = replace(standing, path=path, drift=since.told, given_recording=given)
-    return MachineFound(state, standing, stated.job, tuple(machine_warnings(job, standing, stated.job)))
+    standing = replace(standing, path=path, drift=since.told, given_recording=given, changes=since.changes)
+    told = machine_warnings(job, standing, stated.job)
+    if rerun and stated.not_again:
+        told = [stated.not_again, *told]
+    return MachineFound(state, standing, stated.job, tuple(told))
 
 
 def refuse_machine(job: PartJob) -> None:
@@ -119,17 +132,32 @@ def refuse_machine(job: PartJob) -> None:
     CmmUqError : see :func:`machine_found`.
     """
     if job.facts.machine_state.job is None:
-        stated = _certified(job, rerun=False, trust=None, stage=silent)
-        _standing(job, stated, trusted=False)
-        _machine(job, stated.job)
+        standing_of(job, verified(job))
 
 
-def _certified(job: PartJob, *, rerun: bool, trust: Iterable[Path] | None, stage: Stage) -> _Stated:
-    """What a certificate states that verifies.
+def standing_of(job: PartJob, found: Verification) -> Standing:
+    """The machine's certificate on the day of the part's measurement, without what its errors then are.
+
+    Parameters
+    ----------
+    job : of the part.
+    found : the certificate, verified.
 
     Raises
     ------
-    CmmUqError : it does not, or has no draws of the posterior.
+    CmmUqError : see :func:`machine_found`.
+    """
+    stated = _certified(job, found, rerun=False)
+    _machine(job, stated.job)
+    return _standing(job, stated, trusted=False)
+
+
+def verified(job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None) -> Verification:
+    """The verification of the certificate that states the machine of a part's job.
+
+    Raises
+    ------
+    CmmUqError : it states too little, or a file of it is hostile.
     """
     from cmm_uq.commands.verify import verify_given
 
@@ -138,17 +166,41 @@ def _certified(job: PartJob, *, rerun: bool, trust: Iterable[Path] | None, stage
     if given.results is None:
         raise CmmUqError("states too little: neither draws of the machine's errors nor its recording are inside", where=where,
                          fix="Give certificate.pdf, or the folder that cmm-uq report wrote")  # fmt: skip
-    stage("Verifying the machine's certificate", 0.02)
-    found = verify_given(given, rerun=rerun, trust=trust)
+    if given.of_part:
+        raise CmmUqError("is of a part, and states no machine", where=where,
+                         fix="Give the certificate of the machine that measured the part")  # fmt: skip
+    return verify_given(given, rerun=rerun, trust=trust)
+
+
+def _certified(job: PartJob, found: Verification, *, rerun: bool) -> _Stated:
+    """What a certificate states that verifies.
+
+    Raises
+    ------
+    CmmUqError : it does not, or has no draws of the posterior.
+    """
+    given, where = found.given, _where(job)
     if wrong := found.inquiry.findings:
         more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
         first = ": ".join(filter(None, (wrong[0].file, wrong[0].place, wrong[0].problem)))
         raise CmmUqError(f"the machine's certificate does not verify: {first}{more}", where=where,
                          fix="cmm-uq verify says all that is wrong; ask for the certificate as it was issued")  # fmt: skip
-    results = given.results[1]
-    source: Source = "results" if found.job is None else "certificate"
-    return _Stated(source, job.stated_by, results, _drawn(job, given, results, where), found.job, found.inquiry.word,
-                   _checks(found), rerun and "again" in found.inquiry.done)  # fmt: skip
+    results = {} if given.results is None else given.results[1]
+    read = found.job
+    source: Source = "results" if read is None else "certificate"
+    again = rerun and "again" in found.inquiry.done
+    return _Stated(source, job.stated_by, results, _drawn(job, given, results, where), read, found.inquiry.word,
+                   _checks(found), again, NOTHING if again else _not_again(str(results["software"]["version"])))  # fmt: skip
+
+
+def _not_again(made: str) -> Text:
+    """Why a certificate was not computed again where that was asked for."""
+    if made != __version__:
+        return say(
+            "The machine's certificate was to be computed again and was not: version {made} made it, and this is {here}. "
+            "Verify it with the version that made it, or issue it anew.", made=Verbatim(made), here=Verbatim(__version__),
+        )  # fmt: skip
+    return say("The machine's certificate was to be computed again and was not: cmm-uq verify says why.")
 
 
 def _drawn(job: PartJob, given: Given, results: Mapping[str, Any], where: str) -> dict[str, Floats]:
@@ -182,11 +234,12 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
     from cmm_uq.documents.as_json import as_json
 
     named = str(job.facts.machine_state.job)
-    if job.folder == Path():
+    attached = attached_calibration(job)
+    if job.folder == Path() and not attached:
         raise CmmUqError("a part's job in memory has no other job beside it", where=f"{WHERE} job",
                          fix="Give the machine's certificate, or read the job from its folder")  # fmt: skip
     stage("Analysing the machine's job", 0.02)
-    read = read_job(job.folder / named)
+    read = job_of(attached) if attached else read_job(job.folder / named)
     found = analysis.analyse_job(read, seed=seed)
     outcome = analysis.outcome_of(found, seed)
     if outcome.draws is None:
@@ -194,6 +247,23 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
                          fix="Name a job whose errors are a list of effects")  # fmt: skip
     results = json.loads(as_json(outcome.results))
     return _Stated("job", (named,), results, outcome.draws.flat(), read, "ANALYSED", ())
+
+
+def attached_calibration(job: PartJob) -> dict[str, bytes]:
+    """Inputs of the machine's own job, of a part's report that has them inside; by their names in that job."""
+    if job.facts.machine_state.job is None:
+        return {}
+    return {
+        name.removeprefix(CALIBRATION): content for name, content in job.inputs.items() if name.startswith(CALIBRATION)
+    }
+
+
+def with_calibration(job: PartJob, calibration: Job | None) -> PartJob:
+    """A part's job with the inputs of its machine's job among its own, where that was analysed in place of a certificate."""
+    if job.facts.machine_state.job is None or calibration is None:
+        return job
+    named = {f"{CALIBRATION}{name}": content for name, content in calibration.inputs.items()}
+    return replace(job, inputs={**job.inputs, **named})
 
 
 def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:

@@ -8,10 +8,12 @@ import numpy as np
 
 from cmm_uq.documents.part_found import Standing
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.origin import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.messages import Text, Verbatim, day, say
 from cmm_uq.points import AXES, Floats
+
+_ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}
 
 NORMAL_C = 20.0
 """°C to which lengths are referred (ISO 1)."""
@@ -35,9 +37,8 @@ def machine_warnings(job: PartJob, standing: Standing, calibrated: Job | None) -
     calibrated : job of the calibration, where it is at hand.
     """
     if standing.origin != MEASURED:
-        yield say(
-            "The machine's calibration is {origin}: nobody measured this machine.", origin=Verbatim(standing.origin)
-        )
+        origin = _ORIGINS.get(standing.origin, Verbatim(standing.origin))
+        yield say("The machine's calibration is {origin}: nobody measured this machine.", origin=origin)
     if standing.draft:
         yield say("The machine's certificate is a draft: it does not state all that ISO/IEC 17025:2017 asks for.")
     if standing.source == "results":

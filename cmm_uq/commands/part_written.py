@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.commands.written import REPORTS, RESULTS, Stage, silent
+from cmm_uq.commands.written import REPORTS, RESULTS, Finished, Stage, silent, unchanged
 from cmm_uq.documents.fonts import fonts_of
 from cmm_uq.documents.origin import file_name
 from cmm_uq.documents.provenance import FILE as PROVENANCE
@@ -22,6 +22,7 @@ from cmm_uq.writing import Owner, staged
 
 if TYPE_CHECKING:
     from cmm_uq.documents.document import Document
+    from cmm_uq.documents.in_short import Summary
     from cmm_uq.documents.part_found import PartFound
 
 DOCUMENTS = ("part.html", "part.pdf")
@@ -40,6 +41,7 @@ class Asked:
     rerun : whether the machine's certificate is computed again from its inputs.
     trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
     records : of the machine's history, that its drift is read from; ``None`` for none.
+    changes : what records said of the drift at an earlier time, by parameter; then they are not asked.
     """
 
     seed: int = 0
@@ -48,6 +50,7 @@ class Asked:
     rerun: bool = False
     trust: tuple[Path, ...] | None = None
     records: str | Path | None = None
+    changes: Mapping[str, float | None] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +60,29 @@ class WrittenPart:
     found: PartFound
     results: bytes
     files: Mapping[str, Path] = field(default_factory=dict)
+    recorded: str = ""
+
+    @property
+    def summary(self) -> Summary:
+        """For the end of the command."""
+        from cmm_uq.documents.part_summary import part_summary
+
+        return part_summary(self.found)
+
+    @property
+    def conforming(self) -> bool:
+        """See :class:`~cmm_uq.documents.part_found.PartFound`."""
+        return self.found.conforming
+
+    @property
+    def name(self) -> str:
+        """Id of the job."""
+        return self.found.job.facts.job.id
+
+    @property
+    def origin(self) -> str:
+        """Of the recording."""
+        return self.found.job.facts.job.origin
 
 
 @naming_package()
@@ -71,7 +97,7 @@ def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
 
     return part_found(
         job, seed=asked.seed, trials=TRIALS if asked.trials is None else asked.trials, digits=asked.digits, rerun=asked.rerun,
-        trust=asked.trust, records=asked.records, stage=stage,
+        trust=asked.trust, records=asked.records, changes=asked.changes, stage=stage,
     )  # fmt: skip
 
 
@@ -135,8 +161,14 @@ def written(
     return WrittenPart(one, contents[RESULTS], files)
 
 
-def contents_of(found: PartFound, stage: Stage = silent) -> dict[str, bytes]:
+def contents_of(
+    found: PartFound, stage: Stage = silent, *, finished: Finished = unchanged
+) -> dict[str, bytes]:  # fmt: skip
     """Bytes of every file, by name.
+
+    Parameters
+    ----------
+    finished : what becomes of a document before the next is made of it.
 
     Raises
     ------
@@ -158,7 +190,8 @@ def contents_of(found: PartFound, stage: Stage = silent) -> dict[str, bytes]:
     document = document_of(found)
     stage("Rendering", 0.92)
     page = render_html(document).encode()
-    further = {RESULTS: data, PROVENANCE: provenance_of(_behind(found), results, {html: page, RESULTS: data})}
+    behind = provenance_of(_behind(found), results, {html: page, RESULTS: data})
+    further = {RESULTS: data, PROVENANCE: finished(PROVENANCE, behind)}
     return {html: page, pdf: render_pdf(document, {**job.inputs, **further}), **further, **found.files}
 
 

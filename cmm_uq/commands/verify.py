@@ -6,8 +6,8 @@ takes part in the computation is installed here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -16,13 +16,14 @@ from cmm_uq import __version__
 from cmm_uq.errors import CmmUqError
 from cmm_uq.languages.language import ENGLISH, Code
 from cmm_uq.verification.digital import check_schema, open_digital
-from cmm_uq.verification.found import Inquiry
-from cmm_uq.verification.given import RESULTS, RESULTS_SCHEMA, Given, check_files, read_given
+from cmm_uq.verification.found import AGAIN, NOT_ASKED, Inquiry
+from cmm_uq.verification.given import PART_SCHEMA, RESULTS, RESULTS_SCHEMA, Given, check_files, read_given
 from cmm_uq.verification.signed import check_signatures
 
 if TYPE_CHECKING:
     from cmm_uq.commands.written import Stage
     from cmm_uq.jobs.job import Job
+    from cmm_uq.jobs.part.job import PartJob
     from cmm_uq.verification.again import Again
 
 
@@ -38,7 +39,7 @@ class Verification:
     ----------
     given : the forms of the certificate.
     inquiry : what was found.
-    job : of the inputs, where they are there and sound.
+    job : of the inputs, where they are there and sound; of a part's report none.
     """
 
     given: Given
@@ -97,20 +98,34 @@ def verify_given(
     if trust is not None:
         from cmm_uq.signing import trust_of
 
-        trusted = trust_of(tuple(trust))
-    job = _compare(inquiry, given)
+        trust = tuple(trust)
+        trusted = trust_of(trust)
+    job: Job | None = None
+    part: PartJob | None = None
+    if given.of_part:
+        from cmm_uq.commands.verify_part import compare_part
+
+        part = compare_part(inquiry, given, rerun=rerun, trust=trust)
+    else:
+        job = _compare(inquiry, given)
     check_signatures(inquiry, given, trusted)
     if schema is not None:
         check_schema(inquiry, given, schema)
     alike = False
     if not rerun:
-        inquiry.left("computing again", "not asked for (--no-rerun)")
+        inquiry.left(AGAIN, NOT_ASKED)
+    elif part is not None:
+        alike = _compute_part_again(inquiry, given, part, trust, stage)
     elif job is not None:
         alike = _compute_again(inquiry, given, job, compute or (lambda given, job: again(given, job, stage)))
     if given.pdf is not None and given.html is not None and not alike:
         from cmm_uq.verification.views_agree import compare_views
 
         compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
+    if given.of_part and given.pdf is not None and given.html is None and not alike:
+        inquiry.left(
+            f"words of {given.pdf[0]} beside its figures and decisions", "no HTML is given to compare them with"
+        )
     if given.html is not None and not alike and _version(given) == __version__:
         from cmm_uq.verification.views_agree import check_style
 
@@ -134,15 +149,15 @@ def _check_schema(inquiry: Inquiry, given: Given) -> None:
     hashes = job.get("inputs_sha256") if isinstance(job, dict) else None
     software = data.get("software")
     if (
-        data.get("schema") != RESULTS_SCHEMA
+        data.get("schema") not in (RESULTS_SCHEMA, PART_SCHEMA)
         or not isinstance(hashes, dict)
         or not all(isinstance(one, str) for one in hashes.values())
         or not isinstance(software, dict)
         or not isinstance(software.get("version"), str)
     ):
         raise CmmUqError(
-            f"is no {RESULTS_SCHEMA}, with a job, the hashes of its inputs and the program", where=name,
-            fix="Give the results.json of cmm-uq report or cmm-uq diagnose",
+            f"is neither {RESULTS_SCHEMA} nor {PART_SCHEMA}, with a job, the hashes of its inputs and the program", where=name,
+            fix="Give the results.json of cmm-uq report, diagnose or part",
         )  # fmt: skip
 
 
@@ -227,6 +242,34 @@ def _compute_again(inquiry: Inquiry, given: Given, job: Job, compute: Compute) -
         return False
 
 
+def _compute_part_again(
+    inquiry: Inquiry, given: Given, job: PartJob, trust: Iterable[Path] | None, stage: Stage
+) -> bool:  # fmt: skip
+    """The same of a part."""
+    if given.results is None:
+        return False
+    data = given.results[1]
+    made = str(data["software"]["version"])
+    if _plugins_missing(inquiry, data):
+        return False
+    if made != __version__:
+        inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}: install that")
+        return False
+    from cmm_uq.commands.verify_part import part_again
+    from cmm_uq.verification.again import compare_again
+
+    kept: list[str] = []
+    try:
+        written = part_again(inquiry, job, data, partial(_as_attached, given, kept), trust=trust, stage=stage)
+    except CmmUqError as error:
+        inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
+        return False
+    if written is None:
+        return False
+    files, beside = written
+    return compare_again(inquiry, given, _again_of(given, files, kept, beside))
+
+
 def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Again:
     """What the inputs of a certificate give.
 
@@ -236,7 +279,6 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
     """
     from cmm_uq.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
     from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
-    from cmm_uq.verification.again import Again
 
     data = given.results[1] if given.results else {}
     seed = _seed(data)
@@ -247,14 +289,22 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
         form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, alpha=alpha, stage=stage)
     kept: list[str] = []
     written = form.contents(outcome, stage, finished=partial(_as_attached, given, kept))
+    return _again_of(given, written, kept)
+
+
+def _again_of(given: Given, written: Mapping[str, bytes], kept: Sequence[str], beside: Sequence[str] = ()) -> Again:
+    """Files that were made again, with the PDF where it is set by the program that set the given one."""
+    from cmm_uq.verification.again import Again
+
     pdf = next((content for name, content in written.items() if name.endswith(".pdf")), None)
     files = {name: content for name, content in written.items() if not name.endswith(".pdf")}
+    found = Again(files, None, kept=tuple(kept), beside=tuple(beside))
     if given.pdf is None or pdf is None:
-        return Again(files, kept=tuple(kept))
+        return found
     made, here = given.pdf[1].information.get("/Creator", ""), _creator(pdf)
     if made != here:
-        return Again(files, None, f"they were set by {made or 'another program'}, and here is {here}", tuple(kept))
-    return Again(files, pdf, kept=tuple(kept))
+        return replace(found, why_no_pdf=f"they were set by {made or 'another program'}, and here is {here}")
+    return replace(found, pdf=pdf)
 
 
 def _as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
@@ -310,7 +360,7 @@ def _plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
         if here != wanted:
             missing = True
             told = f"version {here} is installed" if here else "it is not installed"
-            inquiry.left("computing again", f"{package} {wanted} took part, and {told}")
+            inquiry.left(AGAIN, f"{package} {wanted} took part, and {told}")
     return missing
 
 
@@ -319,7 +369,7 @@ def _by_another_version(inquiry: Inquiry, given: Given, job: Job, made: str) -> 
     from cmm_uq.commands.corrections import Inputs, between, order, said
 
     if said(made) >= order(__version__):
-        inquiry.left("computing again", f"made by version {made}, and this is {__version__}: install that")
+        inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}: install that")
         return
     command = "report" if given.results and "estimates" in given.results[1] else "diagnose"
     kind = job.facts.artefact.kind
@@ -328,4 +378,4 @@ def _by_another_version(inquiry: Inquiry, given: Given, job: Job, made: str) -> 
     for one in touching:
         inquiry.notes.append(f"Version {one.version} corrects: {one.what}")
     told = "1 correction since then touches" if len(touching) == 1 else f"{len(touching)} corrections since then touch"
-    inquiry.left("computing again", f"made by version {made}, and this is {__version__}; {told} this certificate")
+    inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}; {told} this certificate")

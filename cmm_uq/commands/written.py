@@ -66,6 +66,25 @@ class Written:
         return self.outcome.found
 
     @property
+    def name(self) -> str:
+        """Id of the job."""
+        return self.found.job.facts.job.id
+
+    @property
+    def origin(self) -> str:
+        """Of the recording, and what became of it."""
+        return self.found.job.origin
+
+    @property
+    def recorded(self) -> str:
+        """Where it was recorded, in a sentence; empty where it was not."""
+        if not self.records:
+            return ""
+        named = self.found.job.facts.machine.serial
+        nameless = "" if named else "; the machine has no [machine] serial and is known by its name"
+        return f"Recorded in {self.records}{nameless}."
+
+    @property
     def summary(self) -> Summary:
         """For the end of the command."""
         return self.outcome.summary

@@ -204,17 +204,18 @@ def judge(limits: Limits, rule: Rule, value: float | None) -> Judged:
     rule : see :func:`cmm_uq.conformity.decision.decide`.
     value : as it is stated, less the mean error; ``None`` where nothing was measured: then what would be accepted is all.
     """
-    accepted = _accepted(limits, rule)
+    accepted = accepted_by(limits, rule)
     if value is None:
         return Judged(limits.lower, limits.upper, None, None, None, accepted, rule_words(rule))
     within, beyond = limits.knowing(value)
-    outcome = _outcome(limits, rule, value, accepted)
+    outcome = outcome_of(limits, rule, value, accepted)
     return Judged(limits.lower, limits.upper, outcome, within, beyond, accepted, rule_words(rule))
 
 
-def _outcome(
+def outcome_of(
     limits: Limits, rule: Rule, value: float, accepted: tuple[float | None, float | None] | None
 ) -> Outcome:  # fmt: skip
+    """What a rule makes of a value, where it is known which values it accepts."""
     inside = limits.inside(value)
     taken = accepted is not None and _between(value, accepted)
     if "non-binary" in rule_name(rule):
@@ -253,7 +254,8 @@ def _wide(limits: Limits, rule: Rule) -> bool:
     return width is None or width >= ratio * 2 * COVERAGE_FACTOR * limits.u
 
 
-def _accepted(limits: Limits, rule: Rule) -> tuple[float | None, float | None] | None:
+def accepted_by(limits: Limits, rule: Rule) -> tuple[float | None, float | None] | None:
+    """Smallest and largest value that a rule accepts; see :class:`Judged`."""
     if least_ratio(rule) is not None:
         return (limits.lower, limits.upper) if _wide(limits, rule) else None
     if (risk := largest_risk(rule)) is not None:

@@ -94,11 +94,16 @@ def grouped(*groups: tuple[Row, ...]) -> tuple[Facts, ...]:
     return tuple(Facts(rows) for group in groups if (rows := tuple((k, foreign(v)) for k, v in group if v)))
 
 
-def identified(job: Identification, laboratory: Laboratory, origin: str) -> tuple[Row, ...]:
-    """Number, customer, order and dates of any certificate."""
+CERTIFICATE_NUMBER = say("Certificate number")
+
+
+def identified(
+    job: Identification, laboratory: Laboratory, origin: str, numbered: Text = CERTIFICATE_NUMBER
+) -> tuple[Row, ...]:  # fmt: skip
+    """Number, by what it is called, customer, order and dates of any certificate or report."""
     measured = origin == MEASURED
     return (
-        (say("Certificate number") if measured else say("Job"), job.number if measured and job.number else job.id),
+        (numbered if measured else say("Job"), job.number if measured and job.number else job.id),
         *(_replacement(job) if measured else ()),
         (say("Customer"), "\n".join(filter(None, (job.customer, job.address)))),
         (say("Order"), job.order),

@@ -36,8 +36,60 @@ LENGTHS = Scale(unit("mm"), unit("µm"), 1.0, MICROMETRE)
 ANGLES = Scale(unit("°"), unit("″"), float(np.pi / 180), ARCSECOND)
 
 
+class Printed:
+    """How figures of one characteristic are printed: to the place of its U, in its units."""
+
+    @property
+    def scale(self) -> Scale:
+        """Its units."""
+        raise NotImplementedError
+
+    @property
+    def expanded(self) -> float:
+        """Half of the shortest 95 % interval of the errors, mm or rad."""
+        raise NotImplementedError
+
+    def small(self, size: float) -> Number:
+        """An uncertainty, two digits of it, in µm or ″."""
+        return significant(size / self.scale.per_small)
+
+    def at(self, value: float) -> Number:
+        """A value to the place of its U, in mm or °."""
+        return rounded(value / self.scale.per_value, self.expanded / self.scale.per_value)[0]
+
+    def error(self, value: float) -> Number:
+        """A difference to the place of U, in µm or ″."""
+        return rounded(value / self.scale.per_small, self.expanded / self.scale.per_small)[0]
+
+    def limit(self, value: float | None) -> Text:
+        """A limit or a nominal value as it was given, in mm or °."""
+        if value is None:
+            return DASH
+        return signed(float(f"{value / self.scale.per_value:.10g}"), ".10g")
+
+    def factor_of(self, k: float) -> Text:
+        """U over u; a dash where there is no u."""
+        return number(k, ".2f") if np.isfinite(k) else DASH
+
+    def interval_of(self, interval: tuple[float, float], *, measured: bool) -> Text:
+        """Of the value, mm or °; where nothing was measured, of value less indication, µm or ″."""
+        show = self.at if measured else self.error
+        return say("{low} to {high}", low=show(interval[0]), high=show(interval[1]))
+
+    def accepted_of(self, accepted: tuple[float | None, float | None] | None) -> Text:
+        """Which values a rule accepts, mm or °."""
+        if accepted is None:
+            return say("none")
+        low, high = accepted
+        if low is not None and high is not None:
+            return say("{low} to {high}", low=self.at(low), high=self.at(high))
+        if high is not None:
+            return say("up to {limit}", limit=self.at(high))
+        return DASH if low is None else say("from {limit}", limit=self.at(low))
+
+
 @dataclass(frozen=True, eq=False)
-class Figures:
+class Figures(Printed):
     """One characteristic in figures.
 
     Parameters
@@ -114,31 +166,12 @@ class Figures:
     @property
     def factor(self) -> Text:
         """U over u; a dash where there is no u."""
-        return number(self.stated.k, ".2f") if np.isfinite(self.stated.k) else DASH
-
-    def small(self, size: float) -> Number:
-        """An uncertainty, two digits of it, in µm or ″."""
-        return significant(size / self.scale.per_small)
-
-    def at(self, value: float) -> Number:
-        """A value to the place of its U, in mm or °."""
-        return rounded(value / self.scale.per_value, self.expanded / self.scale.per_value)[0]
-
-    def error(self, value: float) -> Number:
-        """A difference to the place of U, in µm or ″."""
-        return rounded(value / self.scale.per_small, self.expanded / self.scale.per_small)[0]
-
-    def limit(self, value: float | None) -> Text:
-        """A limit or a nominal value as it was given, in mm or °."""
-        if value is None:
-            return DASH
-        return signed(float(f"{value / self.scale.per_value:.10g}"), ".10g")
+        return self.factor_of(self.stated.k)
 
     @property
     def interval(self) -> Text:
-        """Of the value, mm or °; where nothing was measured, of value less indication, µm or ″."""
-        show = self.error if self.stated.value is None else self.at
-        return say("{low} to {high}", low=show(self.stated.interval[0]), high=show(self.stated.interval[1]))
+        """See :meth:`Printed.interval_of`."""
+        return self.interval_of(self.stated.interval, measured=self.stated.value is not None)
 
     @property
     def limits(self) -> tuple[float | None, float | None]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from cmm_uq.conformity.decision import rule_words
+from cmm_uq.conformity.decision import Outcome, rule_words
 from cmm_uq.conformity.limits import Judged
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
@@ -72,6 +72,8 @@ class Standing:
     drift : what is reckoned with of changes since the calibration, in a sentence.
     temperature_c : of the calibration; ``None`` where it does not say.
     inputs_sha256 : of the calibration, by name.
+    changes : root mean square change of each reported parameter since the calibration, in its unit, as records let expect;
+        ``None`` of one where they do not say, and as a whole without records.
     """
 
     source: Source
@@ -94,6 +96,7 @@ class Standing:
     drift: Text
     temperature_c: float | None = None
     inputs_sha256: Mapping[str, str] = field(default_factory=dict)
+    changes: Mapping[str, float | None] | None = None
 
 
 @dataclass(frozen=True)
@@ -140,6 +143,14 @@ class Further:
     missed: tuple[str, ...] = ()
 
 
+WORST_FIRST: tuple[Outcome, ...] = ("fail", "conditional fail", "undecided", "conditional pass", "pass")
+
+
+def outcome_of_part(outcomes: Sequence[Outcome]) -> Outcome | None:
+    """The worst of its characteristics; ``None`` where nothing is decided."""
+    return next((one for one in WORST_FIRST if one in outcomes), None)
+
+
 @dataclass(frozen=True, eq=False)
 class PartFound:
     """A part's measurement, with its uncertainty and what follows.
@@ -163,6 +174,7 @@ class PartFound:
     methods : other methods on this part beside this one; ``None`` where the job has none.
     digits : of u that were asked for; ``None`` where the number of draws was.
     seed : of everything random.
+    asked : virtual measurements that were asked for, of which ``digits`` may need more.
     files : that come with the page, by name.
     warnings : what the reader must know before using a figure.
     """
@@ -186,6 +198,7 @@ class PartFound:
     methods: Comparison | None = None
     digits: int | None = None
     seed: int = 0
+    asked: int = 0
     warnings: tuple[Text, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
 
@@ -220,18 +233,14 @@ class PartFound:
         return None if np.isnan(self.margins).all() else int(np.nanargmin(self.margins))
 
     @property
-    def outcome(self) -> str | None:
-        """Of the part: ``fail`` where one characteristic fails, ``pass`` where all with limits pass, else ``undecided``.
+    def outcomes(self) -> list[Outcome]:
+        """Of the characteristics that were decided on."""
+        return [one.outcome for one in self.judged if one is not None and one.outcome is not None]
 
-        A part with no worse than conditional passes passes conditionally; ``None`` where nothing is decided.
-        """
-        found = [one.outcome for one in self.judged if one is not None and one.outcome is not None]
-        if not found:
-            return None
-        for worst in ("fail", "conditional fail", "undecided", "conditional pass"):
-            if worst in found:
-                return worst
-        return "pass"
+    @property
+    def outcome(self) -> Outcome | None:
+        """Of the part: see :func:`outcome_of_part`."""
+        return outcome_of_part(self.outcomes)
 
     @property
     def judged_by(self) -> Text:

@@ -116,7 +116,8 @@ def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> 
         ax.set_xlabel(
             say("full dot: conforms, cross: does not, hollow dot: undecided; dark: what is accepted")
             if measured
-            else say("bar: 95 % interval about the middle, since nothing was measured; dark: what is accepted")
+            else say("bar: 95 % interval about the middle, since nothing was measured; dark: what is accepted"),
+            loc="right",  # towards the names: in some languages it is longer than the axis
         )
         caption = (
             say("The characteristics between their limits, with their 95 % intervals.")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+from cmm_uq.conformity.decision import Outcome
 from cmm_uq.documents.document import Overview, Standing
 from cmm_uq.documents.part_budget_section import best_words, largest_words, unseen_words
 from cmm_uq.documents.part_figures import Figures, critical, figures_of
-from cmm_uq.documents.part_found import PartFound
+from cmm_uq.documents.part_found import PartFound, outcome_of_part
 from cmm_uq.documents.wording import probability
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, number, plural, say, semicolons, sentences, signed
 
@@ -31,15 +32,25 @@ def overview_of(found: PartFound) -> Overview:
         (say("Not seen"), unseen_words(found) if found.unseen else NOTHING),
         (say("Not covered"), _not_covered(found)),
     )
-    return Overview(verdict_words(found), STANDING[found.outcome], tuple(row for row in rows if row[1]))
+    return Overview(
+        verdict_words(found.outcomes, measured=found.measured is not None),
+        STANDING[found.outcome],
+        tuple(row for row in rows if row[1]),
+    )
 
 
-def verdict_words(found: PartFound) -> Text:
-    """Whether the part conforms."""
-    outcomes = [one.outcome for one in found.judged if one is not None and one.outcome is not None]
-    if not outcomes:
-        return say("Measured: no limits to decide on") if found.measured is not None else _UNMEASURED
-    all_, outcome = len(outcomes), found.outcome
+def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
+    """Whether the part conforms.
+
+    Parameters
+    ----------
+    outcomes : of the characteristics that were decided on.
+    measured : whether anything was.
+    """
+    outcome = outcome_of_part(outcomes)
+    if outcome is None:
+        return say("Measured: no limits to decide on") if measured else _UNMEASURED
+    all_ = len(outcomes)
     if outcome == "pass":
         return plural(all_, one=say("Conforms: its one limited characteristic is within its limits"),
                       many=say("Conforms: all {count} limited characteristics are within limits", count=all_))  # fmt: skip

@@ -90,14 +90,14 @@ def _particulars(found: PartFound) -> tuple[Facts, ...]:
     if part.cte_per_k and part.u_cte_per_k:
         expansion = say("{expansion}, u = {u:g} × 10⁻⁶ /K", expansion=expansion, u=part.u_cte_per_k * 1e6)
     return grouped(
-        identified(job, facts.laboratory, job.origin),
+        identified(job, facts.laboratory, job.origin, say("Report number")),
         (
             (say("Part"), part.name),
             (say("Drawing"), part.drawing),
             (say("Serial number"), part.serial),
             (say("Owner"), part.owner),
             (say("Material"), part.material),
-            (say("Coefficient of thermal expansion"), expansion),
+            (say("Thermal expansion"), expansion),
             (say("Place"), job.place),
         ),
         certificate_rows(found.standing),

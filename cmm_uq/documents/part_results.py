@@ -33,7 +33,7 @@ def part_results(found: PartFound) -> dict[str, Any]:
                  "not_measured": list(facts.part.not_measured)},
         "machine": standing_data(found.standing),
         "simulation": {
-            "virtual_measurements": simulated.trials, "seed": found.seed, "coverage": simulated.coverage,
+            "virtual_measurements": simulated.trials, "asked": found.asked, "seed": found.seed, "coverage": simulated.coverage,
             "digits": found.digits, "settled": simulated.stable, "first_order": not found.virtual.exact,
             "places": len(found.virtual.places), "points": len(found.plan.points),
             "coefficients": sum(len(cause.factors) for cause in found.virtual.places[0].causes),
@@ -75,6 +75,9 @@ def standing_data(one: Standing) -> dict[str, Any]:
         "not_checked": [{"what": each.what, "why": each.why} for each in one.checked if each.why],
         "computed_again": one.again, "signatures_held_to_trusted": one.trusted, "draft": one.draft,
         "given_recording": one.given_recording, "drawn": _plain(one.path), "drift": _plain(one.drift),
+        "changes": None if one.changes is None else [
+            {"parameter": name, "change": change} for name, change in one.changes.items()
+        ],
         "temperature_c": one.temperature_c, "inputs_sha256": dict(one.inputs_sha256),
     }  # fmt: skip
 

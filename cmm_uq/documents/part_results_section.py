@@ -133,19 +133,15 @@ def _decision(one: Figures, nominal: float, *, measured: bool) -> tuple[Text, ..
             DASH if judged.probability is None else probability(judged.probability),
         )
     shown = DASH if one.zone else one.limit(nominal)
-    return one.number, one.beside, shown, one.limit(low), one.limit(high), _accepted(one), *decided
-
-
-def _accepted(one: Figures) -> Text:
-    accepted = None if one.judged is None else one.judged.accepted
-    if accepted is None:
-        return say("none")
-    low, high = accepted
-    if low is not None and high is not None:
-        return say("{low} to {high}", low=one.at(low), high=one.at(high))
-    if high is not None:
-        return say("up to {limit}", limit=one.at(high))
-    return DASH if low is None else say("from {limit}", limit=one.at(low))
+    return (
+        one.number,
+        one.beside,
+        shown,
+        one.limit(low),
+        one.limit(high),
+        one.accepted_of(None if judged is None else judged.accepted),
+        *decided,
+    )
 
 
 def _margin(one: Figures) -> Margin:

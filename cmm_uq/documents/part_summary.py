@@ -45,7 +45,7 @@ def _verdicts(found: PartFound) -> list[Verdict]:
     if found.together is not None and len(told) > 1:
         whole = found.outcome or "undecided"
         chance = say("all conform with {p}", p=probability(found.together))
-        told.insert(0, Verdict(_WORDS[whole], _STANDING[whole], say("the part"), (chance,)))  # type: ignore[index]
+        told.insert(0, Verdict(_WORDS[whole], _STANDING[whole], say("the part"), (chance,)))
     return told
 
 

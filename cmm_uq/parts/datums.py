@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.associating import Features
@@ -109,6 +108,8 @@ class BestFit:
 
     def frame(self, motion: Floats) -> Frame:
         """The frame that takes a motion (N, 6) back."""
+        from scipy.spatial.transform import Rotation
+
         turn = Rotation.from_rotvec(motion[:, 3:]).as_matrix()
         return Frame(turn, self.middle + motion[:, :3], self.middle)
 

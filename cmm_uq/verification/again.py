@@ -24,6 +24,12 @@ _NUMBER = re.compile(r"[−-]?\d+(?:[.,]\d+)*")
 _OTHER_KERNELS = 0.5
 """Share of the sampled figures from which on their differences are taken for those of other kernels."""
 
+_OF_ONE = ("sampling", "diagnosis", "budget", "correlation", "unseen", "decision")
+"""Parts whose figures are compared with one and not with themselves: shares, probabilities, statistics of a sampler."""
+
+FEWEST_OF_A_PART = 4000
+"""Draws behind a share of a part's variance, or behind what another way of measuring would give."""
+
 _ERRORS = 6.0
 """Standard errors of a Monte Carlo that two of it may differ by, beyond which one figure in 10⁸ lies."""
 
@@ -38,12 +44,14 @@ class Again:
     pdf : the PDF, with the files attached that the given one has; ``None`` where it cannot be set by the same program.
     why_no_pdf : that is so.
     kept : files that say on what platform they were made, and are otherwise what the inputs give.
+    beside : names of files that lie beside the documents and are not inside the PDF.
     """
 
     files: Mapping[str, bytes]
     pdf: bytes | None = None
     why_no_pdf: str = ""
     kept: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
 
 
 Difference = tuple[str, Any, Any]
@@ -118,8 +126,7 @@ def by_other_kernels(data: Any, new: Any) -> bool:
 
 def beyond_sampling(data: Any, new: Any, found: list[Difference]) -> Iterator[Difference]:
     """Of some differences those that neither printed digits nor Monte Carlo error explain."""
-    sampling = data.get("sampling") or {}
-    draws = min(filter(None, (sampling.get("ess_min"), (new.get("sampling") or {}).get("ess_min"))), default=0.0)
+    draws = min(filter(None, map(_draws, (data, new))), default=0.0)
     part = _ERRORS * math.sqrt(2.0 / draws) if draws > 0 else 1e-6
     quantities = dict(_quantities(new))
     for path, stands, should in found:
@@ -135,9 +142,16 @@ def beyond_sampling(data: Any, new: Any, found: list[Difference]) -> Iterator[Di
             place = _place(one)
             room = part * (one["u"] if path.endswith((".value", "]", ".u", ".U")) else scale) + place
         else:
-            room = part * max(scale, 1.0 if path.startswith(("sampling", "diagnosis")) else 0.0)
+            room = part * max(scale, 1.0 if path.startswith(_OF_ONE) else 0.0)
         if abs(stands - should) > room:
             yield path, stands, should
+
+
+def _draws(data: Mapping[str, Any]) -> float:
+    """Independent draws behind the figures that have fewest of them."""
+    if "simulation" in data:
+        return float(min(data["simulation"]["virtual_measurements"], FEWEST_OF_A_PART))
+    return float((data.get("sampling") or {}).get("ess_min") or 0.0)
 
 
 def _quantities(data: Any, path: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -216,7 +230,7 @@ def _compare_attached(inquiry: Inquiry, given: Given, again: Again, *, kernels: 
     for name, data in written.items():
         stands = given.files.get(name)
         inquiry.looked("again")
-        if stands is None and given.pdf is not None:
+        if stands is None and given.pdf is not None and name not in again.beside:
             inquiry.wrong("again", given.pdf[0], f"attachment {name}", "is missing, and the inputs give it")
         elif stands is not None and stands != data and not kernels:
             inquiry.wrong("again", name, "", "is not what the inputs give")

@@ -61,6 +61,9 @@ class Unchecked:
         return f"{self.what}: {self.why}"
 
 
+AGAIN, NOT_ASKED = "computing again", "not asked for (--no-rerun)"
+"""What is left where the inputs are not computed again, and why where nobody wished it."""
+
 CHECKS = {
     "files": "the files are what cmm-uq writes, with nothing active, hidden or further in them",
     "signatures": "signatures are intact and cover the whole file; whom one must trust for them is trusted, or named above",

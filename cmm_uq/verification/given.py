@@ -19,9 +19,9 @@ from cmm_uq.writing import MANIFEST
 from cmm_uq.writing.manifest import Manifest, parsed, plain_name
 
 RESULTS, JOB = "results.json", "job.toml"
-RESULTS_SCHEMA = "cmm-uq/results/1"
+RESULTS_SCHEMA, PART_SCHEMA = "cmm-uq/results/1", "cmm-uq/part/1"
 
-_FIX = "Give files that cmm-uq report or cmm-uq diagnose wrote, or their folder"
+_FIX = "Give files that cmm-uq report, diagnose or part wrote, or their folder"
 
 
 @dataclass
@@ -48,6 +48,11 @@ class Given:
     contents: dict[str, bytes] = field(default_factory=dict)
 
     @property
+    def of_part(self) -> bool:
+        """Whether it is the report of a part."""
+        return self.results is not None and self.results[1].get("schema") == PART_SCHEMA
+
+    @property
     def files(self) -> Mapping[str, bytes]:
         """Whatever belongs to the certificate beside its forms, by name: those inside the PDF, else those given."""
         inside = {} if self.pdf is None else self.pdf[1].files
@@ -66,11 +71,11 @@ def read_given(paths: Iterable[Path]) -> Given:
     CmmUqError : one cannot be read, is nothing of a certificate, or there are two of a form.
     """
     read: dict[str, tuple[bytes, str]] = {}
-    for path in _files(paths):
-        if path.name in read:
-            raise CmmUqError(f"there are two files {path.name!r}, and one certificate is verified at a time", where=str(path),
+    for name, path in _files(paths):
+        if name in read:
+            raise CmmUqError(f"there are two files {name!r}, and one certificate is verified at a time", where=str(path),
                              fix=_FIX)  # fmt: skip
-        read[path.name] = content_of(path, PDF_BYTES, _FIX), str(path)
+        read[name] = content_of(path, PDF_BYTES, _FIX), str(path)
     return _given(read)
 
 
@@ -100,29 +105,49 @@ def _given(read: Mapping[str, tuple[bytes, str]]) -> Given:
     return given
 
 
-def _files(paths: Iterable[Path]) -> list[Path]:
-    """Files, those of a folder in the order of their names; links lead elsewhere and are refused."""
-    found: list[Path] = []
+def _files(paths: Iterable[Path]) -> list[tuple[str, Path]]:
+    """Files with their names, those of a folder in the order of these; links lead elsewhere and are refused.
+
+    Of folders inside a folder those files are read that its manifest names.
+    """
+    found: list[tuple[str, Path]] = []
     for path in paths:
         if path.is_symlink():
             raise CmmUqError("is a link, which may lead to anything", where=str(path), fix="Give the file itself")
         if not path.is_dir():
-            found.append(path)
+            found.append((path.name, path))
             continue
         inside = sorted(
             Path(one.path) for one in os.scandir(path) if not one.name.startswith(".") and not _is_folder(one)
         )
         if not inside:
             raise CmmUqError("holds no files", where=str(path), fix=_FIX)
-        if linked := next((one for one in inside if one.is_symlink()), None):
+        named = [(one.name, one) for one in inside] + _deeper(path)
+        if linked := next((one for name, one in named if _is_linked(path, name)), None):
             raise CmmUqError(
                 "is a link, which may lead to anything", where=str(linked), fix="Put the file itself there"
             )
-        found += inside
+        found += named
     if len(found) > GIVEN.most:
-        raise CmmUqError(f"{len(found)} files are given, and {GIVEN.most} are read at once", where=str(found[0].parent),
+        raise CmmUqError(f"{len(found)} files are given, and {GIVEN.most} are read at once", where=str(found[0][1].parent),
                          fix=_FIX)  # fmt: skip
     return found
+
+
+def _deeper(folder: Path) -> list[tuple[str, Path]]:
+    """Files in folders inside a folder that its manifest names and that are there."""
+    if (folder / MANIFEST).is_symlink() or not (folder / MANIFEST).is_file():
+        return []
+    content = content_of(folder / MANIFEST, PDF_BYTES, _FIX)
+    manifest = parsed(strict_json(content, str(folder / MANIFEST)))
+    names = [] if manifest is None else [name for name in manifest.files if "/" in name and plain_name(name)]
+    return [(name, folder / name) for name in sorted(names) if (folder / name).is_file()]
+
+
+def _is_linked(folder: Path, name: str) -> bool:
+    """Whether a file in a folder, or a folder on the way to it, is a link."""
+    parts = name.split("/")
+    return any(folder.joinpath(*parts[: i + 1]).is_symlink() for i in range(len(parts)))
 
 
 def _is_folder(one: os.DirEntry[str]) -> bool:
@@ -132,7 +157,9 @@ def _is_folder(one: os.DirEntry[str]) -> bool:
 def _sort(given: Given, name: str, content: bytes, where: str) -> None:
     """Put a file where it belongs, by what it begins with."""
     head = content[:1024].removeprefix(b"\xef\xbb\xbf").lstrip().lower()
-    if head.startswith(b"%pdf-") or name.lower().endswith(".pdf"):
+    if "/" in name:
+        given.others[name] = content
+    elif head.startswith(b"%pdf-") or name.lower().endswith(".pdf"):
         _once(given.pdf, "PDF", where)
         given.pdf = name, read_pdf(content, where)
     elif head.startswith((b"<!doctype html", b"<html")) or name.lower().endswith((".html", ".htm")):
@@ -145,7 +172,9 @@ def _sort(given: Given, name: str, content: bytes, where: str) -> None:
         given.manifest = parsed(strict_json(content, where))
         if given.manifest is None:
             raise CmmUqError("is no manifest of cmm-uq", where=where, fix=_FIX)
-    elif name == RESULTS or (head.startswith(b"{") and b'"cmm-uq/results/' in head):
+    elif name == RESULTS or (
+        head.startswith(b"{") and any(one in head for one in (b'"cmm-uq/results/', b'"cmm-uq/part/'))
+    ):
         _once(given.results, RESULTS, where)
         given.results = name, strict_json(content, where), content
     else:
@@ -160,7 +189,7 @@ def _once(before: object, what: str, where: str) -> None:
 def check_files(inquiry: Inquiry, given: Given) -> None:
     """Keep what does not belong in the files, and which of them are not what the folder's manifest says."""
     if given.pdf is not None:
-        _check_pdf(inquiry, *given.pdf)
+        _check_pdf(inquiry, *given.pdf, deeper=given.of_part)
         inside = given.pdf[1].files
         for name in sorted(given.others.keys() & inside.keys()):
             inquiry.looked("forms")
@@ -174,8 +203,8 @@ def check_files(inquiry: Inquiry, given: Given) -> None:
         _check_manifest(inquiry, given, given.manifest)
 
 
-def _check_pdf(inquiry: Inquiry, name: str, pdf: PdfFile) -> None:
-    """What does not belong in a PDF, and what is wrong with the names of its files."""
+def _check_pdf(inquiry: Inquiry, name: str, pdf: PdfFile, *, deeper: bool) -> None:
+    """What does not belong in a PDF, and what is wrong with the names of its files, which may lie in folders or not."""
     inquiry.looked("files")
     for place, problem in pdf.problems:
         inquiry.wrong("files", name, place, problem)
@@ -185,7 +214,7 @@ def _check_pdf(inquiry: Inquiry, name: str, pdf: PdfFile) -> None:
         if one.name in seen:
             inquiry.wrong("files", name, place, "is attached twice: readers may show either")
         seen.add(one.name)
-        if not plain_name(one.name) or "/" in one.name:
+        if not plain_name(one.name) or ("/" in one.name and not deeper):
             inquiry.wrong("files", name, place, "has a name that leads out of its folder")
         should = "Data" if one.name.lower().endswith((".json", ".npz", ".xml")) else "Source"
         if one.relationship != should:

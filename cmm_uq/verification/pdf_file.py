@@ -37,6 +37,9 @@ ACTIVE = frozenset({
 HIDING = frozenset({"/OCProperties", "/OCG", "/OCMD", "/OC"})
 """The same of what may be shown or not."""
 
+_END = re.compile(rb"startxref\s+(\d{1,12})\s+%%EOF(?:\r\n|\n|\r)?")
+_TRAILER = re.compile(rb"trailer\s*<<(?P<told>(?s:.{0,2000}?))>>\s*(?P<end>startxref)")
+_BEFORE = re.compile(rb"/Prev\s+(\d{1,12})")
 _DO = re.compile(rb"/([^\s/<>\[\](){}%]+)\s+Do\b")
 _INVISIBLE = re.compile(rb"(?<![\d.])[1-7]\s+Tr\b")
 _UNTOLD = frozenset({"/Type", "/Length", "/Filter"})
@@ -116,18 +119,47 @@ def read_pdf(content: bytes, where: str) -> PdfFile:
     if len(content) > PDF_BYTES.most:
         raise CmmUqError(f"is larger than {PDF_BYTES.most} bytes", where=where, fix=_FIX)
     found = PdfFile(content, where=where)
-    found.ends = [match.end() for match in re.finditer(rb"%%EOF(?:\r\n|\n|\r)?", content)]
-    if not content.startswith(b"%PDF-") or not found.ends:
+    marks = list(_END.finditer(content))
+    if not content.startswith(b"%PDF-") or not marks:
         raise CmmUqError("is no whole PDF: its beginning or its end is missing", where=where, fix=_FIX)
+    found.ends = _revisions(content, marks, where)
     if rest := len(content) - found.ends[-1]:
         found.problems.append((f"byte {found.ends[-1]}", f"has {rest} bytes after its end"))
-    for match in re.finditer(rb"startxref\s+(\d{1,12})", content):
-        if not content.startswith(b"xref", int(match[1])):
-            raise CmmUqError("has no table of its objects where it says: it is damaged, or no PDF of cmm-uq",
-                             where=f"{where}: byte {match.start()}", fix=_FIX)  # fmt: skip
     with reading(where):
         _read(found, where)
+    _check_ends(found, marks)
     return found
+
+
+def _revisions(content: bytes, marks: list[re.Match[bytes]], where: str) -> list[int]:
+    """Bytes up to the end of each revision, the first one first: from the last, each leads to the one before it.
+
+    A PDF that is attached as it is has ends of its own, which are none of the file.
+    """
+    of, ends, at = {mark.start(): mark for mark in marks}, list[int](), int(marks[-1][1])
+    place = marks[-1].start()
+    while True:
+        trailer = _TRAILER.search(content, at) if content.startswith(b"xref", at) else None
+        own = None if trailer is None else of.get(trailer.start("end"))
+        if trailer is None or own is None or int(own[1]) != at:
+            raise CmmUqError("has no table of its objects where it says: it is damaged, or no PDF of cmm-uq",
+                             where=f"{where}: byte {place}", fix=_FIX)  # fmt: skip
+        ends.append(own.end())
+        before = _BEFORE.search(trailer["told"])
+        if before is None:
+            return ends[::-1]
+        place = own.start()
+        if int(before[1]) >= at:
+            raise CmmUqError("goes round in its revisions: it is damaged", where=f"{where}: byte {place}", fix=_FIX)
+        at = int(before[1])
+
+
+def _check_ends(found: PdfFile, marks: list[re.Match[bytes]]) -> None:
+    """Ends that no revision has, and no attached file either."""
+    inside = [(at, at + len(one.content)) for one in found.attachments if (at := found.content.find(one.content)) >= 0]
+    for mark in marks:
+        if mark.end() not in found.ends and not any(begin <= mark.start() < end for begin, end in inside):
+            found.problems.append((f"byte {mark.start()}", "has an end of a revision that nothing leads to"))
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cmm_uq import __version__
 from cmm_uq.commands.part import judged, part_found
 from cmm_uq.commands.part_machine import machine_found
 from cmm_uq.commands.part_plan import plan_of
@@ -169,9 +170,16 @@ def test_results_say_what_was_found_with_hashes_of_all_inputs() -> None:
 
 def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
     told, there = set(PART_RESULTS), set(results_keys(json.loads(as_json(part_results(shifted())))))
-    empty = {"further", "simulation.not_drawn"}  # here
+    empty = {"further", "simulation.not_drawn", "machine.changes"}  # here
     assert there - told - empty == set()
-    sometimes = ("job.number", "job.language", "simulation.not_drawn[]", "further", "other_methods.")
+    sometimes = (
+        "job.number",
+        "job.language",
+        "simulation.not_drawn[]",
+        "further",
+        "machine.changes[]",
+        "other_methods.",
+    )
     assert {key for key in told - there if not key.startswith(sometimes)} == set()
 
 
@@ -245,6 +253,19 @@ def test_a_certificate_holds_until_its_last_day(last: dt.date) -> None:
     state = {**THERE["machine_state"], "valid_until": last}
     found = machine_found(plate_of(by_results(), machine_state=state))
     assert found.standing.valid_until == last
+
+
+def test_a_certificate_of_another_version_that_was_to_be_computed_again_is_told_with_both_versions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for module in ("verify", "part_machine"):
+        monkeypatch.setattr(f"cmm_uq.commands.{module}.__version__", "99.0.0")
+    job = plate_of(by_certificate())
+    (first, *_) = machine_found(job, rerun=True).warnings
+    assert "was to be computed again and was not: version " in first
+    assert __version__ in first
+    assert "99.0.0" in first
+    assert not any("computed again" in one for one in machine_found(job).warnings)
 
 
 def test_temperatures_outside_of_the_calibrations_are_told() -> None:

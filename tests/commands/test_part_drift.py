@@ -51,6 +51,17 @@ def test_a_steady_drift_goes_on_by_its_rate_and_more(records: Path) -> None:
     assert sooner.state.drift[0] < 0.6 * found.state.drift[0]
 
 
+def test_changes_as_results_have_them_give_the_same_drift_once_more(records: Path) -> None:
+    """To the bit, through ten digits; without the records."""
+    found = with_drift(STATE, "1102", ON, records, "job.toml")
+    assert found.changes is not None
+    assert found.changes["scale_y.ppm"] is None
+    kept = {name: None if one is None else float(f"{one:.10g}") for name, one in found.changes.items()}
+    again = with_drift(STATE, "1102", ON, None, "job.toml", known=kept)
+    np.testing.assert_array_equal(again.state.drift, found.state.drift)
+    assert (again.told, again.state.drift_unknown) == (found.told, found.state.drift_unknown)
+
+
 def test_a_machine_that_was_adjusted_since_is_refused(tmp_path: Path) -> None:
     since = certificate("1102", dt.date(2026, 9, 1), scale(0.0), adjusted_since="2026-06-01")
     kept = recorded(tmp_path, certificate("1102", CALIBRATED, scale(5.0)), since)

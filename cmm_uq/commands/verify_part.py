@@ -1,0 +1,232 @@
+"""Is the report of a part what it says? Its figures and inputs, the machine's certificate inside, and all computed again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from cmm_uq.errors import CmmUqError
+from cmm_uq.languages.language import ENGLISH, Code
+from cmm_uq.verification.found import AGAIN, NOT_ASKED, Finding, Inquiry
+from cmm_uq.verification.given import RESULTS, Given
+
+if TYPE_CHECKING:
+    from cmm_uq.commands.written import Finished, Stage
+    from cmm_uq.jobs.part.job import PartJob
+
+TRUSTED = "whose signature the machine's certificate has"
+
+
+def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None) -> PartJob | None:
+    """Figures, decisions, inputs and the machine's certificate of a part's report; its job, where the inputs are sound.
+
+    Parameters
+    ----------
+    rerun : whether the machine's certificate is computed again.
+    trust : files and folders of certificates that are trusted; ``None`` for nobody.
+    """
+    if given.results is None:
+        return None
+    from cmm_uq.verification.inputs import check_results, inputs_of
+    from cmm_uq.verification.part_decided import check_part_decisions
+    from cmm_uq.verification.part_figures import check_part_figures
+
+    name, data, _ = given.results
+    try:
+        check_results(inquiry, given)
+        check_part_figures(inquiry, data, name)
+        check_part_decisions(inquiry, data, name)
+        _check_stated(inquiry, given)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, CmmUqError) as error:
+        inquiry.wrong("figures", name, "", f"has not the parts that cmm-uq writes ({type(error).__name__}: {error})")
+    inputs = inputs_of(inquiry, given)
+    if inputs is None:
+        inquiry.left(f"the machine's certificate and {AGAIN}", "the inputs are not there as results.json names them")
+        return None
+    try:
+        job = part_job(inputs, data)
+    except CmmUqError as error:
+        inquiry.wrong("inputs", "inputs", "", f"are no job that this version reads: {error}")
+        return None
+    try:
+        _check_job(inquiry, job, data, name)
+        _check_machine(inquiry, job, data, name, rerun=rerun, trust=trust)
+    except (KeyError, TypeError, AttributeError) as error:
+        inquiry.wrong("inputs", name, "", f"has not the parts that cmm-uq writes ({type(error).__name__}: {error})")
+        return None
+    return job
+
+
+def _check_stated(inquiry: Inquiry, given: Given) -> None:
+    """What page and PDF state; their words are compared with each other besides, where both are there."""
+    from cmm_uq.verification.part_stated import check_part_stated
+
+    if given.results is None:
+        return
+    name, data, _ = given.results
+    if given.html is not None:
+        check_part_stated(inquiry, data, given.html[1].text, files=(given.html[0], name))
+    if given.pdf is not None:
+        check_part_stated(inquiry, data, _without_feet(given), files=(given.pdf[0], name))
+
+
+def _without_feet(given: Given) -> str:
+    from cmm_uq.verification.views_agree import squashed, without_foot
+
+    if given.pdf is None:
+        return ""
+    pdf = given.pdf[1]
+    title = squashed(pdf.information.get("/Title", ""))
+    pages = enumerate(pdf.pages, 1)
+    return "".join(without_foot(squashed(text), title, number, len(pdf.pages))[0] for number, text in pages)
+
+
+def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
+    """The job of the inputs of a part's report, with those of the machine's job where that was analysed.
+
+    Raises
+    ------
+    CmmUqError : they are no job of a part.
+    """
+    from cmm_uq.commands.part_machine import CALIBRATION
+    from cmm_uq.commands.part_written import in_language
+    from cmm_uq.jobs.part.job import part_of
+
+    language = data["job"].get("language", ENGLISH)
+    if language not in get_args(Code):
+        raise CmmUqError(f"{language!r} is no language of documents", where=f"{RESULTS}: job.language")
+    own = {name: content for name, content in inputs.items() if not name.startswith(CALIBRATION)}
+    job = in_language(part_of(own), language)
+    if job.facts.machine_state.job is None:
+        return job if len(own) == len(inputs) else in_language(part_of(inputs), language)
+    return replace(job, inputs={**job.inputs, **inputs})
+
+
+def _check_job(inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str) -> None:
+    from cmm_uq.commands.part_plan import plan_of
+    from cmm_uq.parts.result import evaluated
+    from cmm_uq.verification.part_job import check_part_job
+
+    inquiry.looked("inputs")
+    if sorted(data["job"]["inputs_sha256"]) != sorted(job.inputs):
+        inquiry.wrong("inputs", file, "job.inputs_sha256", "names other files than the job",
+                      sorted(data["job"]["inputs_sha256"]), sorted(job.inputs))  # fmt: skip
+    try:
+        plan = plan_of(job)
+        measured = None if job.measured is None else evaluated(plan, job.measured)
+    except CmmUqError as error:
+        inquiry.wrong("inputs", file, "", f"is of a job that cannot be evaluated: {error}")
+        return
+    check_part_job(inquiry, job, plan, measured, data, file)
+
+
+def _check_machine(
+    inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str, *, rerun: bool, trust: Iterable[Path] | None
+) -> None:
+    """The certificate that states the machine, verified as it would be by itself, and whether it held on the day."""
+    from cmm_uq.commands.part_machine import attached_calibration, standing_of, verified
+    from cmm_uq.jobs.reading import sha256
+    from cmm_uq.verification.part_job import check_standing
+
+    said = data["machine"]
+    if job.facts.machine_state.job is not None:
+        inquiry.looked("inputs")
+        hashes = sha256(attached_calibration(job))
+        if said["inputs_sha256"] != hashes:
+            inquiry.wrong(
+                "inputs",
+                file,
+                "machine.inputs_sha256",
+                "are not the machine's job inside",
+                said["inputs_sha256"],
+                hashes,
+            )
+        inquiry.notes.append("No certificate states the machine: its job was analysed, and is inside.")
+        return
+    held = bool(said["signatures_held_to_trusted"])
+    if held and trust is None:
+        inquiry.left(TRUSTED, "it was held to trusted certificates, and none are given (--trust)")
+    where = ", ".join(job.stated_by)
+    try:
+        found = verified(job, rerun=rerun, trust=trust if held else None)
+    except CmmUqError as error:
+        inquiry.wrong("inputs", where, "", f"is no certificate that states the machine: {error}")
+        return
+    _merge(inquiry, found.inquiry, where)
+    if found.inquiry.findings:
+        return
+    inquiry.looked("dates")
+    try:
+        standing = standing_of(job, found)
+    except CmmUqError as error:
+        inquiry.wrong("dates", where, "", f"does not hold for this part: {error.problem}")
+        return
+    check_standing(inquiry, standing, data, file)
+
+
+def _merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:
+    """What was found of the certificate inside, named as such."""
+    for one in inner.findings:
+        inquiry.findings.append(
+            Finding(one.check, _within(where, one.file), one.place, one.problem, one.stands, one.should)
+        )
+    for left in inner.unchecked:
+        if (left.what, left.why) != (AGAIN, NOT_ASKED):
+            inquiry.left(f"{where}: {left.what}", left.why)
+    inquiry.notes += [f"{where}: {note}" for note in inner.notes]
+    for check, count in inner.done.items():
+        inquiry.looked(check, count)
+
+
+def _within(where: str, file: str) -> str:
+    """A file of the certificate inside; the certificate itself by the name that it has among the inputs."""
+    return where if where.rpartition("/")[2] == file else f"{where}: {file}"
+
+
+def part_again(
+    inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], finished: Finished, *, trust: Iterable[Path] | None, stage: Stage
+) -> tuple[dict[str, bytes], tuple[str, ...]] | None:  # fmt: skip
+    """Files that the inputs of a part's report give, by name, and which of them are not inside the PDF.
+
+    ``None`` where that cannot be known, with the reason kept.
+
+    Parameters
+    ----------
+    data : of results.json.
+    finished : what becomes of a document before the next is made of it.
+
+    Raises
+    ------
+    CmmUqError : they give nothing.
+    """
+    from cmm_uq.commands.part_written import Asked, contents_of, found_of
+
+    said, simulation = data["machine"], data["simulation"]
+    held = bool(said["signatures_held_to_trusted"])
+    if held and trust is None:
+        inquiry.left(AGAIN, "the machine's certificate was held to trusted certificates, and none are given (--trust)")
+        return None
+    changes = None
+    if said.get("changes") is not None:
+        changes = {str(one["parameter"]): one["change"] for one in said["changes"]}
+        why = "records that are not inside said so; all else is computed again with the changes that results.json has"
+        inquiry.left("how the machine's errors changed since its calibration", why)
+    asked = Asked(
+        _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"],
+        _asked_again(said), tuple(trust or ()) if held else None, None, changes,
+    )  # fmt: skip
+    found = found_of(job, asked, stage)
+    return contents_of(found, stage, finished=finished), tuple(found.files)
+
+
+def _asked_again(said: Mapping[str, Any]) -> bool:
+    """Whether the machine's certificate was to be computed again, with ``--rerun``; another version may have made it."""
+    return {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]
+
+
+def _whole(value: Any, key: str) -> int:
+    if not isinstance(value, int) or value < 0:
+        raise CmmUqError(f"{value!r} is none", where=f"{RESULTS}: simulation.{key}")
+    return value

@@ -1,0 +1,46 @@
+"""A report of a plate, made once, and forgeries of it in which all documents agree with each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from cmm_uq.commands.part import part_found
+from cmm_uq.commands.part_written import contents_of
+from cmm_uq.documents.part_found import PartFound
+from tests.part_machines import by_certificate, plate_of
+
+TRIALS = 4000
+
+
+@cache
+def plate_found() -> PartFound:
+    """Its bore measured 20 µm off along x."""
+    off = np.zeros((60, 3))
+    off[-8:, 0] = 0.02
+    return part_found(plate_of(by_certificate(), off), trials=TRIALS)
+
+
+@cache
+def plate_report() -> Mapping[str, bytes]:
+    """Its files, by name."""
+    return contents_of(plate_found())
+
+
+def with_inputs(**changed: bytes) -> dict[str, bytes]:
+    """The report as if it had been made of other inputs: hashes and attachments are theirs, figures are not."""
+    found = plate_found()
+    inputs = {name: changed.get(Path(name).stem.partition("-")[0], data) for name, data in found.job.inputs.items()}
+    return contents_of(replace(found, job=replace(found.job, inputs=inputs)))
+
+
+def put(folder: Path, files: Mapping[str, bytes]) -> Path:
+    """Files in a folder."""
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    return folder
