@@ -56,7 +56,9 @@ def test_sizes_depend_on_nothing_else() -> None:
     """What does not matter is drawn anew: the sizes of the noise stay."""
     before = latent()
     number, coordinates = ALL.of(before)
-    after = ALL.latent(number, coordinates, np.random.RandomState(2))
+    random = np.random.default_rng(2)
+    absent, uniform = random.standard_normal(before.shape), random.random((len(before), len(ALL.switches)))
+    after = ALL.latent(number, coordinates, absent, uniform)
     assert np.mean(before == after) < 0.2
     one, two = components().sizes(before), components().sizes(after)
     for name in ("placing", "growth", "slow"):
