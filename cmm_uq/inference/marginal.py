@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -31,10 +30,6 @@ _NUMBERS = 500_000
 
 _CACHED = 220_000
 """Numbers in the matrices that are reckoned with at once: as many as a processor's cache holds beside what makes them."""
-
-_ROWS = 8
-"""Sizes that are reckoned with at once are a multiple of so many, but for the last."""
-
 _MOST_FREE = 150
 """Columns of placings up to which slow noise is eliminated before them."""
 
@@ -238,24 +233,23 @@ class Marginal:
         logs = np.log(factor[:, diagonal, diagonal]).reshape(w, -1).sum(axis=1)
         return rows.transpose(0, 2, 1) @ rows, logs
 
-    def _batches(self, sizes: Sizes) -> Iterator[Ints]:
-        """Which sizes make a batch: those without slow noise, which need smaller matrices, apart."""
-        for chosen, numbers in ((sizes.slow == 0, self._numbers(absent=True)), (sizes.slow > 0, self._numbers())):
-            size = max(1, _NUMBERS // numbers)
+    def _batches(self, sizes: Sizes, most: int = _NUMBERS) -> Iterator[Ints]:
+        """Which sizes to reckon with at once: those without slow noise, which need smaller matrices, apart.
+
+        Parameters
+        ----------
+        most : numbers in the matrices of those where slow noise comes first.
+        """
+        j, c = self._freedoms.columns.shape[1], self.noise.slow.shape[1]
+        without, whole = (
+            (sizes.slow == 0, len(self._length) - c, None),
+            (sizes.slow > 0, len(self._length), self._slow_first),
+        )
+        for chosen, P, first in (without, whole):
+            numbers = first.numbers if first else P**2 + self._freedoms.count * (j + P)
+            size = max(1, (most if first else _NUMBERS) // (numbers + 3 * len(self._counts)))
             at = np.flatnonzero(chosen)
             yield from (at[i : i + size] for i in range(0, len(at), size))
-
-    def _parts(self, batch: Ints, sizes: Sizes) -> Iterator[slice]:
-        """Parts of a batch that a cache holds; none is so small that products would be added up in another order."""
-        size = _CACHED // self._numbers(absent=not np.any(sizes.slow[batch])) // _ROWS * _ROWS or _ROWS
-        ends = [*range(size, len(batch) - _ROWS, size), len(batch)]
-        return (slice(*part) for part in pairwise([0, *ends]))
-
-    def _numbers(self, *, absent: bool = False) -> int:
-        """In the matrices for one size of the noise, or for one without slow noise."""
-        j, c = self._freedoms.columns.shape[1], self.noise.slow.shape[1]
-        first, P = None if absent else self._slow_first, len(self._length) - absent * c
-        return (first.numbers if first else P**2 + self._freedoms.count * (j + P)) + 3 * len(self._counts)
 
     def log_density(self, latent: Floats) -> Floats:
         """(w,) up to a constant, of the numbers (w, d) that say the sizes; minus infinity out of bounds."""
@@ -271,12 +265,11 @@ class Marginal:
     def log_likelihood(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Log likelihood (w,) of w sizes but for the sum of squares, and that sum (w,), of which half is to be subtracted."""
         logs, squares = np.empty(len(sizes.placing)), np.empty(len(sizes.placing))
-        for batch in self._batches(sizes):
-            for part in self._parts(batch, sizes):
-                factors, log = self._factors(sizes.at(batch[part]))
-                diagonal = np.einsum("wii->wi", factors)
-                logs[batch[part]] = log - np.log(diagonal[:, :-1]).sum(axis=1)
-                squares[batch[part]] = diagonal[:, -1] ** 2
+        for part in self._batches(sizes, _CACHED):
+            factors, log = self._factors(sizes.at(part))
+            diagonal = np.einsum("wii->wi", factors)
+            logs[part] = log - np.log(diagonal[:, :-1]).sum(axis=1)
+            squares[part] = diagonal[:, -1] ** 2
         return logs, squares
 
     @property
@@ -290,28 +283,22 @@ class Marginal:
         if not k:
             return np.zeros((count, 0))
         found = np.empty((count, k))
-        first, index = sizes.different
-        once, ahead = sizes.at(first), None if np.any(sizes.slow) else random.standard_normal((count, k))
+        first, index = sizes.different if np.any(sizes.slow) else (np.arange(count), np.arange(count))
+        once = sizes.at(first)
         for part in self._batches(once):
-            lower, place = self._last(part, once), np.full(len(first), -1)
+            factors, _ = self._factors(once.at(part))
+            # the parameters stand last before the observations: the lower right of the factor is all that they need
+            lower, place = factors[:, -1 - k :, -1 - k : -1], np.full(len(first), -1)
             place[part] = np.arange(len(part))
             which = place[index]
             drawn = np.flatnonzero(which >= 0)
             own, mean = lower[which[drawn], :-1], lower[which[drawn], -1]
-            normal = mean + (random.standard_normal(mean.shape) if ahead is None else ahead[drawn])
+            normal = mean + random.standard_normal(mean.shape)
             for i in reversed(range(k)):  # back substitution
                 normal[:, i] /= own[:, i, i]
                 normal[:, :i] -= own[:, i, :i] * normal[:, i : i + 1]
             found[drawn] = normal
         return np.asarray(self.estimate.value + found / self._length[-1 - k : -1])
-
-    def _last(self, batch: Ints, sizes: Sizes) -> Floats:
-        """(w, k + 1, k) of the factors: the parameters stand last before the observations, and draws need nothing else."""
-        k = len(self.model.unknowns)
-        found = np.empty((len(batch), k + 1, k))
-        for part in self._parts(batch, sizes):
-            found[part] = self._factors(sizes.at(batch[part]))[0][:, -1 - k :, -1 - k : -1]
-        return found
 
 
 def _cholesky(matrices: Floats) -> Floats:

@@ -185,36 +185,29 @@ class Present:
         return self.made(self.numbers_of(count, random))
 
     def numbers_of(self, count: int, random: Any) -> RandomNumbers:
-        """Set (count,); normal (count, D), χ² (count, 1) and part (count,) of its distribution; two more of what is absent."""
+        """Set (count,), coordinates (count, D), and two arrays of what is absent, normal and uniform."""
         number, numbers = chosen(self._cumulative, count, random), self.numbers
-        normal, squares = np.zeros((count, numbers.matters.shape[1])), np.ones((count, 1))
-        part = np.zeros(count, dtype=np.int64)
+        coordinates = np.zeros((count, numbers.matters.shape[1]))
         for s in np.flatnonzero(np.bincount(number)).tolist():
-            if k := self._size[s]:
+            if len(self._matters[s]):
                 own = np.flatnonzero(number == s)
-                normal[own, :k], squares[own], part[own] = self.each[s].numbers_of(len(own), random)
+                each = self.each[s]
+                coordinates[own[:, None], self._matters[s]] = each.parameters(each.draws(len(own), random))
         absent = random.standard_normal((len(numbers.names), count)).T
-        return number, normal, squares, part, absent, random.random_sample((len(numbers.switches), count)).T
+        return number, coordinates, absent, random.random_sample((len(numbers.switches), count)).T
 
     def made(self, numbers: RandomNumbers) -> Floats:
         """(w, d) from these."""
-        number, normal, squares, part, absent, uniform = numbers
-        coordinates = np.zeros(normal.shape)
-        for s in np.flatnonzero(np.bincount(number)).tolist():
-            if k := self._size[s]:
-                own = np.flatnonzero(number == s)
-                z = self.each[s].made((normal[own, :k], squares[own], part[own]))
-                coordinates[np.ix_(own, self.numbers.matters[s])] = self.each[s].parameters(z)
-        return self.numbers.latent(number, coordinates, absent, uniform)
+        return self.numbers.latent(*numbers)
 
     @cached_property
     def _cumulative(self) -> Floats:
         return cumulative(self.probability)
 
     @cached_property
-    def _size(self) -> list[int]:
-        """(S,) how many of the coordinates matter in each set."""
-        return [int(size) for size in self.numbers.matters.sum(axis=1)]
+    def _matters(self) -> list[Ints]:
+        """Of each set: the coordinates that matter."""
+        return [np.flatnonzero(matters) for matters in self.numbers.matters]
 
     def log_density(self, z: Floats) -> Floats:
         """(w,) of numbers (w, d), with its constant."""
