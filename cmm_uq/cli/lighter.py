@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec, PathFinder
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from importlib.util import LazyLoader
 from types import ModuleType
 
@@ -26,15 +26,25 @@ def lighten() -> None:
     sys.meta_path.insert(0, _Lighter())
 
 
+class _Unexplained(SourceFileLoader):
+    """Loads matplotlib's artists without the lists of what can be set, which it writes into the docstring of each."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        """See :meth:`importlib.abc.Loader.exec_module`."""
+        super().exec_module(module)
+        module.__dict__["kwdoc"] = lambda _: ""
+
+
 class _Lighter(MetaPathFinder):
-    """Finds what Python would find, and has it loaded later."""
+    """Finds what Python would find, and has it loaded later, or with less."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:  # fmt: skip
-        if fullname not in LATER:
+        if fullname not in LATER and fullname != "matplotlib.artist":
             return None
         spec = PathFinder.find_spec(fullname, path, target)
-        if spec is not None and spec.loader is not None:
-            spec.loader = LazyLoader(spec.loader)
+        if spec is not None and isinstance(spec.loader, SourceFileLoader):
+            own = fullname not in LATER
+            spec.loader = _Unexplained(fullname, spec.loader.path) if own else LazyLoader(spec.loader)
         return spec

@@ -26,8 +26,10 @@ _JITTER = 1e-11
 """Relative; a recording that a model explains to the last digit leaves nothing to factorise."""
 
 _NUMBERS = 500_000
-"""In one batch of matrices."""
+"""In one batch of matrices; the random numbers of draws follow batch by batch."""
 
+_CACHED = 220_000
+"""Numbers in the matrices that are reckoned with at once: as many as a processor's cache holds beside what makes them."""
 _MOST_FREE = 150
 """Columns of placings up to which slow noise is eliminated before them."""
 
@@ -231,8 +233,13 @@ class Marginal:
         logs = np.log(factor[:, diagonal, diagonal]).reshape(w, -1).sum(axis=1)
         return rows.transpose(0, 2, 1) @ rows, logs
 
-    def _batches(self, sizes: Sizes) -> Iterator[Ints]:
-        """Which sizes to reckon with at once: those without slow noise, which need smaller matrices, apart."""
+    def _batches(self, sizes: Sizes, most: int = _NUMBERS) -> Iterator[Ints]:
+        """Which sizes to reckon with at once: those without slow noise, which need smaller matrices, apart.
+
+        Parameters
+        ----------
+        most : numbers in the matrices of those where slow noise comes first.
+        """
         j, c = self._freedoms.columns.shape[1], self.noise.slow.shape[1]
         without, whole = (
             (sizes.slow == 0, len(self._length) - c, None),
@@ -240,7 +247,7 @@ class Marginal:
         )
         for chosen, P, first in (without, whole):
             numbers = first.numbers if first else P**2 + self._freedoms.count * (j + P)
-            size = max(1, _NUMBERS // (numbers + 3 * len(self._counts)))
+            size = max(1, (most if first else _NUMBERS) // (numbers + 3 * len(self._counts)))
             at = np.flatnonzero(chosen)
             yield from (at[i : i + size] for i in range(0, len(at), size))
 
@@ -258,7 +265,7 @@ class Marginal:
     def log_likelihood(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Log likelihood (w,) of w sizes but for the sum of squares, and that sum (w,), of which half is to be subtracted."""
         logs, squares = np.empty(len(sizes.placing)), np.empty(len(sizes.placing))
-        for part in self._batches(sizes):
+        for part in self._batches(sizes, _CACHED):
             factors, log = self._factors(sizes.at(part))
             diagonal = np.einsum("wii->wi", factors)
             logs[part] = log - np.log(diagonal[:, :-1]).sum(axis=1)

@@ -365,17 +365,17 @@ def slow_variances(sd: Floats, rate: Floats, frequency: Floats) -> tuple[Floats,
     """
     if not len(frequency):
         return np.zeros((len(sd), 0)), np.zeros_like(sd)
-    rate, constant = rate[:, None], frequency == 0
-    square = (np.pi * frequency) ** 2
+    once, every = np.unique(frequency, return_inverse=True)
+    rate, constant = rate[:, None], once == 0
+    square = (np.pi * once) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         cosine = np.where(rate > 0, 2 * rate / (rate**2 + square), 2 / square)
         mean = 1 - 1 / np.tanh(rate) + 1 / rate
     each = np.where(constant, 0.0, cosine)
-    once = np.unique(frequency, return_index=True)[1]
-    walked = 1 / 3 - each[:, once].sum(axis=1, keepdims=True)  # Σ 2/(πk)² = 1/3
+    walked = 1 / 3 - each.sum(axis=1, keepdims=True)  # Σ 2/(πk)² = 1/3
     each = np.where(constant, np.where(rate > 0, mean, 2 * walked), each)
-    fast = np.where(rate > 0, 1 - each[:, once].sum(axis=1, keepdims=True), walked)[:, 0]
-    return sd[:, None] ** 2 * each, sd**2 * np.maximum(fast, 0.0)
+    fast = np.where(rate > 0, 1 - each.sum(axis=1, keepdims=True), walked)[:, 0]
+    return (sd[:, None] ** 2 * each)[:, every.ravel()], sd**2 * np.maximum(fast, 0.0)
 
 
 def display_shared(sigma: Floats, step: float) -> Floats:

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.inference.noise import ABSENT, AXES, GROWTH, PLACING, SLOW, WALK
-from cmm_uq.inference.proposals import LogDensity, Proposal, highest_power, moments, weights
+from cmm_uq.inference.proposals import LogDensity, Proposal, chosen, cumulative, highest_power, moments, weights
+from cmm_uq.inference.proposals import Numbers as RandomNumbers
 from cmm_uq.points import Floats, Ints
 
 _SWITCHES = {"spread": ABSENT[AXES], PLACING: ABSENT[PLACING], GROWTH: ABSENT[GROWTH], SLOW: ABSENT[SLOW], "rate": WALK}
@@ -123,11 +124,16 @@ class Numbers:
         place[self.sets @ bits] = np.arange(len(self.sets))
         return np.asarray(place[on @ bits])
 
-    def latent(self, number: Ints, coordinates: Floats, random: Any) -> Floats:
-        """Numbers (w, d) of sets (w,) and their coordinates (w, D), what does not matter being drawn from its prior."""
-        w, on = len(number), self.sets[number]
+    def latent(self, number: Ints, coordinates: Floats, normal: Floats, uniform: Floats) -> Floats:
+        """Numbers (w, d) of sets (w,) and their coordinates (w, D).
+
+        Parameters
+        ----------
+        normal, uniform : (w, d) and (w, switches) random numbers, from which what does not matter is drawn by its prior.
+        """
+        on = self.sets[number]
         column = dict(zip((name for name in self.names if name != "spread"), coordinates.T, strict=True))
-        found = {name: random.standard_normal(w) for name in self.names}
+        found = dict(zip(self.names, normal.T, strict=True))
         if "log_sigma" in column:
             found["log_sigma"] = column["log_sigma"]
         if "spread" in found:
@@ -142,7 +148,7 @@ class Numbers:
         beyond |= {name: special.log_ndtr(-column[name]) for name in self.switches if name != "spread"}
         for i, name in enumerate(self.switches):
             absent = _SWITCHES[name]
-            without = special.ndtri(absent * random.random_sample(w))
+            without = special.ndtri(absent * uniform[:, i])
             if name == "rate":
                 slow = on[:, self.switches.index(SLOW)]
                 without = np.where(slow, without, found[name])
@@ -176,14 +182,32 @@ class Present:
 
     def draws(self, count: int, random: Any) -> Floats:
         """(count, d)."""
-        number = random.choice(len(self.probability), size=count, p=self.probability)
-        coordinates = np.zeros((count, self.numbers.matters.shape[1]))
-        for s in np.unique(number):
-            own, matters = np.flatnonzero(number == s), self.numbers.matters[s]
-            if matters.any():
-                z = self.each[s].draws(len(own), random)
-                coordinates[np.ix_(own, matters)] = self.each[s].parameters(z)
-        return self.numbers.latent(number, coordinates, random)
+        return self.made(self.numbers_of(count, random))
+
+    def numbers_of(self, count: int, random: Any) -> RandomNumbers:
+        """Set (count,), coordinates (count, D), and two arrays of what is absent, normal and uniform."""
+        number, numbers = chosen(self._cumulative, count, random), self.numbers
+        coordinates = np.zeros((count, numbers.matters.shape[1]))
+        for s in np.flatnonzero(np.bincount(number)).tolist():
+            if len(self._matters[s]):
+                own = np.flatnonzero(number == s)
+                each = self.each[s]
+                coordinates[own[:, None], self._matters[s]] = each.parameters(each.draws(len(own), random))
+        absent = random.standard_normal((len(numbers.names), count)).T
+        return number, coordinates, absent, random.random_sample((len(numbers.switches), count)).T
+
+    def made(self, numbers: RandomNumbers) -> Floats:
+        """(w, d) from these."""
+        return self.numbers.latent(*numbers)
+
+    @cached_property
+    def _cumulative(self) -> Floats:
+        return cumulative(self.probability)
+
+    @cached_property
+    def _matters(self) -> list[Ints]:
+        """Of each set: the coordinates that matter."""
+        return [np.flatnonzero(matters) for matters in self.numbers.matters]
 
     def log_density(self, z: Floats) -> Floats:
         """(w,) of numbers (w, d), with its constant."""

@@ -12,9 +12,13 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.points import Floats
+
+Numbers = tuple[NDArray[Any], ...]
+"""Random numbers, of which the first axis are draws."""
 
 LogDensity = Callable[[Floats], Floats]
 """Of (w, d) parameters, up to a constant: (w,)."""
@@ -50,6 +54,12 @@ class Proposes(Protocol):
     def draws(self, count: int, random: Any) -> Floats:
         """Coordinates (count, d)."""
 
+    def numbers_of(self, count: int, random: Any) -> Numbers:
+        """What draws are made of: arrays (count, …) of random numbers, taken in a fixed order."""
+
+    def made(self, numbers: Numbers) -> Floats:
+        """Coordinates (w, d) from such numbers, also of several draws one after another."""
+
     def log_density(self, z: Floats) -> Floats:
         """(w,) up to a constant."""
 
@@ -82,12 +92,20 @@ class Proposal:
 
     def draws(self, count: int, random: Any) -> Floats:
         """Whitened coordinates (count, d)."""
-        d = len(self.centre)
-        normal = random.standard_normal((count, d))
-        t = np.asarray(normal / np.sqrt(random.chisquare(_DOF, size=(count, 1)) / _DOF))
+        return self.made(self.numbers_of(count, random))
+
+    def numbers_of(self, count: int, random: Any) -> Numbers:
+        """Normal numbers (count, d), χ² (count, 1), and which distribution (count,)."""
+        normal = random.standard_normal((count, len(self.centre)))
+        squares = random.chisquare(_DOF, size=(count, 1))
+        return normal, squares, chosen(self._cumulative, count, random)
+
+    def made(self, numbers: Numbers) -> Floats:
+        """Whitened coordinates (w, d) from these."""
+        normal, squares, part = numbers
+        t = np.asarray(normal / np.sqrt(squares / _DOF))
         if len(self.weights) == 1:
             return t
-        part = random.choice(len(self.weights), size=count, p=self.weights)
         return np.asarray(self.centres[part] + np.einsum("wij,wj->wi", self.factors[part], t))
 
     def log_density(self, z: Floats) -> Floats:
@@ -97,10 +115,7 @@ class Proposal:
 
     def log_probability(self, parameters: Floats) -> Floats:
         """Logarithm of the density (w,) of parameters (w, d), with its constant."""
-        d = len(self.centre)
-        z = np.asarray(np.linalg.solve(self.factor, (parameters - self.centre).T).T, dtype=np.float64)
-        constant = special.gammaln(0.5 * (_DOF + d)) - special.gammaln(0.5 * _DOF) - 0.5 * d * np.log(np.pi * _DOF)
-        return np.asarray(self.log_density(z) + constant - np.linalg.slogdet(self.factor)[1])
+        return np.asarray(self.log_density((parameters - self.centre) @ self._whitening) + self._constant)
 
     def log_each(self, z: Floats) -> tuple[Floats, Floats]:
         """Weighted log density of each distribution, and squared distance from its centre, (w, K)."""
@@ -111,6 +126,20 @@ class Proposal:
             squares = np.einsum("wki,wki->wk", own, own)
         log = -0.5 * (_DOF + z.shape[1]) * np.log1p(squares / _DOF)
         return log + self._log_weight, squares
+
+    @cached_property
+    def _whitening(self) -> Floats:
+        return np.asarray(np.linalg.inv(self.factor).T)
+
+    @cached_property
+    def _constant(self) -> float:
+        d = len(self.centre)
+        constant = special.gammaln(0.5 * (_DOF + d)) - special.gammaln(0.5 * _DOF) - 0.5 * d * np.log(np.pi * _DOF)
+        return float(constant - np.linalg.slogdet(self.factor)[1])
+
+    @cached_property
+    def _cumulative(self) -> Floats:
+        return cumulative(self.weights)
 
     @cached_property
     def _inverse(self) -> Floats:
@@ -124,6 +153,19 @@ class Proposal:
     @cached_property
     def _log_weight(self) -> Floats:
         return np.asarray(np.log(self.weights) - np.linalg.slogdet(self.factors)[1])
+
+
+def cumulative(probability: Floats) -> Floats:
+    """(K,) of which :func:`chosen` chooses."""
+    found = np.cumsum(probability)
+    return np.asarray(found / found[-1])
+
+
+def chosen(cumulated: Floats, count: int, random: Any) -> NDArray[np.int64]:
+    """(count,) as ``random.choice`` does, which looks through its probabilities each time; of a single one, with no number."""
+    if len(cumulated) == 1:
+        return np.zeros(count, dtype=np.int64)
+    return np.asarray(cumulated.searchsorted(random.random_sample(count), side="right"), dtype=np.int64)
 
 
 def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> Proposal:

@@ -56,7 +56,9 @@ def test_sizes_depend_on_nothing_else() -> None:
     """What does not matter is drawn anew: the sizes of the noise stay."""
     before = latent()
     number, coordinates = ALL.of(before)
-    after = ALL.latent(number, coordinates, np.random.RandomState(2))
+    random = np.random.default_rng(2)
+    absent, uniform = random.standard_normal(before.shape), random.random((len(before), len(ALL.switches)))
+    after = ALL.latent(number, coordinates, absent, uniform)
     assert np.mean(before == after) < 0.2
     one, two = components().sizes(before), components().sizes(after)
     for name in ("placing", "growth", "slow"):
@@ -98,3 +100,10 @@ def test_what_is_present_is_found_with_its_probability() -> None:
     assert found.probability[~of[SLOW] & of["spread"]].sum() == pytest.approx(0.5, abs=0.06)
     z = found.draws(4000, np.random.RandomState(4))
     assert worth(known(z) - found.log_density(z)) > 0.6 * 4000
+
+
+def test_draws_made_together_are_those_made_one_after_another() -> None:
+    proposal, together, alone = beginning(NAMES), np.random.RandomState(6), np.random.RandomState(6)
+    numbers = [proposal.numbers_of(5, together) for _ in range(4)]
+    whole = proposal.made(tuple(np.concatenate(each) for each in zip(*numbers, strict=True)))
+    np.testing.assert_array_equal(whole, np.vstack([proposal.draws(5, alone) for _ in range(4)]))

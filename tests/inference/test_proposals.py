@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.inference.proposals import Proposal, refined, tempered
+from cmm_uq.inference.proposals import Proposal, chosen, cumulative, refined, tempered
 from cmm_uq.points import Floats
 
 WEIGHTS, CENTRES = np.array([0.3, 0.7]), np.array([[0.0, 0.0], [3.0, -1.0]])
@@ -101,3 +101,9 @@ def test_a_skewed_density_is_refined_to_its_moments() -> None:
     found = refined(density, np.array([8.0]), np.array([[np.sqrt(8.0)]]), 3)
     assert found.centre == pytest.approx([9.0], abs=0.6)
     assert found.factor[0, 0] == pytest.approx(3.0, rel=0.2)
+
+
+def test_parts_are_chosen_as_numpy_chooses_them() -> None:
+    weights = np.array([0.2, 0.0, 0.5, 0.3])
+    found = chosen(cumulative(weights), 1000, np.random.RandomState(5))
+    np.testing.assert_array_equal(found, np.random.RandomState(5).choice(4, size=1000, p=weights))
