@@ -21,7 +21,8 @@ from cmm_uq.documents.part_results_keys import PART_RESULTS
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.beginning import TABLES
 from cmm_uq.messages import say
-from cmm_uq.parts.result import evaluated, zones_of
+from cmm_uq.parts.characteristics import never_negative
+from cmm_uq.parts.result import evaluated
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys
 
@@ -93,7 +94,7 @@ def test_a_value_is_what_was_measured_less_the_mean_error() -> None:
     np.testing.assert_allclose(found.measured, evaluated(found.plan, found.job.measured))
     assert found.measured[0] == pytest.approx(30.0, abs=1e-6)
     assert found.measured[1] == pytest.approx(2 * 0.02, rel=1e-3)  # a position is twice the distance
-    for stated, value, zone in zip(found.stated, found.measured, zones_of(found.plan), strict=True):
+    for stated, value, zone in zip(found.stated, found.measured, never_negative(found.plan), strict=True):
         assert stated.value == pytest.approx(max(0.0, value - stated.error) if zone else value - stated.error)
         assert stated.interval[0] >= 0 or not zone
 
