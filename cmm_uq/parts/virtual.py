@@ -173,8 +173,9 @@ class AtPose:
         self._inverse(exact=exact)
 
     def read(self, coefficients: Sequence[Drawn], *, exact: bool = False) -> Floats:
-        """(n, c) characteristics as they would be measured of the part, mm and rad: of the nominal one, with its mean errors, or
-        of the one that was measured, once more and without them.
+        """(n, c) characteristics as they would be measured, mm and rad.
+
+        Of the nominal part, with mean errors; of the part as it was measured, once more and without mean errors.
         """
         return self.measured(self._given(coefficients), exact=exact) + self._beside(coefficients)
 

@@ -49,8 +49,8 @@ def test_draws_of_a_place_are_those_of_the_noncentral_distribution(found: float)
 @pytest.mark.parametrize("name", WIDTHS)
 @pytest.mark.parametrize("true", [0.0, 0.5, 1.0, 2.0, 5.0])
 def test_intervals_hold_however_small_the_zone(name: str, true: float) -> None:
-    """Both tails fail 2.5 %, near zero only the lower one does; to three standard deviations of 500 measurements. The form is a
-    tilt, whose largest points are no others for their errors."""
+    """Both tails fail 2.5 %, near zero only the lower one does; to three standard deviations of 500 measurements. The form is
+    a tilt, whose largest points are no others for their errors."""
     random = np.random.default_rng(17)
     count, width = WIDTHS[name]
     shape = np.arange(count) - 0.5 * count
