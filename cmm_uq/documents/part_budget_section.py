@@ -153,8 +153,8 @@ def _factors(detailed: list[Figures]) -> Table:
         Column(say("Share"), unit("%")),
     )  # fmt: skip
     note = say(
-        "The calibration ties these errors together. Each share is what knowing this error alone would take away, with what it "
-        "tells of the others, so that together they may be more than 100 % or less."
+        "The calibration ties these errors together. Each share is what knowing this error alone would take away, with what "
+        "it tells of the others, so that together they may be more than 100 % or less."
     )
     return Table(say("Errors that are known together, by name"), columns, tuple(rows), (note,))
 
