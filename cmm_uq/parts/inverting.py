@@ -85,8 +85,7 @@ def inverse(found: float, again: Floats, perfect: Floats, true: Floats, measured
     rising = np.maximum.accumulate(curves(sizes), axis=0)
     solved = np.array([np.interp(found**2, curve, sizes) for curve in rising.T])
     lacking = _square(np.quantile(perfect, _QUANTILES)) - found**2
-    if true[0] <= 0:
-        solved = np.where(lacking > 0, -np.sqrt(np.maximum(lacking, 0.0)), solved)
+    solved = np.where(lacking > 0, -np.sqrt(np.maximum(lacking, 0.0)), solved)
     return Inverse(np.quantile(again, _QUANTILES), np.minimum.accumulate(solved))
 
 
