@@ -161,7 +161,8 @@ def test_results_say_what_was_found_with_hashes_of_all_inputs() -> None:
     assert set(data["job"]["inputs_sha256"]) == {"job.toml", "points.csv", *by_results()}
     one, stated = data["characteristics"][1], found.stated[1]
     assert (one["unit"], one["value"], one["u"]) == ("mm", pytest.approx(stated.value), pytest.approx(stated.u))
-    assert one["measured"] - one["mean_error"] == pytest.approx(one["value"])
+    size = data["characteristics"][0]
+    assert size["measured"] - size["mean_error"] == pytest.approx(size["value"])
     low, high = found.simulated.interval[found.stated.index(stated)]
     assert one["U"] == pytest.approx((high - low) / 2)  # of the errors; the interval of a zone ends at zero
     assert one["interval95"] == pytest.approx(stated.interval)
