@@ -5,8 +5,8 @@ code with the package. Every machine has all common errors, as large as physics 
 the machine corrects its estimates; parts are measured on the truth, and their intervals stated given the recording, as
 ``cmm-uq part`` does.
 
-Run: ``python -m benchmarks.parts.machines FOLDER [--machines N] [--only WORDS]``; ``--page`` writes the table of the page
-of what is there.
+Run: ``python -m benchmarks.parts.machines FOLDER [--machines N] [--only WORDS]``, of other parts with
+``--place-um``, ``--form-um``; ``--page`` writes the table of the page of what is there.
 Every machine is appended to ``FOLDER/<cell>.jsonl`` as it is done: a run can be stopped and taken up again.
 """
 
@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +42,7 @@ from cmm_uq.uncertainty.monte_carlo import Source, from_source
 
 PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
 BEGIN, END = "<!-- written by benchmarks.parts.machines -->", "<!-- end -->"
-TRIALS = 2000
+TRIALS = PILOT = 2000
 NAMED = effects(truth.SIX)
 UNMODELLED = tuple(one for one in unmodelled_errors(truth.SIX, {}) if "time_s" not in one.effect.columns)
 BAR_MM, U_BAR_UM = 400.0, 0.5
@@ -74,6 +74,21 @@ class Cell:
     def key(self) -> tuple[int, int]:
         """Seeds of its own."""
         return ("bars", "free bars", "step gauge").index(self.artefact), ("stated", "white", "set-up").index(self.noise)
+
+
+@dataclass(frozen=True)
+class Made:
+    """What is made, the same for all machines.
+
+    Parameters
+    ----------
+    place_um, form_um : by how much the part is off (:func:`benchmarks.parts.truth.made_part`).
+    periods : whether machines have periodic errors, and reckon with them.
+    """
+
+    place_um: float = 20.0
+    form_um: float = 2.0
+    periods: bool = True
 
 
 CELLS = tuple(
@@ -112,40 +127,44 @@ def placed(random: np.random.Generator) -> Pose:
     return Pose(turn, middle - turn @ [100.0, 50, 0])
 
 
-def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
+def measured(task: tuple[Cell, int, int], made: Made = Made()) -> dict[str, Any]:
     """One machine: of each characteristic what is true, its value, u and interval; what was refused is kept in words."""
     cell, seed, number = task
     random = np.random.default_rng([seed, *cell.key, number])
     start = time.process_time()
     try:
-        found = _measured(cell, random)
+        found = _measured(cell, random, made)
     except Exception as fault:  # a study of thousands goes on, and counts it
         found = {"fault": f"{type(fault).__name__}: {fault}"}
     return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
 
 
-def _measured(cell: Cell, random: np.random.Generator) -> dict[str, Any]:
-    hidden = truth.Truth.drawn(random)
+def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, Any]:
+    hidden = truth.Truth.drawn(random, periods=made.periods)
+    unmodelled = tuple(one for one in UNMODELLED if made.periods or not one.effect.name.startswith("periodic"))
     sigma = 1e-3 * float(np.exp(random.uniform(*np.log([0.7, 2.0]))))
     offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
     model = MeasurementModel(calibrated(cell, hidden, sigma, offset, random), NAMED)
     given = sigma if cell.noise == "stated" else None
     _, mean, _ = joint_posterior(model, (), sigma)
-    certificate = MachineState(MACHINE, NAMED, mean[None], StatedNoise(np.full(3, sigma)), unmodelled=UNMODELLED,
+    certificate = MachineState(MACHINE, NAMED, mean[None], StatedNoise(np.full(3, sigma)), unmodelled=unmodelled,
                                corrections=mean)  # fmt: skip
     state = given_recording(certificate, model, given, TRIALS, int(random.integers(2**31)))
     growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
         PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()
     ) - PART.cte_per_k * (PART.temperature_c - 20)
     pose = placed(random)
-    part, corrected = truth.made_part(random), truth.Truth.of_six(dict(zip(truth.SIX, mean, strict=True)))
+    part, corrected = (
+        truth.made_part(random, made.place_um, made.form_um),
+        truth.Truth.of_six(dict(zip(truth.SIX, mean, strict=True))),
+    )
     measuring = truth.Measuring(hidden, corrected, pose.rotation, pose.translation_mm, float(np.hypot(sigma, offset)),
                                 1e-3 * U_TIP_UM * float(random.standard_normal()), float(growth))  # fmt: skip
     normals = np.concatenate([normal for _, normal in truth.nominal_part().values()])
     points = measuring.measured(joined(part), normals, random)
     true = truth.characteristics(part)
     how = Circumstances(state, (pose,), Surroundings(PART), measured=points)
-    virtual = Virtual(plan(), how, dict(_nominal()))
+    virtual = Virtual(plan(), how, dict(_nominal()), PILOT)
     errors = virtual.errors(random, TRIALS)
     simulated = from_source(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)
     rows = {one.name: [true[one.name], one.value, one.u, *one.interval]
@@ -197,7 +216,11 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--page", action="store_true", help="write the table of the page, and run nothing")
+    parser.add_argument("--place-um", type=float, default=Made.place_um, help="by how much features are off")
+    parser.add_argument("--form-um", type=float, default=Made.form_um, help="form of every feature")
+    parser.add_argument("--without-periods", action="store_true", help="machines have no periodic errors")
     chosen = parser.parse_args()
+    made = Made(chosen.place_um, chosen.form_um, not chosen.without_periods)
     if not chosen.page:
         some = [cell for cell in CELLS if not chosen.only or any(word in cell.name for word in chosen.only)]
         tasks = [
@@ -206,7 +229,7 @@ def main() -> None:
             for task in waiting([cell], chosen.folder, chosen.seed, round(cell.share * chosen.machines))
         ]
         tasks.sort(key=lambda task: task[2] / task[0].share)
-        measure(tasks, chosen.folder, chosen.processes, measured)
+        measure(tasks, chosen.folder, chosen.processes, partial(measured, made=made))
     else:
         written(chosen.folder)
     print(tables(chosen.folder))

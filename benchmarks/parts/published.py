@@ -72,7 +72,7 @@ def polar() -> list[Figure]:
         measured[plan.rows["p"], 0] = off
         at = AtPose(plan, Circumstances(state, measured=measured), Pose())
         drawn = at.drawn(np.random.default_rng(9), TRIALS)
-        values = 0.5 * (at.errors(drawn, exact=True)[:, 0] + at.still[0])  # half of a position is the modulus
+        values = 0.5 * at.read(drawn, exact=True)[:, 0]  # half of a position is the modulus
         where = "JCGM 102:2011, 9.3.2, r = 0"
         found += [
             Figure(f"modulus at x1 = {off:g}", where, modulus, float(values.mean()), 0.5e-4 + 4 * u / np.sqrt(TRIALS)),

@@ -54,8 +54,8 @@ class Truth:
     period: np.ndarray
 
     @classmethod
-    def drawn(cls, random: np.random.Generator) -> Truth:
-        """Any machine."""
+    def drawn(cls, random: np.random.Generator, *, periods: bool = True) -> Truth:
+        """Any machine, with periodic errors or without."""
         sizes = {
             "scale": 3,
             "squareness": 3,
@@ -66,6 +66,7 @@ class Truth:
         }
         errors = [PHYSICS[name] * random.standard_normal(shape) for name, shape in sizes.items()]
         errors[2] *= 1 - np.eye(3)
+        errors[5] *= periods
         return cls(*errors, np.exp(random.uniform(*np.log(PERIODS), 3)))
 
     @classmethod
@@ -323,12 +324,13 @@ def nominal_part() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return found
 
 
-def made_part(random: np.random.Generator) -> dict[str, np.ndarray]:
-    """True points as a workshop makes them: places off by 20 µm, angles by 100 µrad, sizes by 5 µm, form of 2 µm."""
+def made_part(random: np.random.Generator, place_um: float = 20.0, form_um: float = 2.0) -> dict[str, np.ndarray]:
+    """True points as a workshop makes them: places off by so much, 5 µrad a micrometre of it, sizes 5 µm."""
     found = {}
     for name, (points, normals) in nominal_part().items():
         middle = points.mean(axis=0)
-        moved = points + 0.02 * random.standard_normal(3) + np.cross(1e-4 * random.standard_normal(3), points - middle)
+        off, turn = 1e-3 * place_um * random.standard_normal(3), 5e-6 * place_um * random.standard_normal(3)
+        moved = points + off + np.cross(turn, points - middle)
         grown = 0.0 if name in "ABCD" else 2.5e-3 * random.standard_normal()
-        found[name] = moved + (grown + 2e-3 * random.standard_normal((len(points), 1))) * normals
+        found[name] = moved + (grown + 1e-3 * form_um * random.standard_normal((len(points), 1))) * normals
     return found

@@ -28,7 +28,7 @@ from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.placing import placed
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.reducing import ways
-from cmm_uq.parts.result import conforming, evaluated, stated
+from cmm_uq.parts.result import conforming, evaluated, middle, stated
 from cmm_uq.parts.virtual import Circumstances, Virtual
 from cmm_uq.points import Floats, Machine
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
@@ -198,7 +198,7 @@ def judged(
             found.append(None)
             continue
         zone = facts.asks.limits == "zone"
-        mean = float(errors[:, i].mean())
+        mean = middle(errors[:, i]) if zone and measured is not None else float(errors[:, i].mean())
         about = errors[:, i] - mean
         if measured is None and zone:
             size = float(np.sqrt(np.mean(errors[:, i] ** 2)))

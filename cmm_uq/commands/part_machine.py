@@ -30,7 +30,7 @@ from cmm_uq.kinds import kind_of
 from cmm_uq.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.parts.conditional import given_recording
 from cmm_uq.parts.machine import MachineState
-from cmm_uq.parts.stated import machine_stated
+from cmm_uq.parts.machine_stated import machine_stated
 from cmm_uq.points import AXES, Floats, Machine
 from cmm_uq.verification.given import Given, given_of
 

@@ -76,10 +76,7 @@ def largest_words(one: Figures) -> Text:
 
 def share_of(one: Figures, line: str) -> float:
     """Share of a line, or of a factor of the machine, in the variance of a characteristic."""
-    budget = one.found.budget
-    if line in budget.causes:
-        return float(budget.total[budget.causes.index(line), one.place])
-    return float(budget.within[budget.factors.index(line), one.place])
+    return one.found.budget.share(line, one.place)
 
 
 def _percent(share: float) -> Number:
@@ -156,8 +153,8 @@ def _factors(detailed: list[Figures]) -> Table:
         Column(say("Share"), unit("%")),
     )  # fmt: skip
     note = say(
-        "Errors that the calibration ties together have no variance of their own; their shares are covariances with the error "
-        "of the characteristic, and one that makes up for another is negative."
+        "The calibration ties these errors together. Each share is what knowing this error alone would take away, with what "
+        "it tells of the others, so that together they may be more than 100 % or less."
     )
     return Table(say("Errors that are known together, by name"), columns, tuple(rows), (note,))
 

@@ -99,7 +99,10 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "budget.causes[].first": ("", "First-order share of each variance (Sobol), by characteristic."),
         "budget.causes[].total": ("", "Total share, likewise."),
         "budget.factors[].factor": ("", "An error of the machine."),
-        "budget.factors[].share": ("", "Its share, by characteristic; they hang together and may be negative."),
+        "budget.factors[].share": (
+            "",
+            "By characteristic, what knowing it alone would take away of the variance; they hang together.",
+        ),
         "unseen[].characteristic": ("", "Of errors that the calibration left free or did not see and that make 5 % or more "
                                         "of a variance: whose."),
         "unseen[].effect": ("", "The effect, by name."),

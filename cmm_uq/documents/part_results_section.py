@@ -64,8 +64,9 @@ def _notes(every: Sequence[Figures]) -> tuple[Text, ...]:
     notes: list[Text] = [
         say(
             "u: standard uncertainty. 95 % interval: the shortest that holds 95 % of the virtual measurements; that of a "
-            "form, an orientation or a location is never below zero. U = k · u is half of the errors' interval; the value "
-            "lies in the middle only where errors to both sides are alike."
+            "measured form, orientation or location leaves 2.5 % beyond each end, is never below zero, and its value is the "
+            "median. U = k · u is half of the errors' interval; the value lies in the middle only where errors to "
+            "both sides are alike."
         )
     ]
     if every[0].stated.value is None:

@@ -4,9 +4,10 @@ Shares by cause are Sobol's, by drawing one cause anew and keeping the others: *
 take away (Saltelli et al. 2010, Comput. Phys. Commun. 181, table 2 b), *total* what would remain if all else were known
 (Jansen 1999, table 2 f). They are equal where causes only add up; of a position or a form, which do not, they differ.
 
-Errors of a machine hang together, so that no variance of one of them alone is a part of the whole. Their shares are
-covariances with the error of the characteristic (Xu and Gertner 2008, Reliab. Eng. Syst. Saf. 93), of its linear part; they
-may be negative.
+Errors of a machine hang together, so that no variance of one of them alone is a part of the whole. The share of each is what
+knowing it alone would take away, with what it tells of the others: the first-order index of dependent inputs (Kucherenko,
+Tarantola, Annoni 2012, Comput. Phys. Commun. 183) of the linear part, the square of a multiple correlation. It lies between 0
+and 1; errors that are tied to each other have shares that add up to more, errors that make up for each other to less.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Budget:
     causes : g names; independent of each other.
     first, total : (g, c) shares of the variance.
     factors : f names of the machine's errors that its certificate states together.
-    within : (f, c) shares of each.
+    within : (f, c) shares of each, by itself.
     u : (c,) standard uncertainties in this sample, mm and rad.
     """
 
@@ -60,11 +61,15 @@ class Budget:
         least : share from which on it is told.
         """
         column = self.characteristics.index(characteristic)
-        shares = dict(zip(self.causes, self.total[:, column].tolist(), strict=True))
-        shares |= dict(zip(self.factors, self.within[:, column].tolist(), strict=True))
+        shares = {line: self.share(line, column) for line in (*self.causes, *self.factors)}
         found = [(line, share, named[line.partition(": ")[2]]) for line, share in shares.items()
                  if share >= least and line.partition(": ")[2] in named]  # fmt: skip
         return tuple(sorted(found, key=lambda each: -each[1]))
+
+    def share(self, line: str, column: int) -> float:
+        """Of a cause, in total, or of a factor, in the variance of a characteristic: 0 to 1, as far as draws know it."""
+        of, shares = (self.causes, self.total) if line in self.causes else (self.factors, self.within)
+        return float(np.clip(shares[of.index(line), column], 0.0, 1.0))
 
     def worst(self, characteristic: str) -> str:
         """The cause, or the factor where it is the machine's, of the largest part of a variance."""
@@ -126,9 +131,11 @@ def _within(causes: Sequence[Cause], drawn: Sequence[Floats], y: Floats) -> tupl
         if len(factors) < 2:
             continue
         X = coefficients - coefficients.mean(axis=0)
-        slopes = np.linalg.lstsq(X, centred, rcond=None)[0]
         for factor in factors:
-            own = [i for i, name in enumerate(cause.factors) if name == factor]
+            own = X[:, [i for i, name in enumerate(cause.factors) if name == factor]]
+            explained = own @ np.linalg.lstsq(own, centred, rcond=None)[0]
+            chance = own.shape[1] / len(own)  # what as many columns explain of anything
+            share = np.mean(explained**2, axis=0) / variance
             names.append(f"{cause.name}: {factor}")
-            shares.append(np.mean((X[:, own] @ slopes[own]) * centred, axis=0) / variance)
+            shares.append(np.clip((share - chance) / (1 - chance), 0.0, 1.0))
     return tuple(names), np.array(shares).reshape(len(names), y.shape[1])

@@ -15,19 +15,22 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
 from cmm_uq.geometry.repeated import Repeated
-from cmm_uq.parts.associating import Features
+from cmm_uq.parts.associating import VALUES, Features
 from cmm_uq.parts.datums import BEST_FIT, Frame
 from cmm_uq.parts.plan import (
     DIRECTED,
     FORMS,
     LOCATIONS,
     ORIENTATIONS,
+    RELATIONS,
     RUNOUTS,
     SIZED,
+    ZONES,
     Characteristic,
     Feature,
     FeatureKind,
@@ -43,6 +46,9 @@ _ALONG = 0.999
 
 SECTION = 0.01
 """mm: how far points of one section may lie apart along the datum's axis; of a plane, across it."""
+
+_COINCIDE = 1e-6
+"""mm and rad: a nominal distance or angle below which there is none."""
 
 _FEWEST_IN_SECTION = 3
 """Points by which a section shows any runout beyond where the axis stands."""
@@ -118,7 +124,10 @@ class Evaluation:
     @property
     def of_points(self) -> bool:
         """Whether it is of measured points, and not of features alone."""
-        return is_of_points(self.characteristic, self.plan)
+        what = self.characteristic.what
+        if what in FORMS or what in RUNOUTS:
+            return True
+        return self.feature.kind == "plane" and what in (*ORIENTATIONS, "position")
 
     def __call__(self, measured: Measured) -> Floats:
         """Values (N,), mm or rad."""
@@ -189,11 +198,27 @@ class Evaluation:
         return np.array([u, np.cross(u, datum)])
 
 
-def is_of_points(one: Characteristic, plan: Plan) -> bool:
-    """Whether a characteristic is a range of measured points, and not of features alone."""
-    if one.what in FORMS or one.what in RUNOUTS:
-        return True
-    return plan.feature(one.features[0]).kind == "plane" and one.what in (*ORIENTATIONS, "position")
+def never_negative(plan: Plan) -> NDArray[np.bool_]:
+    """(c,) whether each characteristic is zero of the nominal part and never less.
+
+    Such are widths of zones, and the angle or the distance of two features that are meant to coincide.
+    """
+    found = [one.what in ZONES or _coinciding(one, plan) for one in plan.characteristics]
+    return np.array(found, dtype=bool)
+
+
+def _coinciding(one: Characteristic, plan: Plan) -> bool:
+    if one.what not in RELATIONS or len(one.features) < 2:
+        return False
+    of = Evaluation(one, plan, {})
+    nominal = {key: Features(_values(plan.feature(key[0]))) for key in of.keys}
+    return bool(of(Measured(nominal, {}))[0] < _COINCIDE)
+
+
+def _values(feature: Feature) -> Floats:
+    """(1, 8) of a nominal feature, as far as relations are of it."""
+    place, direction = feature.nominal.point, feature.nominal.direction
+    return np.hstack([place, np.zeros(3) if direction is None else direction, np.zeros(VALUES - 6)])[None]
 
 
 def _size(of: Evaluation, measured: Measured) -> Floats:

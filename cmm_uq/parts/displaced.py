@@ -45,11 +45,9 @@ def displaced(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Displaced:
     each = max(1, -(-draws // len(virtual.places)))
     total, first, second = 0, np.zeros((n, 3)), np.zeros((n, 3, 3))
     for place in virtual.places:
-        # what the points are moved by without any draw; where the part was measured they stand about their measured places
-        still = place.measured.base - (place.part - points)
         for start in range(0, each, block):
             count = min(block, each - start)
-            whole = (still + place.measured.moved(place.drawn(random, count), slice(None))).reshape(count, 3 * n)
+            whole = (place.base + place.moved(place.drawn(random, count))).reshape(count, 3 * n)
             off = (whole - (whole @ rigid) @ rigid.T).reshape(count, n, 3)
             first += off.sum(axis=0)
             second += np.einsum("kni,knj->nij", off, off)

@@ -36,7 +36,7 @@ Coefficients = Sequence[Drawn | None]
 
 
 @dataclass(frozen=True, eq=False)
-class Displaced:
+class Movement:
     """What N draws of causes move, beyond the base of an :class:`Evaluator`.
 
     Parameters
@@ -50,16 +50,18 @@ class Displaced:
     points: Mapping[str, Floats]
     whole: Floats | None = None
 
-    def __add__(self, other: Displaced) -> Displaced:
-        return Displaced(
-            self.change + other.change,
-            {name: moved + other.points[name] for name, moved in self.points.items()},
-            None if self.whole is None or other.whole is None else self.whole + other.whole,
+    def plus(self, other: Movement, factor: float = 1.0) -> Movement:
+        """With a multiple of another; one of a single row moves all."""
+        return Movement(
+            self.change + factor * other.change,
+            {name: moved + factor * other.points[name] for name, moved in self.points.items()},
+            None if self.whole is None or other.whole is None else self.whole + factor * other.whole,
         )
 
-    def __neg__(self) -> Displaced:
-        points = {name: -moved for name, moved in self.points.items()}
-        return Displaced(-self.change, points, None if self.whole is None else -self.whole)
+    def row(self, i: int) -> Movement:
+        """One of its draws."""
+        points = {name: moved[i : i + 1] for name, moved in self.points.items()}
+        return Movement(self.change[i : i + 1], points, None if self.whole is None else self.whole[i : i + 1])
 
 
 class Evaluator:
@@ -148,35 +150,37 @@ class Evaluator:
         ----------
         exact : all features on their points, none to first order.
         """
-        return self.of(self.displaced(coefficients, exact=exact), exact=exact)
+        return self.of(self.movement(coefficients, exact=exact), exact=exact)
 
-    def of(self, displaced: Displaced, *, exact: bool = False) -> Floats:
-        """Characteristics (N, c) of what was :meth:`displaced`, mm and rad."""
+    def of(self, movement: Movement, *, exact: bool = False, only: int | None = None) -> Floats:
+        """Characteristics (N, c) of a :meth:`movement`, mm and rad; of ``only`` one, (N, 1)."""
         features: dict[Key, Features] = {}
-        change = displaced.change
+        change, asked = movement.change, self.evaluations if only is None else [self.evaluations[only]]
+        keys = {key for one in asked for key in (*one.keys, *one.datums)}
         for i, key in enumerate([] if exact else self.linear):
-            features[key] = self.associated[key].to_first_order(change[:, VALUES * i : VALUES * (i + 1)])
+            if key in keys:
+                features[key] = self.associated[key].to_first_order(change[:, VALUES * i : VALUES * (i + 1)])
         for key in self.keys:
-            if key not in features:
-                features[key] = self.associated[key].of(displaced.points[key[0]], with_points=key in self.of_points)
+            if key in keys and key not in features:
+                features[key] = self.associated[key].of(movement.points[key[0]], with_points=key in self.of_points)
         frames = {
-            names: system.frames([features[name, self.plan.feature(name).association] for name in names])
-            for names, system in self.frames.items()
+            names: self.frames[names].frames([features[name, self.plan.feature(name).association] for name in names])
+            for names in {one.frame_of for one in asked if one.frame_of in self.frames}
         }
-        if self.best_fit is not None:
+        if any(one.frame_of == BEST_FIT for one in asked) and self.best_fit is not None:
             start = self.best_fit.motion(self.base[None])[0]
             frames[BEST_FIT] = self.best_fit.frame(
                 start + change[:, VALUES * len(self.linear) :]
-                if displaced.whole is None
-                else self.best_fit.motion(self.base + displaced.whole)
+                if movement.whole is None
+                else self.best_fit.motion(self.base + movement.whole)
             )
         measured = Measured(features, frames)
-        return np.column_stack([one(measured) for one in self.evaluations])
+        return np.column_stack([one(measured) for one in asked])
 
-    def displaced(self, coefficients: Coefficients, *, exact: bool = False) -> Displaced:
+    def movement(self, coefficients: Coefficients, *, exact: bool = False) -> Movement:
         """What coefficients move of all that the characteristics are of."""
         on_points = dict.fromkeys(name for name, how in self.keys if exact or not self.to_first_order((name, how)))
-        return Displaced(
+        return Movement(
             np.zeros((_count(coefficients), 0)) if exact else self._changes(coefficients),
             {name: self._moved_of(coefficients, name) for name in on_points},
             self.moved(coefficients, slice(None)) if exact and self.best_fit is not None else None,

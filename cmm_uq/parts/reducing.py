@@ -25,6 +25,9 @@ DRAWS = 10_000
 _LOOKED_AT = 1000
 """Draws by which places on the table are compared."""
 
+_PILOT = 2_000
+"""Of those by which a measurement is turned round, the same for every way."""
+
 ANEW = (NOISE, OPERATOR, FIXTURE)
 """Causes that another set-up draws again; machine, styli, temperatures and the part stay what they are."""
 
@@ -87,7 +90,7 @@ def ways(
     found = [Way(say("as planned"), spread(first, draws, seed))]
     for name, change in _changes(plan, given, doubled):
         with suppress(CmmUqError):  # beyond the travel
-            found.append(Way(name, spread(Virtual(*change(), first.known), draws, seed)))
+            found.append(Way(name, spread(Virtual(*change(), first.known, _PILOT), draws, seed)))
     with suppress(CmmUqError):
         found += _elsewhere(plan, given, first, draws, seed)
     return found + _means(plan, given, first, draws, seed)
@@ -107,7 +110,7 @@ def _means(plan: Plan, given: Circumstances, first: Virtual, draws: int, seed: i
             for turn in turns:
                 if turn.tobytes() not in places:
                     pose = _turned(given.poses[0], turn, plan)
-                    places[turn.tobytes()] = AtPose(plan, given, pose, first.known)
+                    places[turn.tobytes()] = AtPose(plan, given, pose, first.known, _PILOT)
             several = [places[turn.tobytes()] for turn in turns]
             errors = mean_of_places(several, np.random.default_rng(seed), draws, exact=first.exact)
             found.append(Way(name, errors.std(axis=0)))
@@ -147,14 +150,14 @@ def _elsewhere(plan: Plan, given: Circumstances, first: Virtual, draws: int, see
         moved = tuple(replace(p, translation_mm=p.translation_mm + np.append(shift, 0.0)) for p in given.poses)
         there = replace(given, poses=moved)
         with suppress(CmmUqError):
-            u = _quick(AtPose(plan, there, moved[0], first.known), seed)
+            u = _quick(AtPose(plan, there, moved[0], first.known, _LOOKED_AT), seed)
             ratio = float(np.mean(u / np.maximum(planned, np.finfo(np.float64).tiny)))
             best = (ratio, there, shift) if ratio < best[0] else best
     if best[1] is given:
         return []
     x, y = (signed(float(mm), "+.0f") for mm in best[2])
     name = say("part moved by {x} mm along {a} and {y} mm along {b}", x=x, y=y, a=Verbatim("X"), b=Verbatim("Y"))
-    return [Way(name, spread(Virtual(plan, best[1], first.known), draws, seed))]
+    return [Way(name, spread(Virtual(plan, best[1], first.known, _PILOT), draws, seed))]
 
 
 def _quick(place: AtPose, seed: int) -> Floats:

@@ -1,8 +1,11 @@
 """What is stated of a part's characteristics: values where points were measured, and uncertainty with or without them.
 
-The width of a zone is never negative. Where draws of its true value are, they are impossible, and what is stated comes of
-the others: a value that is known to be at least zero, and nothing else (JCGM 106:2012, 7.2.2, with a prior that is flat
-above zero).
+The width of a zone is never negative. Draws of its true value are quantiles of a confidence distribution
+(:mod:`cmm_uq.parts.inverting`), of which those with which even a perfect part would have been measured wider are negative.
+Its value is the median of all, as often too large as too small, and zero where that is negative. Its interval begins where
+2.5 % of all lie below, at zero where these are negative, and ends where 2.5 % of those that are possible lie above. The lower
+end fails as often as it says and the upper end no more often, and no interval is empty because a measurement happened to be
+better than its errors (the ratio of both tails: Read, J. Phys. G 28 (2002) 2693). Probabilities are those of possible draws.
 """
 
 from __future__ import annotations
@@ -13,17 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.evaluating import characteristics_of
-from cmm_uq.parts.plan import ZONES, Plan
+from cmm_uq.parts.plan import Plan
 from cmm_uq.points import Floats
-from cmm_uq.uncertainty.coverage_intervals import Tails
 from cmm_uq.uncertainty.monte_carlo import Simulated
 
 FEWEST = 500
-"""Draws that are possible, from which on an interval or a probability is taken from them alone."""
+"""Draws that are possible, from which on a probability is taken from them alone."""
 
-_AT_ZERO = 0.05
-"""Of the draws outside of an interval: fewer than so many below it are none, and it begins at zero."""
+SCARCE = 0.05
+"""Part of the draws, below which those that are possible say nothing of where an interval ends."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +36,11 @@ class Stated:
     Parameters
     ----------
     name : of it.
-    value : mm or rad, less the mean error, of a zone zero at least; ``None`` where nothing was measured.
+    value : mm or rad, less the mean error, of a zone the median one, and zero at least; ``None`` where nothing was measured.
     error : mean of the errors: by how much such a measurement is off on average, mm or rad.
     u : standard uncertainty, mm or rad.
-    interval : shortest coverage interval of the value; of its error, with the opposite sign, where nothing was measured.
+    interval : shortest coverage interval of the value, of a zone with equal tails; where nothing was measured the shortest of
+        the error, with the opposite sign.
     k : half of the shortest interval of the errors over u.
     """
 
@@ -60,11 +64,11 @@ def stated(
 
     Parameters
     ----------
-    plan, errors : characteristics, and draws (N, c) of their errors, by which intervals of zones are those of what is
-        possible; without them an interval is that of the errors alone.
+    plan, errors : characteristics, and draws (N, c) of their errors, by which values and intervals of zones are those of what
+        is possible; without them they are those of the errors alone.
     """
     found = []
-    zones = np.zeros(len(simulated.outputs), dtype=bool) if plan is None else zones_of(plan)
+    zones = np.zeros(len(simulated.outputs), dtype=bool) if plan is None else never_negative(plan)
     for i, name in enumerate(simulated.outputs):
         error, u = float(simulated.value[i]), float(simulated.u[i])
         low, high = simulated.interval[i].tolist()
@@ -72,34 +76,30 @@ def stated(
         value = None if measured is None else at - error
         interval = at - high, at - low
         if value is not None and zones[i]:
-            value = max(0.0, value)
             if errors is not None:
-                interval = _possible(at - errors[:, i], interval, simulated.coverage)
+                value = at - middle(errors[:, i])
+                interval = possible_interval(at - errors[:, i], simulated.coverage)
+            value = max(0.0, value)
         k = 0.5 * (high - low) / u if u else float("nan")
         found.append(Stated(name, value, error, u, interval, k))
     return tuple(found)
 
 
-def zones_of(plan: Plan) -> NDArray[np.bool_]:
-    """(c,) whether each characteristic is the width of a zone."""
-    return np.array([one.what in ZONES for one in plan.characteristics], dtype=bool)
+def middle(errors: Floats) -> float:
+    """Of the errors (N,) of a zone: about which it is as often too large as too small."""
+    return float(np.median(errors))
 
 
-def _possible(true: Floats, interval: tuple[float, float], coverage: float) -> tuple[float, float]:
-    """The shortest interval of the draws that are not negative; of few, from zero to the width that it has with all.
+def possible_interval(true: Floats, coverage: float) -> tuple[float, float]:
+    """From the lower end of all draws to the upper end of those that are not negative.
 
-    The density of errors falls the faster the farther out, so that what is left beyond zero is no wider than all of it.
+    Where few are possible it ends where errors of a perfect part do: draws are negative by as much as these are larger.
     """
-    left = np.sort(true[true >= 0])
-    if len(left) == len(true):
-        return interval
-    if len(left) < FEWEST:
-        return 0.0, interval[1] - interval[0]
-    tails = Tails(coverage)
-    tails.add(left)
-    low, high = tails.intervals()[:2].tolist()
-    below = np.searchsorted(left, low)
-    return 0.0 if below < _AT_ZERO * (1 - coverage) * len(left) else low, high
+    tail = 0.5 * (1 - coverage)
+    left = true[true >= 0]
+    low = float(np.quantile(true, tail))
+    high = float(np.quantile(left if len(left) >= SCARCE * len(true) else np.abs(true), 1 - tail))
+    return max(0.0, low), high
 
 
 def evaluated(plan: Plan, points: Floats) -> Floats:
@@ -128,7 +128,7 @@ def conforming(plan: Plan, errors: Floats, measured: Floats) -> tuple[Floats, fl
     each : (c,) of every characteristic; ``nan`` where it has no limits.
     together : of all that have some at once; ``nan`` where none has.
     """
-    true, zones = measured - errors, zones_of(plan)
+    true, zones = measured - errors, never_negative(plan)
     inside = np.ones(true.shape, dtype=bool)
     limited = np.zeros(len(plan.characteristics), dtype=bool)
     for i, one in enumerate(plan.characteristics):

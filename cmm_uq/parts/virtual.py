@@ -3,26 +3,26 @@
 The error is what is measured less what is true: of the nominal part, or, where a form is known on the whole surface, of the
 part with the form that was drawn. A characteristic that was measured as y is then y less the errors.
 
-Of measured points what is true is drawn (:meth:`AtPose.errors`), which matters where a characteristic is not linear: a zone
-is never negative, and what adds to its width does so whatever its sign.
+What is never negative, such as a zone, is widened by errors whatever their sign. Where points were measured, its true value is
+inferred from what was measured by turning the measurement round (:mod:`cmm_uq.parts.inverting`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cmm_uq.messages import Text
-from cmm_uq.parts.causes import Cause, Drawn, Scatter
-from cmm_uq.parts.characteristics import is_of_points
-from cmm_uq.parts.evaluating import Evaluator, Known, characteristics_of
+from cmm_uq.parts.causes import Cause, Common, Drawn, normal
+from cmm_uq.parts.characteristics import never_negative
+from cmm_uq.parts.evaluating import Evaluator, Known, Movement, characteristics_of
+from cmm_uq.parts.inverting import Inverse, inverse, nodes_of
 from cmm_uq.parts.machine import MachineState
-from cmm_uq.parts.of_form import FORM, Form, forms, whole_surfaces
+from cmm_uq.parts.of_form import Form, forms, whole_surfaces
 from cmm_uq.parts.of_machine import mean_errors, modelled, noise, not_modelled
 from cmm_uq.parts.of_operator import Beside
 from cmm_uq.parts.of_stylus import styli
@@ -47,6 +47,18 @@ THREADED = 2_000
 
 AGREES = 0.01
 """Of u, by which first order may be off before all is taken exactly: what u is good for."""
+
+PILOT = 10_000
+"""Draws by which the measurement is turned round; u and ends of intervals of zones are then known to a hundredth of u."""
+
+_BLOCK = 400_000
+"""Points of the pilot drawn at once."""
+
+_PILOT_SEED = 20_101
+"""Of these, in every place alike, so that places are compared by the same."""
+
+_NOTHING_SEEN = 0.1
+"""Of what errors alone make of a zone, below which what was measured has no shape of its own to infer from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +96,21 @@ class AtPose:
     given : its circumstances.
     pose : the place.
     known : features that were looked at in another place (:class:`Evaluator`).
+    pilot : draws by which the measurement of what is never negative is turned round.
+
+    Attributes
+    ----------
+    base : (n, 3) by how much points are displaced without any draw, mm.
+    still : (c,) characteristics of the part: as measured, less ``base``, or of the nominal one.
 
     Raises
     ------
     CmmUqError : see :class:`Evaluator`, and an axis beyond its travel.
     """
 
-    def __init__(self, plan: Plan, given: Circumstances, pose: Pose, known: Known | None = None) -> None:
+    def __init__(
+        self, plan: Plan, given: Circumstances, pose: Pose, known: Known | None = None, pilot: int = PILOT
+    ) -> None:
         surroundings = given.surroundings.since(given.machine.temperature_c)
         self.points = points = placed(plan, pose, given.machine.machine, surroundings.columns)
         qualified = Qualified.on(plan, points, given.machine.machine)
@@ -105,20 +125,21 @@ class AtPose:
             *given.further,
             *own,
         ]
-        base = mean_errors(given.machine, qualified, pose) + mean_expansion(surroundings, plan, points, pose)
+        self.base = mean_errors(given.machine, qualified, pose) + mean_expansion(surroundings, plan, points, pose)
+        self.pilot, self._inverses = pilot, dict[bool, dict[int, Inverse]]()
         drawn = any(len(feature.surface) for feature in plan.features)
-        # what was measured has the mean errors in it: the part itself is without them
-        self.part = part = plan.points if drawn or given.measured is None else given.measured - base
-        self.still = characteristics_of(plan, part, known)
-        self.apart = np.zeros(len(plan.characteristics), dtype=bool)
-        if given.measured is not None and not drawn:
-            self.apart = np.array([not is_of_points(one, plan) for one in plan.characteristics], dtype=bool)
-        self.measured = Evaluator(_some(plan, ~self.apart), base + part - plan.points, self.causes, known)
-        self.likely: Evaluator | None = None
-        if self.apart.any():
-            self.likely = Evaluator(_some(plan, self.apart), part - plan.points, self.causes, known)
-            self.found = characteristics_of(self.likely.plan, part + base, known)
         self.true: Evaluator | None = None
+        if drawn or given.measured is None:
+            self.still = characteristics_of(plan, plan.points, known)
+            self.measured = Evaluator(plan, self.base, self.causes, known)
+            self.inferred, self.shift = list[int](), np.zeros_like(self.still)
+        else:
+            # what was measured has the mean errors in it: the part itself is without them
+            deviations = given.measured - self.base - plan.points
+            self.still = characteristics_of(plan, plan.points + deviations, known)
+            self.measured = Evaluator(plan, deviations, [*self.causes, _scaled(deviations)], known)
+            self.inferred = np.flatnonzero(never_negative(plan)).tolist()
+            self.shift = characteristics_of(plan, given.measured, known) - self.still
         if drawn:
             true = whole_surfaces(plan)
             still: list[Cause | None] = [None] * (len(self.causes) - len(own))
@@ -128,48 +149,119 @@ class AtPose:
         """Coefficients (n, K) of each cause."""
         return [cause.draw(random, n) for cause in self.causes]
 
+    def moved(self, coefficients: Sequence[Drawn]) -> Floats:
+        """(n, p, 3) displacements of the plan's p points beyond ``base``, mm."""
+        return self.measured.moved(self._given(coefficients), slice(None))
+
     def errors(self, coefficients: Sequence[Drawn], *, exact: bool = False) -> Floats:
         """(n, c) errors of the characteristics.
 
-        Where points were measured as x, mean errors b are taken off: q = x − b. A range of
-        points (:func:`is_of_points`) has many freedoms of its own, the form, which errors d only ever enlarge: it errs by
-        f(x + d) − f(q). Everything else has few, a direction and a place, of which any is as likely before: it is f(q − s)
-        with the errors s that points have in common, less by how much their own errors n enlarge it, f(q − s + n) − f(q − s).
-        What is linear is the same by both.
+        Where points were measured as x, mean errors b are taken off: q = x − b. What has a sign or a size errs by
+        f(q + d) − f(q) with errors d, beside the mean f(x) − f(q). What is never negative errs by f(x) less its true value,
+        which follows from f(q + d) by turning the measurement round (:func:`cmm_uq.parts.inverting.inverse`). Without measured
+        points, and with a form that is drawn on whole surfaces, all errs by what is measured less what is true.
         """
-        found = np.zeros((len(coefficients[0]), len(self.apart)))
-        if not self.apart.all():
-            true = self.still[~self.apart] if self.true is None else self.true(coefficients, exact=exact)
-            found[:, ~self.apart] = self.measured(coefficients, exact=exact) - true
-        if self.likely is not None:
-            found[:, self.apart] = self.found - self._true(self.likely, coefficients, exact=exact)
+        found = self.read(coefficients, exact=exact)
+        true = self.still if self.true is None else self.true(coefficients, exact=exact)
+        errors = found + self.shift - true
+        for i, inverted in self._inverse(exact=exact).items():
+            errors[:, i] = self.shift[i] + self.still[i] - inverted(found[:, i])
+        return errors
+
+    def prepare(self, *, exact: bool) -> None:
+        """Turn the measurement round, once for all draws."""
+        self._inverse(exact=exact)
+
+    def read(self, coefficients: Sequence[Drawn], *, exact: bool = False) -> Floats:
+        """(n, c) characteristics as they would be measured, mm and rad.
+
+        Of the nominal part, with mean errors; of the part as it was measured, once more and without mean errors.
+        """
+        return self.measured(self._given(coefficients), exact=exact) + self._beside(coefficients)
+
+    def _beside(self, coefficients: Sequence[Drawn]) -> Floats:
+        """(n, c) of causes that move no point."""
+        found = np.zeros((len(coefficients[0]), len(self.still)))
         for cause, drawn in zip(self.causes, coefficients, strict=True):
             if isinstance(cause, Beside):
                 found += np.asarray(drawn) @ cause.adds
         return found
 
-    def _true(self, likely: Evaluator, coefficients: Sequence[Drawn], *, exact: bool) -> Floats:
-        """What is true of all but ranges of points, about what was measured."""
-        each = [isinstance(cause, Scatter) or cause.name == FORM for cause in self.causes]
-        common = [None if own else drawn for drawn, own in zip(coefficients, each, strict=True)]
-        alone = [drawn if own else None for drawn, own in zip(coefficients, each, strict=True)]
-        less = -likely.displaced(common, exact=exact)
-        read = less + likely.displaced(alone, exact=exact)
-        return np.asarray(2 * likely.of(less, exact=exact) - likely.of(read, exact=exact))
+    def _given(self, coefficients: Sequence[Drawn]) -> list[Drawn | None]:
+        """Coefficients of the evaluator's causes: of errors, and none of further deviations of the part."""
+        return [*coefficients, *[None] * (len(self.measured.causes) - len(self.causes))]
+
+    def _inverse(self, *, exact: bool) -> dict[int, Inverse]:
+        """By place of what is never negative, the map from what is read to what is true."""
+        if exact not in self._inverses:
+            self._inverses[exact] = self._inverted(exact=exact) if self.inferred else {}
+        return self._inverses[exact]
+
+    def _inverted(self, *, exact: bool) -> dict[int, Inverse]:
+        """Of a part that deviates λ times as the measured one, or, where that shows nothing, as errors would have it."""
+        deviations = self.measured.movement([*[None] * len(self.causes), np.ones((1, 1))], exact=exact)
+        perfect = deviations.plus(deviations, -2.0)  # from the part as measured to the nominal one
+        again, alone = self._of_pilot([None, perfect], exact=exact)
+        shapes = dict.fromkeys(self.inferred, deviations)
+        first = self._pilot_block(0, exact=exact)[0]
+        for i in self.inferred:
+            typical = int(np.argsort(alone[: len(first.change), i])[len(first.change) // 2])
+            if self.still[i] < max(_NOTHING_SEEN * alone[typical, i], ROUNDING):
+                shapes[i] = first.row(typical)
+        return {
+            i: self._inverted_one(i, perfect, shapes[i], again[:, i], alone[:, i], exact=exact)
+            for i in self.inferred
+            if np.ptp(alone[:, i]) > ROUNDING
+        }
+
+    def _inverted_one(
+        self, i: int, perfect: Movement, shape: Movement, again: Floats, alone: Floats, *, exact: bool
+    ) -> Inverse:  # fmt: skip
+        """Of one characteristic, with parts that deviate from a perfect one by multiples of a shape."""
+
+        def true(part: Movement) -> float:
+            return float(self.measured.of(part, exact=exact, only=i)[0, 0])
+
+        found = float(self.still[i])
+        parts = [perfect.plus(shape, node) for node in nodes_of(found, alone, true(perfect.plus(shape))).tolist()]
+        read = self._of_pilot(parts, only=i, exact=exact)[:, :, 0]
+        return inverse(found, again, alone, np.array([true(part) for part in parts]), read)
+
+    def _of_pilot(self, parts: Sequence[Movement | None], *, only: int | None = None, exact: bool) -> Floats:
+        """(m, n, c) as m parts would be measured, of their movements from the part that was, with the pilot's n draws."""
+        found = list[list[Floats]]()
+        for block in range(-(-self.pilot // self._at_once)):
+            moved, beside = self._pilot_block(block, exact=exact)
+            added = beside if only is None else beside[:, [only]]
+            found.append([
+                self.measured.of(moved if part is None else moved.plus(part), exact=exact, only=only) + added
+                for part in parts
+            ])  # fmt: skip
+        return np.array([np.concatenate(each) for each in zip(*found, strict=True)])
+
+    @property
+    def _at_once(self) -> int:
+        """Draws of the pilot in a block."""
+        return min(self.pilot, max(_BLOCK // len(self.points), 2))
+
+    def _pilot_block(self, block: int, *, exact: bool) -> tuple[Movement, Floats]:
+        """Movements of a block of the pilot, and what adds to its characteristics, the same each time."""
+        count = min(self._at_once, self.pilot - block * self._at_once)
+        drawn = self.drawn(np.random.default_rng([_PILOT_SEED, block]), count)
+        return self.measured.movement(self._given(drawn), exact=exact), self._beside(drawn)
 
     def off(self, seed: int = 0, count: int = CHECKED) -> Floats:
-        """(c,) root mean square difference of first order from exact errors, of their standard deviation."""
+        """(c,) root mean square difference of what is read to first order from what is exactly, of its standard deviation."""
         drawn = self.drawn(np.random.default_rng(seed), count)
-        exact = self.errors(drawn, exact=True)
-        apart = self.errors(drawn) - exact
+        exact = self.read(drawn, exact=True)
+        apart = self.read(drawn, exact=False) - exact
         spread = np.maximum(exact.std(axis=0), ROUNDING)
         return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / spread)
 
 
-def _some(plan: Plan, chosen: NDArray[np.bool_]) -> Plan:
-    """The plan with some of its characteristics."""
-    kept = (one for one, own in zip(plan.characteristics, chosen, strict=True) if own)
-    return replace(plan, characteristics=tuple(kept))
+def _scaled(deviations: Floats) -> Common:
+    """Deviations (n, 3) of a part as often again as a coefficient says."""
+    return Common(name="part", factors=("deviations",), draw=normal([0.0]), basis=deviations[None])
 
 
 class Virtual:
@@ -179,6 +271,7 @@ class Virtual:
     ----------
     plan, given : of the measurement, and its circumstances.
     known : features that were looked at before (:class:`Evaluator`).
+    pilot : draws by which the measurement of what is never negative is turned round.
 
     Attributes
     ----------
@@ -188,10 +281,12 @@ class Virtual:
     off : (c,) by how much first order is off in the first place, of the standard deviation.
     """
 
-    def __init__(self, plan: Plan, given: Circumstances, known: Known | None = None) -> None:
+    def __init__(
+        self, plan: Plan, given: Circumstances, known: Known | None = None, pilot: int = PILOT
+    ) -> None:  # fmt: skip
         self.plan = plan
         self.known: Known = {} if known is None else known
-        self.places = [AtPose(plan, given, pose, self.known) for pose in given.poses]
+        self.places = [AtPose(plan, given, pose, self.known, pilot) for pose in given.poses]
         self.off = self.places[0].off()
         self.exact = bool(np.any(self.off > AGREES))
 
@@ -202,6 +297,8 @@ class Virtual:
 
     def errors(self, random: np.random.Generator, n: int) -> Floats:
         """(n, c) errors, each place as often as the others."""
+        for place in self.places:
+            place.prepare(exact=self.exact)
         if n < 2 * THREADED:
             return self._drawn(random, n)
         halves = n // 2, n - n // 2  # of streams of their own: the same numbers on any number of cores

@@ -22,7 +22,8 @@ from cmm_uq.documents.part_results_keys import PART_RESULTS
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.beginning import TABLES
 from cmm_uq.messages import say
-from cmm_uq.parts.result import evaluated, zones_of
+from cmm_uq.parts.characteristics import never_negative
+from cmm_uq.parts.result import evaluated
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys
 
@@ -87,16 +88,19 @@ def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path, monke
     np.testing.assert_allclose(state.noise.usual_mm, stated.noise.usual_mm, rtol=0.05)
 
 
-def test_a_value_is_what_was_measured_less_the_mean_error() -> None:
+def test_a_value_is_what_was_measured_less_the_mean_error_and_of_a_zone_zero_at_least() -> None:
     found = shifted()
     assert found.measured is not None
     assert found.job.measured is not None
     np.testing.assert_allclose(found.measured, evaluated(found.plan, found.job.measured))
     assert found.measured[0] == pytest.approx(30.0, abs=1e-6)
     assert found.measured[1] == pytest.approx(2 * 0.02, rel=1e-3)  # a position is twice the distance
-    for stated, value, zone in zip(found.stated, found.measured, zones_of(found.plan), strict=True):
-        assert stated.value == pytest.approx(max(0.0, value - stated.error) if zone else value - stated.error)
-        assert stated.interval[0] >= 0 or not zone
+    for stated, value, zone in zip(found.stated, found.measured, never_negative(found.plan), strict=True):
+        assert stated.value is not None
+        if zone:
+            assert 0 <= max(stated.value, stated.interval[0]) <= stated.interval[1]
+        else:
+            assert stated.value == pytest.approx(value - stated.error)
 
 
 def test_without_measured_points_nothing_is_decided_but_what_would_be_accepted_is_told() -> None:
@@ -158,7 +162,8 @@ def test_results_say_what_was_found_with_hashes_of_all_inputs() -> None:
     assert set(data["job"]["inputs_sha256"]) == {"job.toml", "points.csv", *by_results()}
     one, stated = data["characteristics"][1], found.stated[1]
     assert (one["unit"], one["value"], one["u"]) == ("mm", pytest.approx(stated.value), pytest.approx(stated.u))
-    assert one["measured"] - one["mean_error"] == pytest.approx(one["value"])
+    size = data["characteristics"][0]
+    assert size["measured"] - size["mean_error"] == pytest.approx(size["value"])
     low, high = found.simulated.interval[found.stated.index(stated)]
     assert one["U"] == pytest.approx((high - low) / 2)  # of the errors; the interval of a zone ends at zero
     assert one["interval95"] == pytest.approx(stated.interval)

@@ -49,20 +49,20 @@ def test_what_the_calibration_did_not_see_is_told_with_its_share() -> None:
     assert told[0][1] >= told[1][1]
 
 
-def test_errors_that_cancel_have_negative_shares() -> None:
-    """A diagonal of 45°: scale x and squareness of correlation −0.8 by their covariances with the sum."""
+@pytest.mark.parametrize("correlation", [0.8, -0.6, 0.999])
+def test_shares_of_tied_errors_are_what_knowing_one_alone_would_take_away(correlation: float) -> None:
+    """A diagonal of 45°, −s + ½S in units of L/2: the square of each one's correlation with the sum, never more than all."""
     diagonal = Plan((spot("o", [0, 0, 0]), spot("xy", [200, 200, 0])), (Characteristic("d", "distance", ("o", "xy")),))
     arcsec = 1 / 4.84813681
-    V = np.array([[25.0, 0.8 * 25], [0.8 * 25, 25.0]])  # in ppm, and in seconds of as many microradians
+    V = 25.0 * np.array([[1.0, correlation], [correlation, 1.0]])  # in ppm, and in seconds of as many microradians
     draws = np.random.default_rng(2).multivariate_normal([0, 0], V, 20_000) * [1.0, 0.5 * arcsec]
     found = budget(Virtual(diagonal, Circumstances(machine(["scale_x", "squareness_xy"], draws), (POSE,))))
-    # half of the scale's share of x against half of S·y, which counts half here: −s + ½S, in units of L/2
-    c = np.array([-1.0, 0.5])
-    shares = c * (V @ c) / (c @ V @ c)
+    c = np.array([-1.0, 0.5])  # −s·x² and S·x·y over the diagonal, S drawn half as large
+    shares = (V @ c) ** 2 / np.diagonal(V) / (c @ V @ c)
     assert found.factors == ("machine: scale_x", "machine: squareness_xy")
-    np.testing.assert_allclose(found.within[:, 0], shares, atol=0.02)
-    assert found.within[1, 0] < 0
-    assert found.worst("d") == "machine: scale_x"
+    np.testing.assert_allclose(found.within[:, 0], shares, atol=0.03)
+    assert (found.within <= 1).all()
+    assert [found.share(line, 0) for line in found.factors] == found.within[:, 0].tolist()
 
 
 def test_a_position_has_more_in_total_than_alone() -> None:

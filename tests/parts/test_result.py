@@ -7,8 +7,9 @@ import pytest
 from scipy import stats
 
 from cmm_uq.conformity.limits import Limits
+from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.plan import Characteristic, Plan
-from cmm_uq.parts.result import Stated, conforming, stated, zones_of
+from cmm_uq.parts.result import Stated, conforming, stated
 from cmm_uq.uncertainty.monte_carlo import Source, from_source
 from tests.parts_drawn import block, circle, spot
 
@@ -29,27 +30,31 @@ def of(value: float) -> tuple[Stated, ...]:
 
 
 @pytest.mark.parametrize("value", [-1.0, 0.0, 1.0, 2.5])
-def test_the_interval_of_a_zone_is_the_shortest_one_above_zero(value: float) -> None:
-    """A normal distribution cut at zero (scipy's): from zero where it is densest there, else about its mode."""
+def test_the_interval_of_a_zone_ends_where_what_is_possible_ends(value: float) -> None:
+    """2.5 % of a normal distribution below, at zero at least; above, 2.5 % of the same cut at zero (scipy's)."""
     zone, size = of(value)
     cut = stats.truncnorm(-value, np.inf, value, 1.0)
-    shortest = 0.0, float(cut.ppf(0.95))
-    if cut.pdf(shortest[1]) > cut.pdf(0.0):
-        half = stats.norm.ppf(0.5 + 0.5 * 0.95 * stats.norm.cdf(value))
-        shortest = value - half, value + half
-    assert zone.interval == pytest.approx(shortest, abs=0.04)
+    assert zone.interval == pytest.approx((max(0.0, value - 1.96), float(cut.ppf(0.975))), abs=0.03)
     assert zone.value == pytest.approx(max(0.0, value), abs=0.01)
     assert (zone.U, zone.k, size.U) == pytest.approx((1.96, 1.96, 1.96), abs=0.04)  # of the measurement, cut or not
     assert size.interval == pytest.approx((value - 1.96, value + 1.96), abs=0.06)
     assert size.value == pytest.approx(value, abs=0.01)
 
 
-def test_a_zone_far_below_zero_is_zero_and_no_wider_than_its_error() -> None:
-    """With none of 200 000 draws possible: what is left of a normal distribution beyond 6 sigma is far narrower than 3.92."""
+def test_a_zone_far_below_zero_is_zero_and_no_smaller_than_its_error_may_be() -> None:
+    """With none of 200 000 draws possible it ends where 97.5 % of all lie, on the other side of zero."""
     zone, _ = of(-6.0)
     assert (zone.value, zone.interval[0]) == (0.0, 0.0)
-    assert zone.interval[1] == pytest.approx(2 * 1.96, abs=0.05)
-    assert stats.truncnorm(6.0, np.inf, -6.0, 1.0).ppf(0.95) < zone.interval[1]
+    assert zone.interval[1] == pytest.approx(6.0 + 1.96, abs=0.05)
+
+
+def test_the_value_of_a_zone_is_as_often_too_large_as_too_small() -> None:
+    """Errors of an exponential distribution of mean one: ln 2 in the middle. A size is less their mean."""
+    errors = np.repeat(np.random.default_rng(1).exponential(size=(200_000, 1)), 2, axis=1)
+    simulated = from_source(Source(["zone", "size"], lambda random, n: errors[:n].T.copy()), 1000)
+    zone, size = stated(simulated, np.full(2, 5.0), PLAN, errors)
+    assert zone.value == pytest.approx(5 - np.log(2), abs=0.01)
+    assert size.value == pytest.approx(4.0, abs=0.1)
 
 
 @pytest.mark.parametrize("value", [-0.5, 0.0, 1.0, 2.0])
@@ -67,7 +72,7 @@ def test_a_zone_conforms_with_the_probability_given_that_it_is_not_negative(valu
 def test_widths_are_zones_and_what_has_a_sign_or_a_size_is_none() -> None:
     _, characteristics = block()
     features, _ = block()
-    zones = zones_of(Plan(features, characteristics)).tolist()
+    zones = never_negative(Plan(features, characteristics)).tolist()
     assert dict(zip((one.what for one in characteristics), zones, strict=True)) == {
         one.what: one.what not in ("size", "distance", "angle", "x", "y", "z") for one in characteristics
     }

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from scipy.stats import ncx2
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.causes import Rows, Scatter
@@ -325,28 +326,26 @@ def test_a_position_that_is_off_errs_to_both_sides() -> None:
         assert found.mean() == pytest.approx(mean, abs=5e-5)
 
 
-@pytest.mark.parametrize(("common", "own", "mean", "u"), [
-    (1.0, 0.0, -2e-3 * np.sqrt(np.pi / 2), 2e-3 * np.sqrt(2 - np.pi / 2)),
-    (0.0, 1.0, 2e-3 * np.sqrt(np.pi / 2), 2e-3 * np.sqrt(2 - np.pi / 2)),
-    (1.0, 1.0, (np.sqrt(2) - 2) * 2e-3 * np.sqrt(np.pi / 2), None),
-])  # fmt: skip
-def test_what_points_have_in_common_moves_the_true_place_and_their_own_noise_only_adds(
-    common: float, own: float, mean: float, u: float | None
-) -> None:
-    """A hole that was measured in its very place. Moved as a whole by s, it truly lies |s| beside it (Rayleigh); with noise n
-    of its centre it lies in its place, |n| is what the noise added. Both: E(2|s| − |n − s|) of two independent ones."""
+@pytest.mark.parametrize(("common", "own"), [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
+@pytest.mark.parametrize("off_um", [0.0, 1.5, 4.0])
+def test_where_a_hole_truly_is_follows_from_where_it_was_measured(common: float, own: float, off_um: float) -> None:
+    """Measured r off its place with errors of s along each axis, common or of each point: P(θ ≤ t) = P(|t + s| ≥ r), the
+    noncentral χ² of two degrees of freedom (scipy's); twice that is the position."""
     hole, ends = circle("hole", [50, 50, 0], 5.0, 4), (spot("o", [0, 0, 0]), spot("a", [100, 0, 0]))
     tip = Stylus("tip", u_offset_um=np.array([common, common, 0.0]))
     plan = Plan((replace(hole, stylus="tip"), *ends, spot("up", [0, 100, 0])),
                 (Characteristic("p", "position", ("hole",), ("o", "a", "up")),), (Stylus("stylus"), tip))  # fmt: skip
+    of_hole = np.tile((plan.stylus_of == 1)[:, None], (1, 3))
     # the centre is the mean of two of four points along each axis with weight 1/2: u of each reading over √2
-    size = np.sqrt(2) * 1e-3 * own * np.tile((plan.stylus_of == 1)[:, None], (1, 3))
-    noise = Scatter.of("noise", "reading", size)
-    given = Circumstances(machine(), (POSE,), further=(noise,), measured=plan.points)
-    found = Virtual(plan, given).errors(np.random.default_rng(0), 50_000)[:, 0]
-    assert found.mean() == pytest.approx(mean, abs=5e-5)
-    if u is not None:
-        assert found.std() == pytest.approx(u, rel=0.02)
+    noise = Scatter.of("noise", "reading", np.sqrt(2) * 1e-3 * own * of_hole)
+    measured = plan.points + 1e-3 * off_um * of_hole * [1, 0, 0]
+    given = Circumstances(machine(), (POSE,), further=(noise,), measured=measured)
+    true = evaluated(plan, measured) - Virtual(plan, given).errors(np.random.default_rng(0), 100_000)
+    s = np.hypot(common, own)
+    for limit in (1.0, 2.0, 3.0):
+        expected = ncx2.sf((off_um / s) ** 2, 2, (limit / s) ** 2) if off_um else 1.0
+        assert np.mean(true <= 2e-3 * limit) == pytest.approx(expected, abs=0.015)
+    assert true.std() > 1e-3 * s  # nor where it was measured in its very place
 
 
 def test_what_is_linear_errs_alike_about_measured_and_nominal_points() -> None:
