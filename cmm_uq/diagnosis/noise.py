@@ -17,7 +17,7 @@ from cmm_uq.points import Floats
 TAILS = 0.05
 """Probability of heavy tails."""
 
-_OFTEN = 0.25
+OFTEN = 0.25
 """The same for the test whether anything is missing, whose false alarms are promised whatever the tails are.
 
 Many series of routine measurements have longer tails than the normal distribution (Jeffreys 1938, Phil. Trans. A 237,
@@ -127,9 +127,9 @@ def heavy(residuals: Floats) -> bool:
     return len(residuals) >= _FEWEST and _tails_over_normal(residuals) > _BETTER
 
 
-def probable_tails(residuals: Floats) -> float:
-    """Probability that residuals (n,), each of the same variance, have heavy tails: one in four beforehand."""
-    odds = _OFTEN / (1 - _OFTEN) * np.exp(min(_tails_over_normal(residuals), _BETTER))
+def probable_tails(residuals: Floats, often: float = OFTEN) -> float:
+    """Probability that residuals (n,), each of the same variance, have heavy tails; ``often`` is it beforehand."""
+    odds = often / (1 - often) * np.exp(min(_tails_over_normal(residuals), _BETTER))
     return float(odds / (1 + odds))
 
 

@@ -22,7 +22,7 @@ from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of, widths
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.diagnosis.comparison.quick import eigen, interpolated, log_diagonal, log_sum, log_sum_in
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
-from cmm_uq.diagnosis.noise import Kind, probable_tails
+from cmm_uq.diagnosis.noise import OFTEN, Kind, probable_tails
 from cmm_uq.model.display import Display
 from cmm_uq.points import Floats, Ints
 
@@ -90,6 +90,7 @@ class Comparison:
     least_noise : mm, the least that the noise may be; with it the largest coefficients are as large as physics allows.
     certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
     display : steps to which all coordinates are rounded, where they matter.
+    often_heavy : probability, beforehand, that recordings of which nothing is missing have heavy tails.
     """
 
     observed: Floats
@@ -102,6 +103,7 @@ class Comparison:
     least_noise: float
     certified: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     display: Display | None = None
+    often_heavy: float = OFTEN
 
     @cached_property
     def _reached(self) -> Floats:
@@ -295,7 +297,7 @@ class Comparison:
         own -= reached @ (reached.T @ own)
         left = 1 - np.sum(reached**2, axis=1)
         enough = left > _LEAST_LEFT
-        return probable_tails(own[enough] / np.sqrt(left[enough]))
+        return probable_tails(own[enough] / np.sqrt(left[enough]), self.often_heavy)
 
     def log_evidence(
         self,
