@@ -2,8 +2,8 @@
 
 Cases are made first and their truth is sealed by a hash; then they are diagnosed and searched by two oracles. Every result is
 a line in ``FOLDER``, so that a run can be stopped and taken up again, and more cases added with larger numbers.
-``--only make``, ``diagnose`` or ``search`` does one part; ``--page docs`` counts what is there and writes the page, with what
-``FOLDER/note.txt`` says of the run, if anything.
+``--only make``, ``diagnose`` or ``search`` does one part; ``--kind "artefact, geometry"``, once or more, leaves out all other
+kinds; ``--page docs`` counts what is there and writes the page, with what ``FOLDER/note.txt`` says of the run, if anything.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from benchmarks.second.cases import KINDS
 from benchmarks.second.page import write
 from benchmarks.second.running import kept, lines, sealed, tasks
 
@@ -26,12 +27,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the cases")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", choices=PARTS, help="one part of the work")
+    parser.add_argument("--kind", action="append", choices=KINDS, help="of cases, by default all")
     parser.add_argument("--page", type=Path, help="run nothing; count, and write page and picture into this folder")
     chosen = parser.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
 
     def listed(what: str) -> list:
-        return tasks(chosen.folder, chosen.seed, chosen.cases, chosen.nulls, what)
+        every = tasks(chosen.folder, chosen.seed, chosen.cases, chosen.nulls, what)
+        return [task for task in every if task[2] in (chosen.kind or KINDS)]
 
     if not chosen.page:
         kept(listed("make"), chosen.folder / "make.jsonl", chosen.workers)

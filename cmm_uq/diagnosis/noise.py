@@ -17,6 +17,13 @@ from cmm_uq.points import Floats
 TAILS = 0.05
 """Probability of heavy tails."""
 
+OFTEN = 0.25
+"""The same for the test whether anything is missing, whose false alarms are promised whatever the tails are.
+
+Many series of routine measurements have longer tails than the normal distribution (Jeffreys 1938, Phil. Trans. A 237,
+231; Hampel et al. 1986, Robust Statistics, 1.2c).
+"""
+
 _TAILS_DOF = 4.0
 _SHRINK = (_TAILS_DOF - 2) / _TAILS_DOF
 """Square of the t distribution's scale over its standard deviation."""
@@ -117,13 +124,24 @@ def heavy(residuals: Floats) -> bool:
     ----------
     residuals : each of the same variance, as :func:`~cmm_uq.inference.studentised.studentised` gives them.
     """
-    if len(residuals) < _FEWEST or not np.any(residuals):
-        return False
+    return len(residuals) >= _FEWEST and _tails_over_normal(residuals) > _BETTER
+
+
+def probable_tails(residuals: Floats, often: float = OFTEN) -> float:
+    """Probability that residuals (n,), each of the same variance, have heavy tails; ``often`` is it beforehand."""
+    odds = often / (1 - often) * np.exp(min(_tails_over_normal(residuals), _BETTER))
+    return float(odds / (1 + odds))
+
+
+def _tails_over_normal(residuals: Floats) -> float:
+    """Logarithm of the ratio of likelihoods of Student's t and of a normal distribution, each with its best size."""
+    if not np.any(residuals):
+        return 0.0
     z = residuals / np.sqrt(np.mean(residuals**2))
     t = np.outer(1 / _SCALES, z)
     log_t = (special.gammaln(2.5) - special.gammaln(2) - 0.5 * np.log(4 * np.pi) - 2.5 * np.log1p(t**2 / 4)).sum(axis=1)
     normal = -0.5 * len(z) * (np.log(2 * np.pi) + 1)
-    return bool((log_t - len(z) * np.log(_SCALES)).max() - normal > _BETTER)
+    return float((log_t - len(z) * np.log(_SCALES)).max() - normal)
 
 
 def sigma_grid(stated: float | None, residual: float, least: float = 0.0) -> tuple[Floats, Floats]:

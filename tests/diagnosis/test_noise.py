@@ -10,7 +10,7 @@ from scipy import optimize, stats
 
 from cmm_uq.commands.diagnosing import screened_model
 from cmm_uq.commands.reading import read_job
-from cmm_uq.diagnosis.noise import heavy
+from cmm_uq.diagnosis.noise import heavy, probable_tails
 from cmm_uq.inference.studentised import studentised
 from cmm_uq.model.noise import noise_of
 
@@ -59,3 +59,15 @@ def test_a_normal_scatter_is_not_said_to_have_heavy_tails_where_each_placing_is_
     }
     assert said["normal"] <= 3
     assert said["t"] >= 40
+
+
+def test_one_recording_in_four_may_have_heavy_tails_and_its_residuals_say_whether() -> None:
+    """The odds are one to three times the ratio of likelihoods, each at its largest (scipy's fit of the scale of t)."""
+    random = np.random.default_rng(3)
+    for z in (random.standard_normal(19), random.standard_t(3, 19)):
+        best = optimize.minimize_scalar(lambda s, z=z: -stats.t.logpdf(z, 4, scale=s).sum(), bounds=(0.1, 5)).fun
+        odds = np.exp(-best - stats.norm.logpdf(z, scale=np.sqrt(np.mean(z**2))).sum()) / 3
+        assert probable_tails(z) == pytest.approx(odds / (1 + odds), rel=0.01)
+    assert probable_tails(random.standard_normal(300)) < 0.001
+    assert probable_tails(random.standard_t(3, 300)) > 0.9
+    assert probable_tails(np.zeros(19)) == pytest.approx(0.25)

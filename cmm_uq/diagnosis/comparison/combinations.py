@@ -100,13 +100,21 @@ class Combinations:
         return min(1.0, float(sum(p for key, p in self.probability.items() if those & key)))
 
     def instead(self, effects: Key, index: int) -> dict[int, float]:
-        """Odds of each other known effect in the place of one, the rest kept."""
+        """Odds of each other known effect in the place of one, or of one and more, the rest kept.
+
+        In the place of several it counts where it is more probable than that the one is merely left out: a gauge that had
+        another temperature on each of its lines looks like two or three errors of the machine at once.
+        """
         rest, whole = effects - {index}, self.of_effects[effects]
-        return {
-            next(iter(other - rest)): p / whole
-            for other, p in self.of_effects.items()
-            if len(other) == len(effects) and rest < other and other != effects
-        }
+        odds: dict[int, float] = {}
+        for other, p in self.of_effects.items():
+            more = other - effects
+            if len(more) != 1 or index in other:
+                continue
+            if len(other) == len(effects) or p > self.of_effects.get(rest, 0.0):
+                (it,) = more
+                odds[it] = odds.get(it, 0.0) + p / whole
+        return odds
 
 
 def explore(comparison: Comparison, before: Combinations | None = None, changed: Key = frozenset()) -> Combinations:

@@ -7,6 +7,7 @@ the covariance turns it into noise. Rows that are exchanged, numbered anew or mi
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from cmm_uq.diagnosis.noise import Kind
@@ -15,12 +16,16 @@ from cmm_uq.points import Floats, Ints
 _ORTHOGONAL = 1e-9
 """Of the largest square of a row's length, what products of rows that are at right angles come to."""
 
+DEGREES = (3.0, 4.0)
+"""Of freedom, of Student's t where noise has heavy tails: the fewest that have a variance, and those of the noise's model."""
+
 _DIGITS = 7
 """Of what is left, over its root mean square, that rounding spares."""
 
 
 def drawn(
-    kind: Kind, random: np.random.Generator, draws: int, noise_scale: Floats, standing: tuple[Ints, Floats]
+    kind: Kind, random: np.random.Generator, draws: int, noise_scale: Floats, standing: tuple[Ints, Floats],
+    wider: Floats | None = None,
 ) -> Floats:  # fmt: skip
     """Noise (m, draws) of one kind, over the noise scale, a reading's standard deviation being one.
 
@@ -31,10 +36,11 @@ def drawn(
     draws : how many.
     noise_scale : (m,) of the observations.
     standing : see :func:`standing_of`.
+    wider : (m, draws) by how much each is wider than a normal one; see :func:`widths`.
     """
     order, side = standing
     white = np.empty((len(order), draws))
-    white[order] = random.standard_normal((len(order), draws))
+    white[order] = random.standard_normal((len(order), draws)) * (1.0 if wider is None else wider)
     white *= side[:, None]
     # the whitening is mostly an orthogonal matrix T between two diagonal ones: D·T·S; the root is then S⁻¹·Tᵀ·D⁻¹·T
     turned = kind.whitening @ sparse.diags_array(1 / noise_scale)
@@ -45,6 +51,15 @@ def drawn(
     else:  # as of readings that follow each other
         found = _root(kind, len(order)) @ white
     return found + kind.slow @ random.standard_normal((kind.slow.shape[1], draws)) if kind.slow.size else found
+
+
+def widths(random: np.random.Generator, heavy: NDArray[np.bool_], count: int) -> Floats:
+    """Factors (count, draws) that make normal draws those of Student's t where these (draws,) are heavy, of one variance."""
+    found = np.ones((count, len(heavy)))
+    dof = random.choice(DEGREES, len(heavy))
+    square = (dof - 2) / random.chisquare(dof, found.shape)
+    found[:, heavy] = np.sqrt(square[:, heavy])
+    return found
 
 
 def _root(kind: Kind, count: int) -> Floats:

@@ -15,13 +15,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg, sparse, special
 
-from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of
+from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of, widths
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.diagnosis.comparison.quick import eigen, interpolated, log_diagonal, log_sum, log_sum_in
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
-from cmm_uq.diagnosis.noise import Kind
+from cmm_uq.diagnosis.noise import OFTEN, Kind, probable_tails
 from cmm_uq.model.display import Display
 from cmm_uq.points import Floats, Ints
 
@@ -30,6 +31,9 @@ _WIDE = 30
 
 _KEPT = 8_000_000
 """Numbers that are kept of what follows from what was given last."""
+
+_LEAST_LEFT = 0.1
+"""Part of a residual's variance that the fit must leave for it to tell of tails."""
 
 _LARGEST_EXPONENT = 600.0
 """Of a factor that says how little something counts."""
@@ -86,6 +90,7 @@ class Comparison:
     least_noise : mm, the least that the noise may be; with it the largest coefficients are as large as physics allows.
     certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
     display : steps to which all coordinates are rounded, where they matter.
+    often_heavy : probability, beforehand, that recordings of which nothing is missing have heavy tails.
     """
 
     observed: Floats
@@ -98,6 +103,7 @@ class Comparison:
     least_noise: float
     certified: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     display: Display | None = None
+    often_heavy: float = OFTEN
 
     @cached_property
     def _reached(self) -> Floats:
@@ -144,13 +150,22 @@ class Comparison:
         """Explanations of which the baseline leaves anything."""
         return frozenset(i for i, _ in self._where)
 
-    def noise(self, kind: Kind, random: np.random.Generator, sigma: Floats) -> Floats:
-        """What the baseline leaves (m, draws), mm, of noise of one kind; ``sigma`` (draws,) is that of a reading, mm.
+    def noise(
+        self, kind: Kind, random: np.random.Generator, sigma: Floats, heavy: NDArray[np.bool_] | None = None
+    ) -> Floats:
+        """What the baseline leaves (m, draws), mm, of noise of one kind.
 
         Where the display's steps matter, coordinates are rounded as the recording's were.
+
+        Parameters
+        ----------
+        sigma : (draws,) of a reading, mm.
+        heavy : (draws,) which have heavy tails; none by default.
         """
         fine = kind.unrounded if self.display else None
-        found = drawn(fine or kind, random, len(sigma), self.noise_scale, self._standing)
+        # of a stream of its own: the others stay as they are
+        wider = None if heavy is None else widths(random.spawn(1)[0], heavy, len(self.left))
+        found = drawn(fine or kind, random, len(sigma), self.noise_scale, self._standing, wider)
         if self.certified.size:
             found += self.certified @ random.standard_normal((self.certified.shape[1], len(sigma)))
         if not (self.display and fine):
@@ -258,15 +273,31 @@ class Comparison:
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
     def nothing(self, random: np.random.Generator, draws: int) -> Floats:
-        """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, their noise by its posterior."""
+        """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, their noise by its posterior.
+
+        A few readings do not tell whether their noise is normal; so many draws have heavy tails as that is probable.
+        """
         weight = self.noise_posterior()
         chosen = random.choice(weight.size, draws, p=weight.ravel() / weight.sum())
         kind, size = np.unravel_index(chosen, weight.shape)
+        uniform = random.spawn(1)[0].random(draws)
         found = np.empty((len(self.left), draws))
         for g in np.unique(kind):
             columns = np.flatnonzero(kind == g)
-            found[:, columns] = self.noise(self.kinds[g], random, self.sigma[size[columns]])
+            heavy = uniform[columns] < self.heavy_tails(self.kinds[g])
+            found[:, columns] = self.noise(self.kinds[g], random, self.sigma[size[columns]], heavy)
         return found
+
+    def heavy_tails(self, kind: Kind) -> float:
+        """Probability of heavy tails beside what a kind of noise is otherwise."""
+        if kind.name == "tails":
+            return 0.0
+        reached = np.linalg.qr(kind.white(self._reached))[0]
+        own = kind.white(self.left[:, None])[:, 0]
+        own -= reached @ (reached.T @ own)
+        left = 1 - np.sum(reached**2, axis=1)
+        enough = left > _LEAST_LEFT
+        return probable_tails(own[enough] / np.sqrt(left[enough]), self.often_heavy)
 
     def log_evidence(
         self,

@@ -25,7 +25,9 @@ _LOBES = (2, 4, 5, 6, 7, 8, 9, 10)
 """Undulations in a turn; three are an effect of the catalogue."""
 
 _SPACE_PLACES, _SPACE_RANK = 120, 40
-_MOST_STEPS = 40
+_MOST_STEPS = 200
+"""Jumps that are tried. A reading on the wrong side of one is off by all of it: few between many readings find none."""
+
 _MANY_DIRECTIONS, _SEEN = 12, 1e-6
 
 _PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.diagnosis.comparison.combinations import EFFECTS, UNKNOWNS, Prior, explore, log_evidence_together
+from cmm_uq.diagnosis.comparison.combinations import (
+    EFFECTS,
+    UNKNOWNS,
+    Combination,
+    Combinations,
+    Prior,
+    explore,
+    log_evidence_together,
+)
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Version
@@ -112,6 +120,25 @@ def test_two_that_are_one_and_the_same_share_their_probability() -> None:
     first, last = frozenset({0}), len(explanations)
     assert found.of(0) == pytest.approx(found.of(last), rel=0.05)
     assert found.instead(first, 0)[last] == pytest.approx(1.0, rel=0.05)
+
+
+def of_sets(probability: dict[tuple[int, ...], float]) -> Combinations:
+    explanations = rivals(np.random.default_rng(8), 4)
+    return Combinations(explanations, {frozenset(k): Combination((), np.log(p)) for k, p in probability.items()})
+
+
+def test_one_that_explains_what_two_do_is_in_the_place_of_each() -> None:
+    found = of_sets({(0, 1): 0.5, (2,): 0.25, (0, 3): 0.15, (0,): 0.1})
+    both = frozenset({0, 1})
+    assert found.instead(both, 0) == pytest.approx({2: 0.5})
+    assert found.instead(both, 1) == pytest.approx({2: 0.5, 3: 0.3})
+
+
+def test_one_in_the_place_of_another_is_not_in_that_of_a_third_that_is_merely_left_out() -> None:
+    found = of_sets({(0, 1): 0.4, (0,): 0.3, (2,): 0.1, (1, 2): 0.2})
+    both = frozenset({0, 1})
+    assert found.instead(both, 0) == pytest.approx({2: 0.75})
+    assert found.instead(both, 1) == {}
 
 
 def test_prior_probabilities_of_all_combinations_sum_to_one() -> None:

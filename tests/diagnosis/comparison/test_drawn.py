@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of
+from cmm_uq.diagnosis.comparison.drawn import DEGREES, drawn, standing_of, widths
 from cmm_uq.kinds.error_maps.noise import kinds_along
 from cmm_uq.points import Floats
 
@@ -42,3 +43,21 @@ def test_exchanged_and_mirrored_readings_have_the_same_noise() -> None:
         return drawn(kind, random, 5, np.ones(8), standing_of(values, np.zeros((8, 0))))
 
     np.testing.assert_allclose(of((side * left)[order]), (side[:, None] * of(left))[order], atol=1e-12)
+
+
+def test_heavy_draws_are_of_student_s_t_with_the_variance_of_the_others() -> None:
+    """Each draw has one number of degrees of freedom, so that every column is of scipy's t, over its standard deviation."""
+    random = np.random.default_rng(10)
+    heavy = np.arange(60) % 3 != 0
+    wider = widths(random, heavy, 4000)
+    assert np.all(wider[:, ~heavy] == 1)
+    found = wider * random.standard_normal(wider.shape)
+    by_degrees = [
+        [stats.kstest(column * np.sqrt(dof / (dof - 2)), stats.t(dof).cdf).pvalue for column in found[:, heavy].T]
+        for dof in DEGREES
+    ]
+    assert np.max(by_degrees, axis=0).min() > 1e-4
+    likelier = np.argmax(by_degrees, axis=0)
+    assert 8 <= np.sum(likelier == 0) <= 32, "binomial of forty, one half: 1e-4 beyond"
+    normal = [stats.kstest(column, stats.norm.cdf).pvalue for column in found[:, heavy].T]
+    assert max(normal) < 1e-4

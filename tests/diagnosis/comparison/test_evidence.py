@@ -12,7 +12,7 @@ from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation, Member
 from cmm_uq.diagnosis.comparison.lack_of_fit import tail_probability
 from cmm_uq.diagnosis.comparison.stack import Version
-from cmm_uq.diagnosis.noise import TAILS, shape_of, sigma_grid, tails
+from cmm_uq.diagnosis.noise import TAILS, probable_tails, shape_of, sigma_grid, tails
 from cmm_uq.diagnosis.shapes import drawn_shapes, kinds
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
@@ -338,3 +338,26 @@ def test_a_least_noise_cuts_the_integral_off_below_it(least: float, stated: floa
 def test_where_nothing_that_is_thought_of_could_show_nothing_is_missing() -> None:
     """As of a single placing of a triangle, whose freedoms take up all that is observed."""
     assert tail_probability(np.full(50, -np.inf), -np.inf) == 1.0
+
+
+def test_heavy_tails_are_as_probable_as_studentised_residuals_make_them() -> None:
+    """Residuals over the roots of their variances, which the residual-forming matrix of generalised least squares has."""
+    c = comparison(11)
+    for kind in c.kinds:
+        W = kind.white(np.eye(len(c.observed)))
+        X = W @ c.baseline
+        M = np.eye(len(W)) - X @ np.linalg.pinv(X)
+        z = (M @ W @ c.observed)[np.diag(M) > 0.1] / np.sqrt(np.diag(M)[np.diag(M) > 0.1])
+        assert c.heavy_tails(kind) == pytest.approx(0.0 if kind.name == "tails" else probable_tails(z))
+
+
+def test_as_many_recordings_of_nothing_have_heavy_tails_as_that_is_probable(monkeypatch: pytest.MonkeyPatch) -> None:
+    c = comparison(12)
+    draws = {}
+    for share in (0.0, 0.4):
+        monkeypatch.setattr(Comparison, "heavy_tails", lambda *_, share=share: share)
+        draws[share] = c.nothing(np.random.default_rng(1), 2000)
+    changed = np.any(draws[0.0] != draws[0.4], axis=0)
+    assert stats.binomtest(int(changed.sum()), 2000, 0.4).pvalue > 1e-4
+    variance = [np.mean(each[:, ~changed] ** 2) for each in draws.values()]
+    assert variance[0] == variance[1]

@@ -74,3 +74,17 @@ def test_no_jump_parts_readings_of_one_place() -> None:
     assert len(jumps) == len(np.unique(np.round(along_y))) - 1
     for high in (jump > 0 for jump in jumps):
         assert along_y[high].min() - along_y[~high].max() > 1.0
+
+
+def test_a_jump_is_sought_between_every_two_readings_in_time() -> None:
+    """One reading on its wrong side leaves the whole jump of that reading: nearly the right place is not nearly right."""
+    job = read_job(EXAMPLES / "plate-simulated")
+    time = 30.0 * np.arange(len(job.points)) ** 1.01
+    model, _ = screened_model(replace(job, points=replace(job.points, columns={**job.points.columns, "time_s": time})))
+    values = model.estimate().least_squares.value
+    points = model.artefact.points.at(model.placed(values))
+    scale = {e.name: e for e in unknown(model, values)}["scale of X as a function of time"]
+    along_x = points.readings["x"][:, None, None] * np.array([1.0, 0.0, 0.0])[:, None]
+    for after in np.unique(time)[1:]:
+        what = model.seen(along_x * np.where(time >= after, 1.0, -1.0)[:, None, None], values)[:, 0]
+        assert reached(scale, what) == pytest.approx(1.0)
