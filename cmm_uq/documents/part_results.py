@@ -16,6 +16,7 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.languages.language import ENGLISH
 from cmm_uq.messages import Text
+from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.points import Floats
 
 SCHEMA = "cmm-uq/part/1"
@@ -99,6 +100,7 @@ def _characteristic(found: PartFound, i: int) -> dict[str, Any]:
         "association": found.plan.characteristics[i].association, "unit": unit_of(facts),
         "measured": None if found.measured is None else _in(facts, float(found.measured[i])),
         "mean_error": _in(facts, stated.error), "value": None if stated.value is None else _in(facts, stated.value),
+        "value_is": "median" if never_negative(found.plan)[i] else "mean",
         "u": _in(facts, stated.u), "U": _in(facts, stated.U), "k": stated.k if isfinite(stated.k) else None,
         "interval95": [low, high], "worst_cause": found.budget.worst(facts.name),
         "limits": None if judged is None else _limits(facts, judged),

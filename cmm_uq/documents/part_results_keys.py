@@ -71,7 +71,9 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "characteristics[].unit": ("", "Of all values beside it: mm or °."),
         "characteristics[].measured": (OWN, "Value of the measured points."),
         "characteristics[].mean_error": (OWN, "What such measurements err by on average."),
-        "characteristics[].value": (OWN, "The one less the other, which is stated."),
+        "characteristics[].value": (OWN, "What is stated, by `value_is`."),
+        "characteristics[].value_is": (
+            "", "mean: measured less mean_error; median: of the values that such a measurement may come from, zero at least."),
         "characteristics[].u": (OWN, "Standard uncertainty."),
         "characteristics[].U": (OWN, "Half of the shortest 95 % interval."),
         "characteristics[].k": ("", "U over u."),

@@ -72,7 +72,7 @@ def _notes(every: Sequence[Figures]) -> tuple[Text, ...]:
     if every[0].stated.value is None:
         notes.append(say("The interval is that of the true value less the indicated one."))
         return tuple(notes)
-    notes.append(say("Values are stated less the mean of their errors."))
+    notes.append(say("All other values are stated less the mean of their errors."))
     return tuple(notes)
 
 

@@ -49,6 +49,7 @@ def check_part_figures(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> 
 
 def _characteristic(one: Mapping[str, Any]) -> Iterator[Wrong]:
     u, expanded, k, (low, high) = one["u"], one["U"], one["k"], one["interval95"]
+    median = one.get("value_is") == "median"  # before 0.9.0 no value was
     zone, most = is_zone(one), max(abs(low), abs(high), abs(one["mean_error"]), abs(one["measured"] or 0.0))
     if u < 0:
         yield "u", "is an uncertainty below zero", u, ""
@@ -57,16 +58,18 @@ def _characteristic(one: Mapping[str, Any]) -> Iterator[Wrong]:
     if u > 0 and (k is None or abs(k - expanded / u) > 2 * DIGITS * abs(expanded / u)):
         yield "k", "is not U over u", k, f"{expanded / u:.10g}"
     half = 0.5 * (high - low)
-    if not zone and abs(expanded - half) > DIGITS * most:
+    if not zone and not median and abs(expanded - half) > DIGITS * most:
         yield "U", "is not half of its interval", expanded, f"{half:.10g}"
     if (one["measured"] is None) != (one["value"] is None):
         yield "value", "is stated of nothing measured, or not of what was", one["value"], one["measured"]
     elif one["value"] is not None:
         should = one["measured"] - one["mean_error"]
         should = max(0.0, should) if zone else should
-        if abs(one["value"] - should) > DIGITS * most:
+        if not median and abs(one["value"] - should) > DIGITS * most:
             yield "value", "is not what was measured less the mean error", one["value"], f"{should:.10g}"
-        if not zone and not low - DIGITS * most <= one["value"] <= high + DIGITS * most:
+        if median and one["value"] < 0:
+            yield "value", "is less than zero", one["value"], "0"
+        if (median or not zone) and not low - DIGITS * most <= one["value"] <= high + DIGITS * most:
             yield "interval95", "does not contain the value", one["interval95"], one["value"]
     yield from _margin(one, most)
 
