@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import lzma
 import os
 import tempfile
 import time
@@ -68,10 +69,11 @@ def run(
 
 
 def kept(folder: Path) -> list[dict[str, Any]]:
-    """All records of a folder; a last line that was cut off is left out."""
+    """All records of a folder, those packed with xz too; a last line that was cut off is left out."""
     records = []
-    for file in sorted(folder.glob("*.jsonl")):
-        for line in file.read_text(encoding="utf-8").splitlines():
+    for file in sorted((*folder.glob("*.jsonl"), *folder.glob("*.jsonl.xz"))):
+        content = lzma.decompress(file.read_bytes()) if file.suffix == ".xz" else file.read_bytes()
+        for line in content.decode("utf-8").splitlines():
             try:
                 records.append(json.loads(line))
             except json.JSONDecodeError:

@@ -16,6 +16,7 @@ from benchmarks.coverage.measuring import kept, measured
 from benchmarks.coverage.page import page
 from benchmarks.coverage.power import counts
 from benchmarks.coverage.tally import Count, holds, pooled, tallies, wider
+from tests.conftest import ROOT
 
 
 def record(
@@ -94,6 +95,14 @@ def test_a_run_is_taken_up_where_it_was_cut_off(tmp_path: Path, monkeypatch: pyt
     study.measure(tasks, tmp_path, 1)
     assert [each["number"] for each in kept(tmp_path)] == [0, 1]
     assert study.waiting([cell], tmp_path, 3, 2) == []
+
+
+def test_packed_records_count_like_others() -> None:
+    """The recorded run: as many recordings as its page says, in a hundred cells."""
+    records = kept(ROOT / "benchmarks" / "coverage" / "recorded")
+    assert len({record["cell"] for record in records}) == 100
+    said = (ROOT / "docs" / "coverage-study.md").read_text(encoding="utf-8")
+    assert f"This run: {len(records)} recordings" in said
 
 
 def test_a_recording_goes_through_the_api_and_comes_back_with_every_truth() -> None:
