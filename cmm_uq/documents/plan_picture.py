@@ -210,8 +210,8 @@ def gain_plot(
 
 def _size(title: Text) -> float:
     """Of the letters of a placing's title, smaller where it is longer than its picture is wide."""
-    said, room = lettered(title), WIDTH_MM * (1 / A_ROW - 0.05)
-    return SMALL if said is title else SMALL * min(1.0, room / width_mm(said, SMALL, "bold"))
+    room = WIDTH_MM * (1 / A_ROW - 0.05)
+    return SMALL * min(1.0, room / width_mm(lettered(title), SMALL, "bold"))
 
 
 def _edge(last: Text) -> float:
