@@ -11,7 +11,7 @@ import numpy as np
 
 from cmm_uq.commands.part import part_found
 from cmm_uq.commands.part_written import contents_of
-from cmm_uq.documents.part_found import PartFound
+from cmm_uq.documents.part.found import PartFound
 from tests.part_machines import by_certificate, plate_of
 
 TRIALS = 4000

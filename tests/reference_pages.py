@@ -13,9 +13,9 @@ from typer.models import ArgumentInfo, CommandInfo
 from cmm_uq.cli.commands import app
 from cmm_uq.commands.new import known
 from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
-from cmm_uq.documents.part_results_keys import PART_RESULTS
-from cmm_uq.documents.proof_results import KEYS as PROOF
-from cmm_uq.documents.proof_results import RATE
+from cmm_uq.documents.part.results_keys import PART_RESULTS
+from cmm_uq.documents.proof.results import KEYS as PROOF
+from cmm_uq.documents.proof.results import RATE
 from cmm_uq.documents.results_keys import QUANTITY, RESULTS
 from cmm_uq.instruments.library import profile_named, ready
 from cmm_uq.instruments.profile import ProfileFile

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.commands.part_written import written
-from cmm_uq.documents.part_found import PartFound
-from cmm_uq.documents.part_results import part_results
-from cmm_uq.documents.part_summary import part_summary
+from cmm_uq.documents.part.found import PartFound
+from cmm_uq.documents.part.results import part_results
+from cmm_uq.documents.part.summary import part_summary
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.notebook import html_table
 

@@ -17,8 +17,8 @@ from cmm_uq.conformity.consequences import consequences, costs
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
 from cmm_uq.diagnosis.power import ALLOWED
 from cmm_uq.diagnosis.unseen import USUAL_LENGTH, Smallest, smallest_effects
-from cmm_uq.documents.diagnosis_next import TO_FILL_IN
-from cmm_uq.documents.diagnosis_page import diagnosed_outcome
+from cmm_uq.documents.diagnosis.next import TO_FILL_IN
+from cmm_uq.documents.diagnosis.page import diagnosed_outcome
 from cmm_uq.documents.outcome import Found, Outcome, Recipe
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.errors import CmmUqError

@@ -127,8 +127,8 @@ def write_fleet(found: FleetFound, folder: Path, *, force: bool = False) -> dict
     CmmUqError : something in the folder is not this command's.
     OutputError : the folder cannot be written to.
     """
-    from cmm_uq.documents.fleet_data import fleet_csv, fleet_data
-    from cmm_uq.documents.fleet_page import fleet_document
+    from cmm_uq.documents.fleet.data import fleet_csv, fleet_data
+    from cmm_uq.documents.fleet.page import fleet_document
     from cmm_uq.documents.html import render_html
     from cmm_uq.documents.results_file import as_json
     from cmm_uq.writing import Owner, staged

@@ -16,7 +16,7 @@ from cmm_uq.commands.written import Stage, silent
 from cmm_uq.conformity.limits import Judged, Limits, judge
 from cmm_uq.conformity.risk import Known
 from cmm_uq.documents.effect_words import title_of
-from cmm_uq.documents.part_found import MATTERS, PartFound, Unseen
+from cmm_uq.documents.part.found import MATTERS, PartFound, Unseen
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob

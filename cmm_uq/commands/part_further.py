@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from cmm_uq.commands.planning import Plan, make_plan
 from cmm_uq.documents.effect_words import title_of, titles
-from cmm_uq.documents.part_found import Further, Unseen
+from cmm_uq.documents.part.found import Further, Unseen
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.toml_file import as_toml

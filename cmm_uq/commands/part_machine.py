@@ -20,7 +20,7 @@ from cmm_uq.commands.part_machine_warnings import machine_warnings, temperatures
 from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.documents.clauses import draft
-from cmm_uq.documents.part_found import Checked, Source, Standing
+from cmm_uq.documents.part.found import Checked, Source, Standing
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
 from cmm_uq.jobs.job import Job

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cmm_uq.documents.part_found import Standing
+from cmm_uq.documents.part.found import Standing
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.jobs.part.job import PartJob

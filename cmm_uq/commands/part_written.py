@@ -23,7 +23,7 @@ from cmm_uq.writing import Owner, staged
 if TYPE_CHECKING:
     from cmm_uq.documents.document import Document
     from cmm_uq.documents.in_short import Summary
-    from cmm_uq.documents.part_found import PartFound
+    from cmm_uq.documents.part.found import PartFound
 
 DOCUMENTS = ("part.html", "part.pdf")
 COMMAND = "part"
@@ -65,13 +65,13 @@ class WrittenPart:
     @property
     def summary(self) -> Summary:
         """For the end of the command."""
-        from cmm_uq.documents.part_summary import part_summary
+        from cmm_uq.documents.part.summary import part_summary
 
         return part_summary(self.found)
 
     @property
     def conforming(self) -> bool:
-        """See :class:`~cmm_uq.documents.part_found.PartFound`."""
+        """See :class:`~cmm_uq.documents.part.found.PartFound`."""
         return self.found.conforming
 
     @property
@@ -176,7 +176,7 @@ def contents_of(
     """
     from cmm_uq.documents.as_json import as_json
     from cmm_uq.documents.html import render_html
-    from cmm_uq.documents.part_results import part_results
+    from cmm_uq.documents.part.results import part_results
     from cmm_uq.documents.pdf import render_pdf
 
     job = found.job
@@ -207,7 +207,7 @@ def document_of(found: PartFound) -> Document:
     from cmm_uq.documents.in_language import said
     from cmm_uq.documents.lettering import lettered_in
     from cmm_uq.documents.origin import marked_as
-    from cmm_uq.documents.part_page import part_document
+    from cmm_uq.documents.part.page import part_document
 
     facts = found.job.facts.job
     with lettered_in(facts.language):

@@ -43,7 +43,7 @@ def _outcome(
     job: Job, asked: Asked, stage: Stage, folder: Path | None = None, sealed: Sealed | None = None
 ) -> tuple[Outcome, Kept | None]:  # fmt: skip
     from cmm_uq.commands.proving import prove_job
-    from cmm_uq.documents.proof_results import proof_outcome
+    from cmm_uq.documents.proof.results import proof_outcome
 
     proof, kept = prove_job(job, asked, folder=folder, stage=stage, sealed=sealed)
     stage("Composing the page", 0.94)

@@ -17,7 +17,7 @@ from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import OVERFLOW_FIX
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.documents.outcome import OwnAnalysis
-from cmm_uq.documents.proof import Proof
+from cmm_uq.documents.proof.proof import Proof
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.jobs.job import Job

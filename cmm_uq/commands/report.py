@@ -9,7 +9,7 @@ from cmm_uq.commands import analysis, diagnosing
 from cmm_uq.commands.reading import compared_with, in_language, read_job
 from cmm_uq.commands.written import Form, Stage, Told, Written, silent
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.documents.diagnosis_next import TO_FILL_IN
+from cmm_uq.documents.diagnosis.next import TO_FILL_IN
 from cmm_uq.documents.origin import DIGITAL
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.documents.provenance import FILE as PROVENANCE

@@ -219,7 +219,7 @@ class Form:
 def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:
     """The digital certificate, of results.json and the job alone, with the page as its human-readable copy."""
     from cmm_uq.dcc import written
-    from cmm_uq.documents.digital_certificate import digital_certificate
+    from cmm_uq.documents.digital_certificate.certificate import digital_certificate
 
     page = next((content for name, content in rendered.items() if name.endswith(".html")), None)
     return written(digital_certificate(json.loads(results), job, html=page))

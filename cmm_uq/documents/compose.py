@@ -11,7 +11,7 @@ from cmm_uq.documents.certificate import certificate_of
 from cmm_uq.documents.clauses import clauses_data
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conformity_section import conformity_section
-from cmm_uq.documents.diagnosis_page import diagnosis_sections
+from cmm_uq.documents.diagnosis.page import diagnosis_sections
 from cmm_uq.documents.document import Document, Section
 from cmm_uq.documents.method_section import method, posterior_section
 from cmm_uq.documents.outcome import Outcome, Page

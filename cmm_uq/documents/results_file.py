@@ -13,10 +13,10 @@ from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import corrections
 from cmm_uq.documents.as_json import as_json as as_json
-from cmm_uq.documents.diagnosis_costs import costs_data
-from cmm_uq.documents.diagnosis_next import next_data
-from cmm_uq.documents.diagnosis_unseen import unseen_data
-from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.diagnosis.costs import costs_data
+from cmm_uq.documents.diagnosis.next import next_data
+from cmm_uq.documents.diagnosis.unseen import unseen_data
+from cmm_uq.documents.diagnosis.words import sentence
 from cmm_uq.documents.program import software
 from cmm_uq.documents.quantity_data import quantity_data as quantity_data
 from cmm_uq.documents.result import Diagnosed, Result

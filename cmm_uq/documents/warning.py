@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from cmm_uq.conformity.lengths_decided import unknown_expansion
-from cmm_uq.documents.diagnosis_words import VERDICTS
+from cmm_uq.documents.diagnosis.words import VERDICTS
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import title_of
 from cmm_uq.messages import Text, listed, say, sentences

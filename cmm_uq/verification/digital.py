@@ -76,7 +76,7 @@ def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
     import json
 
     from cmm_uq.dcc import written
-    from cmm_uq.documents.digital_certificate import digital_certificate
+    from cmm_uq.documents.digital_certificate.certificate import digital_certificate
 
     name, content = given.xml
     try:

@@ -16,7 +16,7 @@ import numpy as np
 
 from cmm_uq.conformity.decision import largest_risk, largest_share, least_probability
 from cmm_uq.conformity.limits import Limits, accepted_by, outcome_of
-from cmm_uq.documents.part_found import outcome_of_part
+from cmm_uq.documents.part.found import outcome_of_part
 from cmm_uq.jobs.conformity import Rule
 from cmm_uq.verification.decided_again import rule_of
 from cmm_uq.verification.found import Inquiry

@@ -7,14 +7,14 @@ from math import degrees
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.conformity.decision import rule_name
-from cmm_uq.documents.part_results import standing_data
+from cmm_uq.documents.part.results import standing_data
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.parts.plan import Plan
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.given import JOB
 
 if TYPE_CHECKING:
-    from cmm_uq.documents.part_found import Standing
+    from cmm_uq.documents.part.found import Standing
     from cmm_uq.points import Floats
 
 _OF_THE_MACHINE = (

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from math import nan
 from typing import Any
 
-from cmm_uq.documents.part_figures import ANGLES, LENGTHS, Printed, Scale
-from cmm_uq.documents.part_overview import verdict_words
+from cmm_uq.documents.part.figures import ANGLES, LENGTHS, Printed, Scale
+from cmm_uq.documents.part.overview import verdict_words
 from cmm_uq.documents.wording import OUTCOME_WORDS, probability
 from cmm_uq.languages.saying import said_in
 from cmm_uq.messages import Text

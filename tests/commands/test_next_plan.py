@@ -6,7 +6,7 @@ from functools import cache
 
 from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.report import diagnosis_outcome
-from cmm_uq.documents.diagnosis_next import TO_FILL_IN
+from cmm_uq.documents.diagnosis.next import TO_FILL_IN
 from cmm_uq.documents.outcome import Outcome
 from tests.conftest import ROOT
 

@@ -16,9 +16,9 @@ from cmm_uq.commands.part import judged, part_found
 from cmm_uq.commands.part_machine import machine_found
 from cmm_uq.commands.part_plan import plan_of
 from cmm_uq.documents.as_json import as_json
-from cmm_uq.documents.part_found import PartFound
-from cmm_uq.documents.part_results import part_results
-from cmm_uq.documents.part_results_keys import PART_RESULTS
+from cmm_uq.documents.part.found import PartFound
+from cmm_uq.documents.part.results import part_results
+from cmm_uq.documents.part.results_keys import PART_RESULTS
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.beginning import TABLES
 from cmm_uq.messages import say

@@ -8,7 +8,7 @@ from functools import cache
 from cmm_uq.commands.part_further import Planned, further_of
 from cmm_uq.commands.planning import make_plan
 from cmm_uq.commands.reading import job_of, read_job
-from cmm_uq.documents.part_found import Unseen
+from cmm_uq.documents.part.found import Unseen
 from cmm_uq.jobs.job import Job
 from cmm_uq.messages import say
 from tests.conftest import ROOT

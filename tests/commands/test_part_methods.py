@@ -19,8 +19,8 @@ from cmm_uq.commands.check import check_job
 from cmm_uq.commands.part import part_found
 from cmm_uq.commands.part_methods import lacking, methods_of
 from cmm_uq.commands.part_plan import plan_of
-from cmm_uq.documents.part_results import part_results
-from cmm_uq.documents.part_results_keys import PART_RESULTS
+from cmm_uq.documents.part.results import part_results
+from cmm_uq.documents.part.results_keys import PART_RESULTS
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.part.job import part_of, read_part
 from cmm_uq.jobs.toml_file import as_toml

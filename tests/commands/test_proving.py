@@ -18,9 +18,9 @@ from cmm_uq.api import outcomes as api
 from cmm_uq.commands.prove import UNFINISHED
 from cmm_uq.commands.proving import Asked, design_of, prove_job, true_values
 from cmm_uq.commands.reading import read_job
-from cmm_uq.documents.proof import Proof
-from cmm_uq.documents.proof_page import proof_document
-from cmm_uq.documents.proof_results import KEYS, RATE, proof_outcome, proof_results
+from cmm_uq.documents.proof.page import proof_document
+from cmm_uq.documents.proof.proof import Proof
+from cmm_uq.documents.proof.results import KEYS, RATE, proof_outcome, proof_results
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.toml_file import as_toml
 from cmm_uq.physics.catalogue import every

@@ -21,8 +21,8 @@ from cmm_uq.commands.part_machine import machine_found
 from cmm_uq.commands.part_written import Asked, contents_of, write_part
 from cmm_uq.commands.verify import Verification, verify
 from cmm_uq.commands.verify_part import _asked_again
-from cmm_uq.documents.part_found import PartFound
-from cmm_uq.documents.part_results import standing_data
+from cmm_uq.documents.part.found import PartFound
+from cmm_uq.documents.part.results import standing_data
 from cmm_uq.errors import CmmUqError
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of

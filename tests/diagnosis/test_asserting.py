@@ -14,7 +14,7 @@ from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanatio
 from cmm_uq.diagnosis.comparison.search import asserted
 from cmm_uq.diagnosis.diagnosis import LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
-from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.diagnosis.words import sentence
 from cmm_uq.messages import say
 from cmm_uq.physics.effect import Nonparametric
 from cmm_uq.uncertainty.quantity import Quantity

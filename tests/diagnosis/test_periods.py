@@ -14,7 +14,7 @@ from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanatio
 from cmm_uq.diagnosis.comparison.search import Found
 from cmm_uq.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.diagnosis.periods import Mode, _peaks
-from cmm_uq.documents.diagnosis_words import sentence
+from cmm_uq.documents.diagnosis.words import sentence
 from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.plate.observe import Plate
 from cmm_uq.messages import say

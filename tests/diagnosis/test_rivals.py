@@ -14,7 +14,7 @@ from cmm_uq.commands.analysis import analyse_observations, outcome_of
 from cmm_uq.commands.reading import read_job
 from cmm_uq.conformity.accuracy import figures
 from cmm_uq.diagnosis.rivals import REMAINS, SETTLED
-from cmm_uq.documents.diagnosis_costs import costs_data, costs_section
+from cmm_uq.documents.diagnosis.costs import costs_data, costs_section
 from cmm_uq.documents.document import Table
 from cmm_uq.documents.outcome import Outcome
 from cmm_uq.documents.result import Diagnosed, Result

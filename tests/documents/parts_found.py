@@ -12,7 +12,7 @@ import numpy as np
 from cmm_uq.commands.part import COVERAGE, judged
 from cmm_uq.commands.part_plan import circumstances_of, plan_of
 from cmm_uq.documents.effect_words import title_of
-from cmm_uq.documents.part_found import Checked, PartFound, Standing, Unseen
+from cmm_uq.documents.part.found import Checked, PartFound, Standing, Unseen
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.messages import say
 from cmm_uq.parts.budget import budget

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.documents.diagnosis_words import summary_of
+from cmm_uq.documents.diagnosis.words import summary_of
 from cmm_uq.documents.lettering import lettered_in
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed, diagnose_error_maps

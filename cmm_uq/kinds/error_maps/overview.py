@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cmm_uq.documents.diagnosis_overview import STANDING, gained, share_of
+from cmm_uq.documents.diagnosis.overview import STANDING, gained, share_of
 from cmm_uq.documents.document import Overview
 from cmm_uq.documents.effect_words import effect_of, size_of
 from cmm_uq.documents.wording import probability

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.documents.diagnosis_words import held_out, sure
+from cmm_uq.documents.diagnosis.words import held_out, sure
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.effect_words import effect_of, size_of, titles
 from cmm_uq.documents.improvement_table import improvement_table

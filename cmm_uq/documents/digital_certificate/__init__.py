@@ -1,0 +1,1 @@
+"""The digital calibration certificate (DCC) of what a report states."""

@@ -1,0 +1,1 @@
+"""Reports of measured parts, and of the methods beside each other: sections, tables, pictures, results.json."""

@@ -1,0 +1,1 @@
+"""The report of a proof on the user's own plan."""

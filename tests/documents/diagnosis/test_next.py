@@ -1,0 +1,28 @@
+"""What to measure next, as it is written: sizes in units of what physics, or the artefact at hand, allows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmm_uq.documents.diagnosis.next import next_data
+from cmm_uq.kinds import artefact_facts, artefact_of
+from cmm_uq.physics.catalogue import every
+from cmm_uq.planning.advice import NextPlan, Shown
+from tests.kinds.constructions import plate
+
+
+def test_a_fault_of_the_artefact_is_as_large_as_that_artefact_allows() -> None:
+    """Three times its certificate's 0.5 µm at most, where the same deformation of the machine could be far more."""
+    artefact = artefact_of(artefact_facts(kind="plate", u_um=0.5), plate())
+    names = [fault.name for fault in artefact.own_faults() if fault.reported[0].name == fault.coefficients[0].name]
+    plan = NextPlan((), 1, 5, (), tuple(Shown(name, np.inf, 0.5) for name in names), reached=True, box=np.zeros((3, 2)))
+    data = next_data(plan, artefact)
+    assert data is not None
+    unbound, differs = every(), 0
+    for name, shown in zip(names, data["shows"], strict=True):
+        sd = artefact.faults[name].coefficients[0].prior_sd
+        assert shown["detected_before"] is None
+        assert shown["detected_after"] == pytest.approx(0.5 * sd)
+        differs += sd < unbound[name].coefficients[0].prior_sd / 2
+    assert differs
