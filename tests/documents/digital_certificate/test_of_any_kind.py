@@ -10,7 +10,6 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
-from tests.documents.test_digital_certificate import MEASURED, job_of
 
 from cmm_uq.dcc import Certificate, read, written
 from cmm_uq.dcc.quantities import Expanded, Real
@@ -20,6 +19,7 @@ from cmm_uq.jobs.artefact import CertificateFile
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.short_gauge import ShortGaugeFacts
 from tests.dcc.schemas import by_lxml
+from tests.documents.digital_certificate.test_certificate import MEASURED, job_of
 from tests.kinds.simulated import results
 
 TEXTS = st.text(
