@@ -64,3 +64,14 @@ def eigen(blocks: Floats) -> tuple[Floats, Floats]:
 def log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
     """Logarithm of the determinant's amount of a triangular matrix (n, n)."""
     return float(np.log(np.abs(np.diag(triangular))).sum())
+
+
+def squared(rows: Floats) -> Floats:
+    """Products (…, r, r) of rows (…, r, g) with each other; of one or two, which abound, without a call for each matrix."""
+    if rows.shape[-2] > 2:
+        return np.asarray(rows @ rows.swapaxes(-1, -2))
+    found = np.empty((*rows.shape[:-1], rows.shape[-2]))
+    for i in range(rows.shape[-2]):
+        for j in range(i + 1):
+            found[..., i, j] = found[..., j, i] = np.einsum("...g,...g->...", rows[..., i, :], rows[..., j, :])
+    return found
