@@ -22,7 +22,7 @@ from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of, widths
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.diagnosis.comparison.given import Beside, Given
 from cmm_uq.diagnosis.comparison.precision import Precision, precisions
-from cmm_uq.diagnosis.comparison.quick import eigen, interpolated, log_sum, log_sum_in, squared
+from cmm_uq.diagnosis.comparison.quick import corrected, eigen, interpolated, log_sum, log_sum_in, squared
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
 from cmm_uq.diagnosis.noise import OFTEN, Kind, probable_tails
 from cmm_uq.model.display import Display
@@ -36,6 +36,9 @@ _LEAST_LEFT = 0.1
 
 _LARGEST_EXPONENT = 600.0
 """Of a factor that says how little something counts."""
+
+_CORRECTED = 3
+"""Columns of a member, over those of what is given, from which on its own principal axes are corrected for that."""
 
 _BLOCK, _COLUMNS = 150_000, 500
 """Numbers of a block that a processor's cache holds; columns weighed at a time."""
@@ -361,6 +364,9 @@ class Comparison:
             if not len(some.start):
                 continue
             seen = self._seen(known, some, kept=kept)
+            if sizes and (each := self._of_wide(known, some, blocks, part, seen)) is not None:
+                yield some, each
+                continue
             total = np.empty((len(some.start), AMPLITUDES if sizes else 1, b))
             for begin in range(0, len(total), size):
                 these = slice(begin, begin + size)
@@ -383,6 +389,27 @@ class Comparison:
             found = (group.columns(self._stack[0]).T @ known.seen_by).reshape(group.r * len(group.start), kinds, -1)
             found = found.transpose(1, 0, 2)
         return found.reshape(kinds, len(group.start), group.r, -1)
+
+    def _of_wide(self, known: Beside, group: Group, blocks: Floats, part: slice, seen: Floats) -> Floats | None:
+        """As :meth:`_under`, where members have far more columns than what is given beside the recording; else ``None``.
+
+        The principal axes of the members by themselves, which are kept, are corrected for what is given.
+        """
+        given = seen.shape[3] - 1
+        if known.made_of is None or not given or group.r < _CORRECTED * given:
+            return None
+        if group.r not in self._axes:
+            self._axes[group.r] = eigen(blocks)
+        strengths, turn = (axes[:, part] for axes in self._axes[group.r])
+        variance = (group.amplitudes**2)[:, :, None]
+        ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
+        gains = corrected(variance / (1 + ratio), turn.swapaxes(2, 3) @ seen)
+        if gains is None:
+            return None
+        explained, log = gains
+        found = self._over_sigma(known.squares[:, None, None, 0] - explained)
+        found += known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3) - log
+        return log_sum_in(found, 0)[..., None]
 
     def _under(self, known: Beside, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
         """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise, or (M, 1, b) over the sizes too.
@@ -438,6 +465,11 @@ class Comparison:
         np.log(found, out=found)
         found *= -half
         return found, most + self._uniform
+
+    @cached_property
+    def _axes(self) -> dict[int, tuple[Floats, Floats]]:
+        """Principal axes of the members of wide groups, by the number of their columns."""
+        return {}
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from cmm_uq.points import Floats
 
+_LEAST_PIVOT = 1e-3
+"""Of a factor of one less what is taken: six digits of sixteen are lost there."""
+
 
 def log_sum(log: Floats, axis: int) -> Floats:
     """Logarithm of sums of what has these finite logarithms, in the steps of ``scipy.special.logsumexp``.
@@ -59,6 +62,33 @@ def eigen(blocks: Floats) -> tuple[Floats, Floats]:
     sine, shift = tangent * cosine, 0.5 * tangent * twice
     turn = np.stack([np.stack([cosine, sine], axis=-1), np.stack([-sine, cosine], axis=-1)], axis=-2)
     return np.stack([first - shift, second + shift], axis=-1), turn
+
+
+def corrected(gain: Floats, seen: Floats) -> tuple[Floats, Floats] | None:
+    """What columns explain beside others, from what they explain by themselves (Woodbury's identity).
+
+    Parameters
+    ----------
+    gain : (…, a, r) a²/(1 + a²λ) along each principal axis, of strength λ, for coefficients of standard deviation a.
+    seen : (…, r, 1 + g) what is seen along the axes of the data, and of rows of what is given (see ``Beside``).
+
+    Returns
+    -------
+    The sum of squares (…, a) that is explained, and what is given's part (…, a) of half the logarithm of the determinant.
+    ``None`` where digits would be lost, because what is given takes nearly all of the columns.
+    """
+    g = seen.shape[-1] - 1
+    pairs = (seen[..., :, None] * seen[..., None, :]).reshape(*seen.shape[:-1], -1)
+    whole = (gain @ pairs).reshape(*gain.shape[:-1], g + 1, g + 1)
+    left, across = np.eye(g) - whole[..., 1:, 1:], whole[..., 1:, :1]
+    try:
+        pivots = np.einsum("...ii->...i", np.linalg.cholesky(left))
+    except np.linalg.LinAlgError:
+        return None
+    if pivots.size and pivots.min() < _LEAST_PIVOT:
+        return None
+    explained = whole[..., 0, 0] + (across * np.linalg.solve(left, across)).sum(axis=(-2, -1))
+    return explained, np.log(pivots).sum(axis=-1)
 
 
 def log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
