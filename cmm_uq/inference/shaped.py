@@ -92,7 +92,7 @@ class _Density:
         # the walkers need no more rows than the columns have dimensions
         every = np.hstack([reduced.design, *flat])
         every = every / np.maximum(np.linalg.norm(every, axis=0), 1e-300)
-        if every.shape[1] > _MANY * len(every):  # a triangle has the same singular values, and the same vectors on the left
+        if every.shape[1] > _MANY * len(every):  # of the same singular values, and vectors on the left
             every = linalg.qr(every.T, mode="r", overwrite_a=True)[0][: len(every)].T
         U, s, _ = linalg.svd(every, full_matrices=False)
         Q = U[:, s > _NEGLIGIBLE * s[0]]
