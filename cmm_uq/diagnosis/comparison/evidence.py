@@ -383,8 +383,8 @@ class Comparison:
             shape = kinds, columns.stop - columns.start, known.seen_by.shape[1] // kinds
             found = np.zeros(shape)
             found[:, :, :1] = self._left_with_all[:, columns]
-            for member, factor in known.made_of or ():
-                found += self._given.products(member)[:, columns] @ factor
+            for basis, factor in known.made_of or ():
+                found += self._given.products(basis)[:, columns] @ factor
         else:
             found = (group.columns(self._stack[0]).T @ known.seen_by).reshape(group.r * len(group.start), kinds, -1)
             found = found.transpose(1, 0, 2)

@@ -24,6 +24,9 @@ _KEPT = 12_000_000
 Member = tuple[int, int]
 """An explanation and its member."""
 
+Basis = tuple[Member, bool]
+"""A member, and whether it is seen along its principal axes in place of its columns."""
+
 
 @dataclass(frozen=True, eq=False)
 class Beside:
@@ -41,7 +44,7 @@ class Beside:
     seen_by: Floats
     squares: Floats
     log: Floats
-    made_of: tuple[tuple[Member, Floats], ...] | None = None
+    made_of: tuple[tuple[Basis, Floats], ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +84,10 @@ class Given:
         if own:
             mixed = mixing.swapaxes(1, 2)
             factor = np.concatenate([-(mixed @ seen), mixed], axis=2)
-            ends = np.cumsum([self.columns(version).shape[1] for version in order])[:-1]
-            made_of = tuple(
-                ((v.explanation, v.member), part) for v, part in zip(order, np.split(factor, ends, axis=1), strict=True)
-            )
+            columns = [self.columns(version).shape[1] for version in order]
+            first = max(columns) >= _WIDE  # and then along its principal axes
+            bases = [((v.explanation, v.member), first and i == 0) for i, v in enumerate(order)]
+            made_of = tuple(zip(bases, np.split(factor, np.cumsum(columns)[:-1], axis=1), strict=True))
         return Beside(_flat(whole), squares - np.sum(seen**2, axis=1), log - logs, made_of)
 
     def columns(self, version: Version) -> Floats:
@@ -140,20 +143,18 @@ class Given:
         logs = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
         return inverse @ weighed.swapaxes(1, 2), mixing, logs
 
-    def products(self, member: Member) -> Floats:
-        """Inner products (k, K, r) of all columns with a member's weighed ones; where it is wide, with its principal axes."""
+    def products(self, basis: Basis) -> Floats:
+        """Inner products (k, K, r) of all columns with a member's weighed ones, or these along its principal axes."""
         kept = self._products
-        if member not in kept:
+        if basis not in kept:
+            member, turned = basis
             version = Version(*member, 1.0)
-            found = self.with_all(
-                self._principal_axes(version)[1].swapaxes(1, 2)
-                if self.columns(version).shape[1] >= _WIDE
-                else self._weighed_columns(version)
-            )
+            weighed = self._principal_axes(version)[1].swapaxes(1, 2) if turned else self._weighed_columns(version)
+            found = self.with_all(weighed)
             while kept and (len(kept) + 1) * found.size > _KEPT:
                 del kept[next(iter(kept))]
-            kept[member] = found
-        return kept[member]
+            kept[basis] = found
+        return kept[basis]
 
     def with_all(self, columns: Floats) -> Floats:
         """Inner products (k, K, r) of the stack's columns with others (k, m, r)."""
@@ -163,10 +164,10 @@ class Given:
 
     def kept(self, known: Beside) -> bool:
         """Whether the inner products of all that is given are kept."""
-        return known.made_of is not None and all(member in self._products for member, _ in known.made_of)
+        return known.made_of is not None and all(basis in self._products for basis, _ in known.made_of)
 
     @cached_property
-    def _products(self) -> dict[Member, Floats]:
+    def _products(self) -> dict[Basis, Floats]:
         return {}
 
     def _principal_axes(self, version: Version) -> tuple[Floats, Floats]:
