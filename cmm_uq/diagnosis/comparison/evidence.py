@@ -396,7 +396,7 @@ class Comparison:
         The principal axes of the members by themselves, which are kept, are corrected for what is given.
         """
         given = seen.shape[3] - 1
-        if known.made_of is None or not given or group.r < _CORRECTED * given:
+        if known.squares.shape[1] > 1 or not given or group.r < _CORRECTED * given:
             return None
         if group.r not in self._axes:
             self._axes[group.r] = eigen(blocks)

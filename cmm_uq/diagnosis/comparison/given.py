@@ -21,6 +21,9 @@ _WIDE = 30
 _KEPT = 12_000_000
 """Numbers that are kept of the inner products of what was given last."""
 
+_FEW = 3
+"""Observations over columns that are given, from which on it pays to make inner products of those that are kept."""
+
 Member = tuple[int, int]
 """An explanation and its member."""
 
@@ -37,8 +40,8 @@ class Beside:
 
     With Σ = N + C·Cᵀ and rows = root(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, any square root, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
 
-    Of the recording's own data, ``made_of`` says how ``seen_by`` follows from what the members that are given are by
-    themselves, besides N⁻¹·data: a factor (k, r, b + g) of each.
+    Of the recording's own data beside few columns, ``made_of`` says how ``seen_by`` follows from what the members that are
+    given are by themselves, besides N⁻¹·data: a factor (k, r, b + g) of each.
     """
 
     seen_by: Floats
@@ -81,7 +84,7 @@ class Given:
         turned = rows.swapaxes(1, 2)
         whole = np.concatenate([weighed - turned @ seen, turned], axis=2)
         made_of = None
-        if own:
+        if own and _FEW * mixing.shape[2] <= len(plain):
             mixed = mixing.swapaxes(1, 2)
             factor = np.concatenate([-(mixed @ seen), mixed], axis=2)
             columns = [self.columns(version).shape[1] for version in order]
@@ -151,10 +154,12 @@ class Given:
             version = Version(*member, 1.0)
             weighed = self._principal_axes(version)[1].swapaxes(1, 2) if turned else self._weighed_columns(version)
             found = self.with_all(weighed)
-            while kept and (len(kept) + 1) * found.size > _KEPT:
+            while kept and sum(each.size for each in kept.values()) + found.size > _KEPT:
                 del kept[next(iter(kept))]
-            kept[basis] = found
-        return kept[basis]
+        else:
+            found = kept.pop(basis)
+        kept[basis] = found  # what was asked for last is at the end
+        return found
 
     def with_all(self, columns: Floats) -> Floats:
         """Inner products (k, K, r) of the stack's columns with others (k, m, r)."""

@@ -11,7 +11,7 @@ from cmm_uq.diagnosis.comparison.given import Beside, Given
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.points import Floats
 
-KINDS, ROWS = 3, 60
+KINDS, ROWS = 3, 210
 WIDTHS = (1, 2, 34, 31)
 
 
