@@ -25,6 +25,11 @@ _ANYWHERE = 0.02
 
 _NEGLIGIBLE = 1e-9
 _BATCH = 512
+_COLUMNS = 256
+"""Columns that are reduced at once: few enough for a processor's cache."""
+
+_MANY = 4
+"""Columns, over rows, from which on they are made a triangle before their span is sought."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +73,12 @@ def sample_shaped(
     )  # fmt: skip
 
 
+def _reduced(model: LinearModel, columns: Floats) -> Floats:
+    """Columns (m, r) as :meth:`LinearModel.reduce` gives them, which is each by itself."""
+    parts = np.array_split(columns, columns.shape[1] // _COLUMNS + 1, axis=1)
+    return np.hstack([model.reduce(part) for part in parts])
+
+
 class _Density:
     """Log density of (u₁ … u_q, ln σ): each u is normal where its shape follows the marginal of the grid."""
 
@@ -77,10 +88,13 @@ class _Density:
         reduced = model.reduced
         # deviations from the prior means: lengths of half a metre would leave no digits for nanometres
         observed = reduced.observed - reduced.design @ model.prior_mean
-        flat = [model.reduce(np.hstack(list(some.table))) for some in shaped]
+        flat = [_reduced(model, np.hstack(list(some.table))) for some in shaped]
         # the walkers need no more rows than the columns have dimensions
         every = np.hstack([reduced.design, *flat])
-        U, s, _ = linalg.svd(every / np.maximum(np.linalg.norm(every, axis=0), 1e-300), full_matrices=False)
+        every = every / np.maximum(np.linalg.norm(every, axis=0), 1e-300)
+        if every.shape[1] > _MANY * len(every):  # of the same singular values, and vectors on the left
+            every = linalg.qr(every.T, mode="r", overwrite_a=True)[0][: len(every)].T
+        U, s, _ = linalg.svd(every, full_matrices=False)
         Q = U[:, s > _NEGLIGIBLE * s[0]]
         self.design, self.observed, self.count = Q.T @ reduced.design, Q.T @ observed, reduced.count
         self.squares = float(observed @ observed)

@@ -16,18 +16,17 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, sparse, special
+from scipy import linalg, special
 
 from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of, widths
 from cmm_uq.diagnosis.comparison.explanations import Explanation
-from cmm_uq.diagnosis.comparison.quick import eigen, interpolated, log_diagonal, log_sum, log_sum_in
+from cmm_uq.diagnosis.comparison.given import Beside, Given
+from cmm_uq.diagnosis.comparison.precision import Precision, precisions
+from cmm_uq.diagnosis.comparison.quick import corrected, eigen, interpolated, log_sum, log_sum_in, squared
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
 from cmm_uq.diagnosis.noise import OFTEN, Kind, probable_tails
 from cmm_uq.model.display import Display
 from cmm_uq.points import Floats, Ints
-
-_WIDE = 30
-"""Columns of a version from which on its principal axes are kept where it is given."""
 
 _KEPT = 8_000_000
 """Numbers that are kept of what follows from what was given last."""
@@ -38,41 +37,11 @@ _LEAST_LEFT = 0.1
 _LARGEST_EXPONENT = 600.0
 """Of a factor that says how little something counts."""
 
+_CORRECTED = 3
+"""Columns of a member, over those of what is given, from which on its own principal axes are corrected for that."""
+
 _BLOCK, _COLUMNS = 150_000, 500
 """Numbers of a block that a processor's cache holds; columns weighed at a time."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Noise:
-    """One kind of noise, what the baseline reaches projected out.
-
-    The precision of what is left is WᵀW − rowsᵀ·rows, with the whitening W (m, m); ``log``, the log probability less that of
-    the determinant.
-    """
-
-    whitening: sparse.csr_array
-    rows: Floats
-    log: float
-
-    def __call__(self, columns: Floats) -> Floats:
-        """Precision times columns (m, b)."""
-        if self._diagonal is None:
-            whole = self._transposed @ (self.whitening @ columns)
-        else:
-            whole = self._diagonal * (self._diagonal * columns)
-        return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
-
-    @cached_property
-    def _diagonal(self) -> Floats | None:
-        """Of the whitening (m, 1), where it mixes no observations."""
-        each = np.arange(self.whitening.shape[0])
-        if self.whitening.nnz != len(each) or not np.array_equal(self.whitening.indices, each):
-            return None
-        return self.whitening.diagonal()[:, None]
-
-    @cached_property
-    def _transposed(self) -> sparse.csc_array:
-        return self.whitening.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,22 +143,8 @@ class Comparison:
         return self.rest(found + self.display.rounded(scale * found) / scale)
 
     @cached_property
-    def _noises(self) -> list[_Noise]:
-        found = []
-        for kind in self.kinds:
-            Q, R = np.linalg.qr(kind.white(self._reached))
-            log = float(np.log(kind.probability)) + kind.log_factor + kind.log_whitening - log_diagonal(R)
-            rows = kind.whitening.T @ Q
-            shared = [columns for columns in (self.certified, kind.slow) if columns.size]
-            if shared:
-                white = kind.white(np.hstack(shared))
-                white -= Q @ (Q.T @ white)
-                factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white)
-                log -= log_diagonal(factor)
-                certified = np.linalg.solve(factor, white.T)
-                rows = np.hstack([rows, kind.whitening.T @ certified.T])
-            found.append(_Noise(kind.whitening, np.asarray(rows.T, dtype=np.float64), log))
-        return found
+    def _noises(self) -> list[Precision]:
+        return precisions(self.kinds, self._reached, self.certified)
 
     @cached_property
     def _blocks(self) -> list[Floats]:
@@ -220,11 +175,6 @@ class Comparison:
     def squares(self) -> Floats:
         """Sum of squares (k,) of what the baseline leaves, mm², whitened by each kind of noise."""
         return np.asarray(self._left_weighed[:, :, 0] @ self.left, dtype=np.float64)
-
-    @cached_property
-    def _weighed(self) -> dict[tuple[int, int], Floats]:
-        """Precision times the columns of members that were ever given (k, m, r)."""
-        return {}
 
     def over_sigma(self, squares: Floats) -> Floats:
         """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape: in closed form if ln σ is uniform, else from a table."""
@@ -315,7 +265,7 @@ class Comparison:
         """
         return self.log_evidence_of(given, left), self._total(self._beside(left, given), among)
 
-    def _total(self, known: _Beside, among: Container[int] | None = None) -> Floats:
+    def _total(self, known: Beside, among: Container[int] | None = None) -> Floats:
         """Log evidence (c, b) of each explanation, its versions and sizes summed."""
         total = np.full((len(self.explanations), known.squares.shape[1]), -np.inf)
         for group, each in self._each(known, among, sizes=False):
@@ -377,7 +327,7 @@ class Comparison:
 
     def left_of(self, version: Version, given: Sequence[Version]) -> float:
         """Part of the squared visible length of a version that is left beside what is given."""
-        columns = self._columns(version)
+        columns = self._given.columns(version)
         alone, beside = (self._weigh(columns, others).squares.sum(axis=1) for others in ((), given))
         probability = self.noise_probability(given)
         return float(probability @ beside / max(float(probability @ alone), 1e-300))
@@ -401,38 +351,79 @@ class Comparison:
         yield from self._each(self._beside(data, given), among)
 
     def _each(
-        self, known: _Beside, among: Container[int] | None, *, sizes: bool = True
+        self, known: Beside, among: Container[int] | None, *, sizes: bool = True
     ) -> Iterator[tuple[Group, Floats]]:
         """Log evidence (M, a, b) of members at every size, or (M, 1, b) of all sizes together, by groups."""
-        stack, groups = self._stack
-        kinds, b = known.squares.shape
-        for group, blocks in zip(groups, self._blocks, strict=True):
-            part = group.part(among)
-            chosen = group.only(part)
-            if not len(chosen.start):
+        groups, b = self._stack[1], known.squares.shape[1]
+        parts = [group.part(among) for group in groups]
+        chosen = [group.only(part) for group, part in zip(groups, parts, strict=True)]
+        most = 2 * sum(some.r * len(some.start) for some in chosen) > self._stack[0].shape[1]
+        kept = known.made_of is not None and (most or self._given.kept(known))
+        size = max(1, _BLOCK // (len(known.squares) * AMPLITUDES * b))
+        for part, some, blocks in zip(parts, chosen, self._blocks, strict=True):
+            if not len(some.start):
                 continue
-            seen = (chosen.columns(stack).T @ known.seen_by).reshape(len(chosen.start), group.r, kinds, -1)
-            total = np.empty((len(chosen.start), AMPLITUDES if sizes else 1, b))
-            size = max(1, _BLOCK // (kinds * AMPLITUDES * b))
+            seen = self._seen(known, some, kept=kept)
+            if sizes and (each := self._of_wide(known, some, blocks, part, seen)) is not None:
+                yield some, each
+                continue
+            total = np.empty((len(some.start), AMPLITUDES if sizes else 1, b))
             for begin in range(0, len(total), size):
-                some = slice(begin, begin + size)
-                total[some] = self._under(known, chosen.amplitudes[some], blocks[:, part][:, some], seen[some], sizes)
-            yield chosen, total
+                these = slice(begin, begin + size)
+                total[these] = self._under(
+                    known, some.amplitudes[these], blocks[:, part][:, these], seen[:, these], sizes
+                )  # fmt: skip
+            yield some, total
 
-    def _under(self, known: _Beside, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
+    def _seen(self, known: Beside, group: Group, *, kept: bool) -> Floats:
+        """Inner products (k, M, r, b + g) of members with data and what is given; ``kept``: of those that are kept."""
+        kinds = len(known.squares)
+        if kept:
+            columns = group.where
+            shape = kinds, columns.stop - columns.start, known.seen_by.shape[1] // kinds
+            found = np.zeros(shape)
+            found[:, :, :1] = self._left_with_all[:, columns]
+            for basis, factor in known.made_of or ():
+                found += self._given.products(basis)[:, columns] @ factor
+        else:
+            found = (group.columns(self._stack[0]).T @ known.seen_by).reshape(group.r * len(group.start), kinds, -1)
+            found = found.transpose(1, 0, 2)
+        return found.reshape(kinds, len(group.start), group.r, -1)
+
+    def _of_wide(self, known: Beside, group: Group, blocks: Floats, part: slice, seen: Floats) -> Floats | None:
+        """As :meth:`_under`, where members have far more columns than what is given beside the recording; else ``None``.
+
+        The principal axes of the members by themselves, which are kept, are corrected for what is given.
+        """
+        given = seen.shape[3] - 1
+        if known.squares.shape[1] > 1 or not given or group.r < _CORRECTED * given:
+            return None
+        if group.r not in self._axes:
+            self._axes[group.r] = eigen(blocks)
+        strengths, turn = (axes[:, part] for axes in self._axes[group.r])
+        variance = (group.amplitudes**2)[:, :, None]
+        ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
+        gains = corrected(variance / (1 + ratio), turn.swapaxes(2, 3) @ seen)
+        if gains is None:
+            return None
+        explained, log = gains
+        found = self._over_sigma(known.squares[:, None, None, 0] - explained)
+        found += known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3) - log
+        return log_sum_in(found, 0)[..., None]
+
+    def _under(self, known: Beside, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
         """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise, or (M, 1, b) over the sizes too.
 
         Parameters
         ----------
         amplitudes : (M, a) to try.
         blocks : (k, M, r, r) their inner products.
-        seen : (M, r, k, b + g) theirs with the data and with what is given.
+        seen : (k, M, r, b + g) theirs with the data and with what is given.
         """
         b = known.squares.shape[1]
-        by_kind = seen.transpose(2, 0, 1, 3)
-        shown, hidden = by_kind[..., :b], by_kind[..., b:]
+        shown, hidden = seen[..., :b], seen[..., b:]
         if hidden.shape[3]:
-            blocks = blocks - hidden @ hidden.swapaxes(2, 3)
+            blocks = blocks - squared(hidden)
         if blocks.shape[3] == 1:
             strengths = blocks[..., 0]
         else:
@@ -475,7 +466,12 @@ class Comparison:
         found *= -half
         return found, most + self._uniform
 
-    def _beside(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
+    @cached_property
+    def _axes(self) -> dict[int, tuple[Floats, Floats]]:
+        """Principal axes of the members of wide groups, by the number of their columns."""
+        return {}
+
+    def _beside(self, data: Floats | None, given: Sequence[Version]) -> Beside:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
         if data is not None:
             return self._weigh(data, given)
@@ -489,84 +485,21 @@ class Comparison:
         return kept[key]
 
     @cached_property
-    def _besides(self) -> dict[frozenset[Version], _Beside]:
+    def _besides(self) -> dict[frozenset[Version], Beside]:
         """The recording beside what was given last: a search comes back to it within some steps."""
         return {}
 
-    def _weigh(self, data: Floats | None, given: Sequence[Version]) -> _Beside:
-        plain = self.left[:, None] if data is None else data
-        weighed = self._left_weighed if data is None else self._by_noise(data)
-        squares = np.einsum("mb,kmb->kb", plain, weighed)
+    def _weigh(self, data: Floats | None, given: Sequence[Version]) -> Beside:
+        own = data is None
+        plain, weighed = (self.left[:, None], self._left_weighed) if data is None else (data, self._by_noise(data))
         log = np.array([noise.log for noise in self._noises])
-        if given:
-            rows, logs = self._rows(given)
-            seen = rows @ plain
-            log = log - logs
-            squares = squares - np.sum(seen**2, axis=1)
-            weighed = np.concatenate([weighed - rows.swapaxes(1, 2) @ seen, rows.swapaxes(1, 2)], axis=2)
-        return _Beside(weighed.transpose(1, 0, 2).reshape(len(plain), -1), squares, log)
-
-    def _rows(self, given: Sequence[Version]) -> tuple[Floats, Floats]:
-        """Rows (k, g, m) of what is given (see :class:`_Beside`), and half the logarithm (k,) of its determinant.
-
-        The widest comes first and by its principal axes, of which a search, that gives it again and again at several sizes,
-        needs another length only; to what it leaves the others are added by Cholesky's factors.
-        """
-        kinds, m = len(self._noises), len(self.left)
-        rows, logs = np.zeros((kinds, 0, m)), np.zeros(kinds)
-        others = list(given)
-        widest = max(others, key=lambda version: self._columns(version).shape[1])
-        if self._columns(widest).shape[1] >= _WIDE:
-            others.remove(widest)
-            strengths, axes = self._principal_axes(widest)
-            ratio = widest.amplitude**2 * strengths
-            rows = (widest.amplitude / np.sqrt(1 + ratio))[:, :, None] * axes
-            logs = 0.5 * np.log1p(ratio).sum(axis=1)
-        if not others:
-            return rows, logs
-        taken = np.hstack([version.amplitude * self._columns(version) for version in others])
-        weighed = np.concatenate([v.amplitude * self._weighed_columns(v) for v in others], axis=2)
-        if rows.shape[1]:
-            weighed = weighed - rows.swapaxes(1, 2) @ (rows @ taken)
-        factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ weighed)
-        more = np.linalg.inv(factor) @ weighed.swapaxes(1, 2)
-        logs = logs + np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-        return np.concatenate([rows, more], axis=1), logs
-
-    def _principal_axes(self, version: Version) -> tuple[Floats, Floats]:
-        """Eigenvalues (k, r) of a version's inner products by kind of noise, and its weighed columns along them (k, r, m)."""
-        key = version.explanation, version.member
-        if key not in self._axes:
-            weighed = self._weighed_columns(version)
-            strengths, turn = np.linalg.eigh(self._columns(version).T @ weighed)
-            self._axes[key] = np.maximum(strengths, 0.0), turn.swapaxes(1, 2) @ weighed.swapaxes(1, 2)
-        return self._axes[key]
+        return self._given.beside(given, plain, weighed, log, own=own)
 
     @cached_property
-    def _axes(self) -> dict[tuple[int, int], tuple[Floats, Floats]]:
-        """Principal axes of wide members that were ever given."""
-        return {}
+    def _given(self) -> Given:
+        return Given(self._stack[0], self._where, self._by_noise)
 
-    def _columns(self, version: Version) -> Floats:
-        return self._stack[0][:, self._where[version.explanation, version.member]]
-
-    def _weighed_columns(self, version: Version) -> Floats:
-        key = version.explanation, version.member
-        if key not in self._weighed:
-            self._weighed[key] = self._by_noise(self._columns(version))
-        return self._weighed[key]
-
-
-@dataclass(frozen=True, eq=False)
-class _Beside:
-    """Data beside what is given, under each of k kinds of noise.
-
-    ``seen_by`` (m, k·(b + g)): of each kind Σ⁻¹·data and the rows of what is given, side by side; ``squares`` (k, b)
-    dataᵀ·Σ⁻¹·data; ``log`` (k,) probability of the noise less that of its determinant.
-
-    With Σ = N + C·Cᵀ and rows = root(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, any square root, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
-    """
-
-    seen_by: Floats
-    squares: Floats
-    log: Floats
+    @cached_property
+    def _left_with_all(self) -> Floats:
+        """Inner products (k, K, 1) of the stack's columns with what the baseline leaves."""
+        return self._given.with_all(self._left_weighed)

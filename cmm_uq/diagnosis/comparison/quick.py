@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from cmm_uq.points import Floats
 
+_LEAST_PIVOT = 1e-3
+"""Of a factor of one less what is taken: six digits of sixteen are lost there."""
+
 
 def log_sum(log: Floats, axis: int) -> Floats:
     """Logarithm of sums of what has these finite logarithms, in the steps of ``scipy.special.logsumexp``.
@@ -61,6 +64,44 @@ def eigen(blocks: Floats) -> tuple[Floats, Floats]:
     return np.stack([first - shift, second + shift], axis=-1), turn
 
 
+def corrected(gain: Floats, seen: Floats) -> tuple[Floats, Floats] | None:
+    """What columns explain beside others, from what they explain by themselves (Woodbury's identity).
+
+    Parameters
+    ----------
+    gain : (…, a, r) a²/(1 + a²λ) along each principal axis, of strength λ, for coefficients of standard deviation a.
+    seen : (…, r, 1 + g) what is seen along the axes of the data, and of rows of what is given (see ``Beside``).
+
+    Returns
+    -------
+    The sum of squares (…, a) that is explained, and what is given's part (…, a) of half the logarithm of the determinant.
+    ``None`` where digits would be lost, because what is given takes nearly all of the columns.
+    """
+    g = seen.shape[-1] - 1
+    pairs = (seen[..., :, None] * seen[..., None, :]).reshape(*seen.shape[:-1], -1)
+    whole = (gain @ pairs).reshape(*gain.shape[:-1], g + 1, g + 1)
+    left, across = np.eye(g) - whole[..., 1:, 1:], whole[..., 1:, :1]
+    try:
+        pivots = np.einsum("...ii->...i", np.linalg.cholesky(left))
+    except np.linalg.LinAlgError:
+        return None
+    if pivots.size and pivots.min() < _LEAST_PIVOT:
+        return None
+    explained = whole[..., 0, 0] + (across * np.linalg.solve(left, across)).sum(axis=(-2, -1))
+    return explained, np.log(pivots).sum(axis=-1)
+
+
 def log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
     """Logarithm of the determinant's amount of a triangular matrix (n, n)."""
     return float(np.log(np.abs(np.diag(triangular))).sum())
+
+
+def squared(rows: Floats) -> Floats:
+    """Products (…, r, r) of rows (…, r, g) with each other; of one or two, which abound, without a call for each matrix."""
+    if rows.shape[-2] > 2:
+        return np.asarray(rows @ rows.swapaxes(-1, -2))
+    found = np.empty((*rows.shape[:-1], rows.shape[-2]))
+    for i in range(rows.shape[-2]):
+        for j in range(i + 1):
+            found[..., i, j] = found[..., j, i] = np.einsum("...g,...g->...", rows[..., i, :], rows[..., j, :])
+    return found

@@ -50,9 +50,14 @@ class Group:
     amplitudes: Floats
     r: int
 
+    @property
+    def where(self) -> slice:
+        """Of their columns in the stack, one after the other."""
+        return slice(int(self.start[0]), int(self.start[-1]) + self.r)
+
     def columns(self, stack: Floats) -> Floats:
         """Their columns (m, M·r), one after the other."""
-        return stack[:, int(self.start[0]) : int(self.start[-1]) + self.r]
+        return stack[:, self.where]
 
     @cached_property
     def first(self) -> Ints:

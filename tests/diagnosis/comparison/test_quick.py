@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import special
 
-from cmm_uq.diagnosis.comparison.quick import eigen, interpolated, log_sum
+from cmm_uq.diagnosis.comparison.quick import corrected, eigen, interpolated, log_sum, squared
 
 
 def test_a_table_with_equal_steps_is_read_as_numpy_reads_any() -> None:
@@ -36,3 +36,37 @@ def test_sums_of_logarithms_are_scipys_to_the_last_bit(shape: tuple[int, ...], a
     log = random.normal(-50, 20, shape)
     for values in (log, np.round(log), np.zeros(shape)):  # the largest once, now and then several times, always
         np.testing.assert_array_equal(log_sum(values, axis), special.logsumexp(values, axis=axis))
+
+
+def test_columns_beside_others_explain_what_the_whole_covariance_says() -> None:
+    """Woodbury's identity against inverse and determinant."""
+    random = np.random.default_rng(5)
+    columns, given, data = random.standard_normal((40, 9)), random.standard_normal((40, 2)), random.standard_normal(40)
+    rows = np.linalg.solve(np.linalg.cholesky(np.eye(2) + given.T @ given), given.T)
+    amplitudes = np.array([0.1, 1.0, 20.0])
+    strengths, turn = np.linalg.eigh(columns.T @ columns)
+    inverse = np.eye(40) - rows.T @ rows
+    seen = turn.T @ columns.T @ np.column_stack([inverse @ data, rows.T])
+    square = amplitudes[:, None] ** 2
+    found = corrected(square / (1 + square * strengths), seen)
+    assert found is not None
+    for i, a in enumerate(amplitudes):
+        whole = np.linalg.inv(inverse) + a**2 * columns @ columns.T
+        explained = data @ inverse @ data - data @ np.linalg.solve(whole, data)
+        log = 0.5 * (np.linalg.slogdet(whole)[1] - np.linalg.slogdet(np.linalg.inv(inverse))[1])
+        np.testing.assert_allclose(found[0][i], explained, rtol=1e-9)
+        np.testing.assert_allclose(found[1][i] + 0.5 * np.log1p(a**2 * strengths).sum(), log, rtol=1e-9)
+
+
+def test_what_is_given_and_takes_the_columns_themselves_leaves_no_digits() -> None:
+    columns = np.random.default_rng(6).standard_normal((40, 9))
+    rows = np.linalg.solve(np.linalg.cholesky(np.eye(9) + 1e10 * columns.T @ columns), 1e5 * columns.T)
+    strengths, turn = np.linalg.eigh(columns.T @ columns)
+    seen = turn.T @ columns.T @ np.column_stack([np.ones(40), rows.T])
+    assert corrected(1e10 / (1 + 1e10 * strengths)[None], seen) is None
+
+
+@pytest.mark.parametrize("r", [1, 2, 5])
+def test_rows_have_their_own_inner_products(r: int) -> None:
+    rows = np.random.default_rng(7).standard_normal((4, 30, r, 3))
+    np.testing.assert_allclose(squared(rows), np.einsum("kmig,kmjg->kmij", rows, rows), rtol=1e-12, atol=1e-14)
