@@ -97,12 +97,41 @@ def whole_surfaces(plan: Plan) -> Plan:
     return replace(plan, features=features, order=np.zeros(0, dtype=np.int64), times_s=np.zeros(0))
 
 
-def _rough(one: Form, plan: Plan, rows: slice) -> Common:
-    count = rows.stop - rows.start
-    shapes = MICROMETRE * one.roughness_um * np.eye(count)
-    draw = normal(np.ones(count))
-    return Common(
-        name=FORM, factors=(f"roughness of {one.feature}",) * count, draw=draw, basis=_placed(shapes, plan, rows)
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Rough(Cause):
+    """What moves each point of a feature on its own along its normal, in standard deviations.
+
+    Parameters
+    ----------
+    along : (m, 3) displacements of its points for one unit of each coefficient, mm.
+    rows : of these among the plan's points.
+    count : of the plan's points.
+    """
+
+    along: Floats
+    rows: slice
+    count: int
+
+    def through(self, derivative: Floats) -> Floats:
+        """See :meth:`Cause.through`."""
+        return np.asarray(np.einsum("pmi,mi->mp", derivative[:, self.rows], self.along))
+
+    def moved(self, coefficients: Floats, rows: slice) -> Floats:
+        """See :meth:`Cause.moved`."""
+        start, stop, _ = rows.indices(self.count)
+        found = np.zeros((len(coefficients), stop - start, 3))
+        first, last = max(start, self.rows.start), min(stop, self.rows.stop)
+        if first < last:
+            own = slice(first - self.rows.start, last - self.rows.start)
+            found[:, first - start : last - start] = coefficients[:, own, None] * self.along[own]
+        return found
+
+
+def _rough(one: Form, plan: Plan, rows: slice) -> Cause:
+    along = MICROMETRE * one.roughness_um * plan.normals[rows]
+    factors = (f"roughness of {one.feature}",) * len(along)
+    return _Rough(
+        name=FORM, factors=factors, draw=normal(np.ones(len(along))), along=along, rows=rows, count=len(plan.points)
     )
 
 

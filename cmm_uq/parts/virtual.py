@@ -54,6 +54,9 @@ PILOT = 10_000
 _BLOCK = 400_000
 """Points of the pilot drawn at once."""
 
+_AT_ONCE = 2_000_000
+"""Points of virtual measurements that are drawn at once: 50 MB for each cause that moves each coordinate on its own."""
+
 _KEPT = 1_600_000
 """Points of the whole pilot up to which its blocks are drawn once and kept, 40 MB; else they are drawn again when needed."""
 
@@ -322,10 +325,11 @@ class Virtual:
     def _drawn(self, random: np.random.Generator, n: int) -> Floats:
         counts = np.full(len(self.places), n // len(self.places))
         counts[random.permutation(len(counts))[: n - counts.sum()]] += 1
+        at_once = max(2, _AT_ONCE // len(self.plan.points))
         found = [
-            place.errors(place.drawn(random, int(count)), exact=self.exact)
+            place.errors(place.drawn(random, min(at_once, int(count) - first)), exact=self.exact)
             for place, count in zip(self.places, counts, strict=True)
-            if count
+            for first in range(0, int(count), at_once)
         ]
         return np.concatenate(found)
 
