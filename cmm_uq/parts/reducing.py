@@ -16,7 +16,7 @@ from cmm_uq.parts.of_machine import NOISE
 from cmm_uq.parts.of_operator import OPERATOR
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Plan
-from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual
+from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual, in_parts
 from cmm_uq.points import Floats
 
 DRAWS = 10_000
@@ -62,6 +62,11 @@ def mean_of_places(places: Sequence[AtPose], random: np.random.Generator, n: int
 
     Noise, and what comes of operators and fixtures, is drawn anew in each (:data:`ANEW`).
     """
+    plan = places[0].measured.plan
+    return np.concatenate([_means_drawn(places, random, part, exact=exact) for part in in_parts(plan, n)])
+
+
+def _means_drawn(places: Sequence[AtPose], random: np.random.Generator, n: int, *, exact: bool) -> Floats:
     common = places[0].drawn(random, n)
     found = np.zeros((n, len(places[0].still)))
     for place in places:
@@ -162,7 +167,8 @@ def _elsewhere(plan: Plan, given: Circumstances, first: Virtual, draws: int, see
 
 def _quick(place: AtPose, seed: int) -> Floats:
     """(c,) standard deviations to first order, of the same draws in every place."""
-    return np.asarray(place.errors(place.drawn(np.random.default_rng(seed), _LOOKED_AT)).std(axis=0))
+    random, parts = np.random.default_rng(seed), in_parts(place.measured.plan, _LOOKED_AT)
+    return np.asarray(np.concatenate([place.errors(place.drawn(random, n)) for n in parts]).std(axis=0))
 
 
 def _turned(pose: Pose, turn: Floats, plan: Plan) -> Pose:

@@ -276,6 +276,12 @@ class AtPose:
         return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / spread)
 
 
+def in_parts(plan: Plan, draws: int) -> list[int]:
+    """So many draws in parts, of no more points at once than memory should hold."""
+    at_once = max(2, _AT_ONCE // len(plan.points))
+    return [min(at_once, draws - first) for first in range(0, draws, at_once)]
+
+
 def _scaled(deviations: Floats) -> Common:
     """Deviations (n, 3) of a part as often again as a coefficient says."""
     return Common(name="part", factors=("deviations",), draw=normal([0.0]), basis=deviations[None])
@@ -325,11 +331,10 @@ class Virtual:
     def _drawn(self, random: np.random.Generator, n: int) -> Floats:
         counts = np.full(len(self.places), n // len(self.places))
         counts[random.permutation(len(counts))[: n - counts.sum()]] += 1
-        at_once = max(2, _AT_ONCE // len(self.plan.points))
         found = [
-            place.errors(place.drawn(random, min(at_once, int(count) - first)), exact=self.exact)
+            place.errors(place.drawn(random, part), exact=self.exact)
             for place, count in zip(self.places, counts, strict=True)
-            for first in range(0, int(count), at_once)
+            for part in in_parts(self.plan, int(count))
         ]
         return np.concatenate(found)
 
