@@ -155,7 +155,7 @@ def _elsewhere(plan: Plan, given: Circumstances, first: Virtual, draws: int, see
         moved = tuple(replace(p, translation_mm=p.translation_mm + np.append(shift, 0.0)) for p in given.poses)
         there = replace(given, poses=moved)
         with suppress(CmmUqError):
-            u = _quick(AtPose(plan, there, moved[0], first.known, _LOOKED_AT), seed)
+            u = _quick(AtPose(plan, there, moved[0], first.known), seed)
             ratio = float(np.mean(u / np.maximum(planned, np.finfo(np.float64).tiny)))
             best = (ratio, there, shift) if ratio < best[0] else best
     if best[1] is given:
@@ -166,9 +166,10 @@ def _elsewhere(plan: Plan, given: Circumstances, first: Virtual, draws: int, see
 
 
 def _quick(place: AtPose, seed: int) -> Floats:
-    """(c,) standard deviations to first order, of the same draws in every place."""
+    """(c,) standard deviations of what would be read, to first order, of the same draws in every place."""
     random, parts = np.random.default_rng(seed), in_parts(place.measured.plan, _LOOKED_AT)
-    return np.asarray(np.concatenate([place.errors(place.drawn(random, n)) for n in parts]).std(axis=0))
+    errors = [place.errors(place.drawn(random, n), inferred=False) for n in parts]
+    return np.asarray(np.concatenate(errors).std(axis=0))
 
 
 def _turned(pose: Pose, turn: Floats, plan: Plan) -> Pose:

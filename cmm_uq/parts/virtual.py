@@ -163,18 +163,23 @@ class AtPose:
         """(n, p, 3) displacements of the plan's p points beyond ``base``, mm."""
         return self.measured.moved(self._given(coefficients), slice(None))
 
-    def errors(self, coefficients: Sequence[Drawn], *, exact: bool = False) -> Floats:
+    def errors(self, coefficients: Sequence[Drawn], *, exact: bool = False, inferred: bool = True) -> Floats:
         """(n, c) errors of the characteristics.
 
         Where points were measured as x, mean errors b are taken off: q = x − b. What has a sign or a size errs by
         f(q + d) − f(q) with errors d, beside the mean f(x) − f(q). What is never negative errs by f(x) less its true value,
         which follows from f(q + d) by turning the measurement round (:func:`cmm_uq.parts.inverting.inverse`). Without measured
         points, and with a form that is drawn on whole surfaces, all errs by what is measured less what is true.
+
+        Parameters
+        ----------
+        inferred : whether measurements are turned round; else what is never negative errs as all else does, which takes less
+            time and compares places as well.
         """
         found = self.read(coefficients, exact=exact)
         true = self.still if self.true is None else self.true(coefficients, exact=exact)
         errors = found + self.shift - true
-        for i, inverted in self._inverse(exact=exact).items():
+        for i, inverted in (self._inverse(exact=exact) if inferred else {}).items():
             errors[:, i] = self.shift[i] + self.still[i] - inverted(found[:, i])
         return errors
 
