@@ -46,10 +46,19 @@ class Way:
     ----------
     name : of the way.
     u : (c,) standard uncertainties, mm and rad.
+    draws : that they are from.
     """
 
     name: Text
     u: Floats
+    draws: int
+
+    def known(self, *, inferred: bool) -> float:
+        """Relative standard deviation of u; of a zone that is inferred from measured points with that of the pilot.
+
+        Ten runs of two ways of the simulated plate had 0.9 to 1.0 % of a size and a distance, 0.8 to 2.6 % of three zones.
+        """
+        return float(np.sqrt(0.5 / self.draws + (0.5 / _PILOT if inferred else 0.0)))
 
 
 def spread(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Floats:
@@ -92,10 +101,10 @@ def ways(
     planned : the measurement as it is planned, where it is there already.
     """
     first = Virtual(plan, given) if planned is None else planned
-    found = [Way(say("as planned"), spread(first, draws, seed))]
+    found = [Way(say("as planned"), spread(first, draws, seed), draws)]
     for name, change in _changes(plan, given, doubled):
         with suppress(CmmUqError):  # beyond the travel
-            found.append(Way(name, spread(Virtual(*change(), first.known, _PILOT), draws, seed)))
+            found.append(Way(name, spread(Virtual(*change(), first.known, _PILOT), draws, seed), draws))
     with suppress(CmmUqError):
         found += _elsewhere(plan, given, first, draws, seed)
     return found + _means(plan, given, first, draws, seed)
@@ -118,7 +127,7 @@ def _means(plan: Plan, given: Circumstances, first: Virtual, draws: int, seed: i
                     places[turn.tobytes()] = AtPose(plan, given, pose, first.known, _PILOT)
             several = [places[turn.tobytes()] for turn in turns]
             errors = mean_of_places(several, np.random.default_rng(seed), draws, exact=first.exact)
-            found.append(Way(name, errors.std(axis=0)))
+            found.append(Way(name, errors.std(axis=0), draws))
     return found
 
 
@@ -162,7 +171,7 @@ def _elsewhere(plan: Plan, given: Circumstances, first: Virtual, draws: int, see
         return []
     x, y = (signed(float(mm), "+.0f") for mm in best[2])
     name = say("part moved by {x} mm along {a} and {y} mm along {b}", x=x, y=y, a=Verbatim("X"), b=Verbatim("Y"))
-    return [Way(name, spread(Virtual(plan, best[1], first.known, _PILOT), draws, seed))]
+    return [Way(name, spread(Virtual(plan, best[1], first.known, _PILOT), draws, seed), draws)]
 
 
 def _quick(place: AtPose, seed: int) -> Floats:
