@@ -46,13 +46,13 @@ def styli(plan: Plan, pose: Pose) -> list[Cause]:
 
 
 def _lobing(stylus: Stylus, plan: Plan, its: NDArray[np.bool_]) -> Common:
-    size = MICROMETRE * stylus.lobing_um * its
+    variance = (MICROMETRE * stylus.lobing_um) ** 2
 
     def covariance(some: slice) -> Floats:
         cosine = np.clip(plan.normals[some] @ plan.normals.T, -1.0, 1.0)
         mean = np.mean([eval_legendre(degree, cosine) for degree in DEGREES], axis=0)
-        return np.asarray((MICROMETRE * stylus.lobing_um) ** 2 * mean * np.outer(its[some], its))
+        return np.asarray(variance * mean * np.outer(its[some], its))
 
-    shapes = field_components(covariance, size**2)
+    shapes = field_components(covariance, np.where(its, variance, 0.0))
     draw, factors = normal(np.ones(len(shapes))), (f"lobing {stylus.name}",) * len(shapes)
     return Common(name=STYLUS, factors=factors, draw=draw, basis=shapes[:, :, None] * plan.normals)
