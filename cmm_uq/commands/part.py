@@ -46,14 +46,22 @@ KEPT = 100_000
 COMPARED = 6000
 """Virtual measurements of each way that is compared: its u is then known to 0.9 %, and its part of the planned one better."""
 
+MANY = 1000
+"""Points of a plan from which on fewer virtual measurements are made, as many points in all; a tenth of them at least."""
+
 COVERAGE = 0.95
+
+
+def affordable(draws: int, plan: Plan) -> int:
+    """So many virtual measurements, or fewer of a plan of many points."""
+    return max(draws // 10, min(draws, draws * MANY // len(plan.points)))
 
 
 def part_found(
     job: PartJob,
     *,
     seed: int = 0,
-    trials: int = TRIALS,
+    trials: int | None = None,
     digits: int | None = None,
     rerun: bool = False,
     trust: Iterable[Path] | None = None,
@@ -67,7 +75,7 @@ def part_found(
     ----------
     job : that was read.
     seed : of everything random; the same seed gives the same result.
-    trials : number of virtual measurements.
+    trials : number of virtual measurements; by default :data:`TRIALS`, fewer of a plan of many points.
     digits : of u that are to be known: then so many are made as that needs (JCGM 101:2008, 7.9), ``trials`` at least.
     rerun : whether the machine's certificate is computed again from its inputs.
     trust : whose signatures on it are trusted; ``None`` where nothing need be signed.
@@ -80,6 +88,7 @@ def part_found(
     CmmUqError : the machine's certificate does not hold, or the measurement is impossible.
     """
     plan = plan_of(job)
+    trials = affordable(TRIALS, plan) if trials is None else trials
     measured = None if job.measured is None else evaluated(plan, job.measured)
     others = methods_of(job, plan, measured)
 
@@ -98,10 +107,11 @@ def part_found(
     virtual = Virtual(plan, given)
     simulated, errors = _simulated(virtual, trials, digits, seed, stage)
     stage("Shares of each cause", 0.6)
-    shares = budget(virtual, min(SHARED, trials), seed)
+    shares = budget(virtual, min(affordable(SHARED, plan), trials), seed)
     stage("What would change the uncertainty", 0.7)
+    compared_by = min(affordable(COMPARED, plan), trials)
     found_ways = ways(
-        plan, given, min(COMPARED, trials), seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual
+        plan, given, compared_by, seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual
     )
     stage("What to measure on the machine", 0.8)
     unseen = _unseen(virtual, shares)

@@ -36,7 +36,7 @@ class Asked:
     Parameters
     ----------
     seed : of everything random.
-    trials : number of virtual measurements.
+    trials : number of virtual measurements; ``None`` for as many as is usual.
     digits : of u that are to be known: then so many are made as that needs, ``trials`` at least; ``None`` for ``trials``.
     rerun : whether the machine's certificate is computed again from its inputs.
     trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
@@ -93,10 +93,10 @@ def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
     ------
     CmmUqError : see :func:`cmm_uq.commands.part.part_found`.
     """
-    from cmm_uq.commands.part import TRIALS, part_found
+    from cmm_uq.commands.part import part_found
 
     return part_found(
-        job, seed=asked.seed, trials=TRIALS if asked.trials is None else asked.trials, digits=asked.digits, rerun=asked.rerun,
+        job, seed=asked.seed, trials=asked.trials, digits=asked.digits, rerun=asked.rerun,
         trust=asked.trust, records=asked.records, changes=asked.changes, stage=stage,
     )  # fmt: skip
 

@@ -34,6 +34,9 @@ BLOCK = 12_000
 TOGETHER = 9_000_000
 """Coordinates of unit displacements held at once, 72 MB: all of a feature of a thousand points."""
 
+MANY = 500
+"""Points from which on each is not moved alone, with all the others in their places: that takes the square of their number."""
+
 CONDITION = 1e7
 """Condition of nominal points from which they do not determine the feature with errors of micrometres."""
 
@@ -115,6 +118,37 @@ class Repeated:
             state[rows], d = self._descended(self._local(errors[rows], rows.start), errors[rows], rows.start)
             form[rows] = 2 * d.max(axis=1) if self.placed.shape is LINE else np.ptp(d, axis=1)
         return self._drawn(state, form)
+
+    def followed(self, displacements: Floats, step: float) -> tuple[Floats, Floats]:
+        """How the least-squares feature of one measurement follows its points: by the implicit function theorem, Jᵀd = 0.
+
+        Each point adds a term of its own to Jᵀd, so that all points are moved at once and not one after the other.
+
+        Parameters
+        ----------
+        displacements : (n, d) errors of the points, mm.
+        step : mm, of central differences.
+
+        Returns
+        -------
+        states : (2k, k) where one component after the other is larger by a step, then those where it is smaller.
+        derivative : (n·d, k) of the state by the coordinates of each point, in steps of each component.
+
+        Raises
+        ------
+        CmmUqError : as for least squares.
+        """
+        errors, steps = self._checked(displacements[None]), np.diag(step / self._units)
+        points = self.points + displacements
+        state = self._descended(self._local(errors, 0), errors, 0)[0][0]
+        states = np.concatenate([state + steps, state - steps])
+        up, down = np.split(np.array([self._each(one, points).sum(axis=0) for one in states]), 2)
+        pulled = (self._pulls(state, points, step) - self._pulls(state, points, -step)) / step
+        return states, np.asarray(-pulled @ np.linalg.inv(up - down))
+
+    def drawn(self, states: Floats) -> Drawn:
+        """Features of states (N, k), whose form nobody asks for."""
+        return self._drawn(states, np.zeros(len(states)))
 
     def minimum_zone(self, displacements: ArrayLike) -> Drawn:
         """The minimum zone of each draw: straightness in a plane, flatness, roundness, sphericity, cylindricity, conicity.
@@ -207,11 +241,23 @@ class Repeated:
     def _first_order(self) -> Floats:
         """(n·d, k) by which the state follows each coordinate, by a step of a millionth of the extent: where to begin."""
         small = 1e-6 * self.placed.extent
-        followed = []
-        for steps in one_by_one(*self.points.shape):
-            local = self._local(small * steps, 0)
-            followed.append(-self._step(np.tile(self.placed.state, (len(steps), 1)), local)[0] / small)
-        return np.concatenate(followed)
+        if len(self.points) > MANY:
+            return -self._pulls(self.placed.state, self.points, small) @ self._inverse / small
+        steps = np.concatenate(list(one_by_one(*self.points.shape)))
+        local = self._local(small * steps, 0)
+        return -self._step(np.tile(self.placed.state, (len(steps), 1)), local)[0] / small
+
+    def _pulls(self, state: Floats, points: Floats, step: float) -> Floats:
+        """(n·d, k) by how much Jᵀd, at a state (k,), changes with one coordinate of one point (n, d) moved by a step."""
+        still, moved = self._each(state, points), np.empty((*points.shape, len(state)))
+        for j, along in enumerate(np.eye(points.shape[1])):
+            moved[:, j] = self._each(state, points + step * along) - still
+        return moved.reshape(-1, len(state))
+
+    def _each(self, state: Floats, points: Floats) -> Floats:
+        """(n, k) what each point adds to Jᵀd at a state."""
+        d, J = self.placed.shape.distances(state[None], self.placed.local(points[None]))
+        return np.asarray((J[:, 0] * d[0]).T)
 
     def _descended(self, local: Floats, errors: Floats, first: int) -> tuple[Floats, Floats]:
         """States (B, k) of the least-squares features, and distances (B, n)."""

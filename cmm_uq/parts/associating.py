@@ -14,7 +14,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
-from cmm_uq.geometry.repeated import Drawn, Repeated, one_by_one
+from cmm_uq.geometry.repeated import MANY, Drawn, Repeated, one_by_one
 from cmm_uq.parts.plan import DIRECTED, Feature
 from cmm_uq.points import Floats
 
@@ -179,7 +179,14 @@ class ProbedFeature:
     @cached_property
     def derivative(self) -> Floats:
         """(8, n, 3) of the values by the coordinates of each point."""
-        return self.by_differences(lambda displacements: self.of(displacements).values)
+        if self.feature.kind == "point" or self.n <= MANY:
+            return self.by_differences(lambda displacements: self.of(displacements).values)
+        states, followed = self._repeated.followed(self._in_own_plane(self._offset), _STEP)
+        up, down = np.split(self._values(self._repeated.drawn(states)), 2)
+        by_coordinate = (0.5 * followed @ (up - down)).reshape(self.n, -1, VALUES)
+        if self.feature.kind == "line":
+            by_coordinate = np.einsum("nbv,bi->niv", by_coordinate, self._plane)
+        return np.asarray(np.moveaxis(by_coordinate, 2, 0))
 
     def by_differences(self, values: Callable[[Floats], Floats]) -> Floats:
         """(8, n, 3) derivative of values (N, 8) of displacements (N, n, 3) by the coordinates of each point."""

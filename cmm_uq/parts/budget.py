@@ -19,7 +19,7 @@ import numpy as np
 
 from cmm_uq.messages import Text
 from cmm_uq.parts.causes import Cause, Drawn
-from cmm_uq.parts.virtual import AtPose, Virtual
+from cmm_uq.parts.virtual import AtPose, Virtual, in_parts
 from cmm_uq.points import Floats
 
 DRAWS = 2**13
@@ -94,22 +94,28 @@ def budget(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Budget:
     lines = list(dict.fromkeys(line_of(cause) for cause in causes if cause.factors))
     # the second sample stands in other places, so that nothing of it is that of the first
     elsewhere = [places[i] for i in random.permutation(len(places))]
-    A = [place.drawn(random, each) for place in places]
-    B = [place.drawn(random, each) for place in places]
-    yA, yB = _errors(places, A, virtual.exact), _errors(elsewhere, B, virtual.exact)
-    mixed = {line: _errors(places, [_exchanged(a, b, causes, line) for a, b in zip(A, B, strict=True)], virtual.exact)
-             for line in lines}  # fmt: skip
-    if len(places) > 1:
-        mixed[PLACE] = _errors(elsewhere, A, virtual.exact)
+    several = [cause for cause in causes if len(set(cause.factors)) > 1]
+    drawn, found = list[list[Floats]](), list[list[Floats]]()
+    for part in in_parts(virtual.plan, each):
+        A = [place.drawn(random, part) for place in places]
+        B = [place.drawn(random, part) for place in places]
+        exchanged = ([_exchanged(a, b, causes, line) for a, b in zip(A, B, strict=True)] for line in lines)
+        of_place = [_errors(elsewhere, A, virtual.exact)] if len(places) > 1 else []
+        found.append([
+            _errors(places, A, virtual.exact), _errors(elsewhere, B, virtual.exact),
+            *(_errors(places, mixed, virtual.exact) for mixed in exchanged), *of_place,
+        ])  # fmt: skip
+        by_cause = zip(causes, zip(*A, strict=True), strict=True)
+        drawn.append([np.concatenate(own) for cause, own in by_cause if cause in several])
+    yA, yB, *mixed = (np.concatenate(each) for each in zip(*found, strict=True))
     both = np.vstack([yA, yB])
     variance = np.maximum(both.var(axis=0), np.finfo(np.float64).tiny)
     centred = yB - both.mean(axis=0)
-    first = [np.mean(centred * (y - yA), axis=0) / variance for y in mixed.values()]
-    total = [0.5 * np.mean((y - yA) ** 2, axis=0) / variance for y in mixed.values()]
-    factors, within = _within(causes, [np.concatenate(parts) for parts in zip(*A, strict=True)], yA)
-    return Budget(
-        tuple(virtual.names), tuple(mixed), np.array(first), np.array(total), factors, within, np.sqrt(variance)
-    )
+    first = [np.mean(centred * (y - yA), axis=0) / variance for y in mixed]
+    total = [0.5 * np.mean((y - yA) ** 2, axis=0) / variance for y in mixed]
+    factors, within = _within(several, [np.concatenate(own) for own in zip(*drawn, strict=True)], yA)
+    names = (*lines, PLACE) if len(places) > 1 else tuple(lines)
+    return Budget(tuple(virtual.names), names, np.array(first), np.array(total), factors, within, np.sqrt(variance))
 
 
 def _errors(places: Sequence[AtPose], coefficients: Sequence[Sequence[Drawn]], exact: bool) -> Floats:
@@ -122,14 +128,12 @@ def _exchanged(A: Sequence[Drawn], B: Sequence[Drawn], causes: Sequence[Cause], 
 
 
 def _within(causes: Sequence[Cause], drawn: Sequence[Floats], y: Floats) -> tuple[tuple[str, ...], Floats]:
-    """Names of factors of causes that have several, and their shares (f, c)."""
+    """Names of factors of causes, and their shares (f, c)."""
     names, shares = list[str](), list[Floats]()
     centred = y - y.mean(axis=0)
     variance = np.maximum(y.var(axis=0), np.finfo(np.float64).tiny)
     for cause, coefficients in zip(causes, drawn, strict=True):
         factors = list(dict.fromkeys(cause.factors))
-        if len(factors) < 2:
-            continue
         X = coefficients - coefficients.mean(axis=0)
         for factor in factors:
             own = X[:, [i for i, name in enumerate(cause.factors) if name == factor]]

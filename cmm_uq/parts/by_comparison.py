@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from math import hypot, sqrt
 
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from cmm_uq.messages import Text, Verbatim, listed, number, say
 from cmm_uq.parts.budget import Budget
@@ -154,7 +154,8 @@ def _scatter(name: Text, virtual: Stating, figure: Figure, share: float) -> Iter
     if share < MATTERS or not expected:
         return
     ratio, dof = (figure.scatter / expected) ** 2, figure.scatter_dof
-    low, high = (float(chi2.ppf(p, dof)) / dof for p in (CHANCE / 2, 1 - CHANCE / 2))
+    tails = CHANCE / 2, 1 - CHANCE / 2
+    low, high = (2 * float(gammaincinv(0.5 * dof, tail)) / dof for tail in tails)  # quantiles of χ² over its mean
     told = say("What varied between its measurements would scatter by {expected} by the virtual measurements; it scattered by "
                "{seen}",
                expected=small(expected, angle=figure.angle), seen=small(figure.scatter, angle=figure.angle))  # fmt: skip

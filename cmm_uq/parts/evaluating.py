@@ -8,7 +8,7 @@ features in both: a position is not linear where it is small.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -176,6 +176,13 @@ class Evaluator:
             )
         measured = Measured(features, frames)
         return np.column_stack([one(measured) for one in asked])
+
+    def needed(self, movement: Movement, only: int) -> Movement:
+        """What of a :meth:`movement` one characteristic is of."""
+        one = self.evaluations[only]
+        names = {name for name, _ in (*one.keys, *one.datums)}
+        points = {name: moved for name, moved in movement.points.items() if name in names}
+        return replace(movement, points=points, whole=movement.whole if one.frame_of == BEST_FIT else None)
 
     def movement(self, coefficients: Coefficients, *, exact: bool = False) -> Movement:
         """What coefficients move of all that the characteristics are of."""

@@ -7,12 +7,14 @@ probed are drawn on the same surface, and what they miss between them is an erro
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.frame import frame_about
-from cmm_uq.parts.causes import Cause, Common, components, normal
+from cmm_uq.parts.causes import Cause, Common, normal
+from cmm_uq.parts.fields import field_components
 from cmm_uq.parts.plan import DIRECTED, Feature, Plan
 from cmm_uq.points import Floats
 from cmm_uq.units import MICROMETRE
@@ -49,17 +51,23 @@ class Form:
             raise CmmUqError("a field of form needs the distance over which it is correlated",
                              where=f"form of {self.feature!r}", fix="Give correlation_mm")  # fmt: skip
 
-    def kernel(self, feature: Feature, points: Floats) -> Floats:
-        """(n, n) covariance along the normals of points (n, 3), mm²; without roughness."""
-        found = np.zeros((len(points), len(points)))
+    def kernel(self, feature: Feature, points: Floats, some: slice = slice(None)) -> Floats:
+        """(m, n) covariance of some along the normals with all points (n, 3), mm²; without roughness."""
+        own = points[some]
+        found = np.zeros((len(own), len(points)))
         if self.field_um:
-            apart = np.linalg.norm(points[:, None] - points, axis=2)
+            apart = np.linalg.norm(own[:, None] - points, axis=2)
             found += self.field_um**2 * np.exp(-0.5 * (apart / self.correlation_mm) ** 2)
         if self.harmonics_um:
             angle = _angles(feature, points)
             for count, size in self.harmonics_um:
-                found += size**2 * np.cos(count * np.subtract.outer(angle, angle))
+                found += size**2 * np.cos(count * np.subtract.outer(angle[some], angle))
         return np.asarray(MICROMETRE**2 * found)
+
+    def components(self, feature: Feature, points: Floats) -> Floats:
+        """(K, n) of the form on points (n, 3), mm; without roughness."""
+        variance = MICROMETRE**2 * (self.field_um**2 + sum(size**2 for _, size in self.harmonics_um))
+        return field_components(partial(self.kernel, feature, points), np.full(len(points), variance))
 
 
 def forms(known: tuple[Form, ...], plan: Plan) -> tuple[list[Cause], list[Cause | None]]:
@@ -77,7 +85,7 @@ def forms(known: tuple[Form, ...], plan: Plan) -> tuple[list[Cause], list[Cause 
         count, factor = len(feature.points), f"form of {one.feature}"
         both = np.vstack([feature.points, feature.surface]) if len(feature.surface) else feature.points
         if one.field_um or one.harmonics_um:
-            shapes = components(one.kernel(feature, both))
+            shapes = one.components(feature, both)
             draw, factors = normal(np.ones(len(shapes))), (factor,) * len(shapes)
             basis = _placed(shapes[:, :count], plan, rows)
             causes.append(Common(name=FORM, factors=factors, draw=draw, basis=basis))
@@ -97,12 +105,41 @@ def whole_surfaces(plan: Plan) -> Plan:
     return replace(plan, features=features, order=np.zeros(0, dtype=np.int64), times_s=np.zeros(0))
 
 
-def _rough(one: Form, plan: Plan, rows: slice) -> Common:
-    count = rows.stop - rows.start
-    shapes = MICROMETRE * one.roughness_um * np.eye(count)
-    draw = normal(np.ones(count))
-    return Common(
-        name=FORM, factors=(f"roughness of {one.feature}",) * count, draw=draw, basis=_placed(shapes, plan, rows)
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Rough(Cause):
+    """What moves each point of a feature on its own along its normal, in standard deviations.
+
+    Parameters
+    ----------
+    along : (m, 3) displacements of its points for one unit of each coefficient, mm.
+    rows : of these among the plan's points.
+    count : of the plan's points.
+    """
+
+    along: Floats
+    rows: slice
+    count: int
+
+    def through(self, derivative: Floats) -> Floats:
+        """See :meth:`Cause.through`."""
+        return np.asarray(np.einsum("pmi,mi->mp", derivative[:, self.rows], self.along))
+
+    def moved(self, coefficients: Floats, rows: slice) -> Floats:
+        """See :meth:`Cause.moved`."""
+        start, stop, _ = rows.indices(self.count)
+        found = np.zeros((len(coefficients), stop - start, 3))
+        first, last = max(start, self.rows.start), min(stop, self.rows.stop)
+        if first < last:
+            own = slice(first - self.rows.start, last - self.rows.start)
+            found[:, first - start : last - start] = coefficients[:, own, None] * self.along[own]
+        return found
+
+
+def _rough(one: Form, plan: Plan, rows: slice) -> Cause:
+    along = MICROMETRE * one.roughness_um * plan.normals[rows]
+    factors = (f"roughness of {one.feature}",) * len(along)
+    return _Rough(
+        name=FORM, factors=factors, draw=normal(np.ones(len(along))), along=along, rows=rows, count=len(plan.points)
     )
 
 

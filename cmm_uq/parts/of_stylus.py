@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import eval_legendre
 
-from cmm_uq.parts.causes import Cause, Common, field_along, normal
+from cmm_uq.parts.causes import Cause, Common, normal
+from cmm_uq.parts.fields import field_components
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Plan, Stylus
-from cmm_uq.points import AXES
+from cmm_uq.points import AXES, Floats
 from cmm_uq.units import MICROMETRE
 
 STYLUS = "stylus"
@@ -45,7 +46,13 @@ def styli(plan: Plan, pose: Pose) -> list[Cause]:
 
 
 def _lobing(stylus: Stylus, plan: Plan, its: NDArray[np.bool_]) -> Common:
-    cosine = np.clip(plan.normals @ plan.normals.T, -1.0, 1.0)
-    mean = np.mean([eval_legendre(degree, cosine) for degree in DEGREES], axis=0)
-    kernel = (MICROMETRE * stylus.lobing_um) ** 2 * mean * np.outer(its, its)
-    return field_along(STYLUS, f"lobing {stylus.name}", kernel, plan.normals)
+    variance = (MICROMETRE * stylus.lobing_um) ** 2
+
+    def covariance(some: slice) -> Floats:
+        cosine = np.clip(plan.normals[some] @ plan.normals.T, -1.0, 1.0)
+        mean = np.mean([eval_legendre(degree, cosine) for degree in DEGREES], axis=0)
+        return np.asarray(variance * mean * np.outer(its[some], its))
+
+    shapes = field_components(covariance, np.where(its, variance, 0.0))
+    draw, factors = normal(np.ones(len(shapes))), (f"lobing {stylus.name}",) * len(shapes)
+    return Common(name=STYLUS, factors=factors, draw=draw, basis=shapes[:, :, None] * plan.normals)

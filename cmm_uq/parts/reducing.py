@@ -16,7 +16,7 @@ from cmm_uq.parts.of_machine import NOISE
 from cmm_uq.parts.of_operator import OPERATOR
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Plan
-from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual
+from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual, in_parts
 from cmm_uq.points import Floats
 
 DRAWS = 10_000
@@ -46,10 +46,19 @@ class Way:
     ----------
     name : of the way.
     u : (c,) standard uncertainties, mm and rad.
+    draws : that they are from.
     """
 
     name: Text
     u: Floats
+    draws: int
+
+    def known(self, *, inferred: bool) -> float:
+        """Relative standard deviation of u; of a zone that is inferred from measured points with that of the pilot.
+
+        Ten runs of two ways of the simulated plate had 0.9 to 1.0 % of a size and a distance, 0.8 to 2.6 % of three zones.
+        """
+        return float(np.sqrt(0.5 / self.draws + (0.5 / _PILOT if inferred else 0.0)))
 
 
 def spread(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Floats:
@@ -62,6 +71,11 @@ def mean_of_places(places: Sequence[AtPose], random: np.random.Generator, n: int
 
     Noise, and what comes of operators and fixtures, is drawn anew in each (:data:`ANEW`).
     """
+    plan = places[0].measured.plan
+    return np.concatenate([_means_drawn(places, random, part, exact=exact) for part in in_parts(plan, n)])
+
+
+def _means_drawn(places: Sequence[AtPose], random: np.random.Generator, n: int, *, exact: bool) -> Floats:
     common = places[0].drawn(random, n)
     found = np.zeros((n, len(places[0].still)))
     for place in places:
@@ -87,10 +101,10 @@ def ways(
     planned : the measurement as it is planned, where it is there already.
     """
     first = Virtual(plan, given) if planned is None else planned
-    found = [Way(say("as planned"), spread(first, draws, seed))]
+    found = [Way(say("as planned"), spread(first, draws, seed), draws)]
     for name, change in _changes(plan, given, doubled):
         with suppress(CmmUqError):  # beyond the travel
-            found.append(Way(name, spread(Virtual(*change(), first.known, _PILOT), draws, seed)))
+            found.append(Way(name, spread(Virtual(*change(), first.known, _PILOT), draws, seed), draws))
     with suppress(CmmUqError):
         found += _elsewhere(plan, given, first, draws, seed)
     return found + _means(plan, given, first, draws, seed)
@@ -113,7 +127,7 @@ def _means(plan: Plan, given: Circumstances, first: Virtual, draws: int, seed: i
                     places[turn.tobytes()] = AtPose(plan, given, pose, first.known, _PILOT)
             several = [places[turn.tobytes()] for turn in turns]
             errors = mean_of_places(several, np.random.default_rng(seed), draws, exact=first.exact)
-            found.append(Way(name, errors.std(axis=0)))
+            found.append(Way(name, errors.std(axis=0), draws))
     return found
 
 
@@ -150,19 +164,21 @@ def _elsewhere(plan: Plan, given: Circumstances, first: Virtual, draws: int, see
         moved = tuple(replace(p, translation_mm=p.translation_mm + np.append(shift, 0.0)) for p in given.poses)
         there = replace(given, poses=moved)
         with suppress(CmmUqError):
-            u = _quick(AtPose(plan, there, moved[0], first.known, _LOOKED_AT), seed)
+            u = _quick(AtPose(plan, there, moved[0], first.known), seed)
             ratio = float(np.mean(u / np.maximum(planned, np.finfo(np.float64).tiny)))
             best = (ratio, there, shift) if ratio < best[0] else best
     if best[1] is given:
         return []
     x, y = (signed(float(mm), "+.0f") for mm in best[2])
     name = say("part moved by {x} mm along {a} and {y} mm along {b}", x=x, y=y, a=Verbatim("X"), b=Verbatim("Y"))
-    return [Way(name, spread(Virtual(plan, best[1], first.known, _PILOT), draws, seed))]
+    return [Way(name, spread(Virtual(plan, best[1], first.known, _PILOT), draws, seed), draws)]
 
 
 def _quick(place: AtPose, seed: int) -> Floats:
-    """(c,) standard deviations to first order, of the same draws in every place."""
-    return np.asarray(place.errors(place.drawn(np.random.default_rng(seed), _LOOKED_AT)).std(axis=0))
+    """(c,) standard deviations of what would be read, to first order, of the same draws in every place."""
+    random, parts = np.random.default_rng(seed), in_parts(place.measured.plan, _LOOKED_AT)
+    errors = [place.errors(place.drawn(random, n), inferred=False) for n in parts]
+    return np.asarray(np.concatenate(errors).std(axis=0))
 
 
 def _turned(pose: Pose, turn: Floats, plan: Plan) -> Pose:

@@ -9,10 +9,10 @@ inferred from what was measured by turning the measurement round (:mod:`cmm_uq.p
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 
@@ -54,11 +54,21 @@ PILOT = 10_000
 _BLOCK = 400_000
 """Points of the pilot drawn at once."""
 
+_AT_ONCE = 2_000_000
+"""Points of virtual measurements that are drawn at once: 50 MB for each cause that moves each coordinate on its own."""
+
+_KEPT = 1_600_000
+"""Points of the whole pilot up to which its blocks are drawn once and kept, 40 MB; else they are drawn again when needed."""
+
 _PILOT_SEED = 20_101
 """Of these, in every place alike, so that places are compared by the same."""
 
 _NOTHING_SEEN = 0.1
 """Of what errors alone make of a zone, below which what was measured has no shape of its own to infer from."""
+
+
+_PilotBlock = Callable[[], tuple[Movement, Floats]]
+"""Movements of a block of the pilot, and what adds to its characteristics, the same each time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,18 +163,23 @@ class AtPose:
         """(n, p, 3) displacements of the plan's p points beyond ``base``, mm."""
         return self.measured.moved(self._given(coefficients), slice(None))
 
-    def errors(self, coefficients: Sequence[Drawn], *, exact: bool = False) -> Floats:
+    def errors(self, coefficients: Sequence[Drawn], *, exact: bool = False, inferred: bool = True) -> Floats:
         """(n, c) errors of the characteristics.
 
         Where points were measured as x, mean errors b are taken off: q = x − b. What has a sign or a size errs by
         f(q + d) − f(q) with errors d, beside the mean f(x) − f(q). What is never negative errs by f(x) less its true value,
         which follows from f(q + d) by turning the measurement round (:func:`cmm_uq.parts.inverting.inverse`). Without measured
         points, and with a form that is drawn on whole surfaces, all errs by what is measured less what is true.
+
+        Parameters
+        ----------
+        inferred : whether measurements are turned round; else what is never negative errs as all else does, which takes less
+            time and compares places as well.
         """
         found = self.read(coefficients, exact=exact)
         true = self.still if self.true is None else self.true(coefficients, exact=exact)
         errors = found + self.shift - true
-        for i, inverted in self._inverse(exact=exact).items():
+        for i, inverted in (self._inverse(exact=exact) if inferred else {}).items():
             errors[:, i] = self.shift[i] + self.still[i] - inverted(found[:, i])
         return errors
 
@@ -201,53 +216,60 @@ class AtPose:
         """Of a part that deviates λ times as the measured one, or, where that shows nothing, as errors would have it."""
         deviations = self.measured.movement([*[None] * len(self.causes), np.ones((1, 1))], exact=exact)
         perfect = deviations.plus(deviations, -2.0)  # from the part as measured to the nominal one
-        again, alone = self._of_pilot([None, perfect], exact=exact)
+        blocks = self._pilot_blocks(exact=exact)
+        again, alone = self._of_pilot(blocks, {None: [None, perfect]}, exact=exact)[None]
         shapes = dict.fromkeys(self.inferred, deviations)
-        first = self._pilot_block(0, exact=exact)[0]
+        first = blocks[0]()[0]
         for i in self.inferred:
             typical = int(np.argsort(alone[: len(first.change), i])[len(first.change) // 2])
             if self.still[i] < max(_NOTHING_SEEN * alone[typical, i], ROUNDING):
                 shapes[i] = first.row(typical)
+        parts = dict[int | None, list[Movement]]()
+        for i in self.inferred:
+            if np.ptp(alone[:, i]) > ROUNDING:
+                one = self._true(i, perfect.plus(shapes[i]), exact=exact)
+                nodes = nodes_of(float(self.still[i]), alone[:, i], one).tolist()
+                parts[i] = [perfect.plus(shapes[i], node) for node in nodes]
+        read = self._of_pilot(blocks, parts, exact=exact)
         return {
-            i: self._inverted_one(i, perfect, shapes[i], again[:, i], alone[:, i], exact=exact)
-            for i in self.inferred
-            if np.ptp(alone[:, i]) > ROUNDING
-        }
+            i: inverse(float(self.still[i]), again[:, i], alone[:, i],
+                       np.array([self._true(i, part, exact=exact) for part in parts[i]]), read[i][:, :, 0])
+            for i in self.inferred if i in parts
+        }  # fmt: skip
 
-    def _inverted_one(
-        self, i: int, perfect: Movement, shape: Movement, again: Floats, alone: Floats, *, exact: bool
-    ) -> Inverse:  # fmt: skip
-        """Of one characteristic, with parts that deviate from a perfect one by multiples of a shape."""
+    def _true(self, i: int, part: Movement, *, exact: bool) -> float:
+        """A characteristic of a part without errors."""
+        return float(self.measured.of(part, exact=exact, only=i)[0, 0])
 
-        def true(part: Movement) -> float:
-            return float(self.measured.of(part, exact=exact, only=i)[0, 0])
+    def _of_pilot(
+        self, blocks: Sequence[_PilotBlock], parts: Mapping[int | None, Sequence[Movement | None]], *, exact: bool
+    ) -> dict[int | None, Floats]:  # fmt: skip
+        """(m, n, c) as m parts would be measured, of their movements from the part that was, with the pilot's n draws.
 
-        found = float(self.still[i])
-        parts = [perfect.plus(shape, node) for node in nodes_of(found, alone, true(perfect.plus(shape))).tolist()]
-        read = self._of_pilot(parts, only=i, exact=exact)[:, :, 0]
-        return inverse(found, again, alone, np.array([true(part) for part in parts]), read)
+        Parameters
+        ----------
+        parts : by the characteristic that they are asked for; by ``None`` for all.
+        """
+        found = {only: [list[Floats]() for _ in each] for only, each in parts.items()}
+        for block in blocks:
+            moved, beside = block()
+            for only, each in parts.items():
+                own = moved if only is None else self.measured.needed(moved, only)
+                added = beside if only is None else beside[:, [only]]
+                for so_far, part in zip(found[only], each, strict=True):
+                    there = own if part is None else own.plus(part)
+                    so_far.append(self.measured.of(there, exact=exact, only=only) + added)
+        return {only: np.array([np.concatenate(so_far) for so_far in each]) for only, each in found.items()}
 
-    def _of_pilot(self, parts: Sequence[Movement | None], *, only: int | None = None, exact: bool) -> Floats:
-        """(m, n, c) as m parts would be measured, of their movements from the part that was, with the pilot's n draws."""
-        found = list[list[Floats]]()
-        for block in range(-(-self.pilot // self._at_once)):
-            moved, beside = self._pilot_block(block, exact=exact)
-            added = beside if only is None else beside[:, [only]]
-            found.append([
-                self.measured.of(moved if part is None else moved.plus(part), exact=exact, only=only) + added
-                for part in parts
-            ])  # fmt: skip
-        return np.array([np.concatenate(each) for each in zip(*found, strict=True)])
+    def _pilot_blocks(self, *, exact: bool) -> list[_PilotBlock]:
+        """The pilot's blocks, made once and kept where all of them together are small."""
+        at_once = min(self.pilot, max(_BLOCK // len(self.points), 2))
+        counts = [min(at_once, self.pilot - first) for first in range(0, self.pilot, at_once)]
+        blocks = [partial(self._pilot_block, which, count, exact=exact) for which, count in enumerate(counts)]
+        return [cache(block) for block in blocks] if self.pilot * len(self.points) <= _KEPT else list(blocks)
 
-    @property
-    def _at_once(self) -> int:
-        """Draws of the pilot in a block."""
-        return min(self.pilot, max(_BLOCK // len(self.points), 2))
-
-    def _pilot_block(self, block: int, *, exact: bool) -> tuple[Movement, Floats]:
-        """Movements of a block of the pilot, and what adds to its characteristics, the same each time."""
-        count = min(self._at_once, self.pilot - block * self._at_once)
-        drawn = self.drawn(np.random.default_rng([_PILOT_SEED, block]), count)
+    def _pilot_block(self, which: int, count: int, *, exact: bool) -> tuple[Movement, Floats]:
+        drawn = self.drawn(np.random.default_rng([_PILOT_SEED, which]), count)
         return self.measured.movement(self._given(drawn), exact=exact), self._beside(drawn)
 
     def off(self, seed: int = 0, count: int = CHECKED) -> Floats:
@@ -257,6 +279,12 @@ class AtPose:
         apart = self.read(drawn, exact=False) - exact
         spread = np.maximum(exact.std(axis=0), ROUNDING)
         return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / spread)
+
+
+def in_parts(plan: Plan, draws: int) -> list[int]:
+    """So many draws in parts, of no more points at once than memory should hold."""
+    at_once = max(2, _AT_ONCE // len(plan.points))
+    return [min(at_once, draws - first) for first in range(0, draws, at_once)]
 
 
 def _scaled(deviations: Floats) -> Common:
@@ -309,9 +337,9 @@ class Virtual:
         counts = np.full(len(self.places), n // len(self.places))
         counts[random.permutation(len(counts))[: n - counts.sum()]] += 1
         found = [
-            place.errors(place.drawn(random, int(count)), exact=self.exact)
+            place.errors(place.drawn(random, part), exact=self.exact)
             for place, count in zip(self.places, counts, strict=True)
-            if count
+            for part in in_parts(self.plan, int(count))
         ]
         return np.concatenate(found)
 

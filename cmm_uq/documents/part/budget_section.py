@@ -12,8 +12,8 @@ from cmm_uq.documents.part.budget_plot import shares_plots
 from cmm_uq.documents.part.figures import Figures, by_margin, critical, figures_of
 from cmm_uq.documents.part.found import PartFound, Unseen
 from cmm_uq.messages import DASH, NOTHING, Number, Text, Verbatim, after, commas, number, plural, say, signed
+from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.in_words import FAMILIES, family_of, line_in_words
-from cmm_uq.parts.reducing import DRAWS
 from cmm_uq.points import Floats
 from cmm_uq.units import unit
 
@@ -222,10 +222,13 @@ def ways_section(found: PartFound) -> Section:
     )  # fmt: skip
     rows = tuple((say("{way:capital}", way=way.name), *(one.small(float(way.u[one.place])) for one in shown))
                  for way in found.ways)  # fmt: skip
-    known = number(100 / np.sqrt(2 * DRAWS), ".1g")
+    known = number(100 * found.ways[-1].known(inferred=False), ".1g")
     notes: list[Text] = [
         say("Each way alone, by virtual measurements of its own; u is known to {known} %.", known=known)
     ]
+    if found.measured is not None and np.any(never_negative(found.plan)[[one.place for one in shown]]):
+        zones = number(100 * found.ways[-1].known(inferred=True), ".1g")
+        notes.append(say("u of form, orientation, location and runout is known to {known} %.", known=zones))
     if len(shown) < len(found.stated):
         notes.append(_chosen(shown))
     told = [Paragraph(words)] if (words := best_words(critical(found))) else []
