@@ -70,6 +70,8 @@ _FARTHEST = 5.0
 _MOST_CLASSES, _STEPS = 48, 20
 _VARIANCES = 6
 """Columns of ``shares``: reading noise along x, y, z; what repeats share; growing noise; what each observation has alone."""
+GROWING = 4
+"""The column of growing noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +208,7 @@ class Components:
     @cached_property
     def _growth(self) -> float:
         """Typical variance of the growing part over that at the longest length."""
-        return float(np.mean(self.shares[:, 4] / self.shares[:, :3].sum(axis=1)))
+        return float(np.mean(self.shares[:, GROWING] / self.shares[:, :3].sum(axis=1)))
 
     def variances(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Six variances (w, 6), mm², that ``shares`` refers to, and those of the slow columns (w, c)."""
