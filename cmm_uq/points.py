@@ -166,13 +166,24 @@ class Points:
         The order of their points is no matter.
         """
         same: dict[bytes, list[int]] = {}
-        for group, rows in enumerate(self.rows_of_groups):
+        for group in np.unique(self.group[self._somewhere_again]).tolist():
+            rows = self.rows_of_groups[group]
             figures = self.xyz[rows] + 0.0  # −0 is 0
             same.setdefault(figures[np.lexsort(figures.T)].tobytes(), []).append(group)
         found: dict[int, int] = {}
         for groups in same.values():
             original, *later = sorted(groups, key=self.run_of)
             found |= dict.fromkeys(later, original)
+        return found
+
+    @property
+    def _somewhere_again(self) -> NDArray[np.bool_]:
+        """(n,) whether another point has the same coordinates to the last digit."""
+        order = np.lexsort(self.xyz.T)
+        alike = np.all(self.xyz[order[1:]] == self.xyz[order[:-1]], axis=1)
+        found = np.zeros(len(self), dtype=bool)
+        found[order[1:]] |= alike
+        found[order[:-1]] |= alike
         return found
 
     def run_of(self, group: int) -> tuple[int, int]:

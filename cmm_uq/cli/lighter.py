@@ -1,8 +1,9 @@
 """Libraries without what a command never uses of them: modules that are opened only to be named.
 
 numpy's compiler of Fortran and its test tools are opened by scipy, which asks numpy for everything that it has, and a table
-of letters by matplotlib, for TeX. Here such modules are loaded when something of them is first used. What is computed or drawn
-is the same; only the command's own process does so, never whoever imports the package.
+of letters by matplotlib, for TeX. Here such modules are loaded when something of them is first used. Docstrings that scipy
+and matplotlib put together when they are imported, and axes in space, which no picture here has, are left out. What is
+computed or drawn is the same; only the command's own process does so, never whoever imports the package.
 """
 
 from __future__ import annotations
@@ -20,19 +21,44 @@ LATER = ("fontTools.agl", "h5py", "numpy.core", "numpy.ctypeslib", "numpy.f2py",
 
 def lighten() -> None:
     """Have the libraries that are not loaded yet come without what is not used of them."""
-    kde = ModuleType("emcee.moves.kde")  # the move needs all of scipy.stats, a fifth of a report
-    kde.__dict__["KDEMove"] = None
-    sys.modules.setdefault(kde.__name__, kde)
+    for name, part in _WITHOUT.items():
+        empty = ModuleType(name)
+        empty.__dict__[part] = None
+        sys.modules.setdefault(name, empty)
     sys.meta_path.insert(0, _Lighter())
 
 
+_WITHOUT = {"emcee.moves.kde": "KDEMove", "mpl_toolkits.mplot3d": "Axes3D"}
+"""Modules that nothing is used of, and what is taken from them. The move needs all of scipy.stats, a fifth of a report."""
+
+
+class _NoDocstring:
+    """In place of a docstring that scipy takes apart, adds to and puts together again."""
+
+    def __init__(self, *_: object) -> None: ...
+
+    def __getitem__(self, _: str) -> list[str]:
+        return []
+
+    def __str__(self) -> str:
+        return "\n"
+
+
+_UNEXPLAINED: dict[str, tuple[str, object]] = {
+    "matplotlib.artist": ("kwdoc", lambda _: ""),
+    "scipy._lib._docscrape": ("FunctionDoc", _NoDocstring),
+}
+"""Modules that make docstrings for others, and by what that is replaced."""
+
+
 class _Unexplained(SourceFileLoader):
-    """Loads matplotlib's artists without the lists of what can be set, which it writes into the docstring of each."""
+    """Loads what makes docstrings, and has it make none: the lists of what can be set of a picture, notes on batches."""
 
     def exec_module(self, module: ModuleType) -> None:
         """See :meth:`importlib.abc.Loader.exec_module`."""
         super().exec_module(module)
-        module.__dict__["kwdoc"] = lambda _: ""
+        name, instead = _UNEXPLAINED[self.name]
+        module.__dict__[name] = instead
 
 
 class _Lighter(MetaPathFinder):
@@ -41,10 +67,10 @@ class _Lighter(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:  # fmt: skip
-        if fullname not in LATER and fullname != "matplotlib.artist":
+        if fullname not in LATER and fullname not in _UNEXPLAINED:
             return None
         spec = PathFinder.find_spec(fullname, path, target)
         if spec is not None and isinstance(spec.loader, SourceFileLoader):
-            own = fullname not in LATER
-            spec.loader = _Unexplained(fullname, spec.loader.path) if own else LazyLoader(spec.loader)
+            later = fullname in LATER
+            spec.loader = LazyLoader(spec.loader) if later else _Unexplained(fullname, spec.loader.path)
         return spec

@@ -222,7 +222,7 @@ def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:
     from cmm_uq.documents.digital_certificate.certificate import digital_certificate
 
     page = next((content for name, content in rendered.items() if name.endswith(".html")), None)
-    return written(digital_certificate(json.loads(results), job, html=page))
+    return written(digital_certificate(json.loads(results), job, html=page, file=results))
 
 
 def _signed_by(signing: Signing, job: Job) -> Finished:

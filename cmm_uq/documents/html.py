@@ -55,14 +55,14 @@ def _environment() -> Environment:
 
 
 _TAG = re.compile(r"<[^>]*>")
-_REFERENCE = re.compile(r'(?<= id=")|(?<=href="#)|(?<=url\(#)')
+_REFERENCE = re.compile(r' id="|href="#|url\(#')
 
 
 def _inline_svg(plot: Mapping[str, Any], prefix: str) -> str:
     """A plot's SVG as an image with its alternative text, its ids made unique in the page by a prefix."""
     from markupsafe import escape
 
-    svg = _TAG.sub(lambda tag: _REFERENCE.sub(f"{prefix}-", tag[0]), plot["svg"])
+    svg = _TAG.sub(lambda tag: _REFERENCE.sub(lambda found: f"{found[0]}{prefix}-", tag[0]), plot["svg"])
     return svg.replace("<svg ", f'<svg role="img" aria-label="{escape(plot["alternative"])}" ', 1)
 
 

@@ -113,10 +113,10 @@ def new_figure(height_mm: float) -> Figure:
 
 
 _NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
-_COORDINATES = re.compile(r'(?<= )(?:d|x|y|points|transform)="[^"]*"')
+_COORDINATES = re.compile(r'(?<= )(?:x|y|points|transform)="[^"]*"')
 _UNWANTED = re.compile(r'font-family: [^;"]*;? ?| transform="rotate\(-0 [^"]*"| xmlns:xlink="[^"]*"| version="1.1"')
 _TAG = re.compile(r"<[^>]*>")
-_ALONE = re.compile(r'(?<= d=")M (\S+) (\S+)(?: L \1 \2| M \1 \2)+ ?(?=")')
+_ALONE = re.compile(r"M (\S+) (\S+)(?: L \1 \2| M \1 \2)+ ?")
 """Dots in one place: a path without extent, which some viewers of PDF leave out."""
 
 
@@ -129,9 +129,18 @@ def _shorter_of(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-def _extended(alone: re.Match[str]) -> str:
-    x, y = float(alone[1]), alone[2]
-    return f"M {alone[1]} {y} L {_shorter_of(x + 0.01)} {y}"
+class _Words(dict[str, str]):
+    """Words of paths, shortened where they are numbers: that of a dot has each of them twice, that of a ring four times."""
+
+    def __missing__(self, word: str) -> str:
+        self[word] = shorter = _NUMBER.sub(_shorter, word)
+        return shorter
+
+    def path(self, data: str) -> str:
+        """What a path draws."""
+        said = " ".join(map(self.__getitem__, data.split()))
+        alone = _ALONE.fullmatch(said)
+        return f"M {alone[1]} {alone[2]} L {_shorter_of(float(alone[1]) + 0.01)} {alone[2]}" if alone else said
 
 
 def as_svg(figure: Figure) -> str:
@@ -144,13 +153,18 @@ def as_svg(figure: Figure) -> str:
     figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
     svg = buffer.getvalue()
     svg = re.sub(r"<style.*?</style>", "", svg[svg.index("<svg") :], count=1, flags=re.DOTALL)
-    used = set(re.findall(r'(?:url\(|href=")#([^)"]+)', svg))
+    used, words = set(re.findall(r'(?:url\(|href=")#([^)"]+)', svg)), _Words()
 
     def clean(found: re.Match[str]) -> str:
-        tag = _UNWANTED.sub("", found[0]).replace("xlink:href", "href")
+        before, path, after = found[0].partition(' d="')
+        data, _, after = after.partition('"')
+        return f'{plain(before)} d="{words.path(data)}"{plain(after)}' if path else plain(before)
+
+    def plain(tag: str) -> str:
+        tag = _UNWANTED.sub("", tag).replace("xlink:href", "href")
         tag = re.sub(r' id="([^"]*)"', lambda name: name[0] if name[1] in used else "", tag)
         tag = _COORDINATES.sub(lambda values: _NUMBER.sub(_shorter, values[0]), tag)
-        return _ALONE.sub(_extended, re.sub(r"\s+", " ", tag).replace(' "', '"'))
+        return re.sub(r"\s+", " ", tag).replace(' "', '"')
 
     svg = re.sub(r">\s+<", "><", _TAG.sub(clean, svg))
     while "<g></g>" in svg or "<defs></defs>" in svg:

@@ -15,7 +15,7 @@ import numpy as np
 from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel
-from cmm_uq.inference.noise import Components, Sizes, slow_variances
+from cmm_uq.inference.noise import GROWING, Components, Sizes, slow_variances
 from cmm_uq.inference.slow import SlowFirst, groups, products
 from cmm_uq.points import Floats, Ints
 
@@ -135,18 +135,37 @@ class Marginal:
     @cached_property
     def _slow_first(self) -> SlowFirst | None:
         """Products of slow noise with [placings, parameters, observations]; none where placings have too many columns."""
-        c = self.noise.slow.shape[1]
-        if not c or self._freedoms.count > _MOST_FREE:
+        if not self.noise.slow.shape[1] or self._freedoms.count > _MOST_FREE:
             return None
+        return self._eliminating(*self.noise.classes)
+
+    @cached_property
+    def _slow_first_even(self) -> SlowFirst:
+        """The same where no noise grows, so that there are fewer classes."""
+        return self._eliminating(*self._even)
+
+    @cached_property
+    def _even(self) -> tuple[Ints, Floats]:
+        """Classes of observations where no noise grows, and their shares."""
+        index, shares = self.noise.classes
+        others = np.round(np.delete(shares, GROWING, axis=1), 9)
+        _, first, which = np.unique(others, axis=0, return_index=True, return_inverse=True)
+        return which.ravel()[index], shares[first]
+
+    def _eliminating(self, index: Ints, shares: Floats) -> SlowFirst:
+        c = self.noise.slow.shape[1]
         cosines, group = self._turned[:, :c], np.full(len(self._turned), -1)
         for number, (_, rows) in enumerate(groups(cosines)):
             group[rows] = number
         others = np.hstack([self._freedoms.apart(group).dense(), self._turned[:, c:]])
-        index, shares = self.noise.classes
         return SlowFirst(cosines, others, index, shares[:, -1], self._walk)
 
-    def _without_slow_noise(self, slow: SlowFirst, v: Floats, sizes: Sizes) -> tuple[Floats, Floats]:
+    def _without_slow_noise(self, slow: SlowFirst, sizes: Sizes) -> tuple[Floats, Floats]:
         """As :meth:`_factors`, slow noise eliminated ahead of the placings."""
+        shares = self.noise.classes[1]
+        if not np.any(sizes.growth):
+            slow, shares = self._slow_first_even, self._even[1]
+        v = self.noise.variances(sizes)[0] @ shares.T
         precision, walks, log = self._of_slow(sizes)
         c, free = precision.shape[1], self._freedoms.count
         P = len(self._length)
@@ -157,7 +176,7 @@ class Marginal:
         left, logs = slow.precision(v, prior.ravel(), precision, walks)
         diagonal = np.arange(left.shape[1])
         left[:, diagonal, diagonal] *= 1 + _JITTER
-        return _cholesky(left), log - 0.5 * np.log(v) @ self._counts - logs
+        return _cholesky(left), log - 0.5 * np.log(v) @ slow.counts - logs
 
     def _of_slow(self, sizes: Sizes) -> tuple[Floats, Floats, Floats]:
         """What is known beforehand of slow noise' coefficients.
@@ -192,10 +211,10 @@ class Marginal:
         What each placing leaves free is eliminated first, by itself; slow noise has no rows and columns where it is absent in
         all of the sizes, and comes first where there are few placings.
         """
-        v = self.noise.variances(sizes)[0] @ self.noise.classes[1].T
         absent = not np.any(sizes.slow)
         if not absent and self._slow_first is not None:
-            return self._without_slow_noise(self._slow_first, v, sizes)
+            return self._without_slow_noise(self._slow_first, sizes)
+        v = self.noise.variances(sizes)[0] @ self.noise.classes[1].T
         products, prior, blocks = self._without_slow if absent else (self._products, self._prior.ravel(), self._blocks)
         c = self.noise.slow.shape[1]
         P = len(self._length) - absent * c
@@ -234,18 +253,17 @@ class Marginal:
         return rows.transpose(0, 2, 1) @ rows, logs
 
     def _batches(self, sizes: Sizes, most: int = _NUMBERS) -> Iterator[Ints]:
-        """Which sizes to reckon with at once: those without slow noise, which need smaller matrices, apart.
+        """Which sizes to reckon with at once: those without slow noise or growth, which need less, apart.
 
         Parameters
         ----------
         most : numbers in the matrices of those where slow noise comes first.
         """
         j, c = self._freedoms.columns.shape[1], self.noise.slow.shape[1]
-        without, whole = (
-            (sizes.slow == 0, len(self._length) - c, None),
-            (sizes.slow > 0, len(self._length), self._slow_first),
-        )
-        for chosen, P, first in (without, whole):
+        slow, even = sizes.slow > 0, sizes.growth == 0
+        whole = (slow,) if self._slow_first is None else (slow & even, slow & ~even)
+        each = [(~slow, len(self._length) - c, None), *((part, len(self._length), self._slow_first) for part in whole)]
+        for chosen, P, first in each:
             numbers = first.numbers if first else P**2 + self._freedoms.count * (j + P)
             size = max(1, (most if first else _NUMBERS) // (numbers + 3 * len(self._counts)))
             at = np.flatnonzero(chosen)

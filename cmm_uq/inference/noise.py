@@ -70,6 +70,8 @@ _FARTHEST = 5.0
 _MOST_CLASSES, _STEPS = 48, 20
 _VARIANCES = 6
 """Columns of ``shares``: reading noise along x, y, z; what repeats share; growing noise; what each observation has alone."""
+GROWING = 4
+"""The column of growing noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +208,7 @@ class Components:
     @cached_property
     def _growth(self) -> float:
         """Typical variance of the growing part over that at the longest length."""
-        return float(np.mean(self.shares[:, 4] / self.shares[:, :3].sum(axis=1)))
+        return float(np.mean(self.shares[:, GROWING] / self.shares[:, :3].sum(axis=1)))
 
     def variances(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Six variances (w, 6), mm², that ``shares`` refers to, and those of the slow columns (w, c)."""
@@ -305,8 +307,10 @@ class Components:
         variances, slow = self.variances(sizes)
         w, m = len(variances), len(self.shares)
         scale = np.sqrt(variances @ self.shares.T)
-        turned = scale[:, None, :] * random.standard_normal((w, repetitions, m))
-        found = np.asarray((self.turn.T @ turned.reshape(-1, m).T).T, dtype=np.float64).reshape(turned.shape)
+        found = random.standard_normal((w, repetitions, m))
+        found *= scale[:, None, :]
+        if not self._unturned:
+            found = np.asarray((self.turn.T @ found.reshape(-1, m).T).T, dtype=np.float64).reshape(found.shape)
         if self.slow.shape[1] and np.any(slow):
             waves = np.sqrt(slow)[:, None, :] * random.standard_normal((w, repetitions, slow.shape[1]))
             walks = sizes.rate == 0
@@ -314,6 +318,12 @@ class Components:
                 if np.any(chosen):
                     found[chosen] += waves[chosen] @ columns.T
         return found
+
+    @cached_property
+    def _unturned(self) -> bool:
+        """Whether T leaves all as it is: every quantity read once, seen along one axis or by several points."""
+        m = len(self.shares)
+        return self.turn.nnz == m and bool(np.all(self.turn.data == 1) and np.all(self.turn.indices == np.arange(m)))
 
     def white(self, sizes: Sizes) -> Callable[[Floats], Floats]:
         """What turns columns (m, r), mm, of such noise into white noise with the standard deviation of a reading.

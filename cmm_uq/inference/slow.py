@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import linalg
 
 from cmm_uq.points import Floats, Ints
 
@@ -24,9 +25,6 @@ _NONE = 1e-13
 
 _ALIKE = 1e-12
 """Relative difference up to which variances are the same."""
-
-_LARGEST = 2.0
-"""Times the largest product of the other columns: what makes a bordered matrix positive definite; its value has no effect."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,55 +68,53 @@ class SlowFirst:
         return products(self.others, self.others, self.classes, self.count)
 
     @cached_property
-    def _bordered(self) -> list[tuple[Ints, Ints, Floats]]:
-        """Of each group: its columns, its classes, and the products (classes, (c + r)²) of its cosines with what is near.
+    def counts(self) -> Floats:
+        """(count,) observations of each class."""
+        return np.bincount(self.classes, minlength=self.count).astype(np.float64)
 
-        Those of the other columns with each other stay zero.
-        """
+    @cached_property
+    def _products(self) -> list[tuple[Ints, Ints, Floats, Floats]]:
+        """Of each group: columns, classes, products (classes, c²) of its cosines, (classes, r·c) of what is near with them."""
         found = []
         for (columns, rows), near in zip(self.groups, self._near, strict=True):
             own, index = np.unique(self.classes[rows], return_inverse=True)
-            cosines, size = self.cosines[np.ix_(rows, columns)], len(columns) + len(near)
-            whole = np.zeros((len(own), size, size))
-            every = np.hstack([cosines, self.others[np.ix_(rows, near)]])
-            whole[:, :, : len(columns)] = products(every, cosines, index, len(own)).reshape(len(own), size, -1)
-            found.append((columns, own, whole.reshape(len(own), -1)))
+            cosines, others = self.cosines[np.ix_(rows, columns)], self.others[np.ix_(rows, near)]
+            of_cosines, across = (products(each, cosines, index, len(own)) for each in (cosines, others))
+            found.append((columns, own, of_cosines, across))
         return found
 
     @cached_property
     def numbers(self) -> int:
         """In the largest matrices that one of the densities takes."""
-        each = [len(columns) + len(near) for (columns, _), near in zip(self.groups, self._near, strict=True)]
-        return int(max(*each, self.others.shape[1])) ** 2
+        each = [len(c) * (len(c) + len(near)) for (c, _), near in zip(self.groups, self._near, strict=True)]
+        return int(max(*each, self.others.shape[1] ** 2))
 
     @cached_property
     def _turned(self) -> list[_Turned]:
         """Of each group."""
-        return [
-            _Turned.of(self._of_base(of_classes, own, len(columns)), self.walk[np.ix_(columns, columns)])
-            for columns, own, of_classes in self._bordered
-        ]
+        found = []
+        for columns, own, of_cosines, across in self._products:
+            c, weights = len(columns), 1 / self.base[own]
+            every = np.concatenate([weights @ of_cosines, weights @ across]).reshape(-1, c)
+            found.append(_Turned.of(every, self.walk[np.ix_(columns, columns)]))
+        return found
 
-    def _of_base(self, of_classes: Floats, own: Ints, c: int) -> Floats:
-        """Products (c + r, c) of cosines with what is near where the noise is alike."""
-        whole = (1 / self.base[own]) @ of_classes
-        return np.asarray(whole.reshape(int(np.sqrt(len(whole))), -1)[:, :c])
-
-    def precision(self, v: Floats, prior: Floats, of_cosines: Floats, walks: Floats) -> tuple[Floats, Floats]:
+    def precision(self, v: Floats, prior: Floats, known: Floats, walks: Floats) -> tuple[Floats, Floats]:
         """What is left of the other columns' precision (w, R, R), and half the logarithm of the cosines' determinant (w,).
 
         Parameters
         ----------
         v : (w, classes) variance of the observations of each class.
         prior : (R²,) precision of the other columns beforehand.
-        of_cosines : (w, c) precision of the cosines beforehand, but for walks.
+        known : (w, c) precision of the cosines beforehand, but for walks.
         walks : (w,) by what that of a walk is to be multiplied; zero of what is none.
         """
         w, R = len(v), self.others.shape[1]
         left = ((1 / v) @ self._others + prior).reshape(w, R, R)
-        most = _LARGEST * np.einsum("wii->wi", left).sum(axis=1)
         logs = np.zeros(w)
-        for (columns, own, of_classes), near, turned in zip(self._bordered, self._near, self._turned, strict=True):
+        for (columns, own, of_cosines, across), near, turned in zip(
+            self._products, self._near, self._turned, strict=True
+        ):  # fmt: skip
             times = v[:, own] / self.base[own]
             alike = (walks > 0) & (np.ptp(times, axis=1) <= _ALIKE * times[:, 0])
             if alike.any():
@@ -128,17 +124,19 @@ class SlowFirst:
             at = np.flatnonzero(~alike)
             if not len(at):
                 continue
-            c, size, walking = len(columns), len(columns) + len(near), np.flatnonzero(walks[at])
-            bordered = ((1 / v[np.ix_(at, own)]) @ of_classes).reshape(len(at), size, size)
+            c, walking, weights = len(columns), np.flatnonzero(walks[at]), 1 / v[np.ix_(at, own)]
+            precision = (weights @ of_cosines).reshape(len(at), c, c)
             if len(walking):
-                bordered[walking, :c, :c] += walks[at][walking, None, None] * self.walk[np.ix_(columns, columns)]
-            diagonal = bordered.reshape(len(at), -1)[:, :: size + 1]
-            diagonal[:, :c] += of_cosines[np.ix_(at, columns)]
-            diagonal[:, c:] = most[at, None]
-            factor = np.linalg.cholesky(bordered)
-            rows = factor[:, c:, :c]
-            left[np.ix_(at, near, near)] -= rows @ rows.transpose(0, 2, 1)
-            logs[at] += np.log(np.einsum("wii->wi", factor)[:, :c]).sum(axis=1)
+                precision[walking] += walks[at][walking, None, None] * self.walk[np.ix_(columns, columns)]
+            precision.reshape(len(at), -1)[:, :: c + 1] += known[np.ix_(at, columns)]
+            factor = np.linalg.cholesky(precision)
+            solved = (weights @ across).reshape(len(at), -1, c)
+            for lower, each in zip(factor, solved, strict=True):
+                each[:] = linalg.lapack.dtrtrs(lower.T, each.T, trans=1, overwrite_b=1)[0].T
+            rows = np.zeros((len(at), R, c))
+            rows[:, near] = solved
+            left[at] -= rows @ rows.transpose(0, 2, 1)
+            logs[at] += np.log(np.einsum("wii->wi", factor)).sum(axis=1)
         return left, logs
 
 

@@ -20,7 +20,7 @@ _Size = Annotated[float, Field(ge=0, le=LARGEST_UM)]
 class _Part(BaseModel):
     """Of a results.json only what is needed; further keys are none of this module's business."""
 
-    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class _Quantity(_Part):

@@ -13,7 +13,7 @@ from cmm_uq.jobs.file_names import RESULTS
 class Part(BaseModel):
     """Of a results.json only what is needed; further keys are no business of its reader."""
 
-    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 P = TypeVar("P", bound=Part)

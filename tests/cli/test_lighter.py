@@ -8,12 +8,14 @@ COMMAND = """
 import sys
 from cmm_uq.cli.lighter import lighten
 lighten()
-import numpy, emcee, scipy.linalg, scipy.special
+import matplotlib.projections, numpy, emcee, scipy.linalg, scipy.special
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 assert not {"numpy.f2py.crackfortran", "numpy.testing._private", "h5py.h5", "fontTools.misc.textTools"} & {*sys.modules}
-assert "scipy.stats" not in sys.modules
+assert not {"scipy.stats", "mpl_toolkits.mplot3d.axes3d"} & {*sys.modules}
+assert "polar" in matplotlib.projections.get_projection_names()
 assert scipy.special.ndtri(0.975).round(4) == 1.96
+assert scipy.linalg.expm([[0.0, 1.0], [0.0, 0.0]]).tolist() == [[1, 1], [0, 1]]
 figure = Figure()
 FigureCanvasSVG(figure)
 line, = figure.subplots().plot([0, 1], [0, 1])

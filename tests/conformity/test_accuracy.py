@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import statistics
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,19 @@ def test_the_printed_figures_of_the_thesis(
     assert found["rms_accuracy_error_um"] == pytest.approx(rms, abs=0.06)
     assert found["b89_range_um"] == pytest.approx(span, abs=0.06)
     assert found["b89_max_deviation_um"] == pytest.approx(largest, abs=0.06)
+
+
+def test_figures_of_many_sets_are_those_of_each_by_the_standard_library() -> None:
+    sets = 404 + 0.02 * np.random.default_rng(2).standard_normal((3, 2, 7))
+    found = figures(sets.swapaxes(0, 1).copy().swapaxes(0, 1))
+    for at in np.ndindex(3, 2):
+        each = sets[at].tolist()
+        mean = statistics.fmean(each)
+        assert found["mean_length_mm"][at] == pytest.approx(mean, rel=1e-15)
+        assert found["rms_accuracy_error_um"][at] == pytest.approx(1e3 * statistics.stdev(each), rel=1e-10)
+        assert found["b89_range_um"][at] == pytest.approx(1e3 * (max(each) - min(each)), rel=1e-10)
+        assert found["b89_max_deviation_um"][at] == pytest.approx(1e3 * max(abs(x - mean) for x in each), rel=1e-10)
+    assert figures(np.array([404.0]))["rms_accuracy_error_um"] == 0
 
 
 def test_a_copied_length_has_the_noise_of_its_original() -> None:

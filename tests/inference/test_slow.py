@@ -12,7 +12,7 @@ from cmm_uq.inference import marginal as module
 from cmm_uq.inference.least_squares import solve
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.inference.marginal import Marginal
-from cmm_uq.inference.noise import AXES, SLOW, Components, Sizes
+from cmm_uq.inference.noise import AXES, GROWING, GROWTH, SLOW, Components, Sizes
 from cmm_uq.inference.slow import SlowFirst
 from cmm_uq.points import Floats
 
@@ -89,6 +89,24 @@ def test_density_and_draws_do_not_depend_on_what_is_eliminated_first(monkeypatch
     assert first.log_likelihood(SIZES)[1] == pytest.approx(last.log_likelihood(SIZES)[1], rel=1e-8)
     draws = [each.draw(SIZES, np.random.default_rng(5)) for each in (first, last)]
     assert draws[0] == pytest.approx(draws[1], rel=1e-7)
+
+
+def test_where_no_noise_grows_all_lengths_are_of_one_class_and_the_density_is_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With and without growth in one call, beside the density that leaves slow noise among the other columns."""
+    even, model = three_axes(), linear()
+    shares = even.shares.copy()
+    shares[:, GROWING] = (0.2 + PART) ** 2
+    noise = replace(even, shares=shares, possible=(AXES, GROWTH, SLOW))
+    sizes = replace(SIZES, growth=np.array([0.0, 0.8, 0.0, 1.5]))
+    first = Marginal(model, noise, solve(model))
+    assert first._slow_first is not None
+    assert first._slow_first_even.count == 3 < first._slow_first.count
+    monkeypatch.setattr(module, "_MOST_FREE", -1)
+    last = Marginal(model, noise, solve(model))
+    assert first.log_likelihood(sizes)[0] - last.log_likelihood(sizes)[0] == pytest.approx(np.zeros(4), abs=1e-7)
+    assert first.log_likelihood(sizes)[1] == pytest.approx(last.log_likelihood(sizes)[1], rel=1e-8)
 
 
 def test_sizes_that_come_again_are_drawn_for_as_if_alone() -> None:

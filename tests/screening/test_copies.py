@@ -94,3 +94,12 @@ def test_a_repeat_that_reads_the_same_is_no_copy_of_a_measurement(ballbar_points
     points = replace(ballbar_points, xyz=xyz, measurement=number, repeat=repeat)
     assert points.copies == {1: 0}
     assert not copied_measurements(points)
+
+
+def test_a_copy_is_found_whatever_the_sign_of_its_zeros_and_one_end_in_common_is_none(ballbar_points: Points) -> None:
+    xyz = ballbar_points.xyz.copy()
+    xyz[:2, 2] = 0.0
+    xyz[4:6] = xyz[1::-1]  # the ends in the other order
+    xyz[4:6, 2] = -0.0
+    xyz[8] = xyz[0]
+    assert replace(ballbar_points, xyz=xyz).copies == {2: 0}

@@ -61,7 +61,9 @@ _MOST = 40
 """Estimates whose covariance is written out; of more, the attached results.json has it."""
 
 
-def digital_certificate(results: Mapping[str, Any], job: Job, *, html: bytes | None) -> Certificate:
+def digital_certificate(
+    results: Mapping[str, Any], job: Job, *, html: bytes | None, file: bytes | None = None
+) -> Certificate:  # fmt: skip
     """The certificate, in the language that results.json names, and in English.
 
     Parameters
@@ -69,6 +71,7 @@ def digital_certificate(results: Mapping[str, Any], job: Job, *, html: bytes | N
     results : as results.json has them.
     job : whose they are.
     html : the human-readable copy, which the certificate carries.
+    file : results.json itself, where it is at hand.
     """
     say_in = speaking(results["job"].get("language", ENGLISH))
     figures = Figures(say_in, free(results))
@@ -95,7 +98,7 @@ def digital_certificate(results: Mapping[str, Any], job: Job, *, html: bytes | N
                 results=(
                     *_results(results, say_in, figures),
                     *evidence(decided, say_in, figures, certifies=real),
-                    _everything(results, say_in),
+                    _everything(as_json(results) if file is None else file, say_in),
                 ),
                 metadata=metadata(job, results, say_in),
                 ref_id=("machine",),
@@ -191,8 +194,8 @@ def _of(results: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
     return found if isinstance(found, Mapping) and "u" in found else None
 
 
-def _everything(results: Mapping[str, Any], say_in: SayIn) -> Result:
+def _everything(results: bytes, say_in: SayIn) -> Result:
     """results.json itself: what D-SI has no place for stands there."""
-    file = Attached(file_name="results.json", mime_type="application/json", data=as_json(results))
+    file = Attached(file_name="results.json", mime_type="application/json", data=results)
     name = words_of(say("Every figure, for other programs"), say_in)
     return Result(name=name, data=Data(parts=(file,)), ref_type=("cmm_resultsFile",))
