@@ -51,7 +51,7 @@ class Judged:
     outcome : ``None`` where nothing was measured.
     probability, beyond : that the true value conforms, and the rest of it, which keeps its digits; ``None`` likewise.
     accepted : smallest and largest value that the rule accepts, ``None`` of a side without a limit; ``None`` as a whole where
-        it accepts none.
+        it accepts none, or where a zone was measured so much better than its errors that even this value proves nothing.
     rule : in words.
     """
 
@@ -208,6 +208,8 @@ def judge(limits: Limits, rule: Rule, value: float | None) -> Judged:
     if value is None:
         return Judged(limits.lower, limits.upper, None, None, None, accepted, rule_words(rule))
     within, beyond = limits.knowing(value)
+    if limits.zone:
+        accepted = _accepted_near_zero(limits, rule, value, accepted)
     outcome = outcome_of(limits, rule, value, accepted)
     return Judged(limits.lower, limits.upper, outcome, within, beyond, accepted, rule_words(rule))
 
@@ -217,7 +219,7 @@ def outcome_of(
 ) -> Outcome:  # fmt: skip
     """What a rule makes of a value, where it is known which values it accepts."""
     inside = limits.inside(value)
-    taken = accepted is not None and _between(value, accepted)
+    taken = accepted is not None and _between(value, accepted) and _safe(limits, rule, value)
     if "non-binary" in rule_name(rule):
         if inside:
             return "pass" if taken else "conditional pass"
@@ -227,6 +229,31 @@ def outcome_of(
     if "binary" in rule_name(rule):
         return "fail"
     return "fail" if not inside and _proved(limits, rule, value) else "undecided"
+
+
+def _accepted_near_zero(
+    limits: Limits, rule: Rule, value: float, accepted: tuple[float | None, float | None] | None
+) -> tuple[float | None, float | None] | None:
+    """What a rule accepts of a zone, where it may have been measured better than its errors: see :func:`_safe`."""
+    if not _safe(limits, rule, value):
+        return None if accepted is not None and _between(value, accepted) else accepted
+    proves = largest_risk(rule) is not None or least_probability(rule) is not None
+    return (None, 0.0) if proves and accepted is None and value < 0 and limits.lower is None else accepted
+
+
+def _safe(limits: Limits, rule: Rule, value: float) -> bool:
+    """Whether a value below the acceptance limit conforms as probably as the rule asks.
+
+    A zone that is measured better than its errors leaves few true values that are possible, and these may be larger than
+    those of a wider one. A guard band stands for the probability that it leaves of a normal distribution.
+    """
+    if not limits.zone:
+        return True
+    if (least := least_probability(rule)) is not None:
+        return limits.knowing(value)[1] <= 1 - least
+    if (risk := largest_risk(rule)) is None and (guard := guard_width(rule)):
+        risk = float(special.ndtr(-guard * COVERAGE_FACTOR))
+    return risk is None or limits.beyond(value) <= risk
 
 
 def _proved(limits: Limits, rule: Rule, value: float) -> bool:

@@ -41,7 +41,8 @@ class Stated:
     u : standard uncertainty, mm or rad.
     interval : shortest coverage interval of the value, of a zone with equal tails; where nothing was measured the shortest of
         the error, with the opposite sign.
-    k : half of the shortest interval of the errors over u.
+    k : half of the shortest interval of the errors over u; of a zone that is stated as zero so much that U reaches to the end of
+        its interval, where that is more.
     """
 
     name: str
@@ -53,7 +54,7 @@ class Stated:
 
     @property
     def U(self) -> float:  # noqa: N802
-        """Half of the shortest interval of the errors, mm or rad: of a zone near zero more than half of its own interval."""
+        """Half of the shortest interval of the errors, mm or rad; see ``k``. Of a zone near zero it may reach below zero."""
         return self.k * self.u if self.u else 0.5 * (self.interval[1] - self.interval[0])
 
 
@@ -79,8 +80,9 @@ def stated(
             if errors is not None:
                 value = at - middle(errors[:, i])
                 interval = possible_interval(at - errors[:, i], simulated.coverage)
-            value = max(0.0, value)
         k = 0.5 * (high - low) / u if u else float("nan")
+        if value is not None and zones[i] and value <= 0:
+            value, k = 0.0, max(k, interval[1] / u) if u else k
         found.append(Stated(name, value, error, u, interval, k))
     return tuple(found)
 

@@ -141,3 +141,22 @@ def test_without_any_spread_it_is_inside_or_outside() -> None:
     for value, outcome in ((0.99, "pass"), (1.01, "fail")):
         found = judge(Limits(0.0, 1.0, np.zeros(100)), "ISO 14253-1", value)
         assert (found.outcome, found.probability) == (outcome, float(outcome == "pass"))
+
+
+@pytest.mark.parametrize(
+    ("rule", "outcome"),
+    [("ISO 14253-1", "undecided"), ("ILAC-G8 binary", "fail"), ("ILAC-G8 non-binary", "conditional pass"),
+     (GuardBand(guard_band=1.0), "undecided"), (FalseAccept(max_false_accept=0.2), "pass"), ("simple", "pass")],
+    ids=str,
+)  # fmt: skip
+def test_a_zone_that_was_measured_better_than_its_errors_is_accepted_by_its_probability(
+    rule: Rule, outcome: str
+) -> None:
+    """Less than zero by two u: of what is left above zero, Φ(-3.2)/Φ(-2) = 3 % lies above 1.2 u, and 13 % above 0.75 u."""
+    limits = Limits(None, 0.75 * U, NORMAL, zone=True)
+    found = judge(limits, rule, -2 * U)
+    assert found.beyond == pytest.approx(stats.norm.sf(2.75) / stats.norm.sf(2), rel=0.05)
+    assert found.outcome == outcome
+    assert (found.accepted is None) == (outcome != "pass")
+    known = judge(Limits(None, 1.2 * U, NORMAL, zone=True), FalseAccept(max_false_accept=0.05), -2 * U)
+    assert (known.outcome, known.accepted) == ("pass", (None, 0.0))
