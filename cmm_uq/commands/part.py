@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,15 @@ import numpy as np
 from cmm_uq.commands.part_further import further_of
 from cmm_uq.commands.part_machine import machine_found, with_calibration
 from cmm_uq.commands.part_methods import methods_of
-from cmm_uq.commands.part_plan import circumstances_of, doubled, origin_of, plan_of, poses_of
+from cmm_uq.commands.part_plan import (
+    PLACES,
+    circumstances_of,
+    doubled,
+    origin_of,
+    plan_of,
+    refuse_out_of_reach,
+    refuse_unfit,
+)
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.conformity.limits import Judged, Limits, judge
 from cmm_uq.conformity.risk import Known
@@ -25,17 +34,13 @@ from cmm_uq.parts.budget import Budget, budget
 from cmm_uq.parts.by_comparison import compared
 from cmm_uq.parts.displaced import displaced
 from cmm_uq.parts.machine import MachineState
-from cmm_uq.parts.placing import placed
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.reducing import ways
 from cmm_uq.parts.result import conforming, evaluated, middle, stated
 from cmm_uq.parts.virtual import Circumstances, Virtual
-from cmm_uq.points import Floats, Machine
+from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 from cmm_uq.units import MICROMETRE
-
-PLACES = 16
-"""Places of the part that are drawn where it does not lie in the same one each time."""
 
 TRIALS = 200_000
 """Virtual measurements: ten thousand over one less the probability of the interval (JCGM 101:2008, 7.2.2)."""
@@ -79,17 +84,15 @@ def part_found(
     ------
     CmmUqError : the machine's certificate does not hold, or the measurement is impossible.
     """
+    refuse_unfit(job)
     plan = plan_of(job)
     measured = None if job.measured is None else evaluated(plan, job.measured)
     others = methods_of(job, plan, measured)
 
-    def fits(machine: Machine) -> None:
-        for pose in poses_of(job, PLACES, machine):
-            placed(plan, pose, machine)
-
     machine = machine_found(
-        job, rerun=rerun, trust=trust, records=records, changes=changes, seed=seed, stage=stage, fits=fits
-    )
+        job, rerun=rerun, trust=trust, records=records, changes=changes, seed=seed, stage=stage,
+        fits=partial(refuse_out_of_reach, job),
+    )  # fmt: skip
     job = with_calibration(job, machine.job)
     given = circumstances_of(job, machine.state, plan, PLACES)
     if job.measured is not None:

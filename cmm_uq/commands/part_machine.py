@@ -124,15 +124,23 @@ def machine_found(
     return MachineFound(state, standing, stated.job, tuple(told))
 
 
-def refuse_machine(job: PartJob) -> None:
-    """Refuse what :func:`machine_found` refuses of a certificate, without its errors; a job to be analysed is let through.
+def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machine: None) -> None:
+    """Refuse what :func:`machine_found` refuses of a certificate, without its errors; a job to be analysed is read alone.
+
+    Parameters
+    ----------
+    fits : refuses a machine on which the part cannot be measured.
 
     Raises
     ------
     CmmUqError : see :func:`machine_found`.
     """
-    if job.facts.machine_state.job is None:
-        standing_of(job, verified(job))
+    if job.facts.machine_state.job is not None:
+        fits(_machine(job, read_job(_machines_folder(job))))
+        return
+    stated = _certified(job, verified(job), rerun=False)
+    _standing(job, stated, trusted=False)
+    fits(_machine(job, stated.job))
 
 
 def standing_of(job: PartJob, found: Verification) -> Standing:
@@ -239,7 +247,7 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
         raise CmmUqError("a part's job in memory has no other job beside it", where=f"{WHERE} job",
                          fix="Give the machine's certificate, or read the job from its folder")  # fmt: skip
     stage("Analysing the machine's job", 0.02)
-    read = job_of(attached) if attached else read_job(job.folder / named)
+    read = job_of(attached) if attached else read_job(_machines_folder(job))
     found = analysis.analyse_job(read, seed=seed)
     outcome = analysis.outcome_of(found, seed)
     if outcome.draws is None:
@@ -247,6 +255,20 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
                          fix="Name a job whose errors are a list of effects")  # fmt: skip
     results = json.loads(as_json(outcome.results))
     return _Stated("job", (named,), results, outcome.draws.flat(), read, "ANALYSED", ())
+
+
+def _machines_folder(job: PartJob) -> Path:
+    """Folder of the machine's job.
+
+    Raises
+    ------
+    CmmUqError : it is that of the part's own job.
+    """
+    folder = job.folder / str(job.facts.machine_state.job)
+    if folder.resolve() == job.folder.resolve():
+        raise CmmUqError("is the part's own job", where=f"{WHERE} job = {job.facts.machine_state.job!r}",
+                         fix="Name the folder of the machine's job, or its certificate")  # fmt: skip
+    return folder
 
 
 def attached_calibration(job: PartJob) -> dict[str, bytes]:
