@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.commands.part_further import further_of
-from cmm_uq.commands.part_machine import machine_found, with_calibration
+from cmm_uq.commands.part_machine import machine_found, with_calibration, with_history
 from cmm_uq.commands.part_methods import methods_of
 from cmm_uq.commands.part_plan import (
     PLACES,
@@ -63,7 +63,7 @@ def part_found(
     rerun: bool = False,
     trust: Iterable[Path] | None = None,
     records: str | Path | None = None,
-    changes: Mapping[str, float | None] | None = None,
+    history: bytes | None = None,
     stage: Stage = silent,
 ) -> PartFound:
     """What a part's job gives.
@@ -77,7 +77,7 @@ def part_found(
     rerun : whether the machine's certificate is computed again from its inputs.
     trust : whose signatures on it are trusted; ``None`` where nothing need be signed.
     records : of the machine's history, for its drift; ``None`` for none.
-    changes : what records said of the drift at an earlier time, by parameter; then they are not asked.
+    history : of the machine, that a report has inside; then no records are asked.
     stage : told of progress.
 
     Raises
@@ -90,10 +90,10 @@ def part_found(
     others = methods_of(job, plan, measured)
 
     machine = machine_found(
-        job, rerun=rerun, trust=trust, records=records, changes=changes, seed=seed, stage=stage,
+        job, rerun=rerun, trust=trust, records=records, history=history, seed=seed, stage=stage,
         fits=partial(refuse_out_of_reach, job),
     )  # fmt: skip
-    job = with_calibration(job, machine.job)
+    job = with_history(with_calibration(job, machine.job), machine.history)
     given = circumstances_of(job, machine.state, plan, PLACES)
     if job.measured is not None:
         given = replace(given, measured=job.measured)
