@@ -9,6 +9,7 @@ import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -156,7 +157,10 @@ def _check_part(folder: Path, path: Path) -> Checked:
     """The job of a part: what its readers refuse, and that its figures are an example's."""
     from cmm_uq.commands.part_machine import refuse_machine
     from cmm_uq.commands.part_methods import lacking
-    from cmm_uq.commands.part_plan import refuse_unfit  # the virtual measurement, which no other job needs
+    from cmm_uq.commands.part_plan import (  # the virtual measurement, which no other job needs
+        refuse_out_of_reach,
+        refuse_unfit,
+    )
 
     wrong, warnings, job = Gathered(), list[Problem](), None
     with wrong.going_on():
@@ -168,7 +172,7 @@ def _check_part(folder: Path, path: Path) -> Checked:
     if job is not None:
         with wrong.going_on():
             whole = read_part(folder)  # with the files that state the machine
-            refuse_machine(whole)
+            refuse_machine(whole, partial(refuse_out_of_reach, whole))
         if (origin := job.facts.job.origin) != MEASURED:
             said = f"the figures are {origin}, and all that is made of them says so"
             warnings.append(Problem(said, str(path), key="[job] origin", fix="Put in your own, and take origin away"))

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from cmm_uq.commands.part_further import further_of
-from cmm_uq.commands.part_machine import machine_found, with_calibration
+from cmm_uq.commands.part_machine import machine_found, with_calibration, with_history
 from cmm_uq.commands.part_methods import methods_of
-from cmm_uq.commands.part_plan import circumstances_of, doubled, origin_of, plan_of, poses_of
+from cmm_uq.commands.part_plan import (
+    PLACES,
+    circumstances_of,
+    doubled,
+    origin_of,
+    plan_of,
+    refuse_out_of_reach,
+    refuse_unfit,
+)
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.conformity.limits import Judged, Limits, judge
 from cmm_uq.conformity.risk import Known
@@ -25,17 +34,13 @@ from cmm_uq.parts.budget import Budget, budget
 from cmm_uq.parts.by_comparison import compared
 from cmm_uq.parts.displaced import displaced
 from cmm_uq.parts.machine import MachineState
-from cmm_uq.parts.placing import placed
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.reducing import ways
 from cmm_uq.parts.result import conforming, evaluated, middle, stated
 from cmm_uq.parts.virtual import Circumstances, Virtual
-from cmm_uq.points import Floats, Machine
+from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 from cmm_uq.units import MICROMETRE
-
-PLACES = 16
-"""Places of the part that are drawn where it does not lie in the same one each time."""
 
 TRIALS = 200_000
 """Virtual measurements: ten thousand over one less the probability of the interval (JCGM 101:2008, 7.2.2)."""
@@ -66,7 +71,7 @@ def part_found(
     rerun: bool = False,
     trust: Iterable[Path] | None = None,
     records: str | Path | None = None,
-    changes: Mapping[str, float | None] | None = None,
+    history: bytes | None = None,
     stage: Stage = silent,
 ) -> PartFound:
     """What a part's job gives.
@@ -80,26 +85,24 @@ def part_found(
     rerun : whether the machine's certificate is computed again from its inputs.
     trust : whose signatures on it are trusted; ``None`` where nothing need be signed.
     records : of the machine's history, for its drift; ``None`` for none.
-    changes : what records said of the drift at an earlier time, by parameter; then they are not asked.
+    history : of the machine, that a report has inside; then no records are asked.
     stage : told of progress.
 
     Raises
     ------
     CmmUqError : the machine's certificate does not hold, or the measurement is impossible.
     """
+    refuse_unfit(job)
     plan = plan_of(job)
     trials = affordable(TRIALS, plan) if trials is None else trials
     measured = None if job.measured is None else evaluated(plan, job.measured)
     others = methods_of(job, plan, measured)
 
-    def fits(machine: Machine) -> None:
-        for pose in poses_of(job, PLACES, machine):
-            placed(plan, pose, machine)
-
     machine = machine_found(
-        job, rerun=rerun, trust=trust, records=records, changes=changes, seed=seed, stage=stage, fits=fits
-    )
-    job = with_calibration(job, machine.job)
+        job, rerun=rerun, trust=trust, records=records, history=history, seed=seed, stage=stage,
+        fits=partial(refuse_out_of_reach, job),
+    )  # fmt: skip
+    job = with_history(with_calibration(job, machine.job), machine.history)
     given = circumstances_of(job, machine.state, plan, PLACES)
     if job.measured is not None:
         given = replace(given, measured=job.measured)

@@ -16,6 +16,7 @@ from cmm_uq import __version__
 from cmm_uq.commands.diagnosing import screened_model
 from cmm_uq.commands.estimation import with_noise
 from cmm_uq.commands.part_drift import with_drift
+from cmm_uq.commands.part_history import FILE as HISTORY
 from cmm_uq.commands.part_machine_warnings import machine_warnings, temperatures
 from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.written import Stage, silent
@@ -53,12 +54,14 @@ class MachineFound:
     standing : of its certificate.
     job : of its calibration, where the inputs are at hand.
     warnings : what the reader must know of it.
+    history : that its changes since follow from; ``None`` where no records were asked.
     """
 
     state: MachineState
     standing: Standing
     job: Job | None
     warnings: tuple[Text, ...]
+    history: bytes | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +81,7 @@ class _Stated:
 
 def machine_found(
     job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None, records: str | Path | None = None,
-    changes: Mapping[str, float | None] | None = None, seed: int = 0, stage: Stage = silent,
+    history: bytes | None = None, seed: int = 0, stage: Stage = silent,
     fits: Callable[[Machine], None] = lambda machine: None,
 ) -> MachineFound:  # fmt: skip
     """The machine of a part's job.
@@ -89,7 +92,7 @@ def machine_found(
     rerun : whether the certificate's figures are computed again from its inputs.
     trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
     records : of the machine's history, for its drift; ``None`` for none.
-    changes : what records said of the drift at an earlier time, by parameter; then they are not asked.
+    history : of the machine, that a report has inside; then no records are asked.
     seed : of the draws.
     stage : told of progress.
     fits : refuses a machine on which the part cannot be measured, before anything is computed.
@@ -112,7 +115,7 @@ def machine_found(
         state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=_known_at(state, standing)
     )
     since = with_drift(
-        state, standing.serial or standing.machine, job.facts.job.date, records, _where(job), known=changes
+        state, standing.serial or standing.machine, job.facts.job.date, records, _where(job), kept=history
     )
     state = since.state
     stage("The machine's errors, given the recording of its calibration", 0.15)
@@ -121,18 +124,26 @@ def machine_found(
     told = machine_warnings(job, standing, stated.job)
     if rerun and stated.not_again:
         told = [stated.not_again, *told]
-    return MachineFound(state, standing, stated.job, tuple(told))
+    return MachineFound(state, standing, stated.job, tuple(told), since.history)
 
 
-def refuse_machine(job: PartJob) -> None:
-    """Refuse what :func:`machine_found` refuses of a certificate, without its errors; a job to be analysed is let through.
+def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machine: None) -> None:
+    """Refuse what :func:`machine_found` refuses of a certificate, without its errors; a job to be analysed is read alone.
+
+    Parameters
+    ----------
+    fits : refuses a machine on which the part cannot be measured.
 
     Raises
     ------
     CmmUqError : see :func:`machine_found`.
     """
-    if job.facts.machine_state.job is None:
-        standing_of(job, verified(job))
+    if job.facts.machine_state.job is not None:
+        fits(_machine(job, read_job(_machines_folder(job))))
+        return
+    stated = _certified(job, verified(job), rerun=False)
+    _standing(job, stated, trusted=False)
+    fits(_machine(job, stated.job))
 
 
 def standing_of(job: PartJob, found: Verification) -> Standing:
@@ -239,7 +250,7 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
         raise CmmUqError("a part's job in memory has no other job beside it", where=f"{WHERE} job",
                          fix="Give the machine's certificate, or read the job from its folder")  # fmt: skip
     stage("Analysing the machine's job", 0.02)
-    read = job_of(attached) if attached else read_job(job.folder / named)
+    read = job_of(attached) if attached else read_job(_machines_folder(job))
     found = analysis.analyse_job(read, seed=seed)
     outcome = analysis.outcome_of(found, seed)
     if outcome.draws is None:
@@ -247,6 +258,20 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
                          fix="Name a job whose errors are a list of effects")  # fmt: skip
     results = json.loads(as_json(outcome.results))
     return _Stated("job", (named,), results, outcome.draws.flat(), read, "ANALYSED", ())
+
+
+def _machines_folder(job: PartJob) -> Path:
+    """Folder of the machine's job.
+
+    Raises
+    ------
+    CmmUqError : it is that of the part's own job.
+    """
+    folder = job.folder / str(job.facts.machine_state.job)
+    if folder.resolve() == job.folder.resolve():
+        raise CmmUqError("is the part's own job", where=f"{WHERE} job = {job.facts.machine_state.job!r}",
+                         fix="Name the folder of the machine's job, or its certificate")  # fmt: skip
+    return folder
 
 
 def attached_calibration(job: PartJob) -> dict[str, bytes]:
@@ -264,6 +289,11 @@ def with_calibration(job: PartJob, calibration: Job | None) -> PartJob:
         return job
     named = {f"{CALIBRATION}{name}": content for name, content in calibration.inputs.items()}
     return replace(job, inputs={**job.inputs, **named})
+
+
+def with_history(job: PartJob, kept: bytes | None) -> PartJob:
+    """A part's job with the machine's history among its inputs, where its changes were read from records."""
+    return job if kept is None else replace(job, inputs={**job.inputs, HISTORY: kept})
 
 
 def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:

@@ -15,16 +15,19 @@ from cmm_uq.jobs.part.placing import readings, rotation
 from cmm_uq.jobs.part.probed import Probed, probed, whole_surface
 from cmm_uq.jobs.part.tables import StylusFacts
 from cmm_uq.parts.causes import Cause, Scatter
-from cmm_uq.parts.evaluating import Evaluator
+from cmm_uq.parts.evaluating import characteristics_of
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.of_form import Form
 from cmm_uq.parts.of_operator import of_points, reproducibility
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
-from cmm_uq.parts.placing import Pose, around
+from cmm_uq.parts.placing import Pose, around, placed
 from cmm_uq.parts.plan import Alignment, Characteristic, CommonDatum, Feature, Nominal, Plan, Stylus
 from cmm_uq.parts.virtual import Circumstances
 from cmm_uq.points import Floats, Machine
 from cmm_uq.units import MICROMETRE
+
+PLACES = 16
+"""Places of the part that are drawn where it does not lie in the same one each time."""
 
 
 def plan_of(job: PartJob) -> Plan:
@@ -73,13 +76,33 @@ def refuse_unfit(job: PartJob) -> None:
     ------
     CmmUqError : points that do not determine a feature, datums that do not fix a frame.
     """
-    plan = plan_of(job)
+    plan, path = plan_of(job), job.folder / "job.toml"
     try:
-        Evaluator(plan, np.zeros_like(plan.points), ())
+        nominal = characteristics_of(plan, plan.points)
     except CmmUqError as error:
-        raise CmmUqError(
-            error.problem, where=f"{job.folder / 'job.toml'}: {error.where or ''}", fix=error.fix
-        ) from error
+        raise CmmUqError(error.problem, where=f"{path}: {error.where or ''}", fix=error.fix) from error
+    for one, value in zip(plan.characteristics, nominal.tolist(), strict=True):
+        limits = [limit for limit in (one.lower, one.upper) if limit is not None]
+        if one.what == "distance" and limits and max(map(abs, limits)) < value - max(map(abs, limits)):
+            said = " to ".join(f"{limit:g}" for limit in limits)
+            raise CmmUqError(f"limits of {said} mm, where the distance is {value:.6g} mm by the nominals",
+                             where=f"{path}: [[characteristic]] {one.name}",
+                             fix="Give limits of the distance itself, not deviations from it")  # fmt: skip
+
+
+def refuse_out_of_reach(job: PartJob, machine: Machine) -> None:
+    """Refuse a part that the axes do not reach everywhere, in any of the places where it may lie.
+
+    Raises
+    ------
+    CmmUqError : a point of it is beyond the travel.
+    """
+    plan = plan_of(job)
+    for pose in poses_of(job, PLACES, machine):
+        try:
+            placed(plan, pose, machine)
+        except CmmUqError as error:
+            raise CmmUqError(error.problem, where=f"{job.folder / 'job.toml'}: [placing]", fix=error.fix) from error
 
 
 def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: int) -> Circumstances:

@@ -41,7 +41,7 @@ class Asked:
     rerun : whether the machine's certificate is computed again from its inputs.
     trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
     records : of the machine's history, that its drift is read from; ``None`` for none.
-    changes : what records said of the drift at an earlier time, by parameter; then they are not asked.
+    history : of the machine, that a report has inside; then no records are asked.
     """
 
     seed: int = 0
@@ -50,7 +50,7 @@ class Asked:
     rerun: bool = False
     trust: tuple[Path, ...] | None = None
     records: str | Path | None = None
-    changes: Mapping[str, float | None] | None = None
+    history: bytes | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +96,13 @@ def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
     from cmm_uq.commands.part import part_found
 
     return part_found(
+<<<<<<< HEAD
         job, seed=asked.seed, trials=asked.trials, digits=asked.digits, rerun=asked.rerun,
         trust=asked.trust, records=asked.records, changes=asked.changes, stage=stage,
+=======
+        job, seed=asked.seed, trials=TRIALS if asked.trials is None else asked.trials, digits=asked.digits, rerun=asked.rerun,
+        trust=asked.trust, records=asked.records, history=asked.history, stage=stage,
+>>>>>>> assess
     )  # fmt: skip
 
 

@@ -90,18 +90,22 @@ def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
     ------
     CmmUqError : they are no job of a part.
     """
-    from cmm_uq.commands.part_machine import CALIBRATION
+    from cmm_uq.commands.part_history import FILE as HISTORY
+    from cmm_uq.commands.part_machine import CALIBRATION, with_history
     from cmm_uq.commands.part_written import in_language
     from cmm_uq.jobs.part.job import part_of
 
     language = data["job"].get("language", ENGLISH)
     if language not in get_args(Code):
         raise CmmUqError(f"{language!r} is no language of documents", where=f"{RESULTS}: job.language")
-    own = {name: content for name, content in inputs.items() if not name.startswith(CALIBRATION)}
+    stated = {name: content for name, content in inputs.items() if name != HISTORY}
+    own = {name: content for name, content in stated.items() if not name.startswith(CALIBRATION)}
     job = in_language(part_of(own), language)
     if job.facts.machine_state.job is None:
-        return job if len(own) == len(inputs) else in_language(part_of(inputs), language)
-    return replace(job, inputs={**job.inputs, **inputs})
+        job = job if len(own) == len(stated) else in_language(part_of(stated), language)
+    else:
+        job = replace(job, inputs={**job.inputs, **stated})
+    return with_history(job, inputs.get(HISTORY))
 
 
 def _check_job(inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str) -> None:
@@ -201,6 +205,7 @@ def part_again(
     ------
     CmmUqError : they give nothing.
     """
+    from cmm_uq.commands.part_history import FILE as HISTORY
     from cmm_uq.commands.part_written import Asked, contents_of, found_of
 
     said, simulation = data["machine"], data["simulation"]
@@ -208,14 +213,14 @@ def part_again(
     if held and trust is None:
         inquiry.left(AGAIN, "the machine's certificate was held to trusted certificates, and none are given (--trust)")
         return None
-    changes = None
-    if said.get("changes") is not None:
-        changes = {str(one["parameter"]): one["change"] for one in said["changes"]}
-        why = "records that are not inside said so; all else is computed again with the changes that results.json has"
-        inquiry.left("how the machine's errors changed since its calibration", why)
+    history = job.inputs.get(HISTORY)
+    if history is not None:
+        inquiry.notes.append(
+            "The machine's changes since its calibration follow from its history inside, as records had it."
+        )
     asked = Asked(
         _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"],
-        _asked_again(said), tuple(trust or ()) if held else None, None, changes,
+        _asked_again(said), tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
     found = found_of(job, asked, stage)
     return contents_of(found, stage, finished=finished), tuple(found.files)

@@ -1,4 +1,4 @@
-"""Methods beside each other: their figures, E_n between their values, and why they differ, as far as figures say it."""
+"""Methods beside each other: their figures, Eₙ between their values, and why they differ, as far as figures say it."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def _scatter(name: Text, virtual: Stating, figure: Figure, share: float) -> Iter
 
 def _apart(pair: Pair) -> Text:
     return say(
-        "{one:capital} and {other} differ by more than their uncertainties allow (E_n = {value}): one of them leaves "
+        "{one:capital} and {other} differ by more than their uncertainties allow (Eₙ = {value}): one of them leaves "
         "something out.",
         one=METHODS[pair.one], other=METHODS[pair.other], value=number(abs(pair.normalised), ".2f"),
     )  # fmt: skip

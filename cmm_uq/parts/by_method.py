@@ -117,7 +117,7 @@ class Stating:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two methods on one characteristic: E_n = (x₁ − x₂)/√(U₁² + U₂²) (ISO/IEC 17043:2023)."""
+    """Two methods on one characteristic: Eₙ = (x₁ − x₂)/√(U₁² + U₂²) (ISO/IEC 17043:2023)."""
 
     one: Method
     other: Method
@@ -132,7 +132,7 @@ class Compared:
     ----------
     name : of the characteristic.
     stated : by each method that says something of it, the virtual measurement first.
-    pairs : E_n of each two that have a value.
+    pairs : Eₙ of each two that have a value.
     why : they differ, in sentences that follow from the figures.
     """
 

@@ -14,7 +14,7 @@ import pytest
 from cmm_uq import __version__
 from cmm_uq.commands.part import judged, part_found
 from cmm_uq.commands.part_machine import machine_found
-from cmm_uq.commands.part_plan import plan_of
+from cmm_uq.commands.part_plan import plan_of, refuse_unfit
 from cmm_uq.documents.as_json import as_json
 from cmm_uq.documents.part.found import PartFound
 from cmm_uq.documents.part.results import part_results
@@ -291,3 +291,30 @@ def test_a_check_says_what_would_stop_the_command(tmp_path: Path) -> None:
     assert ["does not verify" in one.problem for one in found.problems] == [True]
     (tmp_path / "machine" / "posterior-simulated.npz").write_bytes(report()["posterior-simulated.npz"])
     assert (check_job(tmp_path).sound, check_job(tmp_path).command) == (True, "part")
+
+
+def test_a_check_reaches_as_far_as_the_axes_of_the_certificate(tmp_path: Path) -> None:
+    from cmm_uq.commands.check import check_job
+    from tests.part_machines import plate_files
+
+    for name, content in plate_files(by_certificate(), placing={"origin_mm": [850.0, 300.0, -500.0]}).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    assert ["beyond its travel of 0 to 900 mm" in one.problem for one in check_job(tmp_path).problems] == [True]
+
+
+def test_a_machine_s_job_that_is_not_there_stops_the_check(tmp_path: Path) -> None:
+    from cmm_uq.commands.check import check_job
+    from tests.part_machines import plate_files
+
+    for job, words in (("../nowhere", "no such file"), (".", "is the part's own job")):
+        for name, content in plate_files({}, machine_state={"job": job}).items():
+            (tmp_path / name).write_bytes(content)
+        assert [words in one.problem for one in check_job(tmp_path).problems] == [True]
+
+
+def test_limits_of_a_distance_that_are_deviations_from_it_are_refused() -> None:
+    said = [{"name": "1", "what": "distance", "features": ["bore", "B"], "lower_mm": -0.05, "upper_mm": 0.05}]
+    with pytest.raises(CmmUqError, match=r"limits of -0\.05 to 0\.05 mm, where the distance is 40 mm") as raised:
+        refuse_unfit(plate_of(by_certificate(), characteristic=said))
+    assert raised.value.where == "job.toml: [[characteristic]] 1"

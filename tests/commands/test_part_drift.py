@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.commands.part_drift import with_drift
+from cmm_uq.commands.part_history import known_of
 from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.physics.catalogue import effects
@@ -51,15 +52,31 @@ def test_a_steady_drift_goes_on_by_its_rate_and_more(records: Path) -> None:
     assert sooner.state.drift[0] < 0.6 * found.state.drift[0]
 
 
-def test_changes_as_results_have_them_give_the_same_drift_once_more(records: Path) -> None:
-    """To the bit, through ten digits; without the records."""
+def test_a_history_that_was_kept_gives_the_same_drift_once_more(records: Path) -> None:
+    """To the bit, without the records: of the drift model's changes as :func:`change_since` has them."""
     found = with_drift(STATE, "1102", ON, records, "job.toml")
     assert found.changes is not None
     assert found.changes["scale_y.ppm"] is None
-    kept = {name: None if one is None else float(f"{one:.10g}") for name, one in found.changes.items()}
-    again = with_drift(STATE, "1102", ON, None, "job.toml", known=kept)
+    again = with_drift(STATE, "1102", ON, None, "job.toml", kept=found.history)
     np.testing.assert_array_equal(again.state.drift, found.state.drift)
     assert (again.told, again.state.drift_unknown) == (found.told, found.state.drift_unknown)
+    assert (again.changes, again.history) == (found.changes, found.history)
+
+
+def test_a_history_inside_says_nothing_of_what_came_after_the_calibration(records: Path) -> None:
+    sooner = replace(STATE, calibrated=dt.date(2024, 3, 2))
+    kept = with_drift(sooner, "1102", ON, records, "job.toml").history
+    assert kept is not None
+    ((series, _),) = known_of(kept).values.values()
+    assert series.value.tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"{}", b"[" * 100_000, b'{"schema": "cmm-uq/machine-history/1", "adjusted": [1]}']
+)
+def test_what_is_no_history_is_refused(content: bytes) -> None:
+    with pytest.raises(CmmUqError, match="is no history of a machine"):
+        with_drift(STATE, "1102", ON, None, "job.toml", kept=content)
 
 
 def test_a_machine_that_was_adjusted_since_is_refused(tmp_path: Path) -> None:

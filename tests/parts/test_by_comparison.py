@@ -1,4 +1,4 @@
-"""Methods beside each other: E_n by its definition, and sentences that change with the figures."""
+"""Methods beside each other: Eₙ by its definition, and sentences that change with the figures."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_with_few_degrees_of_freedom_chance_explains_more() -> None:
 
 
 def test_values_that_contradict_are_said_to() -> None:
-    assert "differ by more than their uncertainties allow (E_n = 1.05)" in why(figure(value=19.990))
+    assert "differ by more than their uncertainties allow (Eₙ = 1.05)" in why(figure(value=19.990))
 
 
 def test_one_measurement_alone_is_told_beside_the_mean() -> None:

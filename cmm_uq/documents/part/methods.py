@@ -98,7 +98,7 @@ def _figures(own: Sequence[Compared], *, angle: bool) -> Table:
     large, small, per_large, per_small = _units(angle=angle)
     columns = (
         Column(say("Characteristic"), numeric=False), Column(say("Method"), numeric=False), Column(say("Value"), large),
-        Column(say("u"), small), Column(say("U"), small), Column(say("E_n")),
+        Column(say("u"), small), Column(say("U"), small), Column(say("Eₙ")),
     )  # fmt: skip
     rows = []
     for one in own:
@@ -112,7 +112,7 @@ def _figures(own: Sequence[Compared], *, angle: bool) -> Table:
             rows.append((Verbatim(one.name), name, value, significant(stated.u / per_small),
                          significant(stated.U / per_small), apart))  # fmt: skip
     notes = (
-        say("E_n: difference of the virtual measurement's value from this one over √(U₁² + U₂²) (ISO/IEC 17043); beyond 1 the "
+        say("Eₙ: difference of the virtual measurement's value from this one over √(U₁² + U₂²) (ISO/IEC 17043); beyond 1 the "
             "methods contradict each other. Values that come from the same measured points have most of their error in "
             "common, so that theirs is small."),
     )  # fmt: skip

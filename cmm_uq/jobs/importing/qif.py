@@ -64,14 +64,20 @@ def length_unit(root: Element, where: str) -> str | None:
     length = None if found is None else next((e for e in found if local(e) == "LinearUnit"), None)
     if length is None:
         return None
-    name, factor = child(length, "UnitName"), next((e.text for e in length.iter() if local(e) == "Factor"), "1")
+    name, given = child(length, "UnitName"), next((e.text for e in length.iter() if local(e) == "Factor"), None)
+    factor = given or "1"
     unit = length_named(name)
     if unit is None:
-        metres = float(factor or "1")
+        metres = float(factor)
         lengths = (one for one in UNITS.values() if one.sort == LENGTH)
         unit = next((one for one in lengths if abs(_metres(one.name) / metres - 1) < 1e-9), None)
-    if unit is None or abs(_metres(unit.name) / float(factor or "1") - 1) > 1e-6:
-        raise CmmUqError(f"the unit {name!r} of {factor} m is not known", where=f"{where}: FileUnits",
+    if unit is None or abs(_metres(unit.name) / float(factor) - 1) > 1e-6:
+        said = (
+            f"of {factor} m is not known"
+            if given
+            else "has no Factor to metres (UnitConversion), and is then the metre"
+        )
+        raise CmmUqError(f"the unit {name!r} {said}", where=f"{where}: FileUnits",
                          fix="Export the results in mm or inch")  # fmt: skip
     return unit.name
 

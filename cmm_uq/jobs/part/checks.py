@@ -12,6 +12,7 @@ from cmm_uq.jobs.part.common import as_one, members
 from cmm_uq.jobs.part.file import PartFile
 from cmm_uq.jobs.part.freedoms import freedoms
 from cmm_uq.jobs.part.located import Places
+from cmm_uq.jobs.part.not_modelled import material_condition
 from cmm_uq.jobs.part.placing import readings
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.points import AXES, beyond_travel
@@ -67,7 +68,10 @@ def _datums(names: Sequence[str], known: Sequence[str], where: str, wrong: Gathe
         try:
             own = members(name, known)
         except CmmUqError as error:
-            wrong.add(CmmUqError(error.problem, where=where, fix=error.fix))
+            condition = material_condition(name)
+            problem = f"the datum {name!r} {condition}" if condition else error.problem
+            fix = "Leave the characteristic out, and name it in [part] not_measured" if condition else error.fix
+            wrong.add(CmmUqError(problem, where=where, fix=fix))
             continue
         twice = next((each for each in own if each in taken), None)
         if twice is not None:
@@ -111,8 +115,11 @@ def _alignment(facts: PartFile, features: Mapping[str, Probed], places: Places) 
 
 
 def _unfixed(free: Sequence[str], where: str) -> CmmUqError:
-    return CmmUqError(f"these datums do not fix the part: they leave free {', '.join(free)}", where=where,
-                      fix="Add a feature that fixes it, as a plane, a line across it and a point: 3-2-1")  # fmt: skip
+    fix = (
+        "Add a feature that fixes it, as a plane, a line across it and a point (3-2-1); of a round part whose "
+        "characteristics all have datums of their own leave the alignment out"
+    )
+    return CmmUqError(f"these datums do not fix the part: they leave free {', '.join(free)}", where=where, fix=fix)
 
 
 def _named(datum: str, features: Mapping[str, Probed]) -> tuple[Probed, ...]:
@@ -136,7 +143,7 @@ def unfit(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str
     ----------
     features : by name; all of its own are there.
     """
-    checks: tuple[_Check, ...] = (_of_its_kinds, _nominal_orientation, _limits_of_the_value, _frame_of_a_coordinate)
+    checks: tuple[_Check, ...] = (_of_its_kinds, _nominal_orientation, _limits_of_the_value, _whole_frame)
     return next((found for check in checks if (found := check(one, features))), None)
 
 
@@ -203,13 +210,19 @@ def _limits_of_the_value(one: CharacteristicFacts, features: Mapping[str, Probed
             "Give limits of the diameter itself, as 9.9 and 10.1, not deviations from it")  # fmt: skip
 
 
-def _frame_of_a_coordinate(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
-    """That a coordinate with datums of its own has a whole frame."""
-    if one.what not in AXES or not one.datums:
+def _whole_frame(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+    """That a place with datums of its own has a whole frame: a zone that may turn about its datums is not modelled."""
+    if not one.asks.framed or not one.datums:
         return None
     free = freedoms([_named(name, features) for name in one.datums])
-    told = _unfixed(free, "")
-    return (told.problem, "datums", told.fix or "") if free else None
+    said = (
+        f"the {one.what} of {one.features[0]!r} is to datums that leave free {', '.join(free)}, which is not modelled"
+    )
+    return (
+        (said, "datums", "Add a datum that fixes it, as the drawing's next one, or ask for a distance")
+        if free
+        else None
+    )
 
 
 def _travel(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from xml.etree.ElementTree import Element, SubElement
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.importing.qif import child
 from cmm_uq.jobs.importing.xml_files import local, root_of
 from cmm_uq.jobs.part.characteristic import ASKS, What
@@ -66,10 +67,17 @@ _LENGTH_MM = 20.0
 """Of a plane or line whose length is not said: an example."""
 
 
+_FEATURES = ("FeatureItem", "FeatureNominal")
+"""Ends of the names of elements that a plan or a model is made of; statistics, rules and resources have none."""
+
+
 class _Document:
     """The elements of a document by their numbers."""
 
     def __init__(self, root: Element, where: str) -> None:
+        if not any(local(element).endswith(_FEATURES) for element in root.iter()):
+            raise CmmUqError("is of no feature: it has neither FeatureItem nor FeatureNominal", where=where,
+                             fix="Export the plan, or the model with its product information (PMI)")  # fmt: skip
         self.units = QifUnits(root, where)
         self.root, self.where = root, where
         self.by_id = {element.get("id", ""): element for element in root.iter() if element.get("id")}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +15,11 @@ from cmm_uq.points import Floats
 COLUMNS = ("feature", "point", "x_mm", "y_mm", "z_mm")
 FAR_MM = 5.0
 """From the nominal contact point: a measured one farther away is in another frame, unit or order."""
+
+_IN_UNITS = {
+    1 / 25.4: "in inches", 1e-3: "in metres", 25.4: "taken for inches once too often", 1e3: "in µm",
+}  # fmt: skip
+"""By what the factor of points in another unit to those in mm is; a scale that is off by a hundredth is another matter."""
 
 _FIX = "Save it as CSV in UTF-8, with commas between the columns"
 
@@ -35,7 +40,8 @@ def measured_points(content: bytes, where: str, features: Sequence[Probed]) -> F
     cells = cells_of(content, where, _FIX)
     for name in COLUMNS:
         if name not in cells.header:
-            raise CmmUqError(f"has no column {name!r}", where=where, fix=f"Its columns are {', '.join(COLUMNS)}")
+            raise CmmUqError(f"has no column {name!r}", where=where,
+                             fix=f"Its columns are {', '.join(COLUMNS)}, with commas between them")  # fmt: skip
     short = next((i for i, row in enumerate(cells.rows) if len(row) != len(cells.header)), None)
     if short is not None:
         raise CmmUqError(f"has {len(cells.rows[short])} cells, and the header {len(cells.header)}",
@@ -81,6 +87,8 @@ def in_order(
             if away > FAR_MM:
                 wrong.add(CmmUqError(f"point {index:g} of {name!r} lies {away:.4g} mm from where it is planned", where=at,
                                      fix="Give it in mm in the frame of the part, in the order of the plan"))  # fmt: skip
+    if wrong.problems:
+        _refuse_another_unit(rows, xyz, known, where)
     wrong.refuse()
     for one in features:
         for index in range(1, len(one.points) + 1):
@@ -89,3 +97,18 @@ def in_order(
                                  fix=f"Give all of its {len(one.points)} points")  # fmt: skip
     wanted = [rows[one.facts.name, index] for one in features for index in range(1, len(one.points) + 1)]
     return np.asarray(xyz[wanted])
+
+
+def _refuse_another_unit(
+    rows: Mapping[tuple[str, int], int], xyz: Floats, known: Mapping[str, Probed], where: str
+) -> None:
+    """Say it once where all points are off by the factor of another unit, about the part's origin."""
+    if not rows:
+        return
+    planned = np.array([known[name].points[index - 1] for name, index in rows])
+    found = xyz[list(rows.values())]
+    factor = float(np.sum(found * planned)) / (float(np.sum(planned**2)) or 1.0)
+    unit = next((words for each, words in _IN_UNITS.items() if abs(factor / each - 1) < 0.01), None)
+    if unit and np.linalg.norm(found / factor - planned, axis=1).max() <= FAR_MM:
+        raise CmmUqError(f"the points are {factor:.4g} times those of the plan, as if they were {unit}", where=where,
+                         fix="Give them in mm in the frame of the part")  # fmt: skip

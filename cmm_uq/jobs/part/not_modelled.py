@@ -19,6 +19,7 @@ MAXIMUM_MATERIAL = "holds at maximum material condition, which is not modelled"
 LEAST_MATERIAL = "holds at least material condition, which is not modelled"
 TWO_POINT = "is a two-point size (LP), which is not modelled: sizes are those of associated features"
 PROJECTED = "has a projected tolerance zone, which is not modelled"
+SYMMETRY = "is a symmetry: the median plane of two faces is not modelled"
 FREE_STATE = "is toleranced in the free state, and how a part bends is not modelled"
 
 _INSTEAD = "leave it out, and name it in [part] not_measured"
@@ -30,6 +31,7 @@ _WORDS: Mapping[str, str] = {
     "free_state": FREE_STATE, "f": FREE_STATE, "projected": PROJECTED, "p": PROJECTED,
     "profile": SURFACE_PROFILE, "surface_profile": SURFACE_PROFILE, "profile_of_a_surface": SURFACE_PROFILE,
     "line_profile": LINE_PROFILE, "profile_of_a_line": LINE_PROFILE, "point_profile": POINT_PROFILE,
+    "symmetry": SYMMETRY,
     "scan": SCANNED, "scanning": SCANNED, "scanned": SCANNED, "continuous": SCANNED,
 }  # fmt: skip
 """As somebody may write them in job.toml."""
@@ -42,6 +44,14 @@ _KEYS: Mapping[str, str | None] = {
 """Keys that say such a thing, or whose value does."""
 
 
+def material_condition(datum: str) -> str:
+    """What a datum says of its material condition, as ``B(M)`` does; nothing where it says nothing."""
+    _, bracket, said = datum.strip().rstrip("Ⓜ Ⓛ").partition("(")
+    condition = said.rstrip(") ").casefold() if bracket else ""
+    condition = {"Ⓜ": "m", "Ⓛ": "l"}.get(datum.strip()[-1:], condition)
+    return _WORDS.get(condition, "") if condition in ("m", "l", "mmc", "lmc") else ""
+
+
 def refuse_not_modelled(table: Any) -> Any:
     """The table as it is; for a validator that runs before any other.
 
@@ -52,6 +62,8 @@ def refuse_not_modelled(table: Any) -> Any:
     for key in _KEYS.keys() & (table.keys() if isinstance(table, Mapping) else set()):
         value = table[key]
         told = _KEYS[key] if value is not False else None
+        if key == "what" and isinstance(value, str) and value.strip().casefold() == "concentricity":
+            raise ValueError('ask for "coaxiality", of a circle as of an axis')
         if isinstance(value, str):
             told = _WORDS.get(value.strip().casefold().replace(" ", "_").replace("-", "_").strip("()"), told)
         if told:

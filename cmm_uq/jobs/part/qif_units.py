@@ -32,6 +32,9 @@ class QifUnits:
     def __init__(self, root: Element, where: str) -> None:
         unit = length_unit(root, where)
         if unit is None:
+            if inside(root, "ExternalQIFReferences") is not None:
+                said = "does not say its unit of length, and refers to other QIF documents, which are not read"
+                raise CmmUqError(said, where=where, fix="Export one document with everything in it")
             raise CmmUqError("does not say its unit of length", where=where, fix="Export the plan with FileUnits")
         name = UNITS[unit.casefold()]
         self._mm, self._degrees = name.up / name.down, math.degrees(1.0)

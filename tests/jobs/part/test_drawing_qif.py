@@ -6,6 +6,7 @@ Documents as the schema of QIF 3.0 has them, of one plate; its numbers were chos
 from __future__ import annotations
 
 import math
+import re
 from contextlib import suppress
 from typing import Any
 
@@ -235,6 +236,21 @@ def test_without_units_there_are_no_lengths() -> None:
     bare = document().replace(b"LinearUnit", b"OtherUnit")
     with pytest.raises(CmmUqError, match="does not say its unit of length"):
         drawing_of_qif(bare, "plate.qif")
+    parted = bare.replace(b"</QIFDocument>", b'<ExternalQIFReferences n="1"/></QIFDocument>')
+    with pytest.raises(CmmUqError, match="refers to other QIF documents, which are not read"):
+        drawing_of_qif(parted, "plate.qif")
+
+
+def test_a_unit_without_its_factor_is_the_metre_and_no_inch() -> None:
+    """QIF: a unit without ``UnitConversion`` is that of the SI, whatever its name."""
+    without = re.sub(rb"<Factor>[^<]*</Factor>", b"", document(unit=("inch", "0.0254")))
+    with pytest.raises(CmmUqError, match="'inch' has no Factor to metres"):
+        drawing_of_qif(without, "plate.qif")
+
+
+def test_statistics_and_rules_plan_no_feature() -> None:
+    with pytest.raises(CmmUqError, match="is of no feature"):
+        drawing_of_qif(b'<QIFDocument xmlns="http://qifstandards.org/xsd/qif3"/>', "rules.qif")
 
 
 @given(at=st.integers(0, 20_000), cut=st.integers(0, 12), put=st.sampled_from(["", "9", "x", "nan", "1e999", " 1"]))

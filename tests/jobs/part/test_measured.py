@@ -19,6 +19,13 @@ def rows(shift: float = 0.01) -> list[str]:
     ]
 
 
+def scaled(factor: float) -> list[str]:
+    return [
+        ",".join([*line.split(",")[:2], *(repr(factor * float(value)) for value in line.split(",")[2:])])
+        for line in rows()
+    ]
+
+
 def content(lines: list[str], header: str = "feature,point,x_mm,y_mm,z_mm") -> dict[str, bytes]:
     return {"points.csv": "\n".join([header, *lines]).encode()}
 
@@ -39,6 +46,9 @@ def test_points_come_in_the_order_of_the_plan() -> None:
     (content([*rows()[:-1], "bore,24,60,40,zero"]), "points.csv line 61, column z_mm"),
     (content(rows(), "feature,point,x_mm,y_mm,z"), "has no column 'z_mm'"),
     (content(rows(6.0)), "lies 6 mm from where it is planned"),
+    (content(scaled(1 / 25.4)), "0.03937 times those of the plan, as if they were in inches"),
+    (content(scaled(25.4)), "25.4 times those of the plan, as if they were taken for inches once too often"),
+    (content(scaled(1.5)), "point 2 of 'A' lies"),
     ({}, "points.csv"),
 ])  # fmt: skip
 def test_points_that_are_not_those_of_the_plan_are_refused(files: dict[str, bytes], words: str) -> None:
