@@ -25,12 +25,14 @@ from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.model.measurement import ARTEFACT, MeasurementModel
 from cmm_uq.model.noise import noise_of
+from cmm_uq.parts.drawn_periods import DrawnPeriod, drawable, shown
+from cmm_uq.parts.one_period import Wave, draw
 from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled
 from cmm_uq.parts.periods import linear
 from cmm_uq.parts.recorded_noise import stated_noise
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats, Ints
-from cmm_uq.units import unit
+from cmm_uq.units import MICROMETRE, unit
 
 DRAWS = 10_000
 
@@ -39,6 +41,9 @@ _UNSEEN = 0.01
 
 _SMALLEST = 1e-6
 """mm: the smallest noise that is sampled."""
+
+_SEEN = 1e-10
+"""Part of an observation's variance below which other errors leave nothing of it."""
 
 _UNTOLD = 100.0
 """Ratio of the 95 % to the 5 % quantile of the noise from which on the recording does not tell it from errors left out."""
@@ -140,6 +145,52 @@ def joint_posterior(
     return whole.which, into @ mean[at], into @ covariance[np.ix_(at, at)] @ into.T + unseen
 
 
+def _split(
+    further: Sequence[Unmodelled], model: MeasurementModel
+) -> tuple[tuple[Unmodelled, ...], tuple[Unmodelled, ...]]:
+    """Errors without a period, and those whose periods are drawn."""
+    alone = tuple(one for one in further if drawable(one.effect))
+    return tuple(one for one in further if one not in alone), alone
+
+
+def draw_with_periods(
+    whole: Together, model: MeasurementModel, alone: Sequence[Unmodelled], sigma_mm: float, draws: int,
+    random: np.random.Generator,
+) -> tuple[Floats, tuple[DrawnPeriod, ...]]:  # fmt: skip
+    """Draws of all errors, those with a period with one each."""
+    linear = whole.linear
+    rows, given = linear.priors
+    scale = np.array([unknown.scale for unknown in linear.unknowns])
+    root = np.vstack([linear.reduced.design / sigma_mm, rows]) * scale
+    target = np.append(linear.reduced.observed / sigma_mm, given)
+    if np.linalg.matrix_rank(root) < root.shape[1]:
+        raise _open()
+    m = len(linear.reduced.observed)
+    Q, R = np.linalg.qr(root)
+    left = (target - Q @ (Q.T @ target))[:m]
+    lam, V = np.linalg.eigh(np.eye(m) - Q[:m] @ Q[:m].T)
+    kept = lam > _SEEN
+    W, v = (V[:, kept] * np.sqrt(lam[kept])).T, (V[:, kept] / np.sqrt(lam[kept])).T @ left
+    readings = model.artefact.points.readings
+    impulses, waves = [], []
+    for one in alone:
+        (shape,) = one.effect.shape
+        impulses.append(linear.reduce(shown(model, one.effect)) / sigma_mm)
+        reading = readings[str(one.effect.along_motion)]
+        sd = MICROMETRE * one.effect.coefficients[0].prior_sd
+        waves.append(Wave(reading, W @ impulses[-1], sd, 1 / shape.high, 1 / shape.low))
+    found = draw(v, waves, draws, random)
+    normal = random.standard_normal((draws, len(target)))
+    normal += target
+    periodic = []
+    for i, (one, wave) in enumerate(zip(alone, waves, strict=True)):
+        own = DrawnPeriod(one.effect, found.frequency[:, i], found.coefficients[:, 2 * i : 2 * i + 2])
+        normal[:, :m] -= own.at(wave.reading) @ impulses[i].T
+        periodic.append(own)
+    drawn = scale * np.linalg.solve(R, (normal @ Q).T).T
+    return whole.coefficients(drawn, random), tuple(periodic)
+
+
 def draws_given(whole: Together, components: Components, sizes: Sizes, random: np.random.Generator) -> Floats:
     """Exact draws (N, k + f) of all errors, one for each of N sizes of the noise; no finite ones where a size is open."""
     return whole.coefficients(Marginal(whole.linear, components, whole.estimate).draw(sizes, random), random)
@@ -161,7 +212,15 @@ def given_recording(
     ------
     CmmUqError : the recording leaves even the sizes of the artefact open.
     """
-    whole, random = Together.of(model, state.unmodelled), np.random.default_rng(seed)
+    random = np.random.default_rng(seed)
+    if sigma_mm is not None:
+        apart, alone = _split(state.unmodelled, model)
+        if alone:
+            whole = Together.of(model, apart)
+            drawn, periodic = draw_with_periods(whole, model, alone, sigma_mm, draws, random)
+            kept = tuple(apart) + tuple(alone)
+            return _with(replace(state, unmodelled=kept), model, whole, drawn, replace(state.noise, coordinate_mm=state.noise.usual_mm), periodic)
+    whole = Together.of(model, state.unmodelled)
     if sigma_mm is not None:
         _, mean, covariance = joint_posterior(model, state.unmodelled, sigma_mm)
         drawn = random.multivariate_normal(mean, covariance, draws, method="svd")
@@ -180,7 +239,8 @@ def given_recording(
 
 
 def _with(
-    state: MachineState, model: MeasurementModel, whole: Together, drawn: Floats, noise: StatedNoise
+    state: MachineState, model: MeasurementModel, whole: Together, drawn: Floats, noise: StatedNoise,
+    periodic: tuple[DrawnPeriod, ...] = (),
 ) -> MachineState:  # fmt: skip
     """The state with draws (N, k + f) of all errors together."""
     if not np.isfinite(drawn).all():
@@ -189,9 +249,10 @@ def _with(
     own = [effect.name in acting for effect in model.effects for _ in effect.coefficients]
     kept = np.flatnonzero(np.append(own, np.ones(len(whole.sd), dtype=bool)))
     none = np.zeros(len(whole.sd))
+    drawn_names = {one.effect.name for one in periodic}
     together = replace(
-        state, effects=(*state.effects, *whole.effects), draws=drawn[:, kept], noise=noise, corrected=True,
-        unmodelled=tuple(one for i, one in enumerate(state.unmodelled) if i not in whole.which),
+        state, effects=(*state.effects, *whole.effects), draws=drawn[:, kept], noise=noise, corrected=True, periodic=periodic,
+        unmodelled=tuple(one for i, one in enumerate(state.unmodelled) if i not in whole.which and one.effect.name not in drawn_names),
         corrections=np.append(state.corrects, none), drift=np.append(state.drift, none),
     )  # fmt: skip
     return replace(together, prior_share=_shares(together))
@@ -205,6 +266,9 @@ def _shares(state: MachineState) -> dict[str, float]:
         start += len(effect.coefficients)
         prior = sum(coefficient.prior_sd**2 for coefficient in effect.coefficients)
         found[effect.name] = float(np.sqrt(own.var(axis=0).sum() / prior)) if prior else 0.0
+    for one in state.periodic:
+        prior_mm = MICROMETRE * one.effect.coefficients[0].prior_sd
+        found[one.effect.name] = float(np.sqrt(np.mean(one.coefficients**2)) / prior_mm)
     return found
 
 
