@@ -25,11 +25,11 @@ from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.model.measurement import ARTEFACT, MeasurementModel
 from cmm_uq.model.noise import noise_of
-from cmm_uq.parts.drawn_periods import DrawnPeriod, drawable, shown
-from cmm_uq.parts.one_period import Wave, draw
+from cmm_uq.parts.drawn_periods import DrawnPeriod, drawable
 from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled
 from cmm_uq.parts.periods import linear
 from cmm_uq.parts.recorded_noise import stated_noise
+from cmm_uq.parts.with_periods import Conditioned, Noises
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats, Ints
 from cmm_uq.units import MICROMETRE, unit
@@ -42,8 +42,8 @@ _UNSEEN = 0.01
 _SMALLEST = 1e-6
 """mm: the smallest noise that is sampled."""
 
-_SEEN = 1e-10
-"""Part of an observation's variance below which other errors leave nothing of it."""
+NOISES = 20
+"""Sizes of the noise, of which a draw with periods has one."""
 
 _UNTOLD = 100.0
 """Ratio of the 95 % to the 5 % quantile of the noise from which on the recording does not tell it from errors left out."""
@@ -145,52 +145,6 @@ def joint_posterior(
     return whole.which, into @ mean[at], into @ covariance[np.ix_(at, at)] @ into.T + unseen
 
 
-def _split(
-    further: Sequence[Unmodelled], model: MeasurementModel
-) -> tuple[tuple[Unmodelled, ...], tuple[Unmodelled, ...]]:
-    """Errors without a period, and those whose periods are drawn."""
-    alone = tuple(one for one in further if drawable(one.effect))
-    return tuple(one for one in further if one not in alone), alone
-
-
-def draw_with_periods(
-    whole: Together, model: MeasurementModel, alone: Sequence[Unmodelled], sigma_mm: float, draws: int,
-    random: np.random.Generator,
-) -> tuple[Floats, tuple[DrawnPeriod, ...]]:  # fmt: skip
-    """Draws of all errors, those with a period with one each."""
-    linear = whole.linear
-    rows, given = linear.priors
-    scale = np.array([unknown.scale for unknown in linear.unknowns])
-    root = np.vstack([linear.reduced.design / sigma_mm, rows]) * scale
-    target = np.append(linear.reduced.observed / sigma_mm, given)
-    if np.linalg.matrix_rank(root) < root.shape[1]:
-        raise _open()
-    m = len(linear.reduced.observed)
-    Q, R = np.linalg.qr(root)
-    left = (target - Q @ (Q.T @ target))[:m]
-    lam, V = np.linalg.eigh(np.eye(m) - Q[:m] @ Q[:m].T)
-    kept = lam > _SEEN
-    W, v = (V[:, kept] * np.sqrt(lam[kept])).T, (V[:, kept] / np.sqrt(lam[kept])).T @ left
-    readings = model.artefact.points.readings
-    impulses, waves = [], []
-    for one in alone:
-        (shape,) = one.effect.shape
-        impulses.append(linear.reduce(shown(model, one.effect)) / sigma_mm)
-        reading = readings[str(one.effect.along_motion)]
-        sd = MICROMETRE * one.effect.coefficients[0].prior_sd
-        waves.append(Wave(reading, W @ impulses[-1], sd, 1 / shape.high, 1 / shape.low))
-    found = draw(v, waves, draws, random)
-    normal = random.standard_normal((draws, len(target)))
-    normal += target
-    periodic = []
-    for i, (one, wave) in enumerate(zip(alone, waves, strict=True)):
-        own = DrawnPeriod(one.effect, found.frequency[:, i], found.coefficients[:, 2 * i : 2 * i + 2])
-        normal[:, :m] -= own.at(wave.reading) @ impulses[i].T
-        periodic.append(own)
-    drawn = scale * np.linalg.solve(R, (normal @ Q).T).T
-    return whole.coefficients(drawn, random), tuple(periodic)
-
-
 def draws_given(whole: Together, components: Components, sizes: Sizes, random: np.random.Generator) -> Floats:
     """Exact draws (N, k + f) of all errors, one for each of N sizes of the noise; no finite ones where a size is open."""
     return whole.coefficients(Marginal(whole.linear, components, whole.estimate).draw(sizes, random), random)
@@ -212,15 +166,50 @@ def given_recording(
     ------
     CmmUqError : the recording leaves even the sizes of the artefact open.
     """
+    periodic = tuple(one for one in state.unmodelled if drawable(one.effect))
+    if not periodic:
+        return _given(state, model, sigma_mm, draws, seed)
     random = np.random.default_rng(seed)
+    whole = Together.of(model, [one for one in state.unmodelled if one not in periodic])
+    without = replace(state, unmodelled=tuple(one for one in state.unmodelled if one not in periodic))
     if sigma_mm is not None:
-        apart, alone = _split(state.unmodelled, model)
-        if alone:
-            whole = Together.of(model, apart)
-            drawn, periodic = draw_with_periods(whole, model, alone, sigma_mm, draws, random)
-            kept = tuple(apart) + tuple(alone)
-            return _with(replace(state, unmodelled=kept), model, whole, drawn, replace(state.noise, coordinate_mm=state.noise.usual_mm), periodic)
-    whole = Together.of(model, state.unmodelled)
+        noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
+        stood = Conditioned(model, whole.linear, sigma_mm, periodic).without_noise()
+        each = [Conditioned(model, whole.linear, sigma_mm, periodic, stood=stood)]
+        which, frequency = Noises(each).drawn(draws, random)
+    else:
+        components = replace(noise_of(model), known=model.least_noise)
+        sizes, told = _sizes_of_noise(model, state.unmodelled, components, draws, seed)
+        some = sizes.at(_evenly(len(sizes.slow), NOISES))
+        usual = sizes.typical
+        first = Conditioned(model, whole.linear, float(usual.coordinate[0]), periodic, components.white(usual))
+        stood = first.without_noise()
+        each = [
+            Conditioned(model, whole.linear, float(one.coordinate[0]), periodic, components.white(one), stood)
+            for one in (some.at(slice(i, i + 1)) for i in range(len(some.slow)))
+        ]
+        every = Together.of(model, state.unmodelled)
+        (log, squares), (log_all, squares_all) = (
+            Marginal(one.linear, components, one.estimate).log_likelihood(some) for one in (whole, every)
+        )
+        weight = log - 0.5 * squares - log_all + 0.5 * squares_all
+        which, frequency = Noises(each, weight if told else None).drawn(draws, random)
+        noise = stated_noise(model, components, some.at(which))
+    if any(one.open for one in each):
+        raise _open()
+    own, linear_draws = np.empty((draws, 2 * len(periodic))), np.empty((draws, len(whole.linear.unknowns)))
+    for i in np.unique(which):
+        rows = which == i
+        own[rows], linear_draws[rows] = each[i].drawn(frequency[rows], random)
+    found = tuple(DrawnPeriod(one.effect, frequency[:, i], own[:, 2 * i : 2 * i + 2]) for i, one in enumerate(periodic))
+    return _with(without, model, whole, whole.coefficients(linear_draws, random), noise, found)
+
+
+def _given(
+    state: MachineState, model: MeasurementModel, sigma_mm: float | None, draws: int, seed: int
+) -> MachineState:  # fmt: skip
+    """The same of errors without a period."""
+    whole, random = Together.of(model, state.unmodelled), np.random.default_rng(seed)
     if sigma_mm is not None:
         _, mean, covariance = joint_posterior(model, state.unmodelled, sigma_mm)
         drawn = random.multivariate_normal(mean, covariance, draws, method="svd")
@@ -229,13 +218,31 @@ def given_recording(
     posterior = sample_with_noise(whole.linear, components, whole.estimate, seed)
     every = _evenly(len(posterior.draws), draws)
     sizes, drawn = posterior.sizes.at(every), whole.coefficients(posterior.draws[every], random)
-    low, high = np.quantile(sizes.coordinate, [0.05, 0.95])
-    if high > _UNTOLD * low:  # any noise would do: it is taken for what the calibration took it for, which is no less
-        estimate = model.estimate()
-        alone = sample_with_noise(estimate.linear, components, estimate.least_squares, seed)
-        sizes = alone.sizes.at(_evenly(len(alone.draws), draws))
+    if not _told(sizes):
+        sizes = _alone(model, components, draws, seed)
         drawn = draws_given(whole, components, sizes, random)
     return _with(state, model, whole, drawn, stated_noise(model, components, sizes))
+
+
+def _sizes_of_noise(
+    model: MeasurementModel, further: Sequence[Unmodelled], components: Components, draws: int, seed: int
+) -> tuple[Sizes, bool]:
+    """Sizes of the noise, and whether the recording told them."""
+    whole = Together.of(model, further)
+    sizes = sample_with_noise(whole.linear, components, whole.estimate, seed).sizes
+    return (sizes, True) if _told(sizes) else (_alone(model, components, draws, seed), False)
+
+
+def _told(sizes: Sizes) -> bool:
+    low, high = np.quantile(sizes.coordinate, [0.05, 0.95])
+    return bool(high <= _UNTOLD * low)
+
+
+def _alone(model: MeasurementModel, components: Components, draws: int, seed: int) -> Sizes:
+    """Where any noise would do, it is taken for what the calibration took it for, which is no less."""
+    estimate = model.estimate()
+    alone = sample_with_noise(estimate.linear, components, estimate.least_squares, seed)
+    return alone.sizes.at(_evenly(len(alone.draws), draws))
 
 
 def _with(
@@ -249,10 +256,9 @@ def _with(
     own = [effect.name in acting for effect in model.effects for _ in effect.coefficients]
     kept = np.flatnonzero(np.append(own, np.ones(len(whole.sd), dtype=bool)))
     none = np.zeros(len(whole.sd))
-    drawn_names = {one.effect.name for one in periodic}
     together = replace(
         state, effects=(*state.effects, *whole.effects), draws=drawn[:, kept], noise=noise, corrected=True, periodic=periodic,
-        unmodelled=tuple(one for i, one in enumerate(state.unmodelled) if i not in whole.which and one.effect.name not in drawn_names),
+        unmodelled=tuple(one for i, one in enumerate(state.unmodelled) if i not in whole.which),
         corrections=np.append(state.corrects, none), drift=np.append(state.drift, none),
     )  # fmt: skip
     return replace(together, prior_share=_shares(together))

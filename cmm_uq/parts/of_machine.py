@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.messages import say
-from cmm_uq.parts.drawn_periods import columns_at_each
 from cmm_uq.parts.causes import Cause, Common, Draw, Drawn, Rows, Scatter, field_along
+from cmm_uq.parts.drawn_periods import columns_at_each
 from cmm_uq.parts.machine import MachineState, Unmodelled
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.qualifying import Qualified
@@ -94,7 +94,9 @@ def modelled(state: MachineState, qualified: Qualified, pose: Pose, measured: Fl
         each = [one.at(read.readings[one.axis]) for one in state.periodic]
         columns = np.concatenate([columns, *(columns_at_each(about, one.effect) for one in state.periodic)], axis=2)
         deviations = np.hstack([deviations, *(values - values.mean(axis=0) for values in each)])
-        factors += [one.effect.name for one, values in zip(state.periodic, each, strict=True) for _ in range(values.shape[1])]
+        factors += [
+            one.effect.name for one, values in zip(state.periodic, each, strict=True) for _ in range(values.shape[1])
+        ]
     drift = np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
 
     def draw(random: np.random.Generator, n: int) -> Drawn:

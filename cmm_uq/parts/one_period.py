@@ -12,7 +12,7 @@ one after the other, and weights make them exact.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -79,6 +79,13 @@ class Wave:
         spread = 2 * np.pi * np.diff(bounds)[:, None] / np.sqrt(12) * x
         s, c = np.sin(angle), np.cos(angle)
         return np.asarray(self.sd * (self.shown @ np.stack([s, c, spread * c, -spread * s], axis=-1)))
+
+    def beforehand(self) -> Floats:
+        """(r, r) covariance of what observations show, of any frequency."""
+        bounds = self.cells
+        own = self.of_cells(bounds)[:, :, :2] * np.sqrt(mass(bounds, self))[:, None, None]
+        own = own.transpose(1, 0, 2).reshape(own.shape[1], -1)
+        return np.asarray(own @ own.T)
 
     def at_origin(self, frequency: Floats, coefficients: Floats) -> Floats:
         """Coefficients (N, 2), in standard deviations about the middle of the readings, as those about zero, in mm."""
@@ -171,7 +178,7 @@ def _evidence(A: dict[tuple[int, int], Floats], g: list[Floats]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """N frequencies of each wave (N, w), coefficients (N, 2w) in mm, and what they are worth.
+    """N frequencies of each wave (N, w), and what they are worth.
 
     Attributes
     ----------
@@ -180,13 +187,13 @@ class Found:
     """
 
     frequency: Floats
-    coefficients: Floats
-    waves: Floats
     evidence: float
     effective: float
 
 
-def draw(v: Floats, waves: Sequence[Wave], count: int, random: np.random.Generator, follow=(FIRST, PAIRS, WHOLE)) -> Found:
+def draw(
+    v: Floats, waves: Sequence[Wave], count: int, random: np.random.Generator, follow=(FIRST, PAIRS, WHOLE)
+) -> Found:
     """Draws of all waves given whitened observations v (r,), with noise of variance one and nothing else."""
     bounds = [wave.cells for wave in waves]
     cells = [wave.of_cells(each) for wave, each in zip(waves, bounds, strict=True)]
@@ -257,7 +264,7 @@ def _combinations(
                     other, log = other[keep], log[keep]
                 pa, pb = start[a][1][one], start[b][1][other]
                 pi = 1 - (1 - pa) * (1 - pb)
-                entries.append(np.column_stack([np.full(len(other), one), other])[:, ::-1 if flip else 1])
+                entries.append(np.column_stack([np.full(len(other), one), other])[:, :: -1 if flip else 1])
                 logs.append(np.stack([log, np.log(pi)]))
         entry, log = np.concatenate(entries), np.concatenate(logs, axis=1)
         if w == 2:
@@ -283,7 +290,7 @@ def _combinations(
         least = log.max() - _NEAR
         for row in rows[heavy]:
             for k in range(w):
-                pair = *(int(row[i]) if i != k else -1 for i in range(w)),
+                pair = (*(int(row[i]) if i != k else -1 for i in range(w)),)
                 if pair in looked:
                     continue
                 looked.add(pair)
@@ -331,18 +338,35 @@ def _within(v, waves, bounds, cells, prior, which, log_weight, count, random) ->
     again = systematic(weights / weights.sum(), count, random)
     f = f[again]
     random.shuffle(f)
-    coefficients, shown = np.empty((count, 2 * w)), np.empty((count, len(v)))
-    for begin in range(0, count, _BLOCK):
-        part = slice(begin, begin + _BLOCK)
-        base = np.concatenate([wave.columns(f[part, i]) for i, wave in enumerate(waves)], axis=2)
+    return Found(f, evidence, float(weights.sum() ** 2 / (weights**2).sum()))
+
+
+def evidence_of(v: Floats, waves: Sequence[Wave], frequency: Floats) -> Floats:
+    """(N,) log of the evidence of frequencies (N, w), over that of no wave."""
+    found = np.empty(len(frequency))
+    for part, base in _columns(waves, frequency):
+        log, U = _orthogonal(base)
+        found[part] = log + 0.5 * np.sum((v @ U) ** 2, axis=-1)
+    return found
+
+
+def coefficients_given(v: Floats, waves: Sequence[Wave], frequency: Floats, random: np.random.Generator) -> Floats:
+    """(N, 2w) exact draws of the amplitudes of sine and cosine, mm, at frequencies (N, w)."""
+    w = len(waves)
+    found = np.empty((len(frequency), 2 * w))
+    for part, base in _columns(waves, frequency):
         L = np.linalg.cholesky(np.eye(2 * w) + np.swapaxes(base, 1, 2) @ base)
-        g = v @ base
-        half = np.linalg.solve(L, g[:, :, None]) + random.standard_normal((len(base), 2 * w, 1))
-        a = np.linalg.solve(np.swapaxes(L, 1, 2), half)
-        shown[part] = (base @ a)[:, :, 0]
-        coefficients[part] = a[:, :, 0]
-    turned = [wave.at_origin(f[:, i], coefficients[:, 2 * i : 2 * i + 2]) for i, wave in enumerate(waves)]
-    return Found(f, np.hstack(turned), shown, evidence, float(weights.sum() ** 2 / (weights**2).sum()))
+        normal = np.linalg.solve(L, (v @ base)[:, :, None]) + random.standard_normal((len(base), 2 * w, 1))
+        found[part] = np.linalg.solve(np.swapaxes(L, 1, 2), normal)[:, :, 0]
+    turned = [wave.at_origin(frequency[:, i], found[:, 2 * i : 2 * i + 2]) for i, wave in enumerate(waves)]
+    return np.hstack(turned)
+
+
+def _columns(waves: Sequence[Wave], frequency: Floats) -> Iterator[tuple[slice, Floats]]:
+    """Columns (…, r, 2w) of frequencies (N, w), block by block."""
+    for begin in range(0, len(frequency), _BLOCK):
+        part = slice(begin, begin + _BLOCK)
+        yield part, np.concatenate([wave.columns(frequency[part, i]) for i, wave in enumerate(waves)], axis=2)
 
 
 def _fine(v, waves, bounds, cells, which, random) -> tuple[Floats, Floats]:
@@ -379,7 +403,7 @@ def _fine(v, waves, bounds, cells, which, random) -> tuple[Floats, Floats]:
         row = np.arange(P)
         f[:, i] = at[row, pick]
         chance = each[row, pick] - top - np.log(sums[:, -1])
-        log_q += chance + np.log(FINE) 
+        log_q += chance + np.log(FINE)
         log_q -= 0.0
         last = each[row, pick] + np.log(at[row, pick])
         log_q += np.log(at[row, pick]) + np.log(np.log(high / low)) - np.log(high - low)

@@ -126,7 +126,9 @@ class AtPose:
             *given.further,
             *own,
         ]
-        self.base = mean_errors(given.machine, qualified, pose, beside) + mean_expansion(surroundings, plan, points, pose)
+        self.base = mean_errors(given.machine, qualified, pose, beside) + mean_expansion(
+            surroundings, plan, points, pose
+        )
         self.pilot, self._inverses = pilot, dict[bool, dict[int, Inverse]]()
         drawn = any(len(feature.surface) for feature in plan.features)
         self.true: Evaluator | None = None
