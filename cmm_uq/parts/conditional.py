@@ -19,7 +19,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.least_squares import LeastSquares
-from cmm_uq.inference.linear_model import LinearModel, Unknown
+from cmm_uq.inference.linear_model import LinearModel, Unknown, Whiten
 from cmm_uq.inference.marginal import Marginal
 from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.inference.sampling import sample_with_noise
@@ -41,6 +41,9 @@ _UNSEEN = 0.01
 
 _SMALLEST = 1e-6
 """mm: the smallest noise that is sampled."""
+
+_EFFECTIVE = 0.2
+"""Part of the draws that weights must leave for periods to be drawn; else errors with a period are normal sums."""
 
 NOISES = 20
 """Sizes of the noise, of which a draw with periods has one."""
@@ -166,83 +169,112 @@ def given_recording(
     ------
     CmmUqError : the recording leaves even the sizes of the artefact open.
     """
-    periodic = tuple(one for one in state.unmodelled if drawable(one.effect))
-    if not periodic:
-        return _given(state, model, sigma_mm, draws, seed)
-    random = np.random.default_rng(seed)
-    whole = Together.of(model, [one for one in state.unmodelled if one not in periodic])
-    without = replace(state, unmodelled=tuple(one for one in state.unmodelled if one not in periodic))
-    if sigma_mm is not None:
-        noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
-        stood = Conditioned(model, whole.linear, sigma_mm, periodic).without_noise()
-        each = [Conditioned(model, whole.linear, sigma_mm, periodic, stood=stood)]
-        which, frequency = Noises(each).drawn(draws, random)
-    else:
-        components = replace(noise_of(model), known=model.least_noise)
-        sizes, told = _sizes_of_noise(model, state.unmodelled, components, draws, seed)
-        some = sizes.at(_evenly(len(sizes.slow), NOISES))
-        usual = sizes.typical
-        first = Conditioned(model, whole.linear, float(usual.coordinate[0]), periodic, components.white(usual))
-        stood = first.without_noise()
-        each = [
-            Conditioned(model, whole.linear, float(one.coordinate[0]), periodic, components.white(one), stood)
-            for one in (some.at(slice(i, i + 1)) for i in range(len(some.slow)))
-        ]
-        every = Together.of(model, state.unmodelled)
-        (log, squares), (log_all, squares_all) = (
-            Marginal(one.linear, components, one.estimate).log_likelihood(some) for one in (whole, every)
-        )
-        weight = log - 0.5 * squares - log_all + 0.5 * squares_all
-        which, frequency = Noises(each, weight if told else None).drawn(draws, random)
-        noise = stated_noise(model, components, some.at(which))
-    if any(one.open for one in each):
-        raise _open()
-    own, linear_draws = np.empty((draws, 2 * len(periodic))), np.empty((draws, len(whole.linear.unknowns)))
-    for i in np.unique(which):
-        rows = which == i
-        own[rows], linear_draws[rows] = each[i].drawn(frequency[rows], random)
-    found = tuple(DrawnPeriod(one.effect, frequency[:, i], own[:, 2 * i : 2 * i + 2]) for i, one in enumerate(periodic))
-    return _with(without, model, whole, whole.coefficients(linear_draws, random), noise, found)
-
-
-def _given(
-    state: MachineState, model: MeasurementModel, sigma_mm: float | None, draws: int, seed: int
-) -> MachineState:  # fmt: skip
-    """The same of errors without a period."""
     whole, random = Together.of(model, state.unmodelled), np.random.default_rng(seed)
     if sigma_mm is not None:
+        noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
+        apart = _Apart.of(state, model)
+        found = apart.drawn([(sigma_mm, None)], None, draws, seed)
+        if found is not None:
+            return _with(apart.state, model, apart.whole, found[1], noise, found[2])
         _, mean, covariance = joint_posterior(model, state.unmodelled, sigma_mm)
         drawn = random.multivariate_normal(mean, covariance, draws, method="svd")
-        return _with(state, model, whole, drawn, replace(state.noise, coordinate_mm=state.noise.usual_mm))
+        return _with(state, model, whole, drawn, noise)
     components = replace(noise_of(model), known=model.least_noise)
     posterior = sample_with_noise(whole.linear, components, whole.estimate, seed)
     every = _evenly(len(posterior.draws), draws)
     sizes, drawn = posterior.sizes.at(every), whole.coefficients(posterior.draws[every], random)
-    if not _told(sizes):
-        sizes = _alone(model, components, draws, seed)
+    low, high = np.quantile(sizes.coordinate, [0.05, 0.95])
+    told = bool(high <= _UNTOLD * low)
+    if not told:  # any noise would do: it is taken for what the calibration took it for, which is no less
+        estimate = model.estimate()
+        alone = sample_with_noise(estimate.linear, components, estimate.least_squares, seed)
+        sizes = alone.sizes.at(_evenly(len(alone.draws), draws))
         drawn = draws_given(whole, components, sizes, random)
+    apart, some = _Apart.of(state, model), sizes.at(_evenly(len(sizes.slow), NOISES))
+    noises = [
+        (float(one.coordinate[0]), components.white(one))
+        for one in (sizes.typical, *(some.at(slice(i, i + 1)) for i in range(len(some.slow))))
+    ]
+    likelier = _likelier(components, some, apart.whole, whole) if told else None
+    found = apart.drawn(noises, likelier, draws, seed)
+    if found is not None:
+        return _with(
+            apart.state, model, apart.whole, found[1], stated_noise(model, components, some.at(found[0])), found[2]
+        )
     return _with(state, model, whole, drawn, stated_noise(model, components, sizes))
 
 
-def _sizes_of_noise(
-    model: MeasurementModel, further: Sequence[Unmodelled], components: Components, draws: int, seed: int
-) -> tuple[Sizes, bool]:
-    """Sizes of the noise, and whether the recording told them."""
-    whole = Together.of(model, further)
-    sizes = sample_with_noise(whole.linear, components, whole.estimate, seed).sizes
-    return (sizes, True) if _told(sizes) else (_alone(model, components, draws, seed), False)
+@dataclass(frozen=True, eq=False)
+class _Apart:
+    """Errors with a period apart from all others.
+
+    Attributes
+    ----------
+    state : without them.
+    model : of the calibration.
+    periodic : those.
+    whole : all others together.
+    """
+
+    state: MachineState
+    model: MeasurementModel
+    periodic: tuple[Unmodelled, ...]
+    whole: Together
+
+    @classmethod
+    def of(cls, state: MachineState, model: MeasurementModel) -> _Apart:
+        periodic = tuple(one for one in state.unmodelled if drawable(one.effect))
+        others = tuple(one for one in state.unmodelled if one not in periodic)
+        return cls(replace(state, unmodelled=others), model, periodic, Together.of(model, others))
+
+    def drawn(
+        self, noises: Sequence[tuple[float, Whiten | None]], likelier: Floats | None, draws: int, seed: int
+    ) -> tuple[Ints, Floats, tuple[DrawnPeriod, ...]] | None:
+        """Which noise each draw has, coefficients (N, k + f) of the others, and draws with one period each.
+
+        Parameters
+        ----------
+        noises : standard deviation of a reading, and what makes observations uncorrelated; of several the first is a usual one
+            by which the others are only judged.
+        likelier : (s,) see :class:`Noises`.
+
+        Returns
+        -------
+        Nothing where no error has a period, or weights leave too few of the draws.
+        """
+        if not self.periodic:
+            return None
+        linear, random = self.whole.linear, np.random.default_rng(seed)
+        usual = Conditioned(self.model, linear, noises[0][0], self.periodic, noises[0][1])
+        if usual.open:
+            raise _open()
+        stood = usual.without_noise()
+        usual = Conditioned(self.model, linear, noises[0][0], self.periodic, noises[0][1], stood)
+        found = usual.combinations(draws, random)
+        if found.effective < _EFFECTIVE:
+            return None
+        each = [Conditioned(self.model, linear, *one[:1], self.periodic, one[1], stood) for one in noises[1:]] or [
+            usual
+        ]
+        which, frequency, effective = Noises(usual, each, likelier).drawn(found, random)
+        if effective < _EFFECTIVE:
+            return None
+        own, parameters = np.empty((draws, 2 * len(self.periodic))), np.empty((draws, len(linear.unknowns)))
+        for i in np.unique(which):
+            rows = which == i
+            own[rows], parameters[rows] = each[i].drawn(frequency[rows], random)
+        periods = tuple(
+            DrawnPeriod(one.effect, frequency[:, i], own[:, 2 * i : 2 * i + 2]) for i, one in enumerate(self.periodic)
+        )
+        return which, self.whole.coefficients(parameters, random), periods
 
 
-def _told(sizes: Sizes) -> bool:
-    low, high = np.quantile(sizes.coordinate, [0.05, 0.95])
-    return bool(high <= _UNTOLD * low)
-
-
-def _alone(model: MeasurementModel, components: Components, draws: int, seed: int) -> Sizes:
-    """Where any noise would do, it is taken for what the calibration took it for, which is no less."""
-    estimate = model.estimate()
-    alone = sample_with_noise(estimate.linear, components, estimate.least_squares, seed)
-    return alone.sizes.at(_evenly(len(alone.draws), draws))
+def _likelier(components: Components, sizes: Sizes, apart: Together, whole: Together) -> Floats:
+    """(s,) log likelihood of sizes of the noise without errors that have a period, over that with them as normal sums."""
+    (log, squares), (log_all, squares_all) = (
+        Marginal(one.linear, components, one.estimate).log_likelihood(sizes) for one in (apart, whole)
+    )
+    return log - log_all - 0.5 * (squares - squares_all)
 
 
 def _with(

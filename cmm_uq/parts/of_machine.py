@@ -30,10 +30,7 @@ def mean_errors(state: MachineState, qualified: Qualified, pose: Pose, measured:
     ----------
     measured : see :func:`modelled`.
     """
-    if not state.periodic:
-        periodic = np.zeros_like(qualified.part.xyz)
-    else:
-        periodic = _mean_periodic(state, qualified, pose, measured)
+    periodic = _mean_periodic(state, qualified, pose, measured)
     if np.array_equal(state.corrects, state.mean):
         return periodic
     points = qualified.both
@@ -50,6 +47,8 @@ def mean_errors(state: MachineState, qualified: Qualified, pose: Pose, measured:
 
 def _mean_periodic(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None) -> Floats:
     """(n, 3) displacements by the means of errors with one period a draw."""
+    if not state.periodic:
+        return np.zeros_like(qualified.part.xyz)
     acting = Superposition(state.effects, state.shapes)
     read, about = _read(state, qualified, pose, measured), acting.about(qualified.both, state.mean)
     e = np.zeros((len(qualified.both), 3))

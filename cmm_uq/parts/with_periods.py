@@ -14,7 +14,8 @@ from cmm_uq.inference.linear_model import LinearModel, Whiten
 from cmm_uq.model.measurement import MeasurementModel
 from cmm_uq.parts.drawn_periods import DrawnPeriod, shown
 from cmm_uq.parts.machine import Unmodelled
-from cmm_uq.parts.one_period import Found, Wave, coefficients_given, draw, evidence_of, systematic
+from cmm_uq.parts.one_period import Found, draw, systematic
+from cmm_uq.parts.waves import Wave, coefficients_given, evidence_of
 from cmm_uq.points import Floats, Ints
 from cmm_uq.units import MICROMETRE
 
@@ -31,7 +32,7 @@ _TRIED = 400
 """Combinations by which noises are weighed against each other."""
 
 _LEAST = 5.0
-"""Noises that weights leave, in effect, below which combinations are looked for again, with a noise nearer to theirs."""
+"""Noises that weights must leave, in effect."""
 
 
 class Conditioned:
@@ -115,41 +116,39 @@ class Noises:
 
     Parameters
     ----------
-    conditioned : the model for each of s noises.
-    log_weight : (s,) how much likelier each is without the errors that have a period than it was thought to be; nothing where
-        all are as likely, whatever the recording says.
+    usual : the model for a usual noise.
+    each : for each of s noises.
+    likelier : (s,) how much likelier each is, in its logarithm, without the errors that have a period than it was thought to
+        be; nothing where all are as likely, whatever the recording says.
     """
 
-    def __init__(self, conditioned: Sequence[Conditioned], log_weight: Floats | None = None) -> None:
-        self.each, self._log_weight = conditioned, log_weight
+    def __init__(self, usual: Conditioned, each: Sequence[Conditioned], likelier: Floats | None = None) -> None:
+        self.usual, self.each, self.likelier = usual, each, likelier
 
-    def drawn(self, count: int, random: np.random.Generator) -> tuple[Ints, Floats]:
-        """Which noise (N,) a draw has, and its frequencies (N, w)."""
-        first = len(self.each) // 2
-        for _ in range(2):
-            found = self.each[first].combinations(count, random)
-            if len(self.each) == 1:
-                return np.zeros(count, dtype=np.int64), found.frequency
-            some = found.frequency[:: max(1, count // _TRIED)]
-            start = self.each[first].evidence(some)
-            ratio = np.array([one.evidence(some) - start for one in self.each])
-            top = ratio.max(axis=1)
-            mean = np.log(np.exp(ratio - top[:, None]).mean(axis=1)) + top
-            log = np.zeros(len(mean)) if self._log_weight is None else self._log_weight + mean
-            weight = np.exp(log - log.max())
-            weight /= weight.sum()
-            if 1 / (weight**2).sum() >= _LEAST:
-                break
-            first = int(np.argmax(weight))
+    def drawn(self, found: Found, random: np.random.Generator) -> tuple[Ints, Floats, float]:
+        """Which noise (N,) each draw of the usual one now has, its frequencies (N, w), and the part that weights leave."""
+        count = len(found.frequency)
+        if len(self.each) == 1:
+            return np.zeros(count, dtype=np.int64), found.frequency, found.effective
+        some = found.frequency[:: max(1, count // _TRIED)]
+        start = self.usual.evidence(some)
+        ratio = np.array([one.evidence(some) - start for one in self.each])
+        top = ratio.max(axis=1)
+        mean = np.log(np.exp(ratio - top[:, None]).mean(axis=1)) + top
+        log = np.zeros(len(mean)) if self.likelier is None else self.likelier + mean
+        weight = np.exp(log - log.max())
+        if weight.sum() ** 2 / (weight**2).sum() < _LEAST:
+            return np.zeros(count, dtype=np.int64), found.frequency, 0.0
         which = systematic(weight, count, random)
         random.shuffle(which)
-        log = np.empty(count)
+        left = -self.usual.evidence(found.frequency)
         for i in np.unique(which):
             own = which == i
-            log[own] = self.each[i].evidence(found.frequency[own]) - mean[i]
-        log -= self.each[first].evidence(found.frequency)
-        again = systematic(np.exp(log - log.max()), count, random)
-        return which[again], found.frequency[again]
+            left[own] += self.each[i].evidence(found.frequency[own]) - mean[i]
+        last = np.exp(left - left.max())
+        again = systematic(last, count, random)
+        effective = min(found.effective, float(last.sum() ** 2 / (last**2).sum()) / count)
+        return which[again], found.frequency[again], effective
 
 
 def _together(reading: Floats, seen: Floats) -> tuple[Floats, Floats]:
