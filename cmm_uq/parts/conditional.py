@@ -154,8 +154,9 @@ def draws_given(whole: Together, components: Components, sizes: Sizes, random: n
 
 
 def given_recording(
-    state: MachineState, model: MeasurementModel, sigma_mm: float | None = None, draws: int = DRAWS, seed: int = 0
-) -> MachineState:
+    state: MachineState, model: MeasurementModel, sigma_mm: float | None = None, draws: int = DRAWS, seed: int = 0,
+    *, one_period: bool = False,
+) -> MachineState:  # fmt: skip
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
 
     Parameters
@@ -164,6 +165,8 @@ def given_recording(
         much the calibration bounds an error that it did not model is of no matter here: its recording says that again.
     model : of the calibration, without the observations that its certificate set aside.
     sigma_mm : standard deviation of one recorded coordinate, where the noise is known and white; else it is sampled.
+    one_period : whether an error with an unknown period has one in each draw, where weights leave enough of the draws; else,
+        and without it, it is the normal sum of all.
 
     Raises
     ------
@@ -172,10 +175,11 @@ def given_recording(
     whole, random = Together.of(model, state.unmodelled), np.random.default_rng(seed)
     if sigma_mm is not None:
         noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
-        apart = _Apart.of(state, model)
-        found = apart.drawn([(sigma_mm, None)], None, draws, seed)
-        if found is not None:
-            return _with(apart.state, model, apart.whole, found[1], noise, found[2])
+        if one_period:
+            apart = _Apart.of(state, model)
+            found = apart.drawn([(sigma_mm, None)], None, draws, seed)
+            if found is not None:
+                return _with(apart.state, model, apart.whole, found[1], noise, found[2])
         _, mean, covariance = joint_posterior(model, state.unmodelled, sigma_mm)
         drawn = random.multivariate_normal(mean, covariance, draws, method="svd")
         return _with(state, model, whole, drawn, noise)
@@ -190,17 +194,16 @@ def given_recording(
         alone = sample_with_noise(estimate.linear, components, estimate.least_squares, seed)
         sizes = alone.sizes.at(_evenly(len(alone.draws), draws))
         drawn = draws_given(whole, components, sizes, random)
-    apart, some = _Apart.of(state, model), sizes.at(_evenly(len(sizes.slow), NOISES))
-    noises = [
-        (float(one.coordinate[0]), components.white(one))
-        for one in (sizes.typical, *(some.at(slice(i, i + 1)) for i in range(len(some.slow))))
-    ]
-    likelier = _likelier(components, some, apart.whole, whole) if told else None
-    found = apart.drawn(noises, likelier, draws, seed)
-    if found is not None:
-        return _with(
-            apart.state, model, apart.whole, found[1], stated_noise(model, components, some.at(found[0])), found[2]
-        )
+    if one_period:
+        apart, some = _Apart.of(state, model), sizes.at(_evenly(len(sizes.slow), NOISES))
+        every_one = (sizes.typical, *(some.at(slice(i, i + 1)) for i in range(len(some.slow))))
+        noises = [(float(one.coordinate[0]), components.white(one)) for one in every_one]
+        found = apart.drawn(noises, _likelier(components, some, apart.whole, whole) if told else None, draws, seed)
+        if found is not None:
+            which, together, periods = found
+            return _with(
+                apart.state, model, apart.whole, together, stated_noise(model, components, some.at(which)), periods
+            )
     return _with(state, model, whole, drawn, stated_noise(model, components, sizes))
 
 

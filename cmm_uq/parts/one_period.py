@@ -101,11 +101,11 @@ def _beside(v: Floats, base: Floats, tried: Floats) -> Floats:
     g = np.einsum("r,pfrk->pfk", v, tried, optimize=True) - np.einsum("pb,pfbk->pfk", left, T)
     G = np.einsum("pfrk,pfrl->pfkl", tried, tried, optimize=True) - np.einsum("pfbk,pfbl->pfkl", T, T, optimize=True)
     A = {(0, 0): 1 + G[..., 0, 0], (1, 0): G[..., 1, 0], (1, 1): 1 + G[..., 1, 1]}
-    return (log + 0.5 * np.sum(left**2, axis=-1))[:, None] + evidence(A, [g[..., 0], g[..., 1]])
+    return np.asarray((log + 0.5 * np.sum(left**2, axis=-1))[:, None] + evidence(A, [g[..., 0], g[..., 1]]))
 
 
 def systematic(weight: Floats, count: int, random: np.random.Generator) -> Ints:
     """Indices (count,), each as often as its weight says."""
     marks = np.cumsum(weight)
     found = np.searchsorted(marks / marks[-1], (np.arange(count) + random.random()) / count)
-    return np.asarray(np.minimum(found, len(weight) - 1), dtype=np.int64)
+    return np.minimum(found, len(weight) - 1).astype(np.int64)
