@@ -6,6 +6,7 @@ import numpy as np
 
 from cmm_uq.messages import say
 from cmm_uq.parts.causes import Cause, Common, Draw, Drawn, Rows, Scatter, field_along
+from cmm_uq.parts.drawn_periods import columns_at_each
 from cmm_uq.parts.machine import MachineState, Unmodelled
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.qualifying import Qualified
@@ -20,13 +21,18 @@ _SETTLED = 1e-7
 _ROUNDS = 12
 
 
-def mean_errors(state: MachineState, qualified: Qualified, pose: Pose) -> Floats:
+def mean_errors(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None = None) -> Floats:
     """(n, 3) by how much the machine displaces points without any draw, in the frame of the part, mm.
 
     Solves indicated + e(indicated) = true for the mean of what is known, and adds what the machine corrects.
+
+    Parameters
+    ----------
+    measured : see :func:`modelled`.
     """
+    periodic = _mean_periodic(state, qualified, pose, measured)
     if np.array_equal(state.corrects, state.mean):
-        return np.zeros_like(qualified.part.xyz)
+        return periodic
     points = qualified.both
     indicated = points.xyz.copy()
     acting = Superposition(state.effects, state.shapes)
@@ -36,27 +42,71 @@ def mean_errors(state: MachineState, qualified: Qualified, pose: Pose) -> Floats
         if np.abs(change).max(initial=0.0) < _SETTLED:
             break
     indicated = indicated + acting.errors(points.at(indicated), state.corrects)
-    return pose.back(qualified.left((indicated - points.xyz)[:, :, None])[:, :, 0])
+    return pose.back(qualified.left((indicated - points.xyz)[:, :, None])[:, :, 0]) + periodic
 
 
-def modelled(state: MachineState, qualified: Qualified, pose: Pose) -> Common:
+def _mean_periodic(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None) -> Floats:
+    """(n, 3) displacements by the means of errors with one period a draw."""
+    if not state.periodic:
+        return np.zeros_like(qualified.part.xyz)
+    acting = Superposition(state.effects, state.shapes)
+    read, about = _read(state, qualified, pose, measured), acting.about(qualified.both, state.mean)
+    e = np.zeros((len(qualified.both), 3))
+    for one in state.periodic:
+        e += columns_at_each(about, one.effect) @ one.at(read.readings[one.axis]).mean(axis=0)
+    return -pose.back(qualified.left(e[:, :, None])[:, :, 0])
+
+
+def _read(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None) -> Points:
+    """Points of part and spheres as the scales read them: what was measured less what the machine corrected."""
+    points, n = qualified.both, len(qualified.part)
+    shown = points.xyz.copy()
+    if measured is not None:
+        shown[:n] += pose.turned(measured)
+    indicated, acting = shown.copy(), Superposition(state.effects, state.shapes)
+    for _ in range(_ROUNDS if state.corrects.any() else 0):
+        change = shown - acting.errors(points.at(indicated), state.corrects) - indicated
+        indicated += change
+        if np.abs(change).max(initial=0.0) < _SETTLED:
+            break
+    return points.at(indicated)
+
+
+def modelled(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None = None) -> Common:
     """What the calibration modelled: differences of whole draws of its posterior from their mean, and drift since then.
 
-    The columns are those of small changes about the mean (:meth:`Superposition.about`), axes leaning as they do.
+    The columns are those of small changes about the mean (:meth:`Superposition.about`), axes leaning as they do. Of an error
+    with one period a draw the coefficients are its values at the readings of the points.
+
+    Parameters
+    ----------
+    measured : (n, 3) by how much points were measured beside the plan's, in the frame of the part: what scales read there
+        says the phase of a short period.
     """
     acting = Superposition(state.effects, state.shapes)
-    columns = acting.derivatives(acting.about(qualified.both, state.mean))
-    factors = tuple(effect.name for effect in state.effects for _ in effect.coefficients)
+    about = acting.about(qualified.both, state.mean)
+    columns = acting.derivatives(about)
+    factors = [effect.name for effect in state.effects for _ in effect.coefficients]
     deviations = state.draws - state.mean
+    if state.periodic:
+        read = _read(state, qualified, pose, measured)
+        each = [one.at(read.readings[one.axis]) for one in state.periodic]
+        columns = np.concatenate([columns, *(columns_at_each(about, one.effect) for one in state.periodic)], axis=2)
+        deviations = np.hstack([deviations, *(values - values.mean(axis=0) for values in each)])
+        factors += [
+            one.effect.name for one, values in zip(state.periodic, each, strict=True) for _ in range(values.shape[1])
+        ]
+    drift = np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
 
     def draw(random: np.random.Generator, n: int) -> Drawn:
         drawn = Rows(deviations, random.integers(len(deviations), size=n))
         if not state.drift.any():
             return drawn
-        return np.asarray(drawn) + random.standard_normal((n, len(state.drift))) * state.drift
+        return np.asarray(drawn) + random.standard_normal((n, len(drift))) * drift
 
     why = dict.fromkeys(state.free, say("the calibration left it to what physics allows"))
-    return Common(name=MACHINE, factors=factors, draw=draw, named=why, basis=-_in_part(qualified.left(columns), pose))
+    return Common(name=MACHINE, factors=tuple(factors), draw=draw, named=why,
+                  basis=-_in_part(qualified.left(columns), pose))  # fmt: skip
 
 
 def not_modelled(state: MachineState, qualified: Qualified, pose: Pose) -> tuple[list[Cause], dict[str, str]]:

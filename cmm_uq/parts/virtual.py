@@ -126,8 +126,9 @@ class AtPose:
         qualified = Qualified.on(plan, points, given.machine.machine)
         unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
         own, on_surface = forms(given.forms, plan)
+        beside = None if given.measured is None else given.measured - plan.points
         self.causes: list[Cause] = [
-            modelled(given.machine, qualified, pose),
+            modelled(given.machine, qualified, pose, beside),
             *unmodelled,
             *noise(given.machine, points, pose, given.repeats, int(plan.order[0]) if len(plan.order) else 0),
             *styli(plan, pose),
@@ -135,7 +136,9 @@ class AtPose:
             *given.further,
             *own,
         ]
-        self.base = mean_errors(given.machine, qualified, pose) + mean_expansion(surroundings, plan, points, pose)
+        self.base = mean_errors(given.machine, qualified, pose, beside) + mean_expansion(
+            surroundings, plan, points, pose
+        )
         self.pilot, self._inverses = pilot, dict[bool, dict[int, Inverse]]()
         drawn = any(len(feature.surface) for feature in plan.features)
         self.true: Evaluator | None = None
