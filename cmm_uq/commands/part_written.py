@@ -96,13 +96,8 @@ def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
     from cmm_uq.commands.part import part_found
 
     return part_found(
-<<<<<<< HEAD
         job, seed=asked.seed, trials=asked.trials, digits=asked.digits, rerun=asked.rerun,
-        trust=asked.trust, records=asked.records, changes=asked.changes, stage=stage,
-=======
-        job, seed=asked.seed, trials=TRIALS if asked.trials is None else asked.trials, digits=asked.digits, rerun=asked.rerun,
         trust=asked.trust, records=asked.records, history=asked.history, stage=stage,
->>>>>>> assess
     )  # fmt: skip
 
 

@@ -41,8 +41,8 @@ class Stated:
     u : standard uncertainty, mm or rad.
     interval : shortest coverage interval of the value, of a zone with equal tails; where nothing was measured the shortest of
         the error, with the opposite sign.
-    k : half of the shortest interval of the errors over u; of a zone that is stated as zero so much that U reaches to the end of
-        its interval, where that is more.
+    k : half of the shortest interval of the errors over u; of a zone that is stated as zero so much that U reaches to the
+        end of its interval, where that is more.
     """
 
     name: str
@@ -76,13 +76,13 @@ def stated(
         at = 0.0 if measured is None else float(measured[i])
         value = None if measured is None else at - error
         interval = at - high, at - low
+        k = 0.5 * (high - low) / u if u else float("nan")
         if value is not None and zones[i]:
             if errors is not None:
                 value = at - middle(errors[:, i])
                 interval = possible_interval(at - errors[:, i], simulated.coverage)
-        k = 0.5 * (high - low) / u if u else float("nan")
-        if value is not None and zones[i] and value <= 0:
-            value, k = 0.0, max(k, interval[1] / u) if u else k
+            if value <= 0:
+                value, k = 0.0, max(k, interval[1] / u) if u else k
         found.append(Stated(name, value, error, u, interval, k))
     return tuple(found)
 

@@ -46,6 +46,7 @@ def test_a_zone_far_below_zero_is_zero_and_no_smaller_than_its_error_may_be() ->
     zone, _ = of(-6.0)
     assert (zone.value, zone.interval[0]) == (0.0, 0.0)
     assert zone.interval[1] == pytest.approx(6.0 + 1.96, abs=0.05)
+    assert (zone.U, zone.k) == pytest.approx((zone.interval[1], zone.interval[1] / zone.u))
 
 
 def test_the_value_of_a_zone_is_as_often_too_large_as_too_small() -> None:
@@ -76,12 +77,3 @@ def test_widths_are_zones_and_what_has_a_sign_or_a_size_is_none() -> None:
     assert dict(zip((one.what for one in characteristics), zones, strict=True)) == {
         one.what: one.what not in ("size", "distance", "angle", "x", "y", "z") for one in characteristics
     }
-
-
-def test_the_uncertainty_of_a_zone_stated_as_zero_reaches_to_the_end_of_its_interval() -> None:
-    """Errors of 20 µm with u 10 µm on a width measured as 1 µm: nothing of what may be true is left out by 0 ± U."""
-    errors = 0.020 + 0.010 * stats.norm.ppf((np.arange(50_000) + 0.5) / 50_000)
-    one = stated_of(0.001, errors)
-    assert one.value == 0
-    assert one.U == pytest.approx(one.interval[1])
-    assert one.U == pytest.approx(stats.norm.isf(0.025 * stats.norm.cdf(-1.9), -0.019, 0.010), rel=0.02)
