@@ -42,7 +42,7 @@ from cmm_uq.uncertainty.monte_carlo import Source, from_source
 
 PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
 BEGIN, END = "<!-- written by benchmarks.parts.machines -->", "<!-- end -->"
-TRIALS = PILOT = 2000
+TRIALS, PILOT = 10_000, 2000
 NAMED = effects(truth.SIX)
 UNMODELLED = tuple(one for one in unmodelled_errors(truth.SIX, {}) if "time_s" not in one.effect.columns)
 BAR_MM, U_BAR_UM = 400.0, 0.5
