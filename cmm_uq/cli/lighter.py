@@ -1,9 +1,9 @@
 """Libraries without what a command never uses of them: modules that are opened only to be named.
 
 numpy's compiler of Fortran and its test tools are opened by scipy, which asks numpy for everything that it has, and a table
-of letters by matplotlib, for TeX. Here such modules are loaded when something of them is first used. Docstrings that scipy
-and matplotlib put together when they are imported, and axes in space, which no picture here has, are left out. What is
-computed or drawn is the same; only the command's own process does so, never whoever imports the package.
+of letters by matplotlib, for TeX. Here such modules are loaded when something of them is first used. Lists that matplotlib
+writes into docstrings, and axes in space, which no picture here has, are left out. What is computed or drawn is the same; only
+the command's own process does so, never whoever imports the package.
 """
 
 from __future__ import annotations
@@ -32,33 +32,13 @@ _WITHOUT = {"emcee.moves.kde": "KDEMove", "mpl_toolkits.mplot3d": "Axes3D"}
 """Modules that nothing is used of, and what is taken from them. The move needs all of scipy.stats, a fifth of a report."""
 
 
-class _NoDocstring:
-    """In place of a docstring that scipy takes apart, adds to and puts together again."""
-
-    def __init__(self, *_: object) -> None: ...
-
-    def __getitem__(self, _: str) -> list[str]:
-        return []
-
-    def __str__(self) -> str:
-        return "\n"
-
-
-_UNEXPLAINED: dict[str, tuple[str, object]] = {
-    "matplotlib.artist": ("kwdoc", lambda _: ""),
-    "scipy._lib._docscrape": ("FunctionDoc", _NoDocstring),
-}
-"""Modules that make docstrings for others, and by what that is replaced."""
-
-
 class _Unexplained(SourceFileLoader):
-    """Loads what makes docstrings, and has it make none: the lists of what can be set of a picture, notes on batches."""
+    """Loads matplotlib's artists without the lists of what can be set, which it writes into the docstring of each."""
 
     def exec_module(self, module: ModuleType) -> None:
         """See :meth:`importlib.abc.Loader.exec_module`."""
         super().exec_module(module)
-        name, instead = _UNEXPLAINED[self.name]
-        module.__dict__[name] = instead
+        module.__dict__["kwdoc"] = lambda _: ""
 
 
 class _Lighter(MetaPathFinder):
@@ -67,10 +47,10 @@ class _Lighter(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:  # fmt: skip
-        if fullname not in LATER and fullname not in _UNEXPLAINED:
+        if fullname not in LATER and fullname != "matplotlib.artist":
             return None
         spec = PathFinder.find_spec(fullname, path, target)
         if spec is not None and isinstance(spec.loader, SourceFileLoader):
-            later = fullname in LATER
-            spec.loader = LazyLoader(spec.loader) if later else _Unexplained(fullname, spec.loader.path)
+            own = fullname not in LATER
+            spec.loader = _Unexplained(fullname, spec.loader.path) if own else LazyLoader(spec.loader)
         return spec

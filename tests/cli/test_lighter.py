@@ -39,6 +39,17 @@ def test_what_is_not_used_is_not_loaded_until_it_is_and_nothing_else_changes() -
     assert run.stdout.count("<path") > 10
 
 
+def test_all_of_scipy_that_is_needed_later_can_still_be_loaded() -> None:
+    command = """
+from cmm_uq.cli.lighter import lighten
+lighten()
+import scipy.interpolate, scipy.optimize, scipy.signal, scipy.sparse, scipy.spatial, scipy.stats
+assert round(scipy.stats.norm.cdf(1.96), 3) == 0.975
+"""
+    run = subprocess.run([sys.executable, "-c", command], capture_output=True, check=False, text=True)
+    assert (run.returncode, run.stderr) == (0, "")
+
+
 def _without_ids(svg: str) -> str:
     """Matplotlib salts the names of its clip paths."""
     return re.sub(r"[pm][0-9a-f]{10}", "", svg)
