@@ -35,6 +35,9 @@ RARE = 50
 FEWEST = 500
 """Effective draws of a weighted sample; with fewer the posterior is that of normal distributions."""
 
+SCARCE = 0.05
+"""Share of draws, below which those that are possible say nothing of a zone: it is then taken to be as large as its error."""
+
 _GRID = 33
 _HALVINGS = 30
 _NODES = 2000
@@ -72,7 +75,8 @@ class Limits:
     ----------
     lower, upper : limits, one at least.
     errors : (N,) draws of the error of a value, less their mean, ascending.
-    zone : whether the value is a width that is never negative: probabilities are those given that it is not.
+    zone : whether the value is a width that is never negative: probabilities are those given that it is not, or, where
+        fewer than one draw in twenty leaves it so, those of a width as large as the error.
     prior : what is known of the true value beforehand; of a zone the part above zero.
     """
 
@@ -102,6 +106,8 @@ class Limits:
         found = 0.0
         if self.upper is not None:
             found += self._below(value - self.upper)
+            if self._scarce(value):
+                return min(1.0, found + self._above(value + self.upper))
         if self.lower is not None:
             found += self._above(value - self.lower)
         return min(1.0, found / self._possible(value))
@@ -122,9 +128,13 @@ class Limits:
         return max(0.0, self._below(value - self.lower) - self._below(value - self.upper))
 
     def _within_zone(self, value: float) -> float:
-        if self.upper is None or self.lower is not None or value <= self.upper:
+        if self.upper is None or self.lower is not None or value <= self.upper or self._scarce(value):
             return 1.0 - self.beyond(value)
         return max(0.0, self._above(value - self.upper) - self._above(value)) / self._possible(value)
+
+    def _scarce(self, value: float) -> bool:
+        """Whether hardly any true value of a zone is possible."""
+        return self.zone and self.lower is None and self._below(value) < SCARCE
 
     def _possible(self, value: float) -> float:
         """Probability of a true value that can be."""
@@ -152,7 +162,7 @@ class Limits:
         prior = self.prior
         if prior is None:
             return self.within(value), self.beyond(value)
-        true = value - self.errors
+        true = np.abs(value - self.errors) if self._scarce(value) else value - self.errors
         weight = np.exp(-0.5 * ((true - prior.mean) / prior.sd) ** 2)
         if self.zone:
             weight = np.where(true < 0, 0.0, weight)

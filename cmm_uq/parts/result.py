@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.conformity.limits import SCARCE
 from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.evaluating import characteristics_of
@@ -24,9 +25,6 @@ from cmm_uq.uncertainty.monte_carlo import Simulated
 
 FEWEST = 500
 """Draws that are possible, from which on a probability is taken from them alone."""
-
-SCARCE = 0.05
-"""Part of the draws, below which those that are possible say nothing of where an interval ends."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +129,8 @@ def conforming(plan: Plan, errors: Floats, measured: Floats) -> tuple[Floats, fl
     together : of all that have some at once; ``nan`` where none has.
     """
     true, zones = measured - errors, never_negative(plan)
+    scarce = zones & (np.mean(true >= 0, axis=0) < SCARCE)
+    true[:, scarce] = np.abs(true[:, scarce])
     inside = np.ones(true.shape, dtype=bool)
     limited = np.zeros(len(plan.characteristics), dtype=bool)
     for i, one in enumerate(plan.characteristics):
@@ -142,8 +142,9 @@ def conforming(plan: Plan, errors: Floats, measured: Floats) -> tuple[Floats, fl
     each = np.array([_share(inside[:, i], possible[:, i]) if limited[i] else np.nan for i in range(len(limited))])
     if not limited.any():
         return each, float("nan")
-    all_inside, all_possible = (np.asarray(of[:, limited].all(axis=1)) for of in (inside, possible))
-    return each, _share(all_inside, all_possible)
+    together = _share(*(np.asarray(of[:, limited].all(axis=1)) for of in (inside, possible)))
+    kept = each[limited]  # what is possible of all at once is not what is possible of each: Fréchet's bounds
+    return each, float(np.clip(together, max(0.0, 1 - np.sum(1 - kept)), kept.min()))
 
 
 def _share(inside: NDArray[np.bool_], possible: NDArray[np.bool_]) -> float:

@@ -152,11 +152,21 @@ def test_without_any_spread_it_is_inside_or_outside() -> None:
 def test_a_zone_that_was_measured_better_than_its_errors_is_accepted_by_its_probability(
     rule: Rule, outcome: str
 ) -> None:
-    """Less than zero by two u: of what is left above zero, Φ(-3.2)/Φ(-2) = 3 % lies above 1.2 u, and 13 % above 0.75 u."""
+    """Less than zero by 1.5 u: of what is left above zero 18 % lie above 0.75 u, and 4.5 % above 1.25 u."""
     limits = Limits(None, 0.75 * U, NORMAL, zone=True)
-    found = judge(limits, rule, -2 * U)
-    assert found.beyond == pytest.approx(stats.norm.sf(2.75) / stats.norm.sf(2), rel=0.05)
+    found = judge(limits, rule, -1.5 * U)
+    assert found.beyond == pytest.approx(stats.norm.sf(2.25) / stats.norm.sf(1.5), rel=0.05)
     assert found.outcome == outcome
     assert (found.accepted is None) == (outcome != "pass")
-    known = judge(Limits(None, 1.2 * U, NORMAL, zone=True), FalseAccept(max_false_accept=0.05), -2 * U)
+    known = judge(Limits(None, 1.25 * U, NORMAL, zone=True), FalseAccept(max_false_accept=0.05), -1.5 * U)
     assert (known.outcome, known.accepted) == ("pass", (None, 0.0))
+
+
+@pytest.mark.parametrize("prior", [None, Known(0.0, 1e6 * U)], ids=["without a prior", "that says nothing"])
+def test_a_zone_that_was_measured_much_better_than_its_errors_may_be_as_large_as_these(prior: Known | None) -> None:
+    """Less than zero by 3 u, which one draw in 700 is: a normal distribution of mean 3 u on both sides of zero."""
+    limits = Limits(None, 1.2 * U, NORMAL, zone=True, prior=prior)
+    found = judge(limits, "ISO 14253-1", -3 * U)
+    assert found.probability == pytest.approx(stats.norm.cdf(1.2, 3) - stats.norm.cdf(-1.2, 3), abs=1e-3)
+    assert (found.probability or 0) + (found.beyond or 0) == pytest.approx(1)
+    assert found.outcome == "undecided"

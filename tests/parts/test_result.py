@@ -77,3 +77,20 @@ def test_widths_are_zones_and_what_has_a_sign_or_a_size_is_none() -> None:
     assert dict(zip((one.what for one in characteristics), zones, strict=True)) == {
         one.what: one.what not in ("size", "distance", "angle", "x", "y", "z") for one in characteristics
     }
+
+
+def test_all_limits_are_never_kept_more_often_than_one_of_them() -> None:
+    """Two zones with the opposite errors: what is possible of both at once is near zero, of each alone it is not."""
+    errors = np.hstack([DRAWS - 0.25, 0.25 - DRAWS])
+    plan = Plan(PLAN.features, tuple(Characteristic(name, "roundness", ("hole",), upper=0.5) for name in ("a", "b")))
+    each, together = conforming(plan, errors, np.array([0.1, 0.1]))
+    cut = stats.truncnorm(-0.1, np.inf, 0.1, 1.0).cdf(0.5)
+    np.testing.assert_allclose(each, cut, atol=0.004)
+    assert together == min(each)
+
+
+def test_a_zone_of_which_hardly_a_draw_is_possible_is_as_large_as_its_error() -> None:
+    """Three standard deviations below zero, as a decision has it too (:class:`Limits`)."""
+    each, _ = conforming(PLAN, ERRORS, np.full(2, -3.0 + 0.25))
+    assert each[0] == pytest.approx(stats.norm.cdf(1.5, 3.0) - stats.norm.cdf(-1.5, 3.0), abs=0.004)
+    assert each[0] == pytest.approx(Limits(None, 1.5, DRAWS[:, 0] - DRAWS.mean(), zone=True).within(-3.0), abs=0.004)

@@ -73,6 +73,8 @@ def _notes(every: Sequence[Figures]) -> tuple[Text, ...]:
         notes.append(say("The interval is that of the true value less the indicated one."))
         return tuple(notes)
     notes.append(say("All other values are stated less the mean of their errors."))
+    if any(one.stated.value == 0 for one in every):
+        notes.append(say("A width of zero was measured better than its errors: U reaches to the end of its interval."))
     return tuple(notes)
 
 
