@@ -28,8 +28,8 @@ SETTLED = 1e-9
 """Steps, mm, below which a draw is at its minimum: what is left is smaller by the ratio of error to feature."""
 
 SHARED_STEPS = 20
-"""Steps with the normal equations of the nominal points. They settle slowly, or not at all, where points are off by a large part
-of the feature: a bore's along its axis by a third of the probed length."""
+"""Steps with the normal equations of the nominal points. They settle slowly, or not at all, where points are off by a large
+part of the feature: a bore's along its axis by a third of the probed length."""
 
 MOST_STEPS = 60
 BLOCK = 12_000
