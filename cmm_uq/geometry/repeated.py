@@ -27,6 +27,10 @@ from cmm_uq.points import Floats
 SETTLED = 1e-9
 """Steps, mm, below which a draw is at its minimum: what is left is smaller by the ratio of error to feature."""
 
+SHARED_STEPS = 20
+"""Steps with the normal equations of the nominal points. They settle slowly, or not at all, where points are off by a large
+part of the feature: a bore's along its axis by a third of the probed length."""
+
 MOST_STEPS = 60
 BLOCK = 12_000
 """Points worked on together: a dozen arrays of them stay in the cache of a core."""
@@ -233,10 +237,19 @@ class Repeated:
             raise CmmUqError(f"draw {draw} has a displacement that is no finite number", fix="Correct or leave it out")
         return local
 
-    def _step(self, state: Floats, local: Floats) -> tuple[Floats, Floats, Floats]:
-        """Steps (B, k) towards the least-squares features, distances and derivatives before them."""
+    def _step(self, state: Floats, local: Floats, *, own: bool = False) -> tuple[Floats, Floats, Floats]:
+        """Steps (B, k) towards the least-squares features, distances and derivatives before them.
+
+        ``own``: by the normal equations of each draw (Gauss and Newton), in place of those of the nominal points.
+        """
         d, J = self.placed.shape.distances(state, local)
-        return np.einsum("kbn,bn->bk", J, d) @ self._inverse, d, J
+        gradient = np.einsum("kbn,bn->bk", J, d)
+        if own and self.placed.shape is not LINE and np.isfinite(gradient).all():
+            scaled = J.transpose(1, 0, 2) / self._units[:, None]
+            # of a draw that is far off the matrix may be singular
+            inverse = np.linalg.pinv(scaled @ scaled.transpose(0, 2, 1), hermitian=True)
+            return np.einsum("bkl,bl->bk", inverse, gradient / self._units) / self._units, d, J
+        return gradient @ self._inverse, d, J
 
     def _first_order(self) -> Floats:
         """(n·d, k) by which the state follows each coordinate, by a step of a millionth of the extent: where to begin."""
@@ -262,8 +275,8 @@ class Repeated:
     def _descended(self, local: Floats, errors: Floats, first: int) -> tuple[Floats, Floats]:
         """States (B, k) of the least-squares features, and distances (B, n)."""
         state = self.placed.state + errors.reshape(len(errors), -1) @ self._response
-        for _ in range(MOST_STEPS):
-            step, d, J = self._step(state, local)
+        for done in range(MOST_STEPS):
+            step, d, J = self._step(state, local, own=done >= SHARED_STEPS)
             state -= step
             largest = np.abs(step * self._units).max(axis=1)
             if largest.max() <= SETTLED:
