@@ -199,10 +199,26 @@ class MeasurementModel:
             own = [keys.index(unknown.key) for unknown in self.unknowns]
             linear = whole.linear.only(own)
             return Estimate(self._solved(linear), linear, whole.about[own])
-        values = np.array([u.prior_mean for u in self.unknowns])
+        most: int | None = None
+        while True:
+            try:
+                return self._iterated(most)
+            except CmmUqError:
+                first = self._solved(self.linearised(self._beforehand), most)
+                if first.condition <= _ILL_CONDITIONED or first.rank == 1:
+                    raise
+                most = first.rank - 1  # what the recording hardly shows led the iteration away from all machines
+
+    @property
+    def _beforehand(self) -> Floats:
+        return np.array([u.prior_mean for u in self.unknowns])
+
+    def _iterated(self, most: int | None) -> Estimate:
+        """The estimate with so many combinations taken as determined, at the most."""
+        values = self._beforehand
         for _ in range(10):
             linear = self.linearised(values)
-            result = self._solved(linear)
+            result = self._solved(linear, most)
             scale = np.array([u.scale for u in self.unknowns])
             change = np.abs(result.value - values) / scale
             values = result.value
@@ -211,13 +227,13 @@ class MeasurementModel:
         about = self._likeliest(linear, values, result)
         return Estimate(result, linear if about is values else self.linearised(about), about)
 
-    def _solved(self, linear: LinearModel) -> LeastSquares:
+    def _solved(self, linear: LinearModel, most: int | None = None) -> LeastSquares:
         """Least squares, without angles that the recording would show only if its placings were known without noise.
 
         The squarenesses YZ and ZX of a plate that lies flat move it along its own plane by what the noise of its attitude
         makes of them: their estimates would be radians, about which nothing is linear.
         """
-        found, still = solve(linear), np.zeros(len(linear.unknowns))
+        found, still = solve(linear, most), np.zeros(len(linear.unknowns))
         while found.condition > _ILL_CONDITIONED and found.rank > 1:
             if not self.leans_beyond(still, found.spread, _NO_SQUARENESS):
                 break

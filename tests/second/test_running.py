@@ -68,3 +68,10 @@ def test_the_page_counts_what_was_run_and_says_what_was_asked(
     assert "| `ppm` | 1 of 1: 100.0 % (2.5–100.0) |" in page
     assert (tmp_path / "images" / "diagnosis-second-study.png").stat().st_size > 10_000
     assert "22 cases" in capsys.readouterr().out
+
+
+def test_a_candidate_that_only_the_noise_of_an_attitude_shows_ends_no_diagnosis(tmp_path: Path) -> None:
+    """A level plate displayed in steps of 5 µm: its own squareness YZ follows these, and least squares ran away with it."""
+    made = case(20261124, "nothing, display", 258)
+    write(made, tmp_path)
+    assert "artefact_squareness_yz" not in diagnosed(tmp_path / made.name, whole=True)["effects"]
