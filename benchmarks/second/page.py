@@ -89,12 +89,12 @@ def _state(truths: list[dict], pairs: Pairs, faults: list, mark: str, asked: tup
     by = [sum(t["kind"] == kind for t, _ in pairs) for kind in NOTHING]
     lines = [
         f"{len(pairs)} cases were diagnosed of {len(truths)} made with seed {asked[2]}, whose truth was sealed before as "
-        f"`{mark[:16]}…`: {hiding} with something hidden (600 are asked for), and of each kind of noise {min(by)} to "
-        f"{max(by)} without a cause (300 are asked for)."
+        f"`{mark[:16]}…`: {hiding} with something hidden (600 are asked for), and of each kind of noise "
+        f"{min(by) if min(by) == max(by) else f'{min(by)} to {max(by)}'} without a cause (300 are asked for)."
     ]
     again = sum(bool(f.get("again")) for _, f in pairs)
     if again:
-        lines.append(f"{again} of them was diagnosed again after the refusal that it met had been mended.")
+        lines.append(f"Diagnosed again after a refusal had been mended: {again} of them.")
     return lines + ([f"{len(faults)} ended in a refusal or a fault: " + "; ".join(f"{n}: {w}" for n, w in faults[:8]) + "."]
                     if faults else [])  # fmt: skip
 
