@@ -14,7 +14,7 @@ _BY_ROOM = {
     "documents": "wording",
     "uncertainty": "quantity rounding coverage_intervals degrees_of_freedom shapes",
     "inference": "least_squares linear_model posterior effective",
-    "diagnosis": "comparison/evidence held_out location power",
+    "diagnosis": "comparison/evidence comparison/given comparison/precision held_out location power",
     "planning": "exchange identifiability information separation suggestion",
 }  # fmt: skip
 MODULES = tuple(f"cmm_uq/{room}/{name}.py" for room, names in _BY_ROOM.items() for name in names.split())

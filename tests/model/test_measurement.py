@@ -146,3 +146,14 @@ def test_draws_of_one_effect_are_reported_beside_others_whose_shape_is_not_held(
     ((key, (values, _)),) = model.reported(np.array([[1.0, 2.0, 3.0, 4.0]]), ["squareness_xy"]).items()
     assert key == ("squareness_xy", "angle_arcsec")
     assert values.tolist() == [3.0]
+
+
+def test_bars_between_places_that_have_nothing_to_do_with_each_other_are_no_machines() -> None:
+    """Ends anywhere in the volume, of the certified length on average: what is well determined stays refused."""
+    random = np.random.default_rng(1)
+    twelve = bars(random, 12, 400.0, Machine("m", "XYZ", TRAVEL))
+    ends = random.uniform(TRAVEL[:, 0], TRAVEL[:, 1], (24, 3))
+    ends *= 400 / np.linalg.norm(ends[::2] - ends[1::2], axis=1).mean()
+    six = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"]
+    with pytest.raises(CmmUqError, match="they are no machine's"):
+        MeasurementModel(Ballbar(bar_facts(), twelve.at(ends)), effects(six)).estimate()
