@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import random
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 Altered = tuple[bytes, str]
 """What became of a file, and what was done."""
@@ -192,8 +192,6 @@ JSON = (
     json_keys,
     json_form,
 )
-
-Alteration = Callable[[bytes, random.Random], Altered]
 
 
 def _leaves(data: object) -> list[tuple[dict | list, str | int, object]]:

@@ -13,7 +13,6 @@ from benchmarks.tampering.cases import Case
 from cmm_uq.commands.verify import again, verify
 from cmm_uq.errors import CmmUqError
 
-MOST_SECONDS = 60.0
 _KNOWN: dict[str, Any] = {}
 
 

@@ -14,9 +14,6 @@ from cmm_uq.dcc.tree import Node
 VERSION = "3.2.1"
 """Of the schema that is written."""
 
-VERSIONS = (VERSION, "3.3.0")
-"""Of the schemas that a certificate of this package is valid against."""
-
 
 def _version(text: str) -> str:
     if not text.startswith("3."):

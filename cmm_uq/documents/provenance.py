@@ -96,20 +96,6 @@ def same_but_for_the_platform(one: bytes, other: bytes) -> bool:
     return _without_platform(one) == _without_platform(other)
 
 
-def platform_told(data: bytes) -> dict[str, str]:
-    """What a provenance says of platform and packages, by name; nothing where it says nothing.
-
-    Raises
-    ------
-    ValueError : it is no JSON.
-    """
-    entities = _entities_of(json.loads(data))
-    named = {name.removeprefix("package:"): one for name, one in entities.items() if name.startswith("package:")}
-    platform = entities.get(PLATFORM, {})
-    told = {name.removeprefix("cmm-uq:"): str(value) for name, value in platform.items() if name.startswith("cmm-uq:")}
-    return told | {name: str(one.get("cmm-uq:version", "")) for name, one in named.items()}
-
-
 def _without_platform(data: bytes) -> object:
     graph = json.loads(data)
     entities = _entities_of(graph)

@@ -11,15 +11,12 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.files.content import content_of
 from cmm_uq.files.csv_table import CsvTable, csv_table
-from cmm_uq.files.limits import TABLE_BYTES
 from cmm_uq.points import AXES, Floats
 
 _SENSOR = re.compile(r"(?:temp_)?([xyz])_?(\d+)_c")
@@ -107,12 +104,6 @@ class TemperatureLog:
                 where=where(row),
                 fix=f"Gaps of up to {self.max_gap:.10g} s are interpolated over; longer ones where max_gap_s allows it",
             )
-
-
-def read_temperature_log(path: Path, sensors: Mapping[str, Sequence[str]] | None = None) -> TemperatureLog:
-    """Temperature log from a CSV file; see :func:`parse_temperature_log`."""
-    content = content_of(path, TABLE_BYTES, "Check the name of the log")
-    return parse_temperature_log(content, str(path), sensors)
 
 
 def parse_temperature_log(

@@ -155,12 +155,6 @@ def compensate_points(points: Points, compensation: Compensation) -> Points:
     return _moved(points, xyz, extrapolated)
 
 
-def indicate_points(points: Points, compensation: Compensation) -> Points:
-    """A recording at the coordinates that the machine would indicate; the inverse of :func:`compensate_points`."""
-    xyz, extrapolated = compensation.indicated_from_true(points.xyz, circumstances(points))
-    return _moved(points, xyz, extrapolated)
-
-
 def machine_compensation(
     points: Points, maps: ErrorMaps, *, rigid: bool = False, beyond: Beyond = "refuse"
 ) -> Compensation:

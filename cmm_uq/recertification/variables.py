@@ -88,12 +88,6 @@ def fitted_drift(days: Floats, changes: Floats, order: int = 1) -> Drift:
     )
 
 
-def best_order(days: Floats, changes: Floats, most: int) -> int:
-    """Order of the polynomial with the least scatter for its degrees of freedom."""
-    most = min(most, len(days) - 1)
-    return min(range(1, most + 1), key=lambda order: fitted_drift(days, changes, order).scatter, default=1)
-
-
 def reliability_after(drift: Drift, start: Start, days: Floats, low: float | None, high: float | None) -> Floats:
     """Probability (n,) that the value lies within its limits after times (n,), each limit where there is one.
 
@@ -118,11 +112,6 @@ def interval_of_reliability(drift: Drift, start: Start, target: float, low: floa
     0 where it is not reached from the beginning, infinity where it lasts a hundred of the longest observed intervals.
     """
     return _falls(lambda days: reliability_after(drift, start, days, low, high) - target, drift.longest)
-
-
-def interval_of_uncertainty(drift: Drift, start: Start, u: float) -> float:
-    """Days until the standard uncertainty of the value, √(u_start² + u_fit²), grows to ``u``; see above."""
-    return _falls(lambda days: u - np.hypot(start.u, drift.u_change(days)), drift.longest)
 
 
 def _falls(excess: Callable[[Floats], Floats], longest: float) -> float:

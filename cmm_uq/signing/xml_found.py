@@ -58,10 +58,10 @@ def signatures_of_xml(data: bytes, trust: Trust, *, where: str = "the XML file")
     """
     root = root_of(data, where)
     elements = list(root.iter(SIGNATURE))
-    return tuple(_found(data, element, several=len(elements) > 1, trust=trust, where=where) for element in elements)
+    return tuple(_found(data, element, several=len(elements) > 1, trust=trust) for element in elements)
 
 
-def _found(data: bytes, element: _Element, *, several: bool, trust: Trust, where: str) -> Signature:
+def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Signature:
     with installed():
         from cmm_uq.signing.chain import Evidence, standing
     problems = _shape(element)

@@ -75,12 +75,6 @@ def as_text(outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
     ]
 
 
-def as_markdown(outcomes: Sequence[Outcome]) -> str:
-    """The same as a table for a document."""
-    lines = [HEADINGS, tuple("---" for _ in HEADINGS), *as_text(outcomes)]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines) + "\n"
-
-
 def _beyond(number: float, tolerance: float) -> str:
     decimals = 1 - int(f"{tolerance:.0e}".split("e")[1])
     return f"{number:.{max(0, decimals)}f}" if decimals < 9 else f"{number:.6g}"

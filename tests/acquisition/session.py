@@ -9,7 +9,6 @@ from cmm_uq.acquisition.conducting import Conductor
 from cmm_uq.commands.acquire import Acquisition, begin_acquisition
 from cmm_uq.instruments.reading import Reading
 
-TRUE_LENGTH_MM = 500.0
 JOB = """
 [job]
 id = "bar"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.temperature_log import parse_temperature_log, read_temperature_log
+from cmm_uq.jobs.temperature_log import parse_temperature_log
 
 LOG = b"""time_s,x1_c,x2_c,x3_c,y1_c,y2_c,z1_c,table_c
 0,20.0,20.3,20.6,21,22,19,18
@@ -69,8 +69,3 @@ def test_what_is_wrong_is_named_with_its_line(old, new, message):
 def test_no_temperature_is_known_before_or_after_the_log(time):
     with pytest.raises(CmmUqError, match="the log reaches from 0 to 120 s"):
         parse_temperature_log(LOG.replace(b",,18", b",21,18"), "log.csv").at([60.0, time])
-
-
-def test_a_log_that_is_not_there_is_said_to_be_so(tmp_path):
-    with pytest.raises(CmmUqError, match="no such file"):
-        read_temperature_log(tmp_path / "none.csv")

@@ -10,10 +10,8 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.recertification.variables import (
     Drift,
     Start,
-    best_order,
     fitted_drift,
     interval_of_reliability,
-    interval_of_uncertainty,
 )
 
 DAYS = np.array([70.0, 86, 104, 135, 167, 173])
@@ -38,7 +36,8 @@ def test_with_the_scatter_in_it_the_uncertainty_reaches_its_target_as_in_table_7
     """The handbook adds the scatter about the curve to the uncertainty; suncal 1.7.1 does not (328.93 days)."""
     fit = fitted_drift(DAYS, CHANGES, 2)
     single = Start(10.03, float(np.hypot(0.28, fit.scatter)))
-    assert interval_of_uncertainty(fit, single, 0.5) == pytest.approx(327.15, abs=5e-3)
+    before, after = np.hypot(single.u, fit.u_change(np.array([327.145, 327.155])))
+    assert before < 0.5 < after
 
 
 def test_the_handbooks_one_sided_interval_has_four_degrees_of_freedom() -> None:
@@ -54,7 +53,8 @@ def test_suncals_intervals() -> None:
     fit = fitted_drift(DAYS, CHANGES, 2)
     assert interval_of_reliability(fit, START, 0.9, 9, 11) == pytest.approx(184.934255, abs=1e-5)
     assert interval_of_reliability(fit, START, 0.9, None, 11) == pytest.approx(184.934257, abs=1e-5)
-    assert interval_of_uncertainty(fit, START, 0.5) == pytest.approx(328.931704, abs=1e-5)
+    before, after = np.hypot(START.u, fit.u_change(np.array([328.93169, 328.93171])))
+    assert before < 0.5 < after
 
 
 def test_suncal_itself() -> None:
@@ -81,13 +81,6 @@ def test_a_known_drift_by_hand() -> None:
     assert interval_of_reliability(known, Start(0, 0.1), 0.975, None, 1) == pytest.approx(
         1000 - 100 * norm.ppf(0.975), rel=1e-6
     )
-
-
-def test_the_order_with_the_least_scatter_is_taken() -> None:
-    days = np.arange(1.0, 9.0)
-    wobble = 1e-3 * np.array([1, -1, 1, -1, 1, -1, 1, -1])
-    assert best_order(days, 2 * days + wobble, 3) == 1
-    assert best_order(days, days**2 + wobble, 3) == 2
 
 
 def test_one_interval_is_too_few() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cmm_uq.uncertainty.reference.case import ReferenceCase
-from cmm_uq.uncertainty.selftest import HEADINGS, REFERENCE_CASES, as_markdown, as_text, run
+from cmm_uq.uncertainty.selftest import HEADINGS, REFERENCE_CASES, as_text, run
 
 
 @pytest.mark.parametrize("case", REFERENCE_CASES, ids=lambda case: case.title)
@@ -31,4 +31,3 @@ def test_every_row_has_its_source() -> None:
         ("sum: b", "−2", "1e−12", "−2", "arithmetic", "pass"),
     ]
     assert all(len(row) == len(HEADINGS) for row in rows)
-    assert as_markdown(run([case])).splitlines()[2] == "| sum: a | 2 | 0.1 | 2.05 | arithmetic | pass |"

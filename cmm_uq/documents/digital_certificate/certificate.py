@@ -100,7 +100,7 @@ def digital_certificate(
                     *evidence(decided, say_in, figures, certifies=real),
                     _everything(as_json(results) if file is None else file, say_in),
                 ),
-                metadata=metadata(job, results, say_in),
+                metadata=metadata(results, say_in),
                 ref_id=("machine",),
                 ref_type=("cmm_calibration",) if real else (f"cmm_{job.origin}", "cmm_notACertificate"),
             ),

@@ -181,7 +181,7 @@ def _temperature(id_: str, name: Text, celsius: float, ref_type: str, say_in: Sa
     return Quantity(id=id_, name=words_of(name, say_in), value=both, ref_type=(ref_type,))
 
 
-def metadata(job: Job, results: Mapping[str, Any], say_in: SayIn) -> tuple[Statement, ...]:
+def metadata(results: Mapping[str, Any], say_in: SayIn) -> tuple[Statement, ...]:
     """From which files it can be computed again, and what was odd in the recording."""
     hashes = [f"{name} SHA-256 {digest}" for name, digest in results["job"]["inputs_sha256"].items()]
     seed = results.get("sampling", {}).get("seed")

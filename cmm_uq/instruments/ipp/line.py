@@ -20,9 +20,6 @@ LONGEST = 65536
 MOST_DIGITS = 16
 """Of a number (section 6.1.4.2)."""
 
-UNSOLICITED = "E0000"
-"""Tag of what the server says by itself."""
-
 _RESPONSE = re.compile(r"(?P<tag>\d{5}|E\d{4}) (?P<sign>[&#!%])(?: (?P<rest>.*))?")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d{1,3})?")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(?:\.[A-Za-z][A-Za-z0-9]*)*")
@@ -62,11 +59,6 @@ class Response:
     tag: str
     sign: Sign
     rest: str = ""
-
-    @property
-    def is_event(self) -> bool:
-        """Whether its tag is that of an event."""
-        return self.tag.startswith("E")
 
 
 @dataclass(frozen=True)

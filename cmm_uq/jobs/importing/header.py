@@ -80,7 +80,7 @@ def header_of(sheet: Sheet, keys: ImportKeys, where: str, wanted: Sequence[Seque
         found = _assigned(headings, keys)
         if found is not None and any(set(columns) <= set(found) for columns in wanted):
             place = sheet.at(where, row)
-            return _with_units(sheet, row, headings, _unambiguous(found, headings, place), place)
+            return _with_units(sheet, row, headings, _unambiguous(found, headings, place))
     return None
 
 
@@ -149,10 +149,10 @@ def _unambiguous(found: Found, headings: Sequence[str], place: str) -> dict[str,
             raise CmmUqError(f"columns {shown} could all be {name}", where=place,
                              fix=f'Say which: columns = {{ {name} = "{headings[own[0][1]]}" }}')  # fmt: skip
         columns[name] = tuple(i for _, i in sorted(own, key=lambda one: one[0] or 0))
-    return _one_count(columns, headings, place)
+    return _one_count(columns, place)
 
 
-def _one_count(columns: dict[str, tuple[int, ...]], headings: Sequence[str], place: str) -> dict[str, tuple[int, ...]]:
+def _one_count(columns: dict[str, tuple[int, ...]], place: str) -> dict[str, tuple[int, ...]]:
     """Every column once a row, or once for each of its points."""
     count = max(map(len, columns.values()))
     odd = next((name for name, own in columns.items() if len(own) not in (1, count)), None)
@@ -163,9 +163,7 @@ def _one_count(columns: dict[str, tuple[int, ...]], headings: Sequence[str], pla
                      fix=f"Say which: columns = {{ {name} = [ … ] }}, one heading for each point")  # fmt: skip
 
 
-def _with_units(
-    sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping[str, tuple[int, ...]], place: str
-) -> Header:  # fmt: skip
+def _with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping[str, tuple[int, ...]]) -> Header:
     """The header with its units, which may stand in a row of their own."""
     units, odd = {}, {}
     for i, heading in enumerate(headings):

@@ -111,7 +111,7 @@ def placed_plate(points: Points, plane: str, where: str = "") -> PlacedPlate:
     _check_plane(means.readings, placing, placings, axes, plane, where)
     balls, turned, moved = _laid_over(flat, placing, ball, placings, where)
     _check_balls(flat, placing, ball, (balls, turned, moved), means, where)
-    _check_placings(flat, placing, placings, turned, moved, where)
+    _check_placings(flat, placing, placings, turned, where)
     left = ((points.carriages - means.readings[means.of])[:, axes] / means.ratio[:, None]).ravel()
     dof = 2 * (len(points) - len(means.point))
     return PlacedPlate(
@@ -209,9 +209,7 @@ def _check_balls(
         )  # fmt: skip
 
 
-def _check_placings(
-    flat: Floats, placing: Ints, placings: Ints, turned: Floats, moved: Floats, where: str
-) -> None:  # fmt: skip
+def _check_placings(flat: Floats, placing: Ints, placings: Ints, turned: Floats, where: str) -> None:
     middles = np.array([flat[placing == s].mean(axis=0) for s in range(len(placings))])
     for a, b in combinations(range(len(placings)), 2):
         turn = np.angle(np.exp(1j * (turned[b] - turned[a])))

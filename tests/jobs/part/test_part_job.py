@@ -16,7 +16,7 @@ from cmm_uq.jobs.source import InMemory
 from cmm_uq.jobs.toml_file import as_toml
 from tests.jobs.part.parts import plate, tables
 
-PLANE_A, PLANE_B, PLANE_C, BORE = TABLES["feature"]
+PLANE_A, *_, BORE = TABLES["feature"]
 SIZE = TABLES["characteristic"][0]
 CLOUD = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
 
