@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.tampering.cases import Case
-from cmm_uq.commands.verify import again, verify
+from cmm_uq.commands.verify import verify
+from cmm_uq.commands.verify_again import again
 from cmm_uq.errors import CmmUqError
 
 _KNOWN: dict[str, Any] = {}

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.languages.language import ENGLISH, Code
 from cmm_uq.verification.found import AGAIN, NOT_ASKED, Finding, Inquiry
-from cmm_uq.verification.given import RESULTS, Given
+from cmm_uq.verification.given import RESULTS, Given, language_of
 
 if TYPE_CHECKING:
     from cmm_uq.commands.written import Finished, Stage
@@ -34,13 +33,11 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
     from cmm_uq.verification.part_figures import check_part_figures
 
     name, data, _ = given.results
-    try:
+    with inquiry.reading("figures", name):
         check_results(inquiry, given)
         check_part_figures(inquiry, data, name)
         check_part_decisions(inquiry, data, name)
         _check_stated(inquiry, given)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, CmmUqError) as error:
-        inquiry.wrong("figures", name, "", f"has not the parts that cmm-uq writes ({type(error).__name__}: {error})")
     inputs = inputs_of(inquiry, given)
     if inputs is None:
         inquiry.left(f"the machine's certificate and {AGAIN}", "the inputs are not there as results.json names them")
@@ -95,9 +92,7 @@ def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
     from cmm_uq.commands.part_written import in_language
     from cmm_uq.jobs.part.job import part_of
 
-    language = data["job"].get("language", ENGLISH)
-    if language not in get_args(Code):
-        raise CmmUqError(f"{language!r} is no language of documents", where=f"{RESULTS}: job.language")
+    language = language_of(data)
     stated = {name: content for name, content in inputs.items() if name != HISTORY}
     own = {name: content for name, content in stated.items() if not name.startswith(CALIBRATION)}
     job = in_language(part_of(own), language)

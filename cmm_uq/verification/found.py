@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal
+
+from cmm_uq.errors import CmmUqError
 
 Word = Literal["VERIFIED", "NOT VERIFIED", "NOT WHOLLY CHECKED"]
 
@@ -107,6 +111,14 @@ class Inquiry:
         one = Unchecked(what, why)
         if one not in self.unchecked:
             self.unchecked.append(one)
+
+    @contextmanager
+    def reading(self, check: str, file: str) -> Iterator[None]:
+        """Parts of a file that may be missing, or be of another form: then that is what is wrong."""
+        try:
+            yield
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError, CmmUqError) as error:
+            self.wrong(check, file, "", f"has not the parts that cmm-uq writes ({type(error).__name__}: {error})")
 
     @property
     def word(self) -> Word:

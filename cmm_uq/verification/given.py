@@ -6,11 +6,12 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.content import content_of
 from cmm_uq.files.limits import GIVEN, PDF_BYTES
+from cmm_uq.languages.language import ENGLISH, Code
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.html_page import HtmlPage, read_html
 from cmm_uq.verification.pdf_file import PdfFile, read_pdf
@@ -233,3 +234,16 @@ def _check_manifest(inquiry: Inquiry, given: Given, manifest: Manifest) -> None:
             inquiry.wrong("files", name, "", f"is not the file whose hash {MANIFEST} has", stands, digest)
     for name in contents.keys() - manifest.files.keys():
         inquiry.wrong("files", MANIFEST, "files", f"does not name {name}")
+
+
+def language_of(data: Mapping[str, Any]) -> Code:
+    """Language of the documents, as results.json names it; English where it names none.
+
+    Raises
+    ------
+    CmmUqError : documents know no such language.
+    """
+    language: Code = data["job"].get("language", ENGLISH)
+    if language not in get_args(Code):
+        raise CmmUqError(f"{language!r} is no language of documents", where=f"{RESULTS}: job.language")
+    return language

@@ -8,7 +8,7 @@ import pytest
 
 from cmm_uq.commands import report
 from cmm_uq.commands.reading import read_job
-from cmm_uq.commands.verify import again
+from cmm_uq.commands.verify_again import again
 from cmm_uq.documents.results_file import false_alarms
 from cmm_uq.errors import CmmUqError
 from cmm_uq.verification.given import Given
