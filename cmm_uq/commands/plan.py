@@ -39,7 +39,8 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
     from cmm_uq.commands.planning import make_plan
 
     plan = make_plan(job, power=power, seed=seed, progress=stage)
-    from cmm_uq.commands.plan_page import plan_document, plan_results
+    from cmm_uq.commands.plan_page import plan_document
+    from cmm_uq.commands.plan_results import plan_results
     from cmm_uq.commands.plan_summary import plan_summary
 
     stage("Drawing the placings", 0.95)

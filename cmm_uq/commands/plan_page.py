@@ -1,10 +1,8 @@
-"""A plan as a document for the operator and for whoever answers for it, and its results.json."""
+"""A plan as a document for the operator and for whoever answers for it."""
 
 from __future__ import annotations
 
-from typing import Any
-
-from cmm_uq.commands.plan_noise import averaging_note, noise_data, noise_facts, worth, worth_data
+from cmm_uq.commands.plan_noise import averaging_note, noise_facts, worth
 from cmm_uq.commands.plan_words import (
     CRITERIA,
     STATUS,
@@ -19,88 +17,17 @@ from cmm_uq.commands.plan_words import (
     title_of,
     unit_of,
 )
-from cmm_uq.commands.planning import RECORDED, Outlook, Plan
+from cmm_uq.commands.planning import RECORDED, Plan
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.diagnosis.power import POWER, SIZES
 from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.documents.plan_picture import gain_plot, placing_pictures
 from cmm_uq.documents.program import program
-from cmm_uq.documents.results_file import head
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, number, plural, say
 from cmm_uq.units import unit
 
-SCHEMA = "cmm-uq/plan/1"
-
-
 MET, NOT_MET = Verbatim("✓"), Verbatim("✗")
-
-
-def plan_results(plan: Plan) -> dict[str, Any]:
-    """results.json of a plan."""
-    better = None if plan.better is None or plan.scores is None else {
-        "criterion": plan.setting.plan.criterion, "score_before": plan.scores[0], "score_after": plan.scores[1],
-        "kept": plan.kept, "added": len(plan.better.placings) - plan.kept, **_outlook_data(plan.better),
-    }  # fmt: skip
-    return {
-        **head(plan.job, SCHEMA),
-        "noise": noise_data(plan),
-        "start": {"name": plan.name, "placings": len(plan.start.placings), **_outlook_data(plan.start)},
-        "better": better,
-        "repeats": worth_data(plan),
-        "free": list(plan.free),
-        "conditions": [
-            {"what": condition.what, "met": condition.met, "missing": list(condition.missing)}
-            for condition in plan.conditions
-        ],
-        "placings": [
-            {"measurement": number, "title": placing.title, "minutes": time,
-             "middle_mm": placing.middle.tolist(), "points": len(placing.points)}
-            for number, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.first)
-        ],
-        "minutes": sum(plan.minutes),
-    }  # fmt: skip
-
-
-def _outlook_data(outlook: Outlook) -> dict[str, Any]:
-    found = outlook.identifiability
-    if found is None:
-        return {}
-    return {
-        "determined": [
-            {
-                "effect": p.unknown.key[0],
-                "parameter": p.unknown.key[1],
-                "unit": p.unknown.unit,
-                "u": p.u,
-                "u_with_prior": p.u_with_prior,
-                "u_white": p.u_white,
-                "status": p.status,
-            }
-            for p in found.parameters
-        ],
-        "undetermined": [
-            {
-                "parameters": {f"{owner}.{name}": part for (owner, name), part in parts.items()},
-                "words": combination(parts),
-            }
-            for parts in found.free
-        ],
-        "singular_values": found.singular_values.tolist(),
-        "indistinguishable": [{"effects": [a, b], "cosine": cosine} for a, b, cosine in found.alike],
-        "absorbed": [{"effect": name, "as": list(others)} for name, others in found.absorbed],
-        "unseen": list(found.unseen),
-        "smallest": [
-            {
-                "effect": power.effect,
-                "parameter": power.parameter,
-                "unit": power.unit,
-                "detected": power.detectable,
-                "named": power.identifiable,
-            }
-            for power in outlook.powers
-        ],
-    }
 
 
 def plan_document(plan: Plan) -> Document:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from cmm_uq.documents.document import Plot
 from cmm_uq.documents.lettering import lettered
 from cmm_uq.documents.measured import width_mm
+from cmm_uq.documents.narrowing import NAMES_MM, narrowed
 from cmm_uq.documents.plot_style import (
     ACCENT,
     BAND,
@@ -22,7 +23,6 @@ from cmm_uq.documents.plot_style import (
     INK,
     MUTED,
     RULE,
-    SMALL,
     TINY,
     WIDTH_MM,
     bars,
@@ -34,7 +34,6 @@ from cmm_uq.documents.plot_style import (
 )
 from cmm_uq.documents.shown import shown, told
 from cmm_uq.errors import CmmUqError
-from cmm_uq.languages.saying import Said
 from cmm_uq.messages import Text, Verbatim, say, semicolons, signed
 from cmm_uq.points import Floats
 
@@ -340,36 +339,8 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
         return drawn(figure, caption, alternative)
 
 
-NAMES_MM = 54.0
-"""Room of the names beside the bars of a budget."""
-
-
 def _cut(text: Text, length: int) -> Text:
     """A name for the room beside the bars of a picture, at most so many letters long; it stands whole in a table."""
     if lettered(text) is not text:  # longer or wider letters than English ones
         return narrowed(text, NAMES_MM)
     return text if len(text) <= length else Verbatim(text[: length - 1] + "…")
-
-
-def narrowed(text: Text, room_mm: float) -> Text:
-    """A name as it is lettered, cut to the room that it has."""
-    said = lettered(text)
-    whole = str.__str__(said)
-    kept = whole if width_mm(whole, SMALL) <= room_mm else _longest(whole, room_mm)
-    if kept == text:
-        return text
-    return Verbatim(kept) if said is text else Said(kept, text)
-
-
-def _longest(text: str, room_mm: float) -> str:
-    """The longest beginning of a text that has room, with what says that it goes on."""
-    fits, too_long, trial = 0, len(text), len(text) // 2
-    while too_long - fits > 1:
-        width = width_mm(_going_on(text, trial), SMALL)
-        fits, too_long = (trial, too_long) if width <= room_mm else (fits, trial)
-        trial = min(max(round(trial * room_mm / width), fits + 1), too_long - 1)
-    return _going_on(text, fits)
-
-
-def _going_on(text: str, count: int) -> str:
-    return text[:count].rstrip(" ,") + "…"

@@ -15,7 +15,7 @@ from cmm_uq.commands.compensate import write_compensated
 from cmm_uq.commands.diagnosing import diagnose_read
 from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
-from cmm_uq.kinds.error_maps.page import maps_results
+from cmm_uq.kinds.error_maps.results import maps_results
 from cmm_uq.kinds.error_maps.squareness import squareness_findings, squareness_sections
 from cmm_uq.model.machine_maps import maps_of
 from cmm_uq.points import Floats

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.commands.plan_page import plan_document, plan_results
+from cmm_uq.commands.plan_page import plan_document
+from cmm_uq.commands.plan_results import plan_results
 from cmm_uq.commands.plan_words import combination
 from cmm_uq.commands.planning import Plan, make_plan
 from cmm_uq.commands.reading import read_job

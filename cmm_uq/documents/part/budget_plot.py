@@ -9,9 +9,9 @@ import numpy as np
 from cmm_uq.documents.document import Plot
 from cmm_uq.documents.lettering import lettered
 from cmm_uq.documents.measured import width_mm
+from cmm_uq.documents.narrowing import NAMES_MM, narrowed
 from cmm_uq.documents.part.margin_plot import A_PAGE
 from cmm_uq.documents.plot_style import INK, TINY, WIDTH_MM, drawn, house_style, new_figure
-from cmm_uq.documents.plots import NAMES_MM, narrowed
 from cmm_uq.messages import Text, commas, number, say, semicolons
 from cmm_uq.points import Floats
 

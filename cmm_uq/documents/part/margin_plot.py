@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmm_uq.documents.document import Outcome, Plot
+from cmm_uq.documents.narrowing import NAMES_MM, narrowed
 from cmm_uq.documents.plot_style import (
     ACCENT,
     BAD,
@@ -22,7 +23,6 @@ from cmm_uq.documents.plot_style import (
     house_style,
     new_figure,
 )
-from cmm_uq.documents.plots import NAMES_MM, narrowed
 from cmm_uq.messages import Text, number, say
 
 if TYPE_CHECKING:

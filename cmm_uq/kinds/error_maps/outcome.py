@@ -7,7 +7,8 @@ from cmm_uq.documents.lettering import lettered_in
 from cmm_uq.documents.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed, diagnose_error_maps
 from cmm_uq.kinds.error_maps.overview import told
-from cmm_uq.kinds.error_maps.page import maps_document, maps_results
+from cmm_uq.kinds.error_maps.page import maps_document
+from cmm_uq.kinds.error_maps.results import maps_results
 
 
 def outcome(found: MapsDiagnosed, seed: int) -> Outcome:

@@ -1,8 +1,6 @@
-"""The diagnosis of error maps as a document, and its results.json."""
+"""The diagnosis of error maps as a document."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from cmm_uq import __version__
 from cmm_uq.documents.diagnosis.words import held_out, sure
@@ -10,84 +8,17 @@ from cmm_uq.documents.document import Block, Column, Document, Facts, Paragraph,
 from cmm_uq.documents.effect_words import effect_of, size_of, titles
 from cmm_uq.documents.improvement_table import improvement_table
 from cmm_uq.documents.plots import curve_with_band
-from cmm_uq.documents.results_file import effect_data, false_alarms, finding_data, head, improvement_data, quantity_data
 from cmm_uq.documents.wording import probability
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.kinds.error_maps.analysis import MapsDiagnosed
 from cmm_uq.kinds.error_maps.diagnosis import Difference
 from cmm_uq.kinds.error_maps.overview import overview_of
 from cmm_uq.kinds.error_maps.search import ColumnComparison
-from cmm_uq.kinds.error_maps.squareness import squareness_data, squareness_sections
+from cmm_uq.kinds.error_maps.squareness import squareness_sections
 from cmm_uq.kinds.error_maps.words import VERDICTS, difference_words, next_words, noise_words
 from cmm_uq.messages import Text, Verbatim, commas, day, lines, names, number, say
 
 _PICTURES = 3
-
-
-def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
-    """results.json of a diagnosis of error maps."""
-    d, noise = found.diagnosis, found.diagnosis.displacement
-    squareness = squareness_data(found.maps)
-    nothing = {"value": None, "u": None, "interval95": None}
-    return {
-        **head(found.job, effects=False),
-        "sampling": {
-            "sampler": d.sampler,
-            "seed": seed,
-            "ess_min": min((p.ess_min for p in d.posteriors), default=None),
-            "rhat_max": max((p.rhat_max for p in d.posteriors), default=None),
-            "converged": all(p.converged for p in d.posteriors),
-        },
-        "diagnosis": {
-            "verdict": d.verdict,
-            "p_value": d.p_value,
-            **false_alarms(d.alpha),
-            "where": [
-                {
-                    "covariate": f"{item.column.axis}_mm",
-                    "region": list(item.region),
-                    "p_value": min(1.0, item.p_value),
-                    "amplitude_um": item.amplitude_um,
-                    "what": item.rival.name,
-                    "probability": item.probability,
-                    "instead": list(item.instead),
-                    "sign_turned": item.turned,
-                }
-                for item in d.differences
-            ],
-            "effects": [effect_data(item, d.improvement) for item in d.effects],
-            "indistinguishable": [],
-            "suggested_measurements": [
-                {"separates": list(names), "what": what, "repetitions": 1, "odds": None}
-                for names, what in next_words(d)
-            ],
-            "noise": {
-                "stated_coordinate_um": None,
-                "coordinate_um": nothing if noise is None else quantity_data(noise),
-                "rotation_arcsec": nothing if d.rotation is None else quantity_data(d.rotation),
-                "placing_um": nothing,
-                "correlated_in_time": False,
-                "heavy_tails": False,
-                "contradicts_stated": False,
-            },
-            "screening": [finding_data(finding, "") for finding in found.findings],
-            "improvement": improvement_data(d.improvement),
-            "compared": [
-                {
-                    "what": compared.column.title,
-                    "positions": len(compared.column.positions),
-                    "temperatures_c": compared.column.temperatures.tolist(),
-                    "p_value": d.p_of(compared),
-                    "explanations": [
-                        {"together": [compared.rivals[i].name for i in key], "probability": p}
-                        for key, p in sorted(compared.combinations.probability.items(), key=lambda item: -item[1])[:6]
-                    ],
-                }
-                for compared in d.comparisons
-            ],
-            **({"squareness_arcsec": squareness} if squareness else {}),
-        },
-    }
 
 
 def maps_document(found: MapsDiagnosed, seed: int) -> Document:

@@ -1,0 +1,36 @@
+"""Names cut to the room that a picture has for them; they stand whole in a table."""
+
+from __future__ import annotations
+
+from cmm_uq.documents.lettering import lettered
+from cmm_uq.documents.measured import width_mm
+from cmm_uq.documents.plot_style import SMALL
+from cmm_uq.languages.saying import Said
+from cmm_uq.messages import Text, Verbatim
+
+NAMES_MM = 54.0
+"""Room of the names beside the bars of a budget."""
+
+
+def narrowed(text: Text, room_mm: float) -> Text:
+    """A name as it is lettered, cut to the room that it has."""
+    said = lettered(text)
+    whole = str.__str__(said)
+    kept = whole if width_mm(whole, SMALL) <= room_mm else _longest(whole, room_mm)
+    if kept == text:
+        return text
+    return Verbatim(kept) if said is text else Said(kept, text)
+
+
+def _longest(text: str, room_mm: float) -> str:
+    """The longest beginning of a text that has room, with what says that it goes on."""
+    fits, too_long, trial = 0, len(text), len(text) // 2
+    while too_long - fits > 1:
+        width = width_mm(_going_on(text, trial), SMALL)
+        fits, too_long = (trial, too_long) if width <= room_mm else (fits, trial)
+        trial = min(max(round(trial * room_mm / width), fits + 1), too_long - 1)
+    return _going_on(text, fits)
+
+
+def _going_on(text: str, count: int) -> str:
+    return text[:count].rstrip(" ,") + "…"
