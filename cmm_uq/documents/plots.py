@@ -314,7 +314,12 @@ def curve_with_band(
 
 
 def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, alternative: Text) -> Plot:
-    """Share of every source in the variance (0 … 1; negative where a correlation takes away), largest first."""
+    """Share of every source in the variance (0 … 1; negative where a correlation takes away), largest first.
+
+    Raises
+    ------
+    CmmUqError : there is no source, or a share is no number.
+    """
     share = finite("shares", shares, (len(sources),))
     if not len(share):
         raise CmmUqError("a budget without a source has no picture")

@@ -57,6 +57,10 @@ def check_length(measured: float, certified: float, what: str, where: str | None
     ----------
     measured, certified : mm.
     what : in the plural, as ``the recorded bars``.
+
+    Raises
+    ------
+    CmmUqError : they differ so, with the mistake that explains it.
     """
     if not certified > 0:
         raise CmmUqError(f"{what} are {measured:.6g} mm long on average, and their references lie all in one place",

@@ -152,6 +152,10 @@ def check_positions(axis: str, positions: Sequence[float], places: Sequence[str]
     Parameters
     ----------
     places : file and line of each position.
+
+    Raises
+    ------
+    CmmUqError : with the place of the first that is wrong.
     """
     if len(positions) < 2:
         raise CmmUqError(f"axis {axis} has {len(positions)} positions", where=where, fix="An axis needs two or more")
@@ -171,7 +175,12 @@ def check_positions(axis: str, positions: Sequence[float], places: Sequence[str]
 
 
 def check_units(carriages: Sequence[AxisErrors], where: str) -> None:
-    """Refuse a map whose numbers cannot be µm and arc seconds: a thousand times too small, or far too large."""
+    """Refuse a map whose numbers cannot be µm and arc seconds: a thousand times too small, or far too large.
+
+    Raises
+    ------
+    CmmUqError : they cannot, and which unit they seem to have.
+    """
     displacements = np.abs(np.concatenate([c.errors[:, :3].ravel() for c in carriages])) / MICROMETRE
     rotations = np.abs(np.concatenate([c.errors[:, 3:].ravel() for c in carriages])) / ARCSECOND
     fix = "Convert displacements to µm and rotations to arc seconds"

@@ -57,7 +57,12 @@ def read_error_map_text(path: Path, *, temperature: float = 20.0) -> ErrorMap:
 
 
 def parse_error_map_text(content: bytes, where: str, *, temperature: float = 20.0) -> ErrorMap:
-    """Error map and squareness from the content of a contractor's text file; see :func:`read_error_map_text`."""
+    """Error map and squareness from the content of a contractor's text file; see :func:`read_error_map_text`.
+
+    Raises
+    ------
+    CmmUqError : the text is too long, incomplete, or not in µm and arc seconds.
+    """
     reading = _Reading()
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
     if len(lines) > MAP_ROWS.most or len(max(lines, key=len, default="")) > LINE.most:

@@ -62,7 +62,12 @@ class Dmis(Format):
 
 
 def statements(lines: Sequence[str], where: str) -> Iterator[tuple[int, str]]:
-    """Statements without comments, those over several lines joined, with the line that each begins on."""
+    """Statements without comments, those over several lines joined, with the line that each begins on.
+
+    Raises
+    ------
+    CmmUqError : a statement goes on for longer than a line may be.
+    """
     begun, start = "", 0
     for line, content in enumerate(lines, 1):
         part = content.strip()
