@@ -17,6 +17,7 @@ from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import probability
 from cmm_uq.messages import Text, after, alternatives, lines, say, semicolons
 from cmm_uq.screening.finding import Finding
+from cmm_uq.uncertainty.rounding import alike
 
 STANDING: Mapping[str, Standing] = {
     "consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad",
@@ -112,10 +113,11 @@ def _probable(item: LeftOut) -> Text:
 
 def gained(gain: Improvement) -> Text:
     """What the cause gains where the fit had not seen the recording, in a sentence."""
+    before, after = alike(gain.heldout_rms_before_um, gain.heldout_rms_after_um)
     return say(
-        "{unseen:capital} that the fit had not seen are predicted to {after:.1f}\u00a0µm with it, to {before:.1f}\u00a0µm "
+        "{unseen:capital} that the fit had not seen are predicted to {after}\u00a0µm with it, to {before}\u00a0µm "
         "without it.",
-        unseen=gain.unseen, before=gain.heldout_rms_before_um, after=gain.heldout_rms_after_um,
+        unseen=gain.unseen, before=before, after=after,
     )  # fmt: skip
 
 
