@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.document import Column, Table
-from cmm_uq.messages import NOTHING, Text, number, say
+from cmm_uq.messages import NOTHING, Text, say
 from cmm_uq.uncertainty.rounding import alike
 from cmm_uq.units import unit
 
