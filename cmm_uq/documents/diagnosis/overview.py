@@ -8,6 +8,7 @@ from cmm_uq.diagnosis.comparison.search import ASSERTED
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import contained
+from cmm_uq.documents.diagnosis.costs import explanation
 from cmm_uq.documents.diagnosis.unseen import without_power
 from cmm_uq.documents.document import Overview, Standing
 from cmm_uq.documents.effect_words import effect_of, size_of, titles
@@ -15,7 +16,7 @@ from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.where_section import by_columns, place_words
 from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import probability
-from cmm_uq.messages import Text, after, alternatives, lines, say, semicolons
+from cmm_uq.messages import NOTHING, Text, after, alternatives, lines, say, semicolons
 from cmm_uq.screening.finding import Finding
 from cmm_uq.uncertainty.rounding import alike
 
@@ -34,6 +35,9 @@ VERDICT_TITLES: Mapping[str, Text] = {
 
 _RAREST = 1e-4
 """Probability below which only this is told."""
+
+_TOLD = 0.05
+"""Probability from which another explanation is told beside what is asserted."""
 
 
 def overview_of(found: Diagnosed) -> Overview:
@@ -99,7 +103,18 @@ def _sure(found: Diagnosed) -> Text:
     if not d.effects:
         return by_chance
     probable = semicolons([_probable(item) for item in d.effects])
-    return lines((by_chance, say("Probability: {each}.", each=probable), gained(d.improvement)))
+    each = (by_chance, say("Probability: {each}.", each=probable), _otherwise(d), gained(d.improvement))
+    return lines(text for text in each if text)
+
+
+def _otherwise(d: Diagnosis) -> Text:
+    """What remains as probable that leaves out an effect that is asserted."""
+    asserted = {item.effect for item in d.effects}
+    others = [one for one in d.remaining.rivals if one.probability >= _TOLD and not asserted <= set(one.effects)]
+    each = [
+        say("{title} {probability}", title=explanation(one), probability=probability(one.probability)) for one in others
+    ]
+    return say("Otherwise: {each}.", each=semicolons(each)) if each else NOTHING
 
 
 def _probable(item: LeftOut) -> Text:
