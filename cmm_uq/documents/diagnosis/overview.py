@@ -50,6 +50,8 @@ def overview_of(found: Diagnosed) -> Overview:
     title, standing = VERDICT_TITLES[d.verdict], STANDING[d.verdict]
     if without_power(found):
         title, standing = say("Consistent, as far as this recording can show"), "open"
+    if d.verdict == "explained" and (_otherwise(d) or any(_instead(d, item) for item in d.effects)):
+        title = say("Explained: more than one cause is possible")
     return Overview(title, standing, tuple(row for row in rows if row[1]))
 
 

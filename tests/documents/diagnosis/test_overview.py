@@ -186,6 +186,10 @@ def test_what_remains_as_probable_without_what_is_asserted_is_said_beside_it(exp
         rival(0.56, "squareness_xy"), rival(0.3, unknown=True), rival(0.09, "squareness_xy", "scale_curvature_x"),
         rival(0.04, "straightness_x_y"),
     )  # fmt: skip
-    told = rows(replace(explained, diagnosis=replace(d, remaining=Remaining(several))))["How sure"]
+    open_ = replace(explained, diagnosis=replace(d, remaining=Remaining(several)))
+    told = rows(open_)["How sure"]
     assert "Otherwise: error along Y as a function of X 30\u00a0%." in told
     assert "Otherwise" not in rows(explained)["How sure"]
+    assert overview_of(open_).verdict == "Explained: more than one cause is possible"
+    alone = replace(explained, diagnosis=replace(d, indistinguishable=(), remaining=Remaining()))
+    assert overview_of(alone).verdict == "Explained: the cause is found"
