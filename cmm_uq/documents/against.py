@@ -12,6 +12,7 @@ from cmm_uq.inference.posterior import Posterior
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, say
 from cmm_uq.model import MeasurementModel
 from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.uncertainty.rounding import alike
 
 VERDICTS: Mapping[str, Text] = {
     "consistent": say("The recording agrees with the simulation."),
@@ -42,7 +43,7 @@ def simulation_section(simulated: Simulated, refitted: Mapping[str, Mapping[str,
         (say("Effects that it contains"), commas(titles(simulated.contains)) or say("not stated")),
         (say("Estimated anew"), commas(titles(simulated.refitted)) or say("none")),
         (say("Standard uncertainty of a predicted coordinate"), _uncertainty(simulated)),
-        (say("Predicted errors, rms in the observations"), say("{rms:.1f} µm", rms=simulated.rms_predicted_um)),
+        (say("Predicted errors, rms in the observations"), say("{rms} µm", rms=alike(simulated.rms_predicted_um)[0])),
     ]
     blocks: list[Block] = [Facts(tuple((label, text) for label, text in rows if text))]
     blocks.append(Paragraph(say(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.document import Column, Table
-from cmm_uq.messages import NOTHING, Text, number, say
+from cmm_uq.messages import NOTHING, Text, say
+from cmm_uq.uncertainty.rounding import alike
 from cmm_uq.units import unit
 
 
@@ -18,8 +19,8 @@ def improvement_table(gain: Improvement, rms: Text, heldout: Text, note: Text) -
     note : what was held out, and what ± is.
     """
     rows = (
-        (rms, number(gain.rms_before_um, ".2f"), number(gain.rms_after_um, ".2f"), unit("µm")),
-        (heldout, number(gain.heldout_rms_before_um, ".2f"), number(gain.heldout_rms_after_um, ".2f"), unit("µm")),
+        (rms, *alike(gain.rms_before_um, gain.rms_after_um, decimals=2), unit("µm")),
+        (heldout, *alike(gain.heldout_rms_before_um, gain.heldout_rms_after_um, decimals=2), unit("µm")),
         (
             say("Gain in log predictive density"),
             NOTHING,

@@ -10,6 +10,7 @@ from cmm_uq.documents.wording import title_of
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.messages import NOTHING, Text, Verbatim, listed, number, say
 from cmm_uq.model.measurement import ARTEFACT
+from cmm_uq.uncertainty.rounding import alike
 
 
 def posterior_section(result: Result) -> Section:
@@ -66,7 +67,7 @@ def method(result: Result) -> Section:
         (say("Degrees of freedom"), number(ls.degrees_of_freedom)),
         (
             say("Residual standard deviation"),
-            NOTHING if ls.residual_sd is None else say("{sd:.1f} µm", sd=ls.residual_sd * 1e3),
+            NOTHING if ls.residual_sd is None else say("{sd} µm", sd=alike(ls.residual_sd * 1e3)[0]),
         ),
         (say("Standard uncertainty of a coordinate"), spread),
         (say("Noise"), noise_found(noise, heavy_tails=result.diagnosed.diagnosis.noise.heavy_tails)),

@@ -8,6 +8,7 @@ from cmm_uq.documents.document import Plot
 from cmm_uq.documents.plots import volume_plot
 from cmm_uq.documents.result import Result
 from cmm_uq.messages import Text, say
+from cmm_uq.uncertainty.rounding import alike
 from cmm_uq.units import MICROMETRE
 
 
@@ -21,6 +22,7 @@ def residual_volume(result: Result, what: Text) -> Plot:
     artefact, residuals = result.artefact, result.residuals / MICROMETRE
     readings, travel = artefact.points.machine_xyz, artefact.points.machine.travel_mm
     ends = readings[artefact.rows]
+    low, high = alike(residuals.min(), residuals.max())
     return volume_plot(
         ends[:, 0],
         residuals,
@@ -28,9 +30,9 @@ def residual_volume(result: Result, what: Text) -> Plot:
         travel_mm=travel if np.all(np.isfinite(travel)) else None,
         caption=say("Residuals after the fitted model in the machine's volume (scale readings)."),
         alternative=say(
-            "Three projections of the {what}; residuals of {low:.1f} to {high:.1f} µm.",
+            "Three projections of the {what}; residuals of {low} to {high} µm.",
             what=what,
-            low=residuals.min(),
-            high=residuals.max(),
+            low=low,
+            high=high,
         ),
     )

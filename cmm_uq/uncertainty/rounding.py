@@ -9,7 +9,7 @@ is a tie and the noise of binary arithmetic behind the 13th digit decides nothin
 from __future__ import annotations
 
 from decimal import ROUND_HALF_UP, ROUND_UP, Decimal
-from math import isfinite, isinf, isnan
+from math import ceil, isfinite, isinf, isnan, log10
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Number
@@ -71,6 +71,24 @@ def rounded(value: float, u: float, digits: int = 2) -> tuple[Number, Number]:
     shown = _rounded_uncertainty(_decimal(u), digits)
     place = shown.adjusted() - digits + 1
     return _as_text(_to_place(exact, place), shown, place)
+
+
+def alike(*values: float, decimals: int = 1) -> tuple[Number, ...]:
+    """Numbers without uncertainties of their own, side by side: with so many decimals, or more where the largest is small.
+
+    A step of the last decimal is never more than a third of the largest modulus, unless that is zero.
+
+    Examples
+    --------
+    >>> alike(78.6, 18.04)
+    ('78.6', '18.0')
+    >>> alike(0.0474, 0.0208)
+    ('0.05', '0.02')
+    """
+    largest = max(abs(value) for value in values)
+    _check(largest, 0.0, 1)
+    more = ceil(-log10(largest / 3)) if largest else 0
+    return tuple(Number(f"{value:.{max(decimals, more)}f}") for value in values)
 
 
 def figure(number: float, digits: int = 4) -> Number:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.uncertainty.rounding import figure, rounded, significant
+from cmm_uq.uncertainty.rounding import alike, figure, rounded, significant
 
 
 @pytest.mark.parametrize(
@@ -131,3 +131,23 @@ def test_rounding_moves_the_value_by_half_a_unit_and_never_lowers_u_by_more_than
     assert abs(value_text - Decimal(value)) <= unit / 2 + abs(Decimal(value)) * Decimal("1e-12")
     assert u_text >= Decimal(u) * Decimal("0.95") * (1 - Decimal("1e-12"))
     assert u_text <= Decimal(u) * 2
+
+
+@given(st.lists(st.floats(-1e6, 1e6).filter(lambda x: abs(x) > 1e-9 or x == 0), min_size=1, max_size=4))
+def test_numbers_side_by_side_are_no_coarser_than_a_third_of_the_largest(values: list[float]) -> None:
+    told = alike(*values)
+    places = {len(one.partition(".")[2]) for one in told}
+    assert len(places) == 1
+    (place,) = places
+    largest = max(map(abs, values))
+    assert place >= 1
+    assert largest == 0 or 10.0**-place <= largest / 3 * (1 + 1e-12)
+    assert place == 1 or 10.0 ** (1 - place) > largest / 3 * (1 - 1e-12)
+    assert all(abs(float(one) - value) <= 0.5000001 * 10.0**-place for one, value in zip(told, values, strict=True))
+
+
+def test_numbers_side_by_side_that_are_large_enough_keep_the_decimals_that_are_asked_for() -> None:
+    assert alike(78.61, 18.04) == ("78.6", "18.0")
+    assert alike(1.5, -0.04) == ("1.5", "-0.0")
+    assert alike(0.0474, 0.0208, decimals=2) == ("0.05", "0.02")
+    assert alike(0.0) == ("0.0",)

@@ -28,7 +28,7 @@ def costs_section(found: Diagnosed) -> Section:
     heads = (
         Column(say("Quantity"), numeric=False),
         *(
-            Column(say("{what}: {probability}", what=_what(one), probability=probability(one.probability)))
+            Column(say("{what}: {probability}", what=explanation(one), probability=probability(one.probability)))
             for one in rivals[:_SHOWN]
         ),
         Column(say("Averaged")), Column(say("Unit"), numeric=False),
@@ -75,8 +75,8 @@ def costs_data(found: Diagnosed) -> dict[str, Any]:
     return {"remaining": each, "averaged": whole}
 
 
-def _what(rival: Rival) -> Text:
-    """An explanation in short."""
+def explanation(rival: Rival) -> Text:
+    """What remains as an explanation, in short."""
     words = (*titles(rival.effects), *rival.functions)
     return commas(words) if words else say("nothing missing")
 

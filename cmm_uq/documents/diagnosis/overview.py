@@ -8,6 +8,7 @@ from cmm_uq.diagnosis.comparison.search import ASSERTED
 from cmm_uq.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import contained
+from cmm_uq.documents.diagnosis.costs import explanation
 from cmm_uq.documents.diagnosis.unseen import without_power
 from cmm_uq.documents.document import Overview, Standing
 from cmm_uq.documents.effect_words import effect_of, size_of, titles
@@ -15,8 +16,9 @@ from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.where_section import by_columns, place_words
 from cmm_uq.documents.withheld import sentences as withheld_sentences
 from cmm_uq.documents.wording import probability
-from cmm_uq.messages import Text, after, alternatives, lines, say, semicolons
+from cmm_uq.messages import NOTHING, Text, after, alternatives, lines, say, semicolons
 from cmm_uq.screening.finding import Finding
+from cmm_uq.uncertainty.rounding import alike
 
 STANDING: Mapping[str, Standing] = {
     "consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad",
@@ -34,6 +36,9 @@ VERDICT_TITLES: Mapping[str, Text] = {
 _RAREST = 1e-4
 """Probability below which only this is told."""
 
+_TOLD = 0.05
+"""Probability from which another explanation is told beside what is asserted."""
+
 
 def overview_of(found: Diagnosed) -> Overview:
     """The overview of a recording's diagnosis."""
@@ -45,6 +50,8 @@ def overview_of(found: Diagnosed) -> Overview:
     title, standing = VERDICT_TITLES[d.verdict], STANDING[d.verdict]
     if without_power(found):
         title, standing = say("Consistent, as far as this recording can show"), "open"
+    if d.verdict == "explained" and (_otherwise(d) or any(_instead(d, item) for item in d.effects)):
+        title = say("Explained: more than one cause is possible")
     return Overview(title, standing, tuple(row for row in rows if row[1]))
 
 
@@ -98,7 +105,18 @@ def _sure(found: Diagnosed) -> Text:
     if not d.effects:
         return by_chance
     probable = semicolons([_probable(item) for item in d.effects])
-    return lines((by_chance, say("Probability: {each}.", each=probable), gained(d.improvement)))
+    each = (by_chance, say("Probability: {each}.", each=probable), _otherwise(d), gained(d.improvement))
+    return lines(text for text in each if text)
+
+
+def _otherwise(d: Diagnosis) -> Text:
+    """What remains as probable that leaves out an effect that is asserted."""
+    asserted = {item.effect for item in d.effects}
+    others = [one for one in d.remaining.rivals if one.probability >= _TOLD and not asserted <= set(one.effects)]
+    each = [
+        say("{title} {probability}", title=explanation(one), probability=probability(one.probability)) for one in others
+    ]
+    return say("Otherwise: {each}.", each=semicolons(each)) if each else NOTHING
 
 
 def _probable(item: LeftOut) -> Text:
@@ -112,10 +130,11 @@ def _probable(item: LeftOut) -> Text:
 
 def gained(gain: Improvement) -> Text:
     """What the cause gains where the fit had not seen the recording, in a sentence."""
+    before, after = alike(gain.heldout_rms_before_um, gain.heldout_rms_after_um)
     return say(
-        "{unseen:capital} that the fit had not seen are predicted to {after:.1f}\u00a0µm with it, to {before:.1f}\u00a0µm "
+        "{unseen:capital} that the fit had not seen are predicted to {after}\u00a0µm with it, to {before}\u00a0µm "
         "without it.",
-        unseen=gain.unseen, before=gain.heldout_rms_before_um, after=gain.heldout_rms_after_um,
+        unseen=gain.unseen, before=before, after=after,
     )  # fmt: skip
 
 

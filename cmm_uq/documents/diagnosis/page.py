@@ -44,6 +44,7 @@ from cmm_uq.model import MeasurementModel
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
+from cmm_uq.uncertainty.rounding import alike
 from cmm_uq.units import MICROMETRE
 
 
@@ -168,7 +169,7 @@ def _consistent(found: Diagnosed) -> tuple[Block, ...]:
             "Residual of each observation, with U (k = {k}) from the noise.",
             k=number(factor_of_noise(d.noise.coordinate), ".2f"),
         ),
-        alternative=say("Residuals of {rms:.1f} µm rms.", rms=d.improvement.rms_before_um),
+        alternative=say("Residuals of {rms} µm rms.", rms=alike(d.improvement.rms_before_um)[0]),
     )  # fmt: skip
     return Paragraph(verdict_of(found)), plot
 
@@ -195,9 +196,8 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
             k=number(factor_of_noise(d.noise.coordinate), ".2f"),
         ),
         alternative=say(
-            "Residual rms {rms_before_um:.1f} µm before and {rms_after_um:.1f} µm after.",
-            rms_before_um=gain.rms_before_um,
-            rms_after_um=gain.rms_after_um,
+            "Residual rms {before} µm before and {after} µm after.",
+            **dict(zip(("before", "after"), alike(gain.rms_before_um, gain.rms_after_um), strict=True)),
         ),
     )
     table = improvement_table(

@@ -81,9 +81,9 @@ def _why(row: Smallest) -> Text:
     if row.share == 0 and not row.taken_up:
         said.append(say("moves nothing that is observed here"))
     elif row.taken_up and row.share < 1e-3:
-        said.append(say("{effects} take it up", effects=listed(_titles(row.taken_up))))
+        said.append(say("taken up by {effects}", effects=listed(_titles(row.taken_up))))
     elif row.taken_up:
-        said.append(say("{effects} take most of it up", effects=listed(_titles(row.taken_up))))
+        said.append(say("mostly taken up by {effects}", effects=listed(_titles(row.taken_up))))
     if row.detected is not None and row.detected > row.allowed and row.detected < 100 * row.allowed:
         said.append(say("it would take {size}", size=_size(row.detected, row.unit)))
     if row.periods is not None:

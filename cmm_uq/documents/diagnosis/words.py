@@ -21,6 +21,7 @@ from cmm_uq.jobs.job import JobFile
 from cmm_uq.messages import Text, Verbatim, after, commas, day, say
 from cmm_uq.physics.effect import Effect
 from cmm_uq.screening.finding import Finding
+from cmm_uq.uncertainty.rounding import alike
 
 _SAME = 0.01
 """Difference of two probabilities that is not worth telling."""
@@ -113,9 +114,10 @@ def sure(item: LeftOut) -> Text:
 
 def held_out(gain: Improvement) -> Text:
     """What knowing an effect gains where the fit had not seen the recording."""
+    before, after = alike(gain.heldout_rms_before_um, gain.heldout_rms_after_um)
     return say(
-        "on {unseen} that the fit had not seen the rms falls from {before:.1f} to {after:.1f}\u00a0µm",
-        unseen=gain.unseen, before=gain.heldout_rms_before_um, after=gain.heldout_rms_after_um,
+        "on {unseen} that the fit had not seen the rms falls from {before} to {after}\u00a0µm",
+        unseen=gain.unseen, before=before, after=after,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from cmm_uq.kinds.digitizer.analysis import DigitizerFigures, results
 from cmm_uq.kinds.digitizer.attitudes import words
 from cmm_uq.kinds.digitizer.observe import OFFSET, Digitizer
 from cmm_uq.messages import DASH, Text, Verbatim, number, say, semicolons, signed
-from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.uncertainty.rounding import alike, rounded
 from cmm_uq.units import MICROMETRE, unit
 
 MEANING = say("The mount lies at [U1 V1 W1] in the digitizer's frame u, v, w, whose origin is that of the scan plane.")
@@ -132,6 +132,7 @@ def _residuals(result: Result, digitizer: Digitizer) -> Plot:
         if digitizer.scanned
         else say("each coordinate of the centre")
     )
+    low, high, low_after, high_after = alike(before.min(), before.max(), after.min(), after.max())
     return length_plot(
         digitizer.measurement.astype(float), before, after, expanded_before_um=expanded_um, expanded_after_um=expanded_um,
         reference=say("fitted sphere") if digitizer.scanned else say("common centre"), flagged=result.flagged,
@@ -140,9 +141,9 @@ def _residuals(result: Result, digitizer: Digitizer) -> Plot:
             "Residuals, {what}, with U (k = {k}) of a coordinate.", what=what, k=number(result.noise.coverage_factor, ".2f")
         ),
         alternative=say(
-            "{count} observations: with the offset by centres they deviate by {low:.1f} to {high:.1f} µm; after the "
-            "fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
-            count=len(after), low=before.min(), high=before.max(), low_after=after.min(), high_after=after.max(),
+            "{count} observations: with the offset by centres they deviate by {low} to {high} µm; after the "
+            "fitted model {low_after} to {high_after} µm remain.",
+            count=len(after), low=low, high=high, low_after=low_after, high_after=high_after,
         ),
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.kinds.plane.analysis import PlaneFigures, figures, off_plane_um, results
 from cmm_uq.kinds.plane.observe import PlaneSurface
 from cmm_uq.messages import Text, in_a_row, number, say
-from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.uncertainty.rounding import alike, rounded
 from cmm_uq.units import MICROMETRE, unit
 
 
@@ -72,6 +72,7 @@ def _surfaces(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
 def _by_point(result: Result, plane: PlaneSurface) -> Block:
     off = off_plane_um(plane)
     residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
+    low, high, low_after, high_after = alike(off.min(), off.max(), residuals.min(), residuals.max())
     return length_plot(
         plane.points.point[plane.rows[:, 0]],
         off,
@@ -86,13 +87,13 @@ def _by_point(result: Result, plane: PlaneSurface) -> Block:
             k=number(result.noise.coverage_factor, ".2f"),
         ),
         alternative=say(
-            "{count} points: as recorded they lie {low:.1f} to {high:.1f} µm from their plane; after the "
-            "fitted model {low_after:.1f} to {high_after:.1f} µm remain.",
+            "{count} points: as recorded they lie {low} to {high} µm from their plane; after the "
+            "fitted model {low_after} to {high_after} µm remain.",
             count=len(off),
-            low=off.min(),
-            high=off.max(),
-            low_after=residuals.min(),
-            high_after=residuals.max(),
+            low=low,
+            high=high,
+            low_after=low_after,
+            high_after=high_after,
         ),
     )
 

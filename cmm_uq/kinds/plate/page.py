@@ -14,7 +14,7 @@ from cmm_uq.documents.wording import expanded
 from cmm_uq.kinds.plate.analysis import Arrows, PlateFigures, arrows, compared, figures, results
 from cmm_uq.kinds.plate.observe import Plate
 from cmm_uq.messages import Text, Verbatim, day, number, say, sentences
-from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.uncertainty.rounding import alike, rounded
 from cmm_uq.units import PPM, unit
 
 _PLATES_SHOWN = 6
@@ -74,7 +74,7 @@ def _alike(kelvin: Text, cte: float, *, colder: bool) -> Text:
 
 
 def _picture(one: Arrows, titles: Sequence[Text]) -> Block:
-    largest = [max(hypot(*arrow) for arrow in arrows.tolist()) for arrows in (one.before, one.after)]
+    before, after = alike(*(max(hypot(*arrow) for arrow in arrows.tolist()) for arrows in (one.before, one.after)))
     first, second = ("xyz"[axis] for axis in one.axes)
     return vector_plot(
         one.place,
@@ -88,10 +88,10 @@ def _picture(one: Arrows, titles: Sequence[Text]) -> Block:
             measurement=one.measurement,
         ),
         alternative=say(
-            "Arrows at {count} balls: up to {before:.1f} µm as recorded, up to {after:.1f} µm after the fitted model.",
+            "Arrows at {count} balls: up to {before} µm as recorded, up to {after} µm after the fitted model.",
             count=len(one.place),
-            before=largest[0],
-            after=largest[1],
+            before=before,
+            after=after,
         ),
     )
 

@@ -12,7 +12,7 @@ from cmm_uq.documents.wording import deviating, numbered
 from cmm_uq.kinds.sphere.analysis import about_centre, deviations_um, results
 from cmm_uq.kinds.sphere.observe import Sphere
 from cmm_uq.messages import Number, Text, number, say
-from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.uncertainty.rounding import alike, rounded
 from cmm_uq.units import MICROMETRE, unit
 
 
@@ -81,14 +81,15 @@ def _by_point(result: Result, sphere: Sphere) -> Plot:
 
 def _over(result: Result, sphere: Sphere) -> Plot:
     residuals = result.residuals / MICROMETRE
+    low, high = alike(residuals.min(), residuals.max())
     return volume_plot(
         about_centre(sphere),
         residuals,
         caption=say("Residuals after the fitted model over the sphere (all spheres, about their centres)."),
         alternative=say(
-            "Three projections of the sphere; residuals of {low:.1f} to {high:.1f} µm.",
-            low=residuals.min(),
-            high=residuals.max(),
+            "Three projections of the sphere; residuals of {low} to {high} µm.",
+            low=low,
+            high=high,
         ),
     )
 

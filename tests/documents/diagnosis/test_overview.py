@@ -7,16 +7,19 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import cmm_uq
 from cmm_uq.commands.diagnosing import diagnose_job
+from cmm_uq.diagnosis.rivals import Remaining, Rival
 from cmm_uq.documents.diagnosis.overview import overview_of, share_of
 from cmm_uq.documents.diagnosis.page import diagnosis_document
 from cmm_uq.documents.document import Document, Overview, Plot
 from cmm_uq.documents.html import render_html
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.where_section import place_words, region_words
+from cmm_uq.messages import say
 from cmm_uq.physics.catalogue import EVERY
 from tests.conftest import ROOT
 from tests.documents.saying import leaves
@@ -170,3 +173,23 @@ def test_an_overview_is_a_block_of_any_document(explained: Diagnosed) -> None:
     first = diagnosis_sections(explained)[0].blocks[0]
     assert isinstance(first, Overview)
     assert first == overview_of(explained)
+
+
+def test_what_remains_as_probable_without_what_is_asserted_is_said_beside_it(explained: Diagnosed) -> None:
+    d, free = explained.diagnosis, np.zeros((0, 0))
+
+    def rival(probability: float, *effects: str, unknown: bool = False) -> Rival:
+        functions = (say("error along Y as a function of X"),) if unknown else ()
+        return Rival(probability, effects, functions, {}, {}, d.after, free)
+
+    several = (
+        rival(0.56, "squareness_xy"), rival(0.3, unknown=True), rival(0.09, "squareness_xy", "scale_curvature_x"),
+        rival(0.04, "straightness_x_y"),
+    )  # fmt: skip
+    open_ = replace(explained, diagnosis=replace(d, remaining=Remaining(several)))
+    told = rows(open_)["How sure"]
+    assert "Otherwise: error along Y as a function of X 30\u00a0%." in told
+    assert "Otherwise" not in rows(explained)["How sure"]
+    assert overview_of(open_).verdict == "Explained: more than one cause is possible"
+    alone = replace(explained, diagnosis=replace(d, indistinguishable=(), remaining=Remaining()))
+    assert overview_of(alone).verdict == "Explained: the cause is found"
