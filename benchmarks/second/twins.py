@@ -1,4 +1,4 @@
-"""Which effects a fault of an artefact is: displacements of the artefact's points by every effect that a diagnosis may name for it.
+"""Which effects a fault of an artefact is: how every effect that may be said of it displaces the artefact's points.
 
 A twin of a machine's error is what that error would make of the artefact in its reference set-up, the one least turned
 against its own axes, and it turns with the artefact.
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.concealed.physics import PLACE, TRAVEL, Error, component, kind_of, place
+from benchmarks.concealed.physics import PLACE, Error, component, kind_of, place
 from benchmarks.second.artefacts import Placed
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ GEOMETRY: dict[str, Error] = {
 
 
 def right(seen: Seen, kind: str, words: str, moved: np.ndarray, unseen: float) -> dict[str, list[str]]:
-    """Names of effects that a fault is, and of those that leave less than ``unseen`` of it.
+    """Names of effects of the artefact that a fault is, and of those that leave less than ``unseen`` of it.
 
     Parameters
     ----------
@@ -40,13 +40,24 @@ def right(seen: Seen, kind: str, words: str, moved: np.ndarray, unseen: float) -
     signal, among = seen.of_fault(moved), fields(seen.design)
     left = {name: seen.left(signal, _columns(seen, field)) for name, field in among.items()}
     twins = {name: left[name] for name in left if name.removeprefix("artefact_") in GEOMETRY}
-    if kind == "pattern":
-        own = ["artefact_form" if seen.design.kind == "sphere" else "artefact_pattern"]
-    elif kind == "geometry":
+    if kind == "geometry":
         own = [name for name in twins if twins[name] <= min(twins.values()) + 1e-6 * float(np.linalg.norm(signal))]
+    elif seen.design.kind == "sphere":
+        own = ["artefact_form"]
     else:
-        own = ["artefact_temperature", *(["artefact_set_up_temperature"] if "every" in words else [])]
+        own = _parts(seen, kind, words, moved, unseen)
     return {"is": own, "alike": [name for name in left if left[name] < unseen and name not in own]}
+
+
+def _parts(seen: Seen, kind: str, words: str, moved: np.ndarray, unseen: float) -> list[str]:
+    """A fault without form is two effects: a scale of all, the artefact's temperature, where it is seen; and the rest."""
+    rest = "artefact_pattern" if kind == "pattern" else "artefact_set_up_temperature"
+    if kind == "temperature" and "every" not in words:
+        return ["artefact_temperature"]
+    longer = _turned(seen.design, seen.design.own - seen.design.own.mean(axis=0))
+    scale = float(np.sum(longer * moved) / np.sum(longer**2))
+    large = float(np.linalg.norm(seen.of_fault(scale * longer))) >= unseen
+    return [rest, "artefact_temperature"] if large or seen.design.kind == "ballbar" else [rest]
 
 
 def fields(placed: Placed) -> dict[str, np.ndarray]:
@@ -86,14 +97,17 @@ def _twin(placed: Placed, error: Callable[[np.ndarray, dict], np.ndarray]) -> np
     _, first = np.unique(placed.measurement, return_index=True)
     turned = np.round(np.einsum("qii->qi", placed.axes[first]).sum(axis=1), 2)
     starts = placed.true[first] - _turned(placed, placed.own)[first]
-    row = np.lexsort((*np.round(starts.T, 0), -turned))[0]
+    _, of_node = np.unique(placed.node, return_index=True)
+    middle = placed.own[of_node].mean(axis=0)
+    centres = starts + np.einsum("i,qij->qj", middle, placed.axes[first])
+    row = np.lexsort((*np.round(centres.T, 0), -turned))[0]
     there = starts[row] + placed.own @ placed.axes[first[row]]
     field = error(there, {})
     return _turned(placed, field @ placed.axes[first[row]].T)[:, :, None]
 
 
 def _form(placed: Placed) -> dict[str, np.ndarray]:
-    """Of a sphere: three lobes; harmonics of the degrees 2 to 5, that is all polynomials in the normal up to 5 but size and place."""
+    """Of a sphere: three lobes; harmonics of the degrees 2 to 5, as polynomials in the normal without size and place."""
     n = placed.axes[:, 0]
     angle = 3 * np.arctan2(n[:, 1], n[:, 0])
     lobes = np.column_stack([np.cos(angle), np.sin(angle)])

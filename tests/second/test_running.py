@@ -45,7 +45,14 @@ def test_the_page_counts_what_was_run_and_says_what_was_asked(
     truths = [
         *({**nothing, "name": f"n{i}"} for i in range(20)),
         {**nothing, "name": "a", "kind": "one", "hidden": {"scale_x": 2.0}, "wanted": {"scale_x": 5.0}},
-        {**nothing, "name": "p", "kind": "artefact, pattern", "wanted": {"pattern": 9.0}},
+        {
+            **nothing,
+            "name": "p",
+            "kind": "artefact, pattern",
+            "wanted": {"pattern": 9.0},
+            "is": ["artefact_pattern"],
+            "alike": [],
+        },
     ]
     quiet = {"verdict": "consistent", "p": 0.5, "groups": [], "effects": {}, "seconds": 1.0}
     named = {"probability": 0.97, "together": 0.97, "parameters": {"ppm": [2.5, 0.4, 1.7, 3.3]}}
@@ -67,6 +74,8 @@ def test_the_page_counts_what_was_run_and_says_what_was_asked(
     assert "| 0.9–1.0 | 0.970 | 1 of 3 (0.01–0.91) |" in page
     assert "| `ppm` | 1 of 1: 100.0 % (2.5–100.0) |" in page
     assert (tmp_path / "images" / "diagnosis-second-study.png").stat().st_size > 10_000
+    assert "too few" in page
+    assert "--cases 60 --nulls 300 --seed 9 --workers" in page
     assert "22 cases" in capsys.readouterr().out
 
 
