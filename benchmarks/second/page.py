@@ -12,9 +12,11 @@ import numpy as np
 from benchmarks.second import judging
 from benchmarks.second.cases import EFFECTS, FAULTS, NOTHING
 from benchmarks.second.judging import proportion
+from benchmarks.second.missed import why
 
 Records = dict[str, dict[str, Any]]
 Pairs = list[tuple[dict[str, Any], dict[str, Any]]]
+MISSED = "**not kept**"
 ORACLES = ("estimates", "knows")
 Rule = Callable[[str, dict, set[str]], tuple[bool, bool]]
 
@@ -142,8 +144,14 @@ def _wanted(pairs: Pairs, both: list) -> list[str]:
          _kept(_between(sum(held), len(held), full), full)),
         ("Outside the catalogue, recognised", "≥ 95 %", _share(known, len(out)), _kept(known >= 0.95 * len(out), full)),
     ]  # fmt: skip
+    missed = [
+        f"- {row[0]}: {where}."
+        for row, where in zip(rows, why(pairs, both, kinds, off), strict=True)
+        if row[3] == MISSED
+    ]
     return ["| | asked | this run (95 % interval) | |", "| --- | --- | --- | --- |",
-            *(f"| {a} | {b} | {c} | {d} |" for a, b, c, d in rows)]  # fmt: skip
+            *(f"| {a} | {b} | {c} | {d} |" for a, b, c, d in rows),
+            *(["", "What is not kept:", "", *missed] if missed else [])]  # fmt: skip
 
 
 def _alarm(found: dict) -> bool:
@@ -165,7 +173,7 @@ def _between(hits: int, count: int, full: bool) -> bool:
 
 
 def _kept(good: object, full: bool) -> str:
-    return ("kept" if full else "so far") if good else "**not kept**"
+    return ("kept" if full else "so far") if good else MISSED
 
 
 def _ours(found: dict, oracle: dict) -> dict:

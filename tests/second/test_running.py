@@ -74,7 +74,8 @@ def test_the_page_counts_what_was_run_and_says_what_was_asked(
     assert "| 0.9–1.0 | 0.970 | 1 of 3 (0.01–0.91) |" in page
     assert "| `ppm` | 1 of 1: 100.0 % (2.5–100.0) |" in page
     assert (tmp_path / "images" / "diagnosis-second-study.png").stat().st_size > 10_000
-    assert "too few" in page
+    assert "- False alarms, pooled: more than 2 % of white (1 of 20)." in page
+    assert "- Machine physics asserted for an artefact's fault: scale_x (case p: plate, artefact, pattern)." in page
     assert "--cases 60 --nulls 300 --seed 9 --workers" in page
     assert "22 cases" in capsys.readouterr().out
 
