@@ -120,7 +120,7 @@ def diagnose_maps(
         comparisons.append(compared)
         p_value = len(columns) * compared.p_value
         if p_value < alpha:
-            if found := _effect(compared):
+            if found := expansion_shown(compared):
                 effects.append(found)
             differences += [_difference(compared, index, p_value) for index in compared.unknown]
         if progress:
@@ -136,7 +136,7 @@ def diagnose_maps(
     )  # fmt: skip
 
 
-def _effect(compared: ColumnComparison) -> LeftOut | None:
+def expansion_shown(compared: ColumnComparison) -> LeftOut | None:
     """An effect that the maps of a column show: probable, not zero, and better at predicting what was held out."""
     if compared.effect is None:
         return None

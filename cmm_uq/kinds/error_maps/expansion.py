@@ -42,8 +42,14 @@ _LOG_SIGMA = np.linspace(-1.5, 1.5, 31)
 
 
 def expansion(compared: ColumnComparison, index: int) -> Floats:
-    """Draws (n,) of an effect's coefficient, 1/K; rivals, kinds of noise and own scale errors count by their probability."""
-    log, mean, sd = (np.concatenate(each) for each in zip(*_weighted(compared, index), strict=True))
+    """Draws (n,) of an effect's coefficient, 1/K; rivals, kinds of noise and own scale errors count by their probability.
+
+    None where no combination of rivals that has the effect is probable.
+    """
+    found = list(_weighted(compared, index))
+    if not found:
+        return np.zeros(0)
+    log, mean, sd = (np.concatenate(each) for each in zip(*found, strict=True))
     weight = special.softmax(log)
     random = np.random.default_rng(compared.seed)
     # systematic draws of the mixture: of each normal as many as it is probable
