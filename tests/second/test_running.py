@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.second.cases import CAUSES, KINDS, NOTHING, case, write
+from benchmarks.second.expansions import estimated
 from benchmarks.second.page import write as write_page
-from benchmarks.second.running import diagnosed, done, kept, lines, sealed, tasks
+from benchmarks.second.running import completed, diagnosed, done, kept, lines, sealed, tasks
 
 
 def test_a_part_of_a_run_has_some_of_every_kind(tmp_path: Path) -> None:
@@ -85,3 +86,23 @@ def test_a_candidate_that_only_the_noise_of_an_attitude_shows_ends_no_diagnosis(
     made = case(20261124, "nothing, display", 258)
     write(made, tmp_path)
     assert "artefact_squareness_yz" not in diagnosed(tmp_path / made.name, whole=True)["effects"]
+
+
+def test_truths_of_earlier_runs_are_told_which_effects_a_fault_of_the_artefact_is() -> None:
+    """A record as it was written before, of an artefact whose temperature changed."""
+    made = json.loads(json.dumps(case(20261124, "artefact, temperature", 0).truth))
+    name = f"{KINDS.index('artefact, temperature'):02d}-0"
+    before = {"name": name, **{key: value for key, value in made.items() if key not in ("is", "alike")}}
+    other = {"name": "00-0", "kind": "nothing, white"}
+    after = completed([before, other], 20261124)
+    assert after[0]["fault"] == "another temperature in every set-up"
+    assert after[0]["is"] == ["artefact_set_up_temperature"]  # the mean of all cannot be seen by itself
+    assert json.loads(json.dumps(after[0])) == {"name": name, **made}
+    assert after[1] is other
+
+
+def test_an_expansion_is_estimated_where_one_is_concealed() -> None:
+    assert estimated((5, 3)) is None
+    name, _, _, pull = estimated((5, 0)) or ("", False, False, 9.0)
+    assert name.startswith("thermal_scale_")
+    assert abs(pull) < 5
