@@ -31,7 +31,7 @@ from benchmarks.concealed.physics import (
     Error,
     kind_of,
 )
-from benchmarks.second import artefacts, faults, maps, noises
+from benchmarks.second import artefacts, faults, maps, noises, twins
 from benchmarks.second.artefacts import SIX, Placed
 
 NOTHING = tuple(f"nothing, {kind}" for kind in noises.KINDS)
@@ -336,7 +336,18 @@ def _fault(random: np.random.Generator, kind: str, seen: Seen, nothing: dict) ->
         return None
     sign = float(random.choice([-1, 1]))
     return nothing | {"fault": words, "wanted": {kind: wanted}, "moved": sign * size * moved,
-                      "largest_um": 1e3 * size * float(np.abs(moved).max())}  # fmt: skip
+                      "largest_um": 1e3 * size * float(np.abs(moved).max()),
+                      **_alike(seen, kind, words, size * moved)}  # fmt: skip
+
+
+def _alike(seen: Seen, kind: str, words: str, moved: np.ndarray) -> dict[str, list[str]]:
+    """Effects that a fault is, and those, of the artefact or of the machine, that nobody could tell from it."""
+    found, signal, among = twins.right(seen, kind, words, moved, UNSEEN), seen.of_fault(moved), visible(seen.design)
+    machine = [
+        name for name in among if name not in seen.named
+        and min(seen.left(signal, [v]) for v in seen.versions(name, among)) < UNSEEN
+    ]  # fmt: skip
+    return {**found, "alike": sorted({*found["alike"], *machine})}
 
 
 def _of_effects(

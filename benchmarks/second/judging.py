@@ -66,12 +66,23 @@ def recognised(found: dict) -> bool:
 
 
 def there(name: str, truth: dict, group: Iterable[str]) -> tuple[bool, bool]:
-    """Whether an effect that is named is there; and whether it or one of its group is."""
+    """Whether an effect that is named is there; and whether it or one of its group is.
+
+    Of an artefact's fault: whether it is the effect that the fault is, or one that nobody could tell from it.
+    """
     if truth["kind"] in FAULTS:
-        own = [each.startswith(OF_THE_ARTEFACT) for each in (name, *group)]
-        return own[0], any(own)
+        right = {*truth["is"], *truth["alike"]}
+        return name in right, bool({name, *group} & right)
     function = truth["kind"] == "outside" and any(" " in each for each in group)  # no effect, but one of no known form
     return name in truth["hidden"], function or bool(set(group) & set(truth["hidden"]))
+
+
+def there_of_any(name: str, truth: dict, group: Iterable[str]) -> tuple[bool, bool]:
+    """The same by the rule before: of an artefact's fault any effect of the artefact is right."""
+    if truth["kind"] not in FAULTS:
+        return there(name, truth, group)
+    own = [each.startswith(OF_THE_ARTEFACT) for each in (name, *group)]
+    return own[0], any(own)
 
 
 def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:

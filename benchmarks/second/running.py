@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.coverage.measuring import run
-from benchmarks.second.cases import CAUSES, KINDS, NOTHING, case, name_of, seal, write
+from benchmarks.second.cases import CAUSES, FAULTS, KINDS, NOTHING, case, name_of, seal, write
 from benchmarks.second.maps import concealed
 
 Task = tuple[str, int, str, int, str]
@@ -150,3 +150,12 @@ def sealed(folder: Path, listed: Sequence[Task]) -> tuple[list[dict[str, Any]], 
         with book.open("a", encoding="utf-8") as out:
             out.write(f"{mark}  {len(truths)} cases, {ready} of them diagnosed before, {when}\n")
     return truths, mark
+
+
+def completed(truths: list[dict[str, Any]], seed: int) -> list[dict[str, Any]]:
+    """Truths of runs that were sealed before it was written down which effects a fault of the artefact is, with these."""
+    return [
+        {"name": each["name"], **case(seed, each["kind"], int(each["name"].split("-")[1])).truth}
+        if each["kind"] in FAULTS and "is" not in each else each
+        for each in truths
+    ]  # fmt: skip

@@ -3,7 +3,8 @@
 Cases are made first and their truth is sealed by a hash; then they are diagnosed and searched by two oracles. Every result is
 a line in ``FOLDER``, so that a run can be stopped and taken up again, and more cases added with larger numbers.
 ``--only make``, ``diagnose`` or ``search`` does one part; ``--kind "artefact, geometry"``, once or more, leaves out all other
-kinds; ``--page docs`` counts what is there and writes the page, with what ``FOLDER/note.txt`` says of the run, if anything.
+kinds; ``--page docs`` writes the page in the end, with what ``FOLDER/note.txt`` says of the run, if anything, and with
+``--count`` of what is there. The larger run is ``--seed 20261125 --nulls 600 --cases 120 --page docs``.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from pathlib import Path
 
 from benchmarks.second.cases import KINDS
 from benchmarks.second.page import write
-from benchmarks.second.running import kept, lines, sealed, tasks
+from benchmarks.second.running import completed, kept, lines, sealed, tasks
 
 PARTS = ("make", "diagnose", "search")
 
@@ -28,7 +29,8 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", choices=PARTS, help="one part of the work")
     parser.add_argument("--kind", action="append", choices=KINDS, help="of cases, by default all")
-    parser.add_argument("--page", type=Path, help="run nothing; count, and write page and picture into this folder")
+    parser.add_argument("--page", type=Path, help="write page and picture into this folder, in the end")
+    parser.add_argument("--count", action="store_true", help="run nothing; count what is there")
     chosen = parser.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
 
@@ -36,11 +38,11 @@ def main() -> None:
         every = tasks(chosen.folder, chosen.seed, chosen.cases, chosen.nulls, what)
         return [task for task in every if task[2] in (chosen.kind or KINDS)]
 
-    if not chosen.page:
+    if not chosen.count:
         kept(listed("make"), chosen.folder / "make.jsonl", chosen.workers)
     truths, mark = sealed(chosen.folder, listed("make"))
     print(f"{len(truths)} cases, truth sealed: {mark}", flush=True)
-    if not chosen.page:
+    if not chosen.count:
         for what in PARTS[1:] if chosen.only is None else {chosen.only} - {"make"}:
             kept(listed(what), chosen.folder / f"{what}.jsonl", chosen.workers)
     found, oracles = (
@@ -48,6 +50,7 @@ def main() -> None:
     )
     note = chosen.folder / "note.txt"
     said = note.read_text(encoding="utf-8").strip() if note.exists() else ""
+    truths = completed(truths, chosen.seed)
     write(truths, found, oracles, mark, (chosen.cases, chosen.nulls, chosen.seed), chosen.page, said)
 
 

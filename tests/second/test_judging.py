@@ -18,6 +18,7 @@ from benchmarks.second.judging import (
     same,
     tenths,
     there,
+    there_of_any,
 )
 
 
@@ -66,7 +67,22 @@ def test_an_effect_is_there_by_itself_or_with_its_group() -> None:
     outside = {"kind": "outside", "hidden": {}}
     assert there("drift_x", outside, ("scale_x", "error along X as a function of the place")) == (False, True)
     assert there("drift_x", outside, ("scale_x",)) == (False, False)
-    assert there("artefact_pattern", {"kind": "artefact, pattern", "hidden": {}}, ()) == (True, True)
+
+
+def test_of_an_artefacts_fault_right_is_what_it_is_or_what_nobody_could_tell_from_it() -> None:
+    fault = {
+        "kind": "artefact, geometry",
+        "hidden": {},
+        "is": ["artefact_scale_x"],
+        "alike": ["artefact_pattern", "scale_x"],
+    }
+    assert there("artefact_scale_x", fault, ()) == (True, True)
+    assert there("scale_x", fault, {"scale_x", "scale_y"}) == (True, True)
+    assert there("artefact_bending", fault, {"artefact_bending", "artefact_pattern"}) == (False, True)
+    assert there("artefact_bending", fault, {"artefact_bending", "drift_x"}) == (False, False)
+    assert there_of_any("artefact_bending", fault, {"artefact_bending"}) == (True, True)
+    assert there_of_any("scale_x", fault, {"scale_x", "artefact_bending"}) == (False, True)
+    assert there_of_any("drift_x", TRUTH, {"drift_x", "scale_x"}) == (False, True)
 
 
 def test_a_phase_is_held_on_the_circle_and_turned_half_where_the_amplitude_is_negative() -> None:

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.second.cases import CAUSES, KINDS, NOTHING, case, write
+from benchmarks.second.expansions import estimated
 from benchmarks.second.page import write as write_page
-from benchmarks.second.running import diagnosed, done, kept, lines, sealed, tasks
+from benchmarks.second.running import completed, diagnosed, done, kept, lines, sealed, tasks
 
 
 def test_a_part_of_a_run_has_some_of_every_kind(tmp_path: Path) -> None:
@@ -45,7 +46,14 @@ def test_the_page_counts_what_was_run_and_says_what_was_asked(
     truths = [
         *({**nothing, "name": f"n{i}"} for i in range(20)),
         {**nothing, "name": "a", "kind": "one", "hidden": {"scale_x": 2.0}, "wanted": {"scale_x": 5.0}},
-        {**nothing, "name": "p", "kind": "artefact, pattern", "wanted": {"pattern": 9.0}},
+        {
+            **nothing,
+            "name": "p",
+            "kind": "artefact, pattern",
+            "wanted": {"pattern": 9.0},
+            "is": ["artefact_pattern"],
+            "alike": [],
+        },
     ]
     quiet = {"verdict": "consistent", "p": 0.5, "groups": [], "effects": {}, "seconds": 1.0}
     named = {"probability": 0.97, "together": 0.97, "parameters": {"ppm": [2.5, 0.4, 1.7, 3.3]}}
@@ -67,6 +75,9 @@ def test_the_page_counts_what_was_run_and_says_what_was_asked(
     assert "| 0.9–1.0 | 0.970 | 1 of 3 (0.01–0.91) |" in page
     assert "| `ppm` | 1 of 1: 100.0 % (2.5–100.0) |" in page
     assert (tmp_path / "images" / "diagnosis-second-study.png").stat().st_size > 10_000
+    assert "- False alarms, pooled: more than 2 % of white (1 of 20)." in page
+    assert "- Machine physics asserted for an artefact's fault: scale_x (case p: plate, artefact, pattern)." in page
+    assert "--cases 60 --nulls 300 --seed 9 --workers" in page
     assert "22 cases" in capsys.readouterr().out
 
 
@@ -75,3 +86,23 @@ def test_a_candidate_that_only_the_noise_of_an_attitude_shows_ends_no_diagnosis(
     made = case(20261124, "nothing, display", 258)
     write(made, tmp_path)
     assert "artefact_squareness_yz" not in diagnosed(tmp_path / made.name, whole=True)["effects"]
+
+
+def test_truths_of_earlier_runs_are_told_which_effects_a_fault_of_the_artefact_is() -> None:
+    """A record as it was written before, of an artefact whose temperature changed."""
+    made = json.loads(json.dumps(case(20261124, "artefact, temperature", 0).truth))
+    name = f"{KINDS.index('artefact, temperature'):02d}-0"
+    before = {"name": name, **{key: value for key, value in made.items() if key not in ("is", "alike")}}
+    other = {"name": "00-0", "kind": "nothing, white"}
+    after = completed([before, other], 20261124)
+    assert after[0]["fault"] == "another temperature in every set-up"
+    assert after[0]["is"] == ["artefact_set_up_temperature"]  # the mean of all cannot be seen by itself
+    assert json.loads(json.dumps(after[0])) == {"name": name, **made}
+    assert after[1] is other
+
+
+def test_an_expansion_is_estimated_where_one_is_concealed() -> None:
+    assert estimated((5, 3)) is None
+    name, _, _, pull = estimated((5, 0)) or ("", False, False, 9.0)
+    assert name.startswith("thermal_scale_")
+    assert abs(pull) < 5

@@ -10,9 +10,10 @@ import numpy as np
 from cmm_uq.diagnosis.diagnosis import LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.diagnosis.location import region_of
-from cmm_uq.inference.posterior import Posterior, Progress
+from cmm_uq.inference.ensembles import Progress
 from cmm_uq.kinds.error_maps.columns import MapColumn, turned
-from cmm_uq.kinds.error_maps.fit import expansion, function, held_out, noise_of, residual
+from cmm_uq.kinds.error_maps.expansion import expansion
+from cmm_uq.kinds.error_maps.fit import function, held_out, noise_of, residual
 from cmm_uq.kinds.error_maps.search import ColumnComparison, Rival, column_comparison
 from cmm_uq.messages import Text, say
 from cmm_uq.physics.catalogue import effects as effects_named
@@ -78,7 +79,6 @@ class MapsDiagnosis:
     differences : beyond them, the most significant first.
     displacement, rotation : noise of a reading, µm and ″; ``None`` where no such error was compared.
     improvement : parts of the travel predicted from the rest; a rotation counts as µm at one metre.
-    posteriors : of the effects asserted.
     """
 
     verdict: str
@@ -90,12 +90,6 @@ class MapsDiagnosis:
     displacement: Quantity | None
     rotation: Quantity | None
     improvement: Improvement
-    posteriors: tuple[Posterior, ...]
-
-    @property
-    def sampler(self) -> str | None:
-        """Program and version; ``None`` where nothing had to be sampled."""
-        return self.posteriors[0].sampler if self.posteriors else None
 
     def p_of(self, compared: ColumnComparison) -> float:
         """Of "these maps differ by noise alone" for one error, corrected for all that were compared."""
@@ -120,15 +114,14 @@ def diagnose_maps(
     seed : of everything random.
     progress : told the part done.
     """
-    comparisons, effects, differences, posteriors = [], [], [], []
+    comparisons, effects, differences = [], [], []
     for i, column in enumerate(columns):
         compared = column_comparison(column, named, seed)
         comparisons.append(compared)
         p_value = len(columns) * compared.p_value
         if p_value < alpha:
-            if found := _effect(compared):
-                effects.append(found[0])
-                posteriors.append(found[1])
+            if found := expansion_shown(compared):
+                effects.append(found)
             differences += [_difference(compared, index, p_value) for index in compared.unknown]
         if progress:
             progress((i + 1) / len(columns))
@@ -139,19 +132,19 @@ def diagnose_maps(
     return MapsDiagnosis(
         verdict, p_value, alpha, tuple(comparisons), tuple(sorted(effects, key=lambda e: -e.probability)),
         tuple(sorted(differences, key=lambda d: -d.amplitude_um)), _noise(comparisons, alpha, rotations=False),
-        _noise(comparisons, alpha, rotations=True), _improvement(comparisons, alpha), tuple(posteriors),
+        _noise(comparisons, alpha, rotations=True), _improvement(comparisons, alpha),
     )  # fmt: skip
 
 
-def _effect(compared: ColumnComparison) -> tuple[LeftOut, Posterior] | None:
+def expansion_shown(compared: ColumnComparison) -> LeftOut | None:
     """An effect that the maps of a column show: probable, not zero, and better at predicting what was held out."""
     if compared.effect is None:
         return None
     without = [v for v in compared.versions if v.explanation != compared.effect]
     gain = held_out(compared, compared.versions)[1] - held_out(compared, without)[1]
-    posterior = expansion(compared, compared.effect)
+    draws = expansion(compared, compared.effect)
     (effect,) = effects_named((str(compared.rivals[compared.effect].effect),))
-    reported = effect.to_reported(posterior.draws, np.zeros((len(posterior.draws), 0)))
+    reported = effect.to_reported(draws[:, None], np.zeros((len(draws), 0)))
     units = {parameter.name: parameter.unit for parameter in effect.reported}
     parameters = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
     sure = all(q.interval95[0] > 0 or q.interval95[1] < 0 for q in parameters.values())
@@ -159,10 +152,9 @@ def _effect(compared: ColumnComparison) -> tuple[LeftOut, Posterior] | None:
         return None
     whole, rest, left = (float(np.sum(residual(compared, some) ** 2)) for some in ((), without, compared.versions))
     probability = compared.combinations.of(compared.effect)
-    found = LeftOut(
+    return LeftOut(
         effect.name, effect.title, probability, parameters, (rest - left) / whole, probability, effect.points_to
     )  # fmt: skip
-    return found, posterior
 
 
 def _difference(compared: ColumnComparison, index: int, p_value: float) -> Difference:

@@ -1,20 +1,15 @@
-"""What follows from a compared: how the maps differ, what is left, what held-out parts say, how large an effect is."""
+"""What follows from a compared: how the maps differ, what is left, what held-out parts say, and how noisy a reading is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
 from cmm_uq.diagnosis.comparison.stack import Version
-from cmm_uq.diagnosis.noise import Kind
-from cmm_uq.inference.linear_model import LinearModel, Unknown
-from cmm_uq.inference.posterior import Posterior, sample
 from cmm_uq.kinds.error_maps.search import ColumnComparison
-from cmm_uq.physics.thermal import EXPANSION
 from cmm_uq.points import Floats
 
 BLOCKS = 5
@@ -22,9 +17,6 @@ BLOCKS = 5
 
 _LEAST_NOISE = 1e-7
 """mm; figures that agree to their last digit have no less."""
-
-_FOLLOWED = 0.05
-"""Probability of a combination, and of a kind of noise, from which it counts for the expansion's distribution."""
 
 
 def function(compared: ColumnComparison, index: int) -> tuple[Floats, Floats]:
@@ -97,37 +89,6 @@ def noise_of(compared: ColumnComparison, versions: Sequence[Version]) -> tuple[f
     return _sigma(compared, versions, compared.observed, every) ** 2, compared.comparison.degrees_of_freedom
 
 
-def expansion(compared: ColumnComparison, index: int) -> Posterior:
-    """Posterior of an effect's coefficient, sampled; rivals and kinds of noise count by their probability."""
-    rival, draws, weights = compared.rivals[index], [], []
-    (function,) = rival.functions
-    unknown = Unknown((str(rival.effect), EXPANSION.name), EXPANSION.unit, 0.0, EXPANSION.prior_sd, EXPANSION.prior_sd)
-    linear = LinearModel(
-        compared.observed, compared.seen(rival.over_maps, function) / EXPANSION.prior_sd, (unknown,), compared.baseline,
-        np.ones(len(compared.observed)), None,
-    )  # fmt: skip
-    for key, probability in compared.combinations.probability.items():
-        if index not in key or probability < _FOLLOWED:
-            continue
-        versions = compared.combinations.found[key].versions
-        for kind, share in zip(compared.comparison.kinds, compared.comparison.noise_probability(versions), strict=True):
-            if share > _FOLLOWED:
-                white = linear.uncorrelated(_whitening(compared, kind, versions, index))
-                draws.append(sample(white, compared.seed))
-                weights.append(probability * share)
-    return mixed(draws, np.array(weights) / sum(weights))
-
-
-def _whitening(
-    compared: ColumnComparison, kind: Kind, versions: Sequence[Version], index: int
-) -> Callable[[Floats], Floats]:
-    """What whitens noise of one kind together with the given rivals but one."""
-    columns, spread = compared.columns_of([v for v in versions if v.explanation != index])
-    factor = kind.coloured(np.eye(len(compared.observed)))
-    lower = np.linalg.cholesky(factor @ factor.T + (columns * spread**2) @ columns.T)
-    return lambda some: np.asarray(linalg.solve_triangular(lower, some, lower=True), dtype=np.float64)
-
-
 def _given(compared: ColumnComparison, versions: Sequence[Version]) -> tuple[Floats, Floats]:
     columns, spread = compared.columns_of(versions)
     return compared.comparison.rest(columns), spread
@@ -141,20 +102,3 @@ def _sigma(compared: ColumnComparison, versions: Sequence[Version], observed: Fl
     covariance = np.eye(len(rows)) + (columns * spread**2) @ columns.T
     squares = float(left @ linalg.solve(covariance, left, assume_a="pos"))
     return max(float(np.sqrt(squares / max(len(rows) - Q.shape[1], 1))), _LEAST_NOISE)
-
-
-def mixed(posteriors: Sequence[Posterior], weights: Floats) -> Posterior:
-    """One posterior from several, each with as many of its draws as its weight says."""
-    first, total = posteriors[0], len(posteriors[0].draws)
-    counts = np.round(weights * total).astype(np.int64)
-    draws = [
-        p.draws[np.linspace(0, len(p.draws) - 1, n).astype(np.int64)] for p, n in zip(posteriors, counts, strict=True)
-    ]
-    sigma = [
-        p.sigma[np.linspace(0, len(p.sigma) - 1, n).astype(np.int64)] for p, n in zip(posteriors, counts, strict=True)
-    ]
-    return replace(
-        first, draws=np.vstack(draws), sigma=np.concatenate(sigma), ess_min=min(p.ess_min for p in posteriors),
-        rhat_max=max(p.rhat_max for p in posteriors), steps=min(p.steps for p in posteriors),
-        autocorrelation_time=max(p.autocorrelation_time for p in posteriors),
-    )  # fmt: skip

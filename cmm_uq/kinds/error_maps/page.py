@@ -58,14 +58,14 @@ def maps_document(found: MapsDiagnosed, seed: int) -> Document:
         ),
         warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
         sections=sections,
-        produced_by=_produced_by(d.sampler, seed),
+        produced_by=_produced_by(seed),
         attachments=(*names(found.job.inputs), Verbatim("results.json")),
     )
 
 
-def _produced_by(sampler: str | None, seed: int) -> Text:
+def _produced_by(seed: int) -> Text:
     program = say("cmm-uq {version}", version=Verbatim(__version__))
-    return commas((program, *names(filter(None, (sampler,))), say("seed {seed}", seed=seed)))
+    return commas((program, say("seed {seed}", seed=seed)))
 
 
 def _told(found: MapsDiagnosed) -> tuple[Block, ...]:
