@@ -95,8 +95,8 @@ def test_a_mirrored_axis_changes_no_verdict_and_no_figure_that_is_printed() -> N
 
 @pytest.mark.parametrize(("factor", "start"), [(1.0, 1.7e9), (60.0, 0.0)], ids=["epoch", "minutes"])
 def test_a_clock_that_started_long_ago_or_counts_in_minutes_changes_no_verdict(factor: float, start: float) -> None:
-    """Of a backlash of 24 µm, far from the rate: where times differ in their last digit other shapes of slow noise stand for all,
-    and of one of 12 µm the p-value is 0.001 or 0.01.
+    """Of a backlash of 24 µm, far from the rate: where times differ in their last digit, other shapes of slow noise stand for
+    all, and of one of 12 µm the p-value is 0.001 or 0.01.
     """
     points = recording(24.0)
     plain = diagnosed(points)
