@@ -182,8 +182,12 @@ class _Evidence:
             together.setdefault(version.explanation, []).append(column)
         for first, columns in together.items():
             others = [i for i in self.single if i != first]
-            gain = special.logsumexp(self.both[np.ix_(others, columns)], axis=0) - self.alone[columns]
-            log_odds[columns] = np.logaddexp(log_odds[columns], pair + gain + odds[first, columns])
+            gain = (
+                special.logsumexp(self.both[np.ix_(others, columns)], axis=0)
+                - self.alone[columns]
+                + odds[first, columns]
+            )
+            log_odds[columns] = np.logaddexp(log_odds[columns], pair + gain)
         return np.asarray(log_odds, dtype=np.float64)
 
 
