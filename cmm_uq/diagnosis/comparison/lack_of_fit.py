@@ -150,10 +150,7 @@ class _Evidence:
         alone, both = np.zeros_like(nothing), np.full_like(something, -np.inf)
         if len(single) > 1:
             lead = comparison.best(data, single) if lead is None else lead
-            together: dict[Version, list[int]] = {}
-            for column, version in enumerate(lead):
-                together.setdefault(version, []).append(column)
-            for version, columns in together.items():
+            for version, columns in _together(lead).items():
                 alone[columns], both[:, columns] = comparison.log_evidence(data[:, columns], [version], single)
         return cls(comparison.explanations, nothing, something, single, lead, alone, both)
 
@@ -177,18 +174,20 @@ class _Evidence:
         if self.lead is None:
             return np.asarray(log_odds, dtype=np.float64)
         pair = np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(len(self.single), 2)) + np.log(NOTHING)
-        together: dict[int, list[int]] = {}
-        for column, version in enumerate(self.lead):
-            together.setdefault(version.explanation, []).append(column)
-        for first, columns in together.items():
+        for version, columns in _together(self.lead).items():
+            first = version.explanation
             others = [i for i in self.single if i != first]
-            gain = (
-                special.logsumexp(self.both[np.ix_(others, columns)], axis=0)
-                - self.alone[columns]
-                + odds[first, columns]
-            )
-            log_odds[columns] = np.logaddexp(log_odds[columns], pair + gain)
+            gain = special.logsumexp(self.both[np.ix_(others, columns)], axis=0) - self.alone[columns]
+            log_odds[columns] = np.logaddexp(log_odds[columns], pair + (gain + odds[first, columns]))
         return np.asarray(log_odds, dtype=np.float64)
+
+
+def _together(versions: Sequence[Version]) -> dict[Version, list[int]]:
+    """Columns of data that have a version in common."""
+    found: dict[Version, list[int]] = {}
+    for column, version in enumerate(versions):
+        found.setdefault(version, []).append(column)
+    return found
 
 
 def tail_probability(draws: Floats, value: float, tail: float = _TAIL) -> float:
