@@ -177,7 +177,8 @@ class _Evidence:
         for version, columns in _together(self.lead).items():
             first = version.explanation
             others = [i for i in self.single if i != first]
-            gain = special.logsumexp(self.both[np.ix_(others, columns)], axis=0) - self.alone[columns]
+            beside = np.ascontiguousarray(self.both[:, columns])[others]
+            gain = special.logsumexp(beside, axis=0) - self.alone[columns]
             log_odds[columns] = np.logaddexp(log_odds[columns], pair + (gain + odds[first, columns]))
         return np.asarray(log_odds, dtype=np.float64)
 
