@@ -107,14 +107,41 @@ def tails(residual: Floats) -> Kind:
     evidence of this kind is never overstated. (σ stays the standard deviation of a reading.)
     """
     scale = 1.4826 * float(np.median(np.abs(residual)))
-    squares = (residual / max(scale, _NANOMETRE)) ** 2 / _SHRINK
-    weight = (_TAILS_DOF + 1) / (_TAILS_DOF + squares)
+    precision, log_factor = _tangent(residual / max(scale, _NANOMETRE))
+    whitening = sparse.csr_array(sparse.diags_array(np.sqrt(precision)))
+    return Kind("tails", whitening, 0.5 * float(np.log(precision).sum()), TAILS, log_factor=log_factor)
+
+
+def with_tails(kind: Kind, residual: Floats, probability: float) -> Kind:
+    """A kind of noise whose independent part is of Student's t, by its tangent at residuals; see :func:`tails`.
+
+    Parameters
+    ----------
+    kind : otherwise.
+    residual : (m,) of the whitened observations, over their standard deviation.
+    probability : beforehand.
+    """
+    precision, log_factor = _tangent(residual)
+    whitening = sparse.csr_array(sparse.diags_array(np.sqrt(precision)) @ kind.whitening)
+    log = kind.log_whitening + 0.5 * float(np.log(precision).sum())
+    return replace(kind, name="tails", whitening=whitening, log_whitening=log, probability=probability,
+                   log_factor=kind.log_factor + log_factor, unrounded=None)  # fmt: skip
+
+
+def _tangent(residual: Floats) -> tuple[Floats, float]:
+    """Precisions (m,) of the tangent at residuals (m,), and the sum by which ln t exceeds the normal density there."""
+    squares, precision = residual**2 / _SHRINK, tail_precision(residual)
     log_t = special.gammaln((_TAILS_DOF + 1) / 2) - special.gammaln(_TAILS_DOF / 2) - 0.5 * np.log(np.pi * _TAILS_DOF)
     log_t = log_t - 0.5 * (_TAILS_DOF + 1) * np.log1p(squares / _TAILS_DOF) - 0.5 * np.log(_SHRINK)
+    weight = precision * _SHRINK
     normal = -0.5 * np.log(2 * np.pi * _SHRINK / weight) - 0.5 * weight * squares
-    log_whitening = 0.5 * float(np.log(weight / _SHRINK).sum())
-    whitening = sparse.csr_array(sparse.diags_array(np.sqrt(weight / _SHRINK)))
-    return Kind("tails", whitening, log_whitening, TAILS, log_factor=float(np.sum(log_t - normal)))
+    return precision, float(np.sum(log_t - normal))
+
+
+def tail_precision(residual: Floats) -> Floats:
+    """Of the tangent of ln t, over that of a reading, at residuals over their standard deviation; largest at zero."""
+    weight = (_TAILS_DOF + 1) / (_TAILS_DOF + residual**2 / _SHRINK)
+    return np.asarray(weight / _SHRINK, dtype=np.float64)
 
 
 def heavy(residuals: Floats) -> bool:

@@ -178,7 +178,8 @@ def test_the_false_alarm_rate_is_asked_for() -> None:
     model = MeasurementModel(Ballbar(bar_facts(), points), effects(SIX))
     weak = diagnose(model, stated_um=1.0, alpha=1e-6, seed=0)
     assert weak.verdict == "consistent"
-    assert weak.p_value == diagnose(replace(model), stated_um=1.0, alpha=0.5, seed=0).p_value
+    near = diagnose(replace(model), stated_um=1.0, alpha=0.5, seed=0).p_value  # of more draws, and with heavy tails
+    assert weak.p_value == pytest.approx(near, abs=4 * np.sqrt(near * (1 - near) / 200))
 
 
 def test_a_jump_is_located_between_the_readings_about_it() -> None:

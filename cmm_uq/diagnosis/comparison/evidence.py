@@ -207,6 +207,30 @@ class Comparison:
         )
         return nodes, np.asarray(special.logsumexp(exponent, axis=1), dtype=np.float64)
 
+    def of_nothing(self, data: Floats) -> Floats:
+        """Log evidence (k, b) of nothing beyond the baseline, by kind of noise, for data (m, b)."""
+        known = self._weigh(data, ())
+        return np.asarray(self.over_sigma(known.squares) + known.log[:, None], dtype=np.float64)
+
+    def precision(self, kind: int) -> Precision:
+        """Of a kind of noise, by its index."""
+        return self._noises[kind]
+
+    def only(self, kinds: Sequence[int]) -> Comparison:
+        """The same under some of the kinds of noise."""
+        found = self.under([self.kinds[k] for k in kinds], self.left)
+        index = list(kinds)
+        found.__dict__["_noises"] = [self._noises[k] for k in index]
+        found.__dict__["_blocks"] = [blocks[index] for blocks in self._blocks]
+        return found
+
+    def under(self, kinds: Sequence[Kind], left: Floats) -> Comparison:
+        """The same candidates for what the baseline leaves (m,) of other observations, under other kinds of noise."""
+        found = replace(self, observed=left, kinds=kinds)
+        shared = {name: getattr(self, name) for name in ("_reached", "_stack", "_where", "_table", "visible")}
+        found.__dict__.update(shared, left=left)  # what none of the two changes
+        return found
+
     def noise_posterior(self, left: Floats | None = None) -> Floats:
         """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline.
 

@@ -19,12 +19,13 @@ class Precision:
     """Of one kind of noise, what the baseline reaches projected out.
 
     The precision of what is left is WᵀW − rowsᵀ·rows, with the whitening W (m, m); ``log``, the log probability less that of
-    the determinant.
+    the determinant. ``basis`` (m, g) see :meth:`explained`.
     """
 
     whitening: sparse.csr_array
     rows: Floats
     log: float
+    basis: Floats
 
     def __call__(self, columns: Floats) -> Floats:
         """Precision times columns (m, b)."""
@@ -33,6 +34,10 @@ class Precision:
         else:
             whole = self._diagonal * (self._diagonal * columns)
         return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
+
+    def explained(self, white: Floats) -> Floats:
+        """Of whitened observations (m, b), what the baseline takes, and what noise in common explains of the rest."""
+        return np.asarray(self.basis @ (self.basis.T @ white), dtype=np.float64)
 
     @cached_property
     def _diagonal(self) -> Floats | None:
@@ -60,7 +65,7 @@ def precisions(kinds: Sequence[Kind], reached: Floats, certified: Floats) -> lis
     for kind in kinds:
         Q, R = np.linalg.qr(kind.white(reached))
         log = float(np.log(kind.probability)) + kind.log_factor + kind.log_whitening - log_diagonal(R)
-        rows = kind.whitening.T @ Q
+        rows, basis = kind.whitening.T @ Q, Q
         shared = [columns for columns in (certified, kind.slow) if columns.size]
         if shared:
             white = kind.white(np.hstack(shared))
@@ -68,6 +73,6 @@ def precisions(kinds: Sequence[Kind], reached: Floats, certified: Floats) -> lis
             factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white)
             log -= log_diagonal(factor)
             own = np.linalg.solve(factor, white.T)
-            rows = np.hstack([rows, kind.whitening.T @ own.T])
-        found.append(Precision(kind.whitening, np.asarray(rows.T, dtype=np.float64), log))
+            rows, basis = np.hstack([rows, kind.whitening.T @ own.T]), np.hstack([Q, own.T])
+        found.append(Precision(kind.whitening, np.asarray(rows.T, dtype=np.float64), log, basis))
     return found

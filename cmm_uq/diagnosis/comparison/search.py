@@ -169,7 +169,7 @@ def _without(model: MeasurementModel, whole: MeasurementModel) -> Floats:
 
 
 def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: int) -> Found:
-    first = model_comparison(model, stated, seed)
+    first = model_comparison(model, stated, seed, alpha)
     if first.p_value >= alpha:
         return Found(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)
     combinations = explore(first.comparison)
@@ -337,8 +337,16 @@ def rivals_of(combinations: Combinations, chosen: Key, index: int) -> Key:
     return frozenset(i for i, odds in combinations.instead(chosen, index).items() if odds > NOT_TOLD_APART)
 
 
-def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -> ModelComparison:
-    """Compare all candidates for what a model leaves; ``seed`` is that of the null distribution."""
+def model_comparison(
+    model: MeasurementModel, stated: float | None, seed: int, alpha: float | None = None
+) -> ModelComparison:
+    """Compare all candidates for what a model leaves.
+
+    Parameters
+    ----------
+    seed : of the null distribution.
+    alpha : false-alarm rate near which the p-value is found more closely.
+    """
     values = model.estimate().about
     singles = known(model, values, tuple(effect.name for effect in model.effects))
     known_as = {term for single in singles if single.effect is not None for term in single.effect.stands_for}
@@ -349,7 +357,7 @@ def model_comparison(model: MeasurementModel, stated: float | None, seed: int) -
     log_odds = something[:, 0] - nothing[0]
     prior = log_prior(candidates)
     log_total = special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
-    p_value, null, maxima = lack_of_fit(comparison, seed)
+    p_value, null, maxima = lack_of_fit(comparison, seed, alpha)
     probability = np.exp(prior + log_odds - log_total)
     return ModelComparison(model, values, comparison, log_odds, probability, p_value, null, maxima)
 
