@@ -96,8 +96,8 @@ def unpredicted(found: Found, unseen: Text) -> tuple[Withheld, ...]:
     return tuple(replace(_withheld(found, i, why), modes=modes_of(found, i)) for i in sorted(found.chosen))
 
 
-def with_sizes(found: Found, joint: Joint) -> tuple[Found, tuple[Withheld, ...]]:
-    """Without the effects of whose size the joint posterior says too little, and these."""
+def without_size(found: Found, joint: Joint) -> dict[int, Withheld]:
+    """The effects of whose size the joint posterior says too little."""
     gone, shares = {}, _chance(found, joint)
     for i in sorted(found.chosen):
         effect = effect_of(found.first.explanations[i])
@@ -112,7 +112,7 @@ def with_sizes(found: Found, joint: Joint) -> tuple[Found, tuple[Withheld, ...]]
             why = WITHIN_NOISE
         if why is not None:
             gone[i] = replace(_withheld(found, i, why), modes=modes)
-    return (without(found, frozenset(gone)), tuple(gone.values())) if gone else (found, ())
+    return gone
 
 
 def group_of(combinations: Combinations, chosen: Key, index: int) -> Key:
