@@ -106,7 +106,8 @@ def test_in_place_of_an_effect_of_open_size_stands_the_next_that_cannot_be_told_
     of = found_with(*(((i,), p) for i, p in enumerate(each)), chosen=frozenset({0}))
     monkeypatch.setattr(search, "_of", lambda first, own, chosen, stated: replace(of, chosen=chosen))
     other = in_place_of(of, 0, frozenset({0}))
-    assert (other and (other[1], other[0].chosen)) == (instead and (instead, {instead}))
+    assert (None if other is None else other[1]) == instead
+    assert other is None or other[0].chosen == {instead}
     assert in_place_of(of, 0, frozenset({0, 1, 2})) is None, "each is tried once"
 
 
