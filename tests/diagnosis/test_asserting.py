@@ -66,6 +66,13 @@ def test_a_function_belongs_to_it_where_effects_alone_are_no_more_than_one_half(
     assert group_of(found, frozenset({0}), 0) == {3}
 
 
+def test_what_was_never_compared_by_itself_has_none_in_its_place() -> None:
+    """Two effects found together, of which one is withheld: the other alone is no combination."""
+    found = combinations(((0, 1), 0.7), ((1,), 0.2), ((2,), 0.1))
+    assert group_of(found, frozenset({0}), 0) == frozenset()
+    assert in_place_of(found_with(((0, 1), 0.7), ((1,), 0.3), chosen=frozenset({0})), 0, frozenset({0})) is None
+
+
 def test_effects_that_a_function_could_be_are_named_with_it_one_after_the_other() -> None:
     """The most probable effects; the second by what it has where the first is found, 0.25 of 0.3."""
     found = combinations(((3,), 0.65), ((0, 1), 0.25), ((0,), 0.05), ((2,), 0.05))
