@@ -3,8 +3,8 @@
 A probable effect is no finding where the recording does not say of which size it is: where the interval of its size holds
 zero, where it takes no more of the misfit than noise gives to something tried as often, where no period of several that fit
 is more probable than not, or where the phase of a period is open. That an error of an axis is periodic is one statement, its
-period another: without a settled period the first alone is asserted, where all else is as good as excluded. An effect less
-probable than one half is asserted as one of a group, whose names go with it.
+period another: without a settled period the first alone is asserted, where it is more probable than not by itself, over all
+periods. Any other effect less probable than one half is asserted as one of a group, whose names go with it.
 """
 
 from __future__ import annotations
@@ -31,9 +31,6 @@ _COVERED = 0.95
 
 _BY_NOISE = 0.05
 """Probability, under noise, of taking as much of the misfit, from which on it is the noise's share."""
-
-_SURE = 0.99
-"""Probability from which an error is said to be periodic, or at least to go by the reading, without saying its period."""
 
 _FEW = 100
 """Draws within the most probable mode from which its sizes are judged by these."""
@@ -90,8 +87,7 @@ def _too_little(found: Found, index: int, modes: tuple[Mode, ...]) -> Text | Non
         return NOT_WHOLE
     if settled(found, index, modes):
         return None
-    sure = combinations.of(index) >= ASSERTED and combinations.of_any(combinations.imitating(index) | {index}) >= _SURE
-    return None if sure else UNRESOLVED
+    return None if combinations.of(index) >= ASSERTED else UNRESOLVED
 
 
 def unpredicted(found: Found, unseen: Text) -> tuple[Withheld, ...]:
@@ -100,8 +96,8 @@ def unpredicted(found: Found, unseen: Text) -> tuple[Withheld, ...]:
     return tuple(replace(_withheld(found, i, why), modes=modes_of(found, i)) for i in sorted(found.chosen))
 
 
-def with_sizes(found: Found, joint: Joint) -> tuple[Found, tuple[Withheld, ...]]:
-    """Without the effects of whose size the joint posterior says too little, and these."""
+def without_size(found: Found, joint: Joint) -> dict[int, Withheld]:
+    """The effects of whose size the joint posterior says too little."""
     gone, shares = {}, _chance(found, joint)
     for i in sorted(found.chosen):
         effect = effect_of(found.first.explanations[i])
@@ -116,7 +112,7 @@ def with_sizes(found: Found, joint: Joint) -> tuple[Found, tuple[Withheld, ...]]
             why = WITHIN_NOISE
         if why is not None:
             gone[i] = replace(_withheld(found, i, why), modes=modes)
-    return (without(found, frozenset(gone)), tuple(gone.values())) if gone else (found, ())
+    return gone
 
 
 def group_of(combinations: Combinations, chosen: Key, index: int) -> Key:

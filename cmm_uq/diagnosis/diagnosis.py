@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import special
 
-from cmm_uq.diagnosis.asserting import Withheld, group_of, settled, unpredicted, with_periods, with_sizes
+from cmm_uq.diagnosis.asserting import Withheld, group_of, settled, unpredicted, with_periods, without_size
 from cmm_uq.diagnosis.compared import compared_on
-from cmm_uq.diagnosis.comparison.search import Found, ModelComparison, search, without
+from cmm_uq.diagnosis.comparison.search import Found, ModelComparison, in_place_of, search, without
 from cmm_uq.diagnosis.held_out import Improvement, improvement
 from cmm_uq.diagnosis.joint import Joint, joint_posterior
 from cmm_uq.diagnosis.location import Place, located
@@ -167,15 +167,27 @@ def diagnose(
 def _asserted(
     found: Found, model: MeasurementModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
 ) -> tuple[Found, Joint, tuple[Withheld, ...]]:
-    """What of a search may be asserted, estimated from all observations, and what is withheld."""
+    """What of a search may be asserted, estimated from all observations, and what is withheld.
+
+    Where the size of an effect is open, the next most probable that cannot be told from it is tried in its place.
+    """
     found, gone = with_periods(found)
+    places: dict[int, Withheld] = {}  # of each effect that was tried in the place of others, the first of these
+    tried: frozenset[int] = frozenset()
     while True:
         found = _of_all(found, model)
         joint = joint_posterior(found, seed, progress, known)
-        found, more = with_sizes(found, joint)
+        more = without_size(found, joint)
         if not more:
             return found, joint, gone
-        gone = (*gone, *more)
+        tried |= frozenset(more)
+        for i, withheld in more.items():
+            first = places.get(i, withheld)
+            if (instead := in_place_of(found, i, tried)) is not None:
+                found, other = instead
+                places[other] = first
+            else:
+                found, gone = without(found, frozenset({i})), (*gone, first)
 
 
 def _of_all(found: Found, model: MeasurementModel) -> Found:

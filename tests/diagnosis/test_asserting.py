@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from cmm_uq.diagnosis import diagnosis
-from cmm_uq.diagnosis.asserting import _holds_zero, _phase_known, group_of
+from cmm_uq.diagnosis.asserting import HOLDS_ZERO, Withheld, _holds_zero, _phase_known, group_of
+from cmm_uq.diagnosis.comparison import search
 from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.diagnosis.comparison.search import asserted
+from cmm_uq.diagnosis.comparison.search import Found, ModelComparison, asserted, in_place_of
 from cmm_uq.diagnosis.diagnosis import LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.diagnosis.words import sentence
@@ -63,6 +66,13 @@ def test_a_function_belongs_to_it_where_effects_alone_are_no_more_than_one_half(
     assert group_of(found, frozenset({0}), 0) == {3}
 
 
+def test_what_was_never_compared_by_itself_has_none_in_its_place() -> None:
+    """Two effects found together, of which one is withheld: the other alone is no combination."""
+    found = combinations(((0, 1), 0.7), ((1,), 0.2), ((2,), 0.1))
+    assert group_of(found, frozenset({0}), 0) == frozenset()
+    assert in_place_of(found_with(((0, 1), 0.7), ((1,), 0.3), chosen=frozenset({0})), 0, frozenset({0})) is None
+
+
 def test_effects_that_a_function_could_be_are_named_with_it_one_after_the_other() -> None:
     """The most probable effects; the second by what it has where the first is found, 0.25 of 0.3."""
     found = combinations(((3,), 0.65), ((0, 1), 0.25), ((0,), 0.05), ((2,), 0.05))
@@ -82,6 +92,50 @@ def test_effects_that_a_function_could_not_be_are_not_named_with_it() -> None:
     assert asserted(replace(found, explanations=strange, imitated={0: frozenset({3})})) == {0}, (
         "as this recording shows it"
     )
+
+
+def found_with(*members: tuple[tuple[int, ...], float], chosen: frozenset[int]) -> Found:
+    of = combinations(*members)
+    first = SimpleNamespace(explanations=of.explanations)
+    none: Any = None
+    return Found(cast("ModelComparison", first), none, of, chosen, (), none, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("each", "instead"),
+    [((0.36, 0.3, 0.25, 0.09), 1), ((0.36, 0.19, 0.05, 0.4), None), ((0.2, 0.24, 0.05, 0.51), None)],
+    ids=["next most probable", "too improbable to be named", "no half with all that cannot be told from it"],
+)
+def test_in_place_of_an_effect_of_open_size_stands_the_next_that_cannot_be_told_from_it(
+    monkeypatch: pytest.MonkeyPatch, each: tuple[float, ...], instead: int | None
+) -> None:
+    """One fifth to be named, one half with its group, as any; the last of them is a function."""
+    of = found_with(*(((i,), p) for i, p in enumerate(each)), chosen=frozenset({0}))
+    monkeypatch.setattr(search, "_of", lambda first, own, chosen, stated: replace(of, chosen=chosen))
+    other = in_place_of(of, 0, frozenset({0}))
+    assert (None if other is None else other[1]) == instead
+    assert other is None or other[0].chosen == {instead}
+    assert in_place_of(of, 0, frozenset({0, 1, 2})) is None, "each is tried once"
+
+
+def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeypatch: pytest.MonkeyPatch) -> None:
+    """0.45, 0.40 and 0.10 in its place: the third is improbable, the second's size is open as well."""
+    start = found_with(((0,), 0.45), ((1,), 0.4), ((2,), 0.1), ((3,), 0.05), chosen=frozenset({0}))
+    seen = []
+
+    def open_size(found: Found, _joint: object) -> dict[int, Withheld]:
+        seen.append(set(found.chosen))
+        return {i: Withheld(str(i), say("one"), 0.4, HOLDS_ZERO) for i in found.chosen}
+
+    monkeypatch.setattr(search, "_of", lambda first, own, chosen, stated: replace(start, chosen=chosen))
+    for name, stub in {
+        "with_periods": lambda found: (found, ()), "_of_all": lambda found, _model: found, "without_size": open_size,
+        "joint_posterior": lambda *_: None, "without": lambda found, gone: replace(found, chosen=found.chosen - gone),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(diagnosis, name, stub)
+    found, _, withheld = diagnosis._asserted(start, cast("Any", None), 0, None, None)
+    assert seen == [{0}, {1}, set()]
+    assert (found.chosen, [each.effect for each in withheld]) == (frozenset(), ["0"])
 
 
 def test_what_held_out_placings_do_not_bear_out_is_said_to_be_withheld(monkeypatch: pytest.MonkeyPatch) -> None:

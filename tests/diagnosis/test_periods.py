@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from cmm_uq.diagnosis.asserting import UNRESOLVED, _too_little
+from cmm_uq.diagnosis.asserting import UNRESOLVED, _too_little, settled
 from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.diagnosis.comparison.search import Found
@@ -64,23 +64,23 @@ def test_five_places_at_equal_distances_do_not_tell_a_period_from_its_aliases() 
 
 
 @pytest.mark.parametrize(
-    ("probability", "other", "asserted"), [(0.98, 0.0, False), (0.9, 0.095, True), (0.45, 0.55, False)]
+    ("probability", "other", "asserted"),
+    [(0.51, 0.0, True), (0.51, 0.49, True), (0.49, 0.0, False), (0.49, 0.51, False)],
 )
-def test_without_a_period_an_error_is_asserted_where_all_but_functions_of_the_reading_is_excluded(
+def test_without_a_period_an_error_is_asserted_where_it_is_more_probable_than_not_over_all_periods(
     probability: float, other: float, *, asserted: bool
 ) -> None:
-    """By 99 %, and where the error itself is more probable than not."""
+    """As any effect (ASSERTED), whatever else there may be; a function of the reading is no part of it."""
     why = _too_little(searched(probability, other), 0, (Mode(LONG, 0.3, (10.0, 20.0)), Mode(LONG, 0.3, (30.0, 40.0))))
     assert why is (None if asserted else UNRESOLVED)
 
 
-@pytest.mark.parametrize(("share", "asserted"), [(0.6, False), (0.7, True)])
+@pytest.mark.parametrize(("share", "with_period"), [(0.6, False), (0.7, True)])
 def test_an_error_is_asserted_with_a_period_where_both_together_are_more_probable_than_not(
-    share: float, *, asserted: bool
+    share: float, *, with_period: bool
 ) -> None:
     """Of 0.77: 0.46 with a period that has six tenths of it, 0.54 with one that has seven."""
-    why = _too_little(searched(0.77, 0.0), 0, (Mode(LONG, share, (10.0, 20.0)),))
-    assert why is (None if asserted else UNRESOLVED)
+    assert settled(searched(0.77, 0.0), 0, (Mode(LONG, share, (10.0, 20.0)),)) is with_period
 
 
 def searched(probability: float, other: float) -> Found:

@@ -103,10 +103,13 @@ class Combinations:
         """Odds of each other known effect in the place of one, or of one and more, the rest kept.
 
         In the place of several it counts where it is more probable than that the one is merely left out: a gauge that had
-        another temperature on each of its lines looks like two or three errors of the machine at once.
+        another temperature on each of its lines looks like two or three errors of the machine at once. Of effects that were
+        never compared by themselves, but with others that are withheld, there are no odds.
         """
-        rest, whole = effects - {index}, self.of_effects[effects]
+        rest, whole = effects - {index}, self.of_effects.get(effects, 0.0)
         odds: dict[int, float] = {}
+        if whole == 0:
+            return odds
         for other, p in self.of_effects.items():
             more = other - effects
             if len(more) != 1 or index in other:

@@ -181,8 +181,13 @@ def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: i
         combinations = explore(first.comparison, combinations, frozenset(shaped))
     combinations = replace(combinations, imitated=_imitated(first.comparison, combinations))
     chosen = asserted(combinations)
+    return _of(first, combinations, chosen, stated)
+
+
+def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated: float | None) -> Found:
+    """What a search ends with where these effects are found."""
     versions = combinations.versions(chosen)
-    found = model if not chosen else with_effects(first, versions, chosen)
+    found = first.model if not chosen else with_effects(first, versions, chosen)
     last = comparison_of(found, stated, ())
     rough = frozenset(
         i for i in chosen if _rough(first.comparison, versions, i) > ASSERTED or _less_than_function(combinations, i)
@@ -203,6 +208,30 @@ def without(found: Found, gone: Key) -> Found:
     return replace(
         found, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0, rough=found.rough - gone
     )
+
+
+def in_place_of(found: Found, index: int, tried: Key) -> tuple[Found, int] | None:
+    """The same search with the next most probable in the place of an effect, and which that is; ``None`` where none may be.
+
+    It is one that these data cannot tell from it, is probable enough to be named, and has with all such one half, as any.
+
+    Parameters
+    ----------
+    found : the search.
+    index : of the effect.
+    tried : effects that are none to be found.
+    """
+    combinations = found.combinations
+    if combinations is None:
+        return None
+    for other in sorted(rivals_of(combinations, found.chosen, index) - tried, key=lambda i: -combinations.of(i)):
+        chosen = found.chosen - {index} | {other}
+        if chosen not in combinations.of_effects or found.first.explanations[other].shaped:
+            continue
+        if combinations.of(other) >= _MECHANISM and with_rivals(combinations, chosen, other) >= ASSERTED:
+            instead = _of(found.first, combinations, chosen, found.stated)
+            return replace(instead, unexplained=max(instead.unexplained, found.unexplained)), other
+    return None
 
 
 def _rough(comparison: Comparison, versions: Sequence[Version], index: int) -> float:

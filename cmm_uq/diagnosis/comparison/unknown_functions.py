@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from scipy import linalg
@@ -106,9 +106,9 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
         if half < 1.0:
             continue
         lever = (readings / half)[:, None]
-        members = tuple(
-            Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in _functions(time)
-        )
+        free = any(effect.name == f"scale_{axis}" for effect in model.effects)
+        functions = _functions(time) if free else _one_sided(_functions(time))
+        members = tuple(Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in functions)
         name = say("scale of {axis} as a function of time", axis=Verbatim(axis.upper()))
         yield Explanation(name, UNKNOWN, members, time, "time_s", Nonparametric("time_s", axis, scale=True))
 
@@ -199,6 +199,16 @@ def _functions(covariate: Floats, same: float = 0.0) -> Iterator[tuple[Floats, f
     chosen = distinct[widest] + 0.5 * gaps[widest]
     for place in chosen:
         yield UNKNOWN_SD * np.where(covariate > place, 1.0, -1.0)[:, None], 1 / len(chosen)
+
+
+def _one_sided(functions: Iterable[tuple[Floats, float]]) -> Iterator[tuple[Floats, float]]:
+    """The same, and each jump from or to zero besides: of what is right but on one side, where no constant is free."""
+    for function, weight in functions:
+        if function.shape[1] > 1:
+            yield function, weight
+            continue
+        for constant in (-UNKNOWN_SD, 0.0, UNKNOWN_SD):
+            yield (function + constant) / (2 if constant else 1), weight / 3
 
 
 def smooth_functions(covariate: Floats) -> Iterator[Floats]:

@@ -11,7 +11,7 @@ import pytest
 from cmm_uq.commands.diagnosing import screened_model
 from cmm_uq.commands.reading import read_job
 from cmm_uq.diagnosis.comparison.explanations import Explanation
-from cmm_uq.diagnosis.comparison.unknown_functions import directions, unknown
+from cmm_uq.diagnosis.comparison.unknown_functions import UNKNOWN_SD, _functions, _one_sided, directions, unknown
 from cmm_uq.points import Floats
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -88,3 +88,19 @@ def test_a_jump_is_sought_between_every_two_readings_in_time() -> None:
     for after in np.unique(time)[1:]:
         what = model.seen(along_x * np.where(time >= after, 1.0, -1.0)[:, None, None], values)[:, 0]
         assert reached(scale, what) == pytest.approx(1.0)
+
+
+def test_a_jump_from_or_to_zero_is_among_them_where_no_constant_is_free() -> None:
+    """A scale that was right until an hour and wrong after it: one version is it, and all weigh as before."""
+    hour = np.arange(8.0)
+    plain, sided = list(_functions(hour)), list(_one_sided(_functions(hour)))
+    assert sum(w for _, w in sided) == pytest.approx(sum(w for _, w in plain))
+    jumps = [f[:, 0] / UNKNOWN_SD for f, _ in sided if f.shape[1] == 1]
+    for last in range(7):
+        for wanted in (
+            np.where(hour > last, 1.0, -1.0),
+            np.where(hour > last, 1.0, 0.0),
+            np.where(hour > last, 0.0, -1.0),
+        ):
+            assert any(np.allclose(jump, wanted, atol=1e-12) for jump in jumps), (last, wanted)
+    assert len(jumps) == 3 * 7
