@@ -71,11 +71,9 @@ def test_what_is_stated_does_not_contradict_itself(
     measured = np.array([max(value, 0.0) if zone else value for zone, _, value, *_ in kinds])
     plan = Plan((circle("hole", [0, 0, 0], 20.0, 8),), tuple(made))
     found, each, together, decided = all_of(errors, measured, plan)
-    for one, asked, probability, judged, draws, at in zip(
-        found, made, each, decided, (measured - errors).T, measured, strict=True
-    ):
+    for one, asked, probability, judged, draws in zip(found, made, each, decided, (measured - errors).T, strict=True):
         low, high = one.interval
-        zone, upper = asked.what == "roundness", float(asked.upper or 0.0)
+        zone = asked.what == "roundness"
         rare = 2.01 * RARE / N / (SCARCE if zone else 1.0)  # tails of fewer draws than these are judged apart
         assert one.value is not None
         assert judged.probability is not None
@@ -84,32 +82,37 @@ def test_what_is_stated_does_not_contradict_itself(
         assert judged.probability + (judged.beyond or 0.0) == pytest.approx(1, abs=rare)
         # value, interval and U
         assert low <= high
-        assert one.U >= 0.5 * (high - low) * (1 - 1e-9), "U shorter than its interval"
+        assert 0.5 * (high - low) * (1 - 1e-9) <= one.U, "U shorter than its interval"
         if zone:
             assert low <= one.value <= high, "a value outside of its interval"
             assert low >= 0
             if low == 0:
                 assert one.value + one.U >= high * (1 - 1e-9), "U ends before the interval"
-        # decision and probability
-        probability = judged.probability
-        if judged.outcome == "pass":
-            assert 1 - probability <= PROVED + 1e-9, "a pass that is not proved"
-            assert one.value <= upper
-        if judged.outcome == "fail":
-            assert probability <= PROVED + 1e-9, "a fail that is not proved"
-        # decision and interval
-        inside = (asked.lower is None or low >= asked.lower) and high <= upper
-        outside = low > upper or (asked.lower is not None and high < asked.lower)
-        if inside:
-            assert probability >= 0.95 - DRAW_ERROR, "an interval inside of limits that are not kept"
-            assert judged.outcome != "fail"
-        if outside:
-            assert probability <= 0.05 + DRAW_ERROR, "an interval outside of limits that are kept"
-            assert judged.outcome != "pass"
-        if zone and np.mean(draws >= 0) >= SCARCE and high > upper:
-            assert 1 - probability >= 0.025 - DRAW_ERROR, "an interval beyond a limit that is kept for sure"
+        _agrees_with_its_decision(one, asked, judged, draws)
     # Fréchet
     told = np.array([judged.probability for judged in decided])
     for every, least in ((together, each), (_together(together, decided), told)):
         assert every is not None
         assert max(0.0, 1 - np.sum(1 - least)) - 1e-12 <= every <= least.min() + 1e-12
+
+
+def _agrees_with_its_decision(one: Stated, asked: Characteristic, judged: Judged, draws: Floats) -> None:
+    (low, high), upper, probability = one.interval, float(asked.upper or 0.0), float(judged.probability or 0.0)
+    assert one.value is not None
+    # decision and probability
+    if judged.outcome == "pass":
+        assert 1 - probability <= PROVED + 1e-9, "a pass that is not proved"
+        assert one.value <= upper
+    if judged.outcome == "fail":
+        assert probability <= PROVED + 1e-9, "a fail that is not proved"
+    # decision and interval
+    inside = (asked.lower is None or low >= asked.lower) and high <= upper
+    outside = low > upper or (asked.lower is not None and high < asked.lower)
+    if inside:
+        assert probability >= 0.95 - DRAW_ERROR, "an interval inside of limits that are not kept"
+        assert judged.outcome != "fail"
+    if outside:
+        assert probability <= 0.05 + DRAW_ERROR, "an interval outside of limits that are kept"
+        assert judged.outcome != "pass"
+    if asked.what == "roundness" and np.mean(draws >= 0) >= SCARCE and high > upper:
+        assert 1 - probability >= 0.025 - DRAW_ERROR, "an interval beyond a limit that is kept for sure"

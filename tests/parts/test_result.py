@@ -33,8 +33,9 @@ def of(value: float) -> tuple[Stated, ...]:
 def test_the_interval_of_a_zone_ends_where_what_is_possible_ends(value: float) -> None:
     """2.5 % of a normal distribution below, at zero at least; above, 2.5 % of the same cut at zero (scipy's)."""
     zone, size = of(value)
-    reach = max(1.96, float(stats.truncnorm(-value, np.inf, value, 1.0).ppf(0.975)) - max(0.0, value) if value < 1.96 else 0.0)
     cut = stats.truncnorm(-value, np.inf, value, 1.0)
+    begins_at_zero = value < 1.96
+    reach = max(1.96, float(cut.ppf(0.975)) - max(0.0, value)) if begins_at_zero else 1.96
     assert zone.interval == pytest.approx((max(0.0, value - 1.96), float(cut.ppf(0.975))), abs=0.03)
     assert zone.value == pytest.approx(max(0.0, value), abs=0.01)
     # to the end of an interval that begins at zero, no less than that of the measurement
