@@ -22,7 +22,7 @@ from cmm_uq.documents.plot_style import (
     house_style,
     new_figure,
 )
-from cmm_uq.documents.plots import NAMES_MM, narrowed
+from cmm_uq.documents.plots import NAMES_MM, told_apart
 from cmm_uq.messages import Text, number, say
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> 
         for place, row in enumerate(rows):
             _band(ax, place, row)
             _interval(ax, place, row)
-        ax.set_yticks(np.arange(len(rows)), [narrowed(row.name, NAMES_MM) for row in rows])
+        ax.set_yticks(np.arange(len(rows)), told_apart([row.name for row in rows], NAMES_MM))
         ax.set_xticks([0.0, 0.5, 1.0], [say("lower limit"), say("middle"), say("upper limit")])
         ax.set(xlim=(-_FARTHEST, 1 + _FARTHEST), ylim=(len(rows) - 0.4, -0.6))
         ax.tick_params(left=False)
