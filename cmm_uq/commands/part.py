@@ -36,7 +36,7 @@ from cmm_uq.parts.displaced import displaced
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.reducing import ways
-from cmm_uq.parts.result import conforming, evaluated, middle, stated
+from cmm_uq.parts.result import conforming, evaluated, middle, stated, within_bounds
 from cmm_uq.parts.virtual import Circumstances, Virtual
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
@@ -121,14 +121,21 @@ def part_found(
     further = further_of(machine.job, unseen)
     stage("Decisions", 0.85)
     known = stated(simulated, measured, plan, errors)
-    together = None if measured is None else conforming(plan, errors, measured)[1]
+    decided = judged(job, plan, errors, measured)
+    together = None if measured is None else _together(conforming(plan, errors, measured)[1], decided)
     return PartFound(
         job, plan, given, virtual, simulated, known, measured, shares, unseen, None if further is None else further.further,
-        judged(job, plan, errors, measured), None if together is None or np.isnan(together) else together, tuple(found_ways),
+        decided, together, tuple(found_ways),
         displaced(virtual, seed=seed), _three(origin_of(job, machine.state.machine)),
         machine.standing, compared(known, shares, others), digits=digits, seed=seed, asked=trials, warnings=machine.warnings,
         files={} if further is None else further.files,
     )  # fmt: skip
+
+
+def _together(together: float, decided: Iterable[Judged | None]) -> float | None:
+    """The probability that all limits are kept, beside those of each as they are told: with a prior, and rare tails."""
+    each = [one.probability for one in decided if one is not None and one.probability is not None]
+    return within_bounds(together, np.array(each)) if each else None
 
 
 def _with_twice_the_points(job: PartJob, machine: MachineState) -> Callable[[], tuple[Plan, Circumstances]]:

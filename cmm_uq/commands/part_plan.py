@@ -15,6 +15,7 @@ from cmm_uq.jobs.part.placing import readings, rotation
 from cmm_uq.jobs.part.probed import Probed, probed, whole_surface
 from cmm_uq.jobs.part.tables import StylusFacts
 from cmm_uq.parts.causes import Cause, Scatter
+from cmm_uq.parts.condensing import LARGE
 from cmm_uq.parts.evaluating import characteristics_of
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.of_form import Form
@@ -200,8 +201,11 @@ def doubled(job: PartJob) -> PartJob:
 
     Raises
     ------
-    CmmUqError : no feature is.
+    CmmUqError : no feature is, or one has so many points that twice as many change nothing.
     """
+    if any(len(one.points) >= LARGE for one in job.features):
+        raise CmmUqError("has a feature of thousands of points", where=str(job.folder / "job.toml"),
+                         fix="More of them change nothing")  # fmt: skip
     features = tuple(_doubled(one) for one in job.features)
     if all(one is other for one, other in zip(features, job.features, strict=True)):
         raise CmmUqError("has no feature that is probed by a pattern", where=str(job.folder / "job.toml"),

@@ -116,13 +116,13 @@ class Limits:
         """Probability of the true value inside, with its digits where it is small."""
         if self.zone:
             return self._within_zone(value)
+        if self.inside(value):
+            return 1.0 - self.beyond(value)
         if self.upper is None or self.lower is None:
             only = (
                 self._above(value - self.upper) if self.upper is not None else self._below(value - (self.lower or 0.0))
             )
             return min(1.0, only)
-        if self.inside(value):
-            return 1.0 - self.beyond(value)
         if value > self.upper:
             return max(0.0, self._above(value - self.upper) - self._above(value - self.lower))
         return max(0.0, self._below(value - self.lower) - self._below(value - self.upper))

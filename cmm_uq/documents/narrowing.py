@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from cmm_uq.documents.lettering import lettered
 from cmm_uq.documents.measured import width_mm
 from cmm_uq.documents.plot_style import SMALL
@@ -20,6 +22,23 @@ def narrowed(text: Text, room_mm: float) -> Text:
     if kept == text:
         return text
     return Verbatim(kept) if said is text else Said(kept, text)
+
+
+def told_apart(names: Sequence[Text], room_mm: float) -> list[Text]:
+    """Names cut to their room; where the beginnings of two are the same, each with its end in place of its beginning."""
+    found = [narrowed(name, room_mm) for name in names]
+    again = [str(one) for one in found]
+    return [
+        _ending(name, room_mm) if again.count(str(one)) > 1 and str(one) != str(name) else one
+        for name, one in zip(names, found, strict=True)
+    ]
+
+
+def _ending(text: Text, room_mm: float) -> Text:
+    """The longest end of a text that has room, with what says that it began before."""
+    whole = str.__str__(lettered(text))
+    start = next(i for i in range(1, len(whole)) if width_mm("…" + whole[i:].lstrip(" ,"), SMALL) <= room_mm)
+    return Verbatim("…" + whole[start:].lstrip(" ,"))
 
 
 def _longest(text: str, room_mm: float) -> str:

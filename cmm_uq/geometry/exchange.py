@@ -21,6 +21,13 @@ SETTLED = 1e-11
 
 MOST_EXCHANGES = 200
 MOST_STEPS = 12
+SCREENED = 1000
+"""Points from which on only those that stand out in their neighbourhood are looked at together."""
+
+RUNS = 64
+"""Parts of these, one after the other, whose highest and lowest points are looked at."""
+
+MOST_ROUNDS = 40
 ROUNDING = 1e-13
 """Share of the coordinates by which a point may lie outside by rounding."""
 
@@ -47,6 +54,8 @@ def least_zones(shape: Shape, start: Floats, local: Floats, units: Floats) -> tu
     start : (N, k) the least-squares features.
     units : (k,) see :meth:`Placed.units`.
     """
+    if local.shape[2] >= SCREENED:
+        return _screened(shape, start, local, units)
     state, width = start.copy(), np.empty(len(start))
     floor = ROUNDING * float(np.abs(local).max())
     pending, stuck = np.arange(len(start)), np.zeros(len(start), dtype=np.bool_)
@@ -70,14 +79,66 @@ def least_zones(shape: Shape, start: Floats, local: Floats, units: Floats) -> tu
     return state, width, np.flatnonzero(stuck)
 
 
+def _screened(shape: Shape, start: Floats, local: Floats, units: Floats) -> tuple[Floats, Floats, Ints]:
+    """The same of many points: exchanges among those that stand out, which all others then join that lie outside.
+
+    The highest and the lowest of all are among those that stand out. Where these no longer move the zone, no point lies
+    outside, and the proof is that of all points.
+    """
+    k, N = start.shape[1], local.shape[1]
+    state, width = start.copy(), np.empty(N)
+    floor = ROUNDING * float(np.abs(local).max())
+    pending, stuck = np.arange(N), np.zeros(N, dtype=np.bool_)
+    held = np.zeros((N, 0), dtype=np.int64)
+    for _ in range(MOST_ROUNDS):
+        own = local if len(pending) == N else local[:, pending]
+        d = shape.distances(state[pending], own)[0]
+        if not held.shape[1]:
+            J = shape.distances(state[:1], local[:, :1])[1]
+            held = np.tile(_independent((J[:, 0] / units[:, None]).T), (N, 1))
+        index = np.concatenate([_standing_out(d), held], axis=1)
+        d, J = shape.distances(state[pending], np.take_along_axis(own, index[None], axis=2))
+        A = np.ascontiguousarray((J / units[:, None, None]).transpose(1, 2, 0))
+        try:
+            basis = _signed(A, np.tile(np.arange(index.shape[1] - k - 1, index.shape[1]), (len(pending), 1)))
+            step, half = _exchange(A, d, basis, floor)
+        except np.linalg.LinAlgError:  # contact points of one draw that determine nothing
+            break
+        state[pending] += step / units
+        width[pending] = 2 * half
+        stuck[pending] = ~np.isfinite(half)
+        left = (np.abs(step).max(axis=1) > SETTLED) & ~stuck[pending]
+        held = np.take_along_axis(index, basis.index, axis=1)[left]
+        pending = pending[left]
+        if not len(pending):
+            break
+    stuck[pending] = True
+    return state, width, np.flatnonzero(stuck)
+
+
+def _standing_out(d: Floats) -> Ints:
+    """(N, 2c) the highest and the lowest point of each run of neighbours, in the order in which they were probed."""
+    N, n = d.shape
+    length = n // RUNS
+    whole = d[:, : RUNS * length].reshape(N, RUNS, length)
+    first = length * np.arange(RUNS)
+    found = [first + whole.argmax(axis=2), first + whole.argmin(axis=2)]
+    if rest := n - RUNS * length:
+        last = d[:, -rest:]
+        found += [n - rest + last.argmax(axis=1)[:, None], n - rest + last.argmin(axis=1)[:, None]]
+    return np.concatenate(found, axis=1)
+
+
 def _first(A: Floats) -> _Basis:
     """Contact points to begin with, the same for all draws: as independent as those of the first draw allow."""
+    return _signed(A, np.tile(_independent(A[0]), (len(A), 1)))
+
+
+def _independent(A: Floats) -> Ints:
+    """K + 1 of the rows (n, k), as independent as they allow."""
     from scipy.linalg import qr
 
-    N, _, k = A.shape
-    rows = qr(A[0].T, pivoting=True, mode="r")[1]
-    index = np.tile(rows[: k + 1], (N, 1))
-    return _signed(A, index)
+    return np.asarray(qr(A.T, pivoting=True, mode="r")[1][: A.shape[1] + 1], dtype=np.int64)
 
 
 def _signed(A: Floats, index: Ints) -> _Basis:

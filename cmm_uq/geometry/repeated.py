@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.geometry.exchange import least_zones
+from cmm_uq.geometry.exchange import SCREENED, least_zones
 from cmm_uq.geometry.extremes import circumscribed as alone_circumscribed
 from cmm_uq.geometry.extremes import inscribed as alone_inscribed
 from cmm_uq.geometry.extremes import least_zone
@@ -76,6 +76,28 @@ class Drawn:
     form: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class Raised:
+    """Errors of points along one direction of each.
+
+    Parameters
+    ----------
+    heights : (N, n) mm.
+    directions : (n, d) of the points.
+    offset : (n, d) errors that all draws have besides, mm.
+    """
+
+    heights: Floats
+    directions: Floats
+    offset: Floats
+
+    def __len__(self) -> int:
+        return len(self.heights)
+
+    def __getitem__(self, rows: slice) -> Raised:
+        return Raised(self.heights[rows], self.directions, self.offset)
+
+
 class Repeated:
     """A feature and its nominal points, to be measured many times.
 
@@ -105,7 +127,7 @@ class Repeated:
         self._units = units
         self._response = self._first_order()
 
-    def least_squares(self, displacements: ArrayLike) -> Drawn:
+    def least_squares(self, displacements: ArrayLike | Raised) -> Drawn:
         """The least-squares feature of each draw, to 1e-9 mm.
 
         Parameters
@@ -154,7 +176,7 @@ class Repeated:
         """Features of states (N, k), whose form nobody asks for."""
         return self._drawn(states, np.zeros(len(states)))
 
-    def minimum_zone(self, displacements: ArrayLike) -> Drawn:
+    def minimum_zone(self, displacements: ArrayLike | Raised) -> Drawn:
         """The minimum zone of each draw: straightness in a plane, flatness, roundness, sphericity, cylindricity, conicity.
 
         Each ends where contact points prove a local minimum. Position and size are those of the middle of the zone. Of a line
@@ -175,7 +197,8 @@ class Repeated:
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
         for rows in self._blocks(len(errors), 20 * BLOCK):
             local = self._local(errors[rows], rows.start)
-            state[rows], _ = self._descended(local, errors[rows], rows.start)
+            many = local.shape[2] >= SCREENED and self.placed.shape is not LINE
+            state[rows] = self._begun(errors[rows]) if many else self._descended(local, errors[rows], rows.start)[0]
             left = np.arange(local.shape[1])
             if self.placed.shape is not LINE:
                 state[rows], form[rows], left = least_zones(self.placed.shape, state[rows], local, self._units)
@@ -184,7 +207,7 @@ class Repeated:
                 form[rows.start + i] = self._range(state[rows.start + i], local[:, i])
         return self._drawn(state, form)
 
-    def one_sided(self, displacements: ArrayLike, *, inscribed: bool) -> Drawn:
+    def one_sided(self, displacements: ArrayLike | Raised, *, inscribed: bool) -> Drawn:
         """The largest circle, sphere or cylinder inside the points of each draw, or the smallest about them.
 
         Each is held by contact points near the least-squares feature: of several inscribed ones that points hold, as they do
@@ -217,7 +240,9 @@ class Repeated:
         d = self.placed.shape.distances(state[None], local[:, None])[0]
         return float(2 * d.max() if self.placed.shape is LINE else np.ptp(d))
 
-    def _checked(self, displacements: ArrayLike) -> Floats:
+    def _checked(self, displacements: ArrayLike | Raised) -> Floats | Raised:
+        if isinstance(displacements, Raised):
+            return displacements
         errors = np.asarray(displacements, dtype=np.float64)
         if errors.ndim != 3 or errors.shape[1:] != self.points.shape:
             n, d = self.points.shape
@@ -228,9 +253,14 @@ class Repeated:
         step = max(1, points // len(self.points))
         return (slice(i, min(i + step, draws)) for i in range(0, draws, step))
 
-    def _local(self, errors: Floats, first: int) -> Floats:
+    def _local(self, errors: Floats | Raised, first: int) -> Floats:
         """(m, B, n) coordinates in the frame."""
-        local = self.nominal[:, None, :] + np.tensordot(self.placed.frame, errors, axes=(1, 2))
+        if isinstance(errors, Raised):
+            still = self.nominal + self.placed.frame @ errors.offset.T
+            local = (self.placed.frame @ errors.directions.T)[:, None] * errors.heights
+            local += still[:, None]
+        else:
+            local = self.nominal[:, None, :] + np.tensordot(self.placed.frame, errors, axes=(1, 2))
         finite = np.isfinite(local).all(axis=(0, 2))
         if not finite.all():
             draw = first + int(np.argmin(finite)) + 1
@@ -272,9 +302,17 @@ class Repeated:
         d, J = self.placed.shape.distances(state[None], self.placed.local(points[None]))
         return np.asarray((J[:, 0] * d[0]).T)
 
-    def _descended(self, local: Floats, errors: Floats, first: int) -> tuple[Floats, Floats]:
+    def _begun(self, errors: Floats | Raised) -> Floats:
+        """(B, k) states to first order."""
+        if not isinstance(errors, Raised):
+            return np.asarray(self.placed.state + errors.reshape(len(errors), -1) @ self._response)
+        n, d = errors.directions.shape
+        response = np.einsum("nd,ndk->nk", errors.directions, self._response.reshape(n, d, -1))
+        return np.asarray(self.placed.state + errors.offset.ravel() @ self._response + errors.heights @ response)
+
+    def _descended(self, local: Floats, errors: Floats | Raised, first: int) -> tuple[Floats, Floats]:
         """States (B, k) of the least-squares features, and distances (B, n)."""
-        state = self.placed.state + errors.reshape(len(errors), -1) @ self._response
+        state = self._begun(errors)
         for done in range(MOST_STEPS):
             step, d, J = self._step(state, local, own=done >= SHARED_STEPS)
             state -= step

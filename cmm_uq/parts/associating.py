@@ -14,7 +14,7 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
-from cmm_uq.geometry.repeated import MANY, Drawn, Repeated, one_by_one
+from cmm_uq.geometry.repeated import MANY, Drawn, Raised, Repeated, one_by_one
 from cmm_uq.parts.plan import DIRECTED, Feature
 from cmm_uq.points import Floats
 
@@ -116,12 +116,14 @@ class ProbedFeature:
         return np.asarray(points @ self._plane.T) if self.feature.kind == "line" else points
 
     def of(self, displacements: Floats, *, with_points: bool = False) -> Features:
-        """Features of displacements (N, n, 3) from ``points``, mm, by the association itself.
+        """Features of displacements (N, n, 3) from ``points``, mm, by the association itself; (N, n) along the normals.
 
         Raises
         ------
         CmmUqError : displacements that are large against the feature.
         """
+        if displacements.ndim < self.points.ndim + 1:
+            return self._of_raised(displacements, with_points=with_points)
         points = self.points + displacements if with_points else np.zeros((0, 0, 3))
         if self.feature.kind == "point":
             values = np.zeros((len(displacements), VALUES))
@@ -130,7 +132,14 @@ class ProbedFeature:
         drawn = self._associated(self._in_own_plane(displacements + self._offset))
         return Features(self._values(drawn), drawn.form, points)
 
-    def _associated(self, displacements: Floats) -> Drawn:
+    def _of_raised(self, heights: Floats, *, with_points: bool) -> Features:
+        normals = self.feature.normals
+        raised = Raised(heights, self._in_own_plane(normals), self._in_own_plane(self._offset))
+        points = self.points + heights[:, :, None] * normals if with_points else np.zeros((0, 0, 3))
+        drawn = self._associated(raised)
+        return Features(self._values(drawn), drawn.form, points)
+
+    def _associated(self, displacements: Floats | Raised) -> Drawn:
         if self.association == "least_squares":
             return self._repeated.least_squares(displacements)
         if self.association in ("minimum_zone", "tangent"):

@@ -50,6 +50,16 @@ _NOTHING = 1e-12
 """Part of the largest variance below which a component of a random field is rounding."""
 
 
+_UNSEEN_MM = 1e-11
+"""Root mean square displacement for one unit of a coefficient below which a component is left out."""
+
+_FACTORED = 64
+"""Coefficients up to which no components are looked for."""
+
+_ROUNDING = 1e-15
+"""Of the largest, a square of components that is rounding."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Cause(ABC):
     """What moves points in proportion to coefficients.
@@ -75,6 +85,10 @@ class Cause(ABC):
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
         """(N, m, 3) displacements of m points for coefficients (N, K), mm."""
 
+    def raised(self, coefficients: Floats, rows: slice, normals: Floats) -> Floats:
+        """(N, m) of these along normals (m, 3); (N, 1) of zero where it moves none."""
+        return np.asarray(np.einsum("nmi,mi->nm", self.moved(coefficients, rows), normals))
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Common(Cause):
@@ -86,6 +100,7 @@ class Common(Cause):
     """
 
     basis: Floats
+    _raising: dict[tuple[int, int], tuple[Floats, Floats]] = field(default_factory=dict, init=False)
 
     def through(self, derivative: Floats) -> Floats:
         """See :meth:`Cause.through`."""
@@ -98,6 +113,16 @@ class Common(Cause):
         K, m, _ = part.shape
         return np.asarray((coefficients @ part.reshape(K, 3 * m)).reshape(len(coefficients), m, 3))
 
+    def raised(self, coefficients: Floats, rows: slice, normals: Floats) -> Floats:
+        """See :meth:`Cause.raised`."""
+        key = rows.start, rows.stop
+        if key not in self._raising:
+            self._raising[key] = _few(np.einsum("kmi,mi->km", self.basis[:, rows], normals))
+        left, right = self._raising[key]
+        if not len(right):
+            return np.zeros((len(coefficients), 1))
+        return np.asarray((coefficients @ left) @ right)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scatter(Cause):
@@ -107,10 +132,12 @@ class Scatter(Cause):
     ----------
     size : (n, 3) standard deviations along three axes, mm.
     turn : (3, 3) unit vectors of these axes in the frame of the part, a row each.
+    scale : draws (N, 3) of a factor on the size along each axis, common to all points; none where it is one.
     """
 
     size: Floats
     turn: Floats = field(default_factory=lambda: np.eye(3))
+    scale: Draw | None = None
 
     @classmethod
     def of(cls, name: str, factor: str, size: Floats, turn: Floats | None = None, scale: Draw | None = None) -> Scatter:
@@ -123,7 +150,7 @@ class Scatter(Cause):
             return drawn.reshape(n, -1)
 
         axes = np.eye(3) if turn is None else turn
-        return cls(name=name, factors=(factor,) * size.size, draw=draw, size=size, turn=axes)
+        return cls(name=name, factors=(factor,) * size.size, draw=draw, size=size, turn=axes, scale=scale)
 
     def through(self, derivative: Floats) -> Floats:
         """See :meth:`Cause.through`."""
@@ -133,6 +160,17 @@ class Scatter(Cause):
         """See :meth:`Cause.moved`."""
         along = coefficients.reshape(len(coefficients), -1, 3)[:, rows] * self.size[rows]
         return np.asarray(along @ self.turn)
+
+
+def _few(heights: Floats) -> tuple[Floats, Floats]:
+    """Factors (K, r) and (r, m) of heights (K, m), of as few components as these have where they are many."""
+    heights = np.asarray(heights)
+    if len(heights) <= _FACTORED:
+        acting = np.flatnonzero(np.abs(heights).max(axis=1, initial=0.0) > 0)
+        return np.eye(len(heights))[:, acting], heights[acting]
+    values, vectors = np.linalg.eigh(heights @ heights.T)
+    left = vectors[:, values > heights.shape[1] * _UNSEEN_MM**2 + _ROUNDING * values[-1]]
+    return left, np.asarray(left.T @ heights)
 
 
 def normal(sd: ArrayLike) -> Draw:

@@ -42,9 +42,9 @@ def displaced(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Displaced:
     n = len(points)
     rigid = _rigid(points)
     block = max(1, min(draws, _BLOCK // (3 * n)))
-    each = max(1, -(-draws // len(virtual.places)))
+    each = max(1, -(-draws // len(virtual.whole)))
     total, first, second = 0, np.zeros((n, 3)), np.zeros((n, 3, 3))
-    for place in virtual.places:
+    for place in virtual.whole:
         for start in range(0, each, block):
             count = min(block, each - start)
             whole = (place.base + place.moved(place.drawn(random, count))).reshape(count, 3 * n)

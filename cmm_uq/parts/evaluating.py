@@ -7,7 +7,7 @@ features in both: a position is not linear where it is small.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -19,7 +19,7 @@ from cmm_uq.parts.causes import Cause, Drawn, Rows
 from cmm_uq.parts.characteristics import Evaluation, Key, Measured
 from cmm_uq.parts.common_datums import ProbedCommon
 from cmm_uq.parts.datums import BEST_FIT, BestFit, DatumSystem
-from cmm_uq.parts.plan import Feature, Plan
+from cmm_uq.parts.plan import FORMS, Feature, Plan
 from cmm_uq.points import Floats
 
 Known = dict[tuple[str, Association, bytes], ProbedFeature]
@@ -42,7 +42,7 @@ class Movement:
     Parameters
     ----------
     change : (N, …) of what is taken to first order.
-    points : by feature that is taken on its points, (N, m, 3) of these, mm.
+    points : by feature that is taken on its points, (N, m, 3) of these, mm; (N, m) along their normals.
     whole : (N, n, 3) of all points for an exact best fit, or none.
     """
 
@@ -73,6 +73,7 @@ class Evaluator:
     base : (n, 3) displacements without any draw, mm.
     causes : that move the points besides; ``None`` for one that does not.
     known : features that were looked at before, to be looked up and added to: they are the same wherever the part lies.
+    along : names of features whose points are moved along their normals alone.
 
     Raises
     ------
@@ -80,9 +81,10 @@ class Evaluator:
     """
 
     def __init__(
-        self, plan: Plan, base: Floats, causes: Sequence[Cause | None], known: Known | None = None
+        self, plan: Plan, base: Floats, causes: Sequence[Cause | None], known: Known | None = None,
+        along: Collection[str] = (),
     ) -> None:  # fmt: skip
-        self.plan, self.base, self.causes = plan, base, causes
+        self.plan, self.base, self.causes, self.along = plan, base, causes, along
         self._known: Known = {} if known is None else known
         self._followed: dict[object, tuple[Floats, Floats]] = {}
         asked = [name for one in plan.characteristics for name in (*one.features, *one.datums)]
@@ -90,6 +92,7 @@ class Evaluator:
         self.evaluations = [Evaluation(one, plan, self.nominal) for one in plan.characteristics]
         self.keys = list(dict.fromkeys(key for one in self.evaluations for key in (*one.keys, *one.datums)))
         self.of_points = {one.keys[0] for one in self.evaluations if one.of_points}
+        self.seen = {one.keys[0] for one in self.evaluations if one.of_points and one.characteristic.what not in FORMS}
         for one in self.evaluations:
             one.refuse_unfit()
         self.associated = {(name, how): self._associated(name, how) for name, how in self.keys}
@@ -135,13 +138,19 @@ class Evaluator:
 
         Six columns more are of the motion of a best fit, where one is asked for.
         """
-        count = len(self.plan.points)
-        whole = np.zeros((VALUES * len(self.linear), count, 3))
+        whole = self.derivative()
+        return [None if cause is None else cause.through(whole) for cause in self.causes]
+
+    def derivative(self) -> Floats:
+        """(8f, n, 3) of the values of ``linear`` features by all points; six rows more of a best fit."""
+        whole = np.zeros((VALUES * len(self.linear), len(self.plan.points), 3))
         for i, key in enumerate(self.linear):
             whole[VALUES * i : VALUES * (i + 1), self.plan.rows_of(key[0])] = self.associated[key].derivative
-        if self.best_fit is not None:
-            whole = np.concatenate([whole, self.best_fit.derivative])
-        return [None if cause is None else cause.through(whole) for cause in self.causes]
+        return whole if self.best_fit is None else np.concatenate([whole, self.best_fit.derivative])
+
+    def on_points(self, *, exact: bool = False) -> list[str]:
+        """Names of the features and common datums that are taken on their points."""
+        return list(dict.fromkeys(name for name, how in self.keys if exact or not self.to_first_order((name, how))))
 
     def __call__(self, coefficients: Coefficients, *, exact: bool = False) -> Floats:
         """Characteristics (N, c), mm and rad, for coefficients (N, K) of each cause; one row where there is none.
@@ -162,7 +171,7 @@ class Evaluator:
                 features[key] = self.associated[key].to_first_order(change[:, VALUES * i : VALUES * (i + 1)])
         for key in self.keys:
             if key in keys and key not in features:
-                features[key] = self.associated[key].of(movement.points[key[0]], with_points=key in self.of_points)
+                features[key] = self.associated[key].of(movement.points[key[0]], with_points=key in self.seen)
         frames = {
             names: self.frames[names].frames([features[name, self.plan.feature(name).association] for name in names])
             for names in {one.frame_of for one in asked if one.frame_of in self.frames}
@@ -186,18 +195,28 @@ class Evaluator:
 
     def movement(self, coefficients: Coefficients, *, exact: bool = False) -> Movement:
         """What coefficients move of all that the characteristics are of."""
-        on_points = dict.fromkeys(name for name, how in self.keys if exact or not self.to_first_order((name, how)))
         return Movement(
             np.zeros((_count(coefficients), 0)) if exact else self._changes(coefficients),
-            {name: self._moved_of(coefficients, name) for name in on_points},
+            {name: self._moved_of(coefficients, name) for name in self.on_points(exact=exact)},
             self.moved(coefficients, slice(None)) if exact and self.best_fit is not None else None,
         )
 
     def _moved_of(self, coefficients: Coefficients, name: str) -> Floats:
-        """(N, m, 3) displacements of the points of a feature or common datum."""
+        """(N, m, 3) displacements of the points of a feature or common datum; (N, m) along their normals."""
+        if name in self.along:
+            return self._raised(coefficients, name)
         rows = [self.plan.rows[member] for member in self.plan.members(name)]
         moved = [self.moved(coefficients, each) for each in rows]
         return moved[0] if len(moved) == 1 else np.concatenate(moved, axis=1)
+
+    def _raised(self, coefficients: Coefficients, name: str) -> Floats:
+        """(N, m) displacements of the points of a feature along their normals, mm."""
+        rows = self.plan.rows[name]
+        normals, found = self.plan.normals[rows], np.zeros((_count(coefficients), rows.stop - rows.start))
+        for cause, drawn in zip(self.causes, coefficients, strict=True):
+            if cause is not None and drawn is not None:
+                found += cause.raised(np.asarray(drawn), rows, normals)
+        return found
 
     def _changes(self, coefficients: Coefficients) -> Floats:
         """(N, …) changes of what is taken to first order."""

@@ -69,6 +69,19 @@ def nodes_of(found: float, perfect: Floats, one: float) -> Floats:
     return np.linspace(max(0.0, found - beyond), found + beyond, NODES) / one
 
 
+def mixed_in(shape: float, errors: float) -> float:
+    """How much of a typical draw of errors a trial part has: all where the shape has no zone, none where its own is wider.
+
+    Added with the sign that gives the wider zone, the zone is no narrower than the shape's or than this much of the errors',
+    so that λ stays within some times of what errors make.
+
+    Parameters
+    ----------
+    shape, errors : widths of their zones.
+    """
+    return max(0.0, 1 - shape / errors) if errors > 0 else 0.0
+
+
 def inverse(found: float, again: Floats, perfect: Floats, true: Floats, measured: Floats) -> Inverse:
     """The map by which errors of a measurement become draws of what is true.
 

@@ -7,7 +7,7 @@ probed are drawn on the same surface, and what they miss between them is an erro
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -70,8 +70,9 @@ class Form:
         return field_components(partial(self.kernel, feature, points), np.full(len(points), variance))
 
 
+@lru_cache(maxsize=2)
 def forms(known: tuple[Form, ...], plan: Plan) -> tuple[list[Cause], list[Cause | None]]:
-    """Form of the points that are probed, and of whole surfaces.
+    """Form of the points that are probed, and of whole surfaces: the same wherever the part lies, and so looked up.
 
     Returns
     -------
@@ -106,7 +107,7 @@ def whole_surfaces(plan: Plan) -> Plan:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Rough(Cause):
+class Rough(Cause):
     """What moves each point of a feature on its own along its normal, in standard deviations.
 
     Parameters
@@ -138,7 +139,7 @@ class _Rough(Cause):
 def _rough(one: Form, plan: Plan, rows: slice) -> Cause:
     along = MICROMETRE * one.roughness_um * plan.normals[rows]
     factors = (f"roughness of {one.feature}",) * len(along)
-    return _Rough(
+    return Rough(
         name=FORM, factors=factors, draw=normal(np.ones(len(along))), along=along, rows=rows, count=len(plan.points)
     )
 

@@ -124,7 +124,8 @@ def _means(plan: Plan, given: Circumstances, first: Virtual, draws: int, seed: i
             for turn in turns:
                 if turn.tobytes() not in places:
                     pose = _turned(given.poses[0], turn, plan)
-                    places[turn.tobytes()] = AtPose(plan, given, pose, first.known, _PILOT)
+                    place = AtPose(plan, given, pose, first.known, _PILOT)
+                    places[turn.tobytes()] = place if first.exact else place.condensed()
             several = [places[turn.tobytes()] for turn in turns]
             errors = mean_of_places(several, np.random.default_rng(seed), draws, exact=first.exact)
             found.append(Way(name, errors.std(axis=0), draws))
@@ -164,7 +165,7 @@ def _elsewhere(plan: Plan, given: Circumstances, first: Virtual, draws: int, see
         moved = tuple(replace(p, translation_mm=p.translation_mm + np.append(shift, 0.0)) for p in given.poses)
         there = replace(given, poses=moved)
         with suppress(CmmUqError):
-            u = _quick(AtPose(plan, there, moved[0], first.known), seed)
+            u = _quick(AtPose(plan, there, moved[0], first.known).condensed(), seed)
             ratio = float(np.mean(u / np.maximum(planned, np.finfo(np.float64).tiny)))
             best = (ratio, there, shift) if ratio < best[0] else best
     if best[1] is given:

@@ -39,8 +39,8 @@ class Stated:
     u : standard uncertainty, mm or rad.
     interval : shortest coverage interval of the value, of a zone with equal tails; where nothing was measured the shortest of
         the error, with the opposite sign.
-    k : half of the shortest interval of the errors over u; of a zone that is stated as zero so much that U reaches to the
-        end of its interval, where that is more.
+    k : half of the shortest interval of the errors over u; of a zone half of its own interval where that is more, and so much
+        that U reaches to the end of an interval that begins at zero.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Stated:
 
     @property
     def U(self) -> float:  # noqa: N802
-        """Half of the shortest interval of the errors, mm or rad; see ``k``. Of a zone near zero it may reach below zero."""
+        """Half of the interval, mm or rad; see ``k``. Of a zone near zero it may reach below zero."""
         return self.k * self.u if self.u else 0.5 * (self.interval[1] - self.interval[0])
 
 
@@ -79,8 +79,9 @@ def stated(
             if errors is not None:
                 value = at - middle(errors[:, i])
                 interval = possible_interval(at - errors[:, i], simulated.coverage)
-            if value <= 0:
-                value, k = 0.0, max(k, interval[1] / u) if u else k
+            value = max(0.0, value)
+            low, high = interval
+            k = max(k, 0.5 * (high - low) / u, (high - value) / u if low <= 0 else 0.0) if u else k
         found.append(Stated(name, value, error, u, interval, k))
     return tuple(found)
 
@@ -143,8 +144,12 @@ def conforming(plan: Plan, errors: Floats, measured: Floats) -> tuple[Floats, fl
     if not limited.any():
         return each, float("nan")
     together = _share(*(np.asarray(of[:, limited].all(axis=1)) for of in (inside, possible)))
-    kept = each[limited]  # what is possible of all at once is not what is possible of each: Fréchet's bounds
-    return each, float(np.clip(together, max(0.0, 1 - np.sum(1 - kept)), kept.min()))
+    return each, within_bounds(together, each[limited])  # what is possible of all at once is not what is possible of each
+
+
+def within_bounds(together: float, each: Floats) -> float:
+    """The probability of all at once, as near as Fréchet's bounds allow: no more than that of one, no less than all leave."""
+    return float(np.clip(together, max(0.0, 1 - np.sum(1 - each)), each.min()))
 
 
 def _share(inside: NDArray[np.bool_], possible: NDArray[np.bool_]) -> float:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cache, cached_property, partial
 
@@ -19,8 +20,9 @@ import numpy as np
 from cmm_uq.messages import Text
 from cmm_uq.parts.causes import Cause, Common, Drawn, normal
 from cmm_uq.parts.characteristics import never_negative
+from cmm_uq.parts.condensing import LARGE, condensed
 from cmm_uq.parts.evaluating import Evaluator, Known, Movement, characteristics_of
-from cmm_uq.parts.inverting import Inverse, inverse, nodes_of
+from cmm_uq.parts.inverting import Inverse, inverse, mixed_in, nodes_of
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.of_form import Form, forms, whole_surfaces
 from cmm_uq.parts.of_machine import mean_errors, modelled, noise, not_modelled
@@ -30,6 +32,7 @@ from cmm_uq.parts.of_temperature import Surroundings, mean_expansion, temperatur
 from cmm_uq.parts.placing import Pose, placed
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.qualifying import Qualified
+from cmm_uq.parts.trial_shapes import shape_of
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 
@@ -57,14 +60,17 @@ _BLOCK = 400_000
 _AT_ONCE = 2_000_000
 """Points of virtual measurements that are drawn at once: 50 MB for each cause that moves each coordinate on its own."""
 
+_AT_ONCE_OF_MANY = 500_000
+"""The same of a plan of thousands of points, of which a block of few draws is large enough to be quick."""
+
 _KEPT = 1_600_000
 """Points of the whole pilot up to which its blocks are drawn once and kept, 40 MB; else they are drawn again when needed."""
 
 _PILOT_SEED = 20_101
 """Of these, in every place alike, so that places are compared by the same."""
 
-_NOTHING_SEEN = 0.1
-"""Of what errors alone make of a zone, below which what was measured has no shape of its own to infer from."""
+_SHOWN = 0.5
+"""Of a zone, that the deviations which make it have to show by themselves; else it is of second order, and all are taken."""
 
 
 _PilotBlock = Callable[[], tuple[Movement, Floats]]
@@ -106,7 +112,8 @@ class AtPose:
     given : its circumstances.
     pose : the place.
     known : features that were looked at in another place (:class:`Evaluator`).
-    pilot : draws by which the measurement of what is never negative is turned round.
+    pilot : draws by which the measurement of what is never negative is turned round; fewer, a quarter at least, of a plan of
+        thousands of points.
 
     Attributes
     ----------
@@ -139,7 +146,7 @@ class AtPose:
         self.base = mean_errors(given.machine, qualified, pose, beside) + mean_expansion(
             surroundings, plan, points, pose
         )
-        self.pilot, self._inverses = pilot, dict[bool, dict[int, Inverse]]()
+        self.pilot, self._inverses = _affordable(pilot, plan), dict[bool, dict[int, Inverse]]()
         drawn = any(len(feature.surface) for feature in plan.features)
         self.true: Evaluator | None = None
         if drawn or given.measured is None:
@@ -150,13 +157,30 @@ class AtPose:
             # what was measured has the mean errors in it: the part itself is without them
             deviations = given.measured - self.base - plan.points
             self.still = characteristics_of(plan, plan.points + deviations, known)
-            self.measured = Evaluator(plan, deviations, [*self.causes, _scaled(deviations)], known)
+            self.measured = Evaluator(plan, deviations, self.causes, known)
             self.inferred = np.flatnonzero(never_negative(plan)).tolist()
+            shapes = [shape_of(self.measured.evaluations[i], deviations) for i in self.inferred]
+            self.measured.causes = [*self.causes, _multiples([deviations, *shapes])]
             self.shift = characteristics_of(plan, given.measured, known) - self.still
+        self._known = known
         if drawn:
             true = whole_surfaces(plan)
             still: list[Cause | None] = [None] * (len(self.causes) - len(own))
             self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface], known)
+
+    def condensed(self) -> AtPose:
+        """The same, of fewer coefficients: where nothing is taken exactly that is to first order, and features are large."""
+        plan, evaluator = self.measured.plan, self.measured
+        large = {one.name for one in plan.features if len(one.points) >= LARGE and one.kind != "point"}
+        if not large:
+            return self
+        on_points, derivative = evaluator.on_points(), evaluator.derivative()
+        found = copy(self)
+        found.causes = [condensed(cause, plan, on_points, derivative) for cause in self.causes]
+        beside = evaluator.causes[len(self.causes) :]
+        found.measured = Evaluator(plan, evaluator.base, [*found.causes, *beside], self._known, large & set(on_points))
+        found._inverses = {}
+        return found
 
     def drawn(self, random: np.random.Generator, n: int) -> list[Drawn]:
         """Coefficients (n, K) of each cause."""
@@ -216,17 +240,20 @@ class AtPose:
         return self._inverses[exact]
 
     def _inverted(self, *, exact: bool) -> dict[int, Inverse]:
-        """Of a part that deviates λ times as the measured one, or, where that shows nothing, as errors would have it."""
-        deviations = self.measured.movement([*[None] * len(self.causes), np.ones((1, 1))], exact=exact)
+        """Of parts that deviate λ times as the measured one does, as far as that makes the zone (:mod:`.trial_shapes`)."""
+        known = self.measured.movement([*[None] * len(self.causes), np.eye(1 + len(self.inferred))], exact=exact)
+        deviations = known.row(0)
         perfect = deviations.plus(deviations, -2.0)  # from the part as measured to the nominal one
         blocks = self._pilot_blocks(exact=exact)
         again, alone = self._of_pilot(blocks, {None: [None, perfect]}, exact=exact)[None]
-        shapes = dict.fromkeys(self.inferred, deviations)
         first = blocks[0]()[0]
-        for i in self.inferred:
+        shapes = dict[int, Movement]()
+        for place, i in enumerate(self.inferred):
+            own = known.row(1 + place)
+            if self._true(i, perfect.plus(own), exact=exact) < _SHOWN * self.still[i]:
+                own = deviations
             typical = int(np.argsort(alone[: len(first.change), i])[len(first.change) // 2])
-            if self.still[i] < max(_NOTHING_SEEN * alone[typical, i], ROUNDING):
-                shapes[i] = first.row(typical)
+            shapes[i] = self._mixed(i, perfect, own, first.row(typical), float(alone[typical, i]), exact=exact)
         parts = dict[int | None, list[Movement]]()
         for i in self.inferred:
             if np.ptp(alone[:, i]) > ROUNDING:
@@ -239,6 +266,16 @@ class AtPose:
                        np.array([self._true(i, part, exact=exact) for part in parts[i]]), read[i][:, :, 0])
             for i in self.inferred if i in parts
         }  # fmt: skip
+
+    def _mixed(
+        self, i: int, perfect: Movement, own: Movement, typical: Movement, size: float, *, exact: bool
+    ) -> Movement:  # fmt: skip
+        """A shape with a draw of errors, whose zone is of this size, where the shape's is narrower (:func:`.mixed_in`)."""
+        much = mixed_in(self._true(i, perfect.plus(own), exact=exact), size if size > ROUNDING else 0.0)
+        if not much:
+            return own
+        both = [own.plus(typical, sign * much) for sign in (1.0, -1.0)]
+        return max(both, key=lambda shape: self._true(i, perfect.plus(shape), exact=exact))
 
     def _true(self, i: int, part: Movement, *, exact: bool) -> float:
         """A characteristic of a part without errors."""
@@ -286,13 +323,21 @@ class AtPose:
 
 def in_parts(plan: Plan, draws: int) -> list[int]:
     """So many draws in parts, of no more points at once than memory should hold."""
-    at_once = max(2, _AT_ONCE // len(plan.points))
+    at_once = max(2, (_AT_ONCE if len(plan.points) <= LARGE else _AT_ONCE_OF_MANY) // len(plan.points))
     return [min(at_once, draws - first) for first in range(0, draws, at_once)]
 
 
-def _scaled(deviations: Floats) -> Common:
-    """Deviations (n, 3) of a part as often again as a coefficient says."""
-    return Common(name="part", factors=("deviations",), draw=normal([0.0]), basis=deviations[None])
+def _affordable(pilot: int, plan: Plan) -> int:
+    """So many draws, or fewer of a plan of thousands of points, a quarter at least."""
+    return max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
+
+
+def _multiples(deviations: Sequence[Floats]) -> Common:
+    """Deviations (n, 3) of a part, each as often again as its coefficient says."""
+    count = len(deviations)
+    return Common(
+        name="part", factors=("deviations",) * count, draw=normal(np.zeros(count)), basis=np.array(deviations)
+    )
 
 
 class Virtual:
@@ -307,7 +352,8 @@ class Virtual:
     Attributes
     ----------
     known : those, and its own.
-    places : one a pose.
+    places : one a pose, of large features with as few coefficients as serve.
+    whole : the same with those of every point.
     exact : whether nothing is taken to first order, because that is off by more than a hundredth of an uncertainty.
     off : (c,) by how much first order is off in the first place, of the standard deviation.
     """
@@ -320,6 +366,9 @@ class Virtual:
         self.places = [AtPose(plan, given, pose, self.known, pilot) for pose in given.poses]
         self.off = self.places[0].off()
         self.exact = bool(np.any(self.off > AGREES))
+        self.whole = self.places
+        if not self.exact:
+            self.places = [place.condensed() for place in self.places]
 
     @property
     def names(self) -> list[str]:

@@ -12,8 +12,17 @@ import pytest
 
 from cmm_uq.documents.document import Plot
 from cmm_uq.documents.plot_style import ACCENT, DIVERGING, MUTED, WIDTH_MM, as_svg, dots, house_style, new_figure
-from cmm_uq.documents.plots import budget_bars, curve_with_band, length_plot, volume_plot
+from cmm_uq.documents.plots import (
+    NAMES_MM,
+    budget_bars,
+    curve_with_band,
+    length_plot,
+    narrowed,
+    told_apart,
+    volume_plot,
+)
 from cmm_uq.errors import CmmUqError
+from cmm_uq.messages import Verbatim
 from tests.documents.samples import plots
 from tests.documents.svg import Drawing, outlines, strokes
 
@@ -210,3 +219,19 @@ def test_dots_in_one_place_have_an_extent_without_which_viewers_of_pdf_leave_the
         ax.set(xlim=(0, 10), ylim=(0, 2))
         ax.axis("off")
         assert f'd="{path}"' in as_svg(figure)
+
+
+def test_long_names_that_begin_alike_keep_their_ends() -> None:
+    names = [Verbatim(f"Drawing 4711-0815 sheet 3 of the cover, balloon number {i}") for i in range(1, 21)]
+    found = told_apart(names, NAMES_MM)
+    assert len(set(map(str, found))) == len(names)
+    assert all(str(one).endswith(f" {i}") for i, one in enumerate(found, start=1))
+
+
+def test_other_names_are_cut_as_they_were() -> None:
+    names = [
+        Verbatim("A"),
+        Verbatim("A"),
+        Verbatim("one name that is far too long for the room that it has beside bars"),
+    ]
+    assert told_apart(names, NAMES_MM) == [narrowed(name, NAMES_MM) for name in names]

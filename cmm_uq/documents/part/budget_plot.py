@@ -9,7 +9,7 @@ import numpy as np
 from cmm_uq.documents.document import Plot
 from cmm_uq.documents.lettering import lettered
 from cmm_uq.documents.measured import width_mm
-from cmm_uq.documents.narrowing import NAMES_MM, narrowed
+from cmm_uq.documents.narrowing import NAMES_MM, told_apart
 from cmm_uq.documents.part.margin_plot import A_PAGE
 from cmm_uq.documents.plot_style import INK, TINY, WIDTH_MM, drawn, house_style, new_figure
 from cmm_uq.messages import Text, commas, number, say, semicolons
@@ -55,7 +55,7 @@ def _bars(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> Plot
                 ax.text(before[row] + 0.5 * shares[g, row], row, number(100 * shares[g, row], ".0f"), fontsize=TINY,
                         color="white" if shade in _DARK else INK, ha="center", va="center_baseline")  # fmt: skip
             before = before + shares[g]
-        ax.set_yticks(rows, [narrowed(name, NAMES_MM) for name in names])
+        ax.set_yticks(rows, told_apart(names, NAMES_MM))
         ax.set(xlim=(0, 1), ylim=(len(names) - 0.4, -0.6), xticks=[])
         ax.tick_params(left=False)
         for side in ("bottom", "left"):

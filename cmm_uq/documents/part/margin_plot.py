@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmm_uq.documents.document import Outcome, Plot
-from cmm_uq.documents.narrowing import NAMES_MM, narrowed
+from cmm_uq.documents.narrowing import NAMES_MM, told_apart
 from cmm_uq.documents.plot_style import (
     ACCENT,
     BAD,
@@ -108,7 +108,7 @@ def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> 
         for place, row in enumerate(rows):
             _band(ax, place, row)
             _interval(ax, place, row)
-        ax.set_yticks(np.arange(len(rows)), [narrowed(row.name, NAMES_MM) for row in rows])
+        ax.set_yticks(np.arange(len(rows)), told_apart([row.name for row in rows], NAMES_MM))
         ax.set_xticks([0.0, 0.5, 1.0], [say("lower limit"), say("middle"), say("upper limit")])
         ax.set(xlim=(-_FARTHEST, 1 + _FARTHEST), ylim=(len(rows) - 0.4, -0.6))
         ax.tick_params(left=False)
