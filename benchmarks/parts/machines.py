@@ -47,6 +47,8 @@ NAMED = effects(truth.SIX)
 UNMODELLED = tuple(one for one in unmodelled_errors(truth.SIX, {}) if "time_s" not in one.effect.columns)
 BAR_MM, U_BAR_UM = 400.0, 0.5
 GAUGE_MM, U_GAUGE_UM = 800.0, 0.4
+FACES = {"step gauge": 6, "dense gauge": 41}
+"""On each of the seven lines of a gauge."""
 PART = Expansion(11.5e-6, 1e-6, 21.0, 0.3)
 
 
@@ -56,7 +58,7 @@ class Cell:
 
     Parameters
     ----------
-    artefact : bars, free bars (whose length nobody certified), or a step gauge.
+    artefact : bars, free bars (whose length nobody certified), a step gauge, or a dense gauge of many more faces.
     noise : ``stated``: white, and the job says how large; ``white``, ``set-up``: to be found, of an offset of each set-up too.
     share : of all machines.
     """
@@ -73,7 +75,7 @@ class Cell:
     @property
     def key(self) -> tuple[int, int]:
         """Seeds of its own."""
-        return ("bars", "free bars", "step gauge").index(self.artefact), ("stated", "white", "set-up").index(self.noise)
+        return ("bars", "free bars", *FACES).index(self.artefact), ("stated", "white", "set-up").index(self.noise)
 
 
 @dataclass(frozen=True)
@@ -94,9 +96,9 @@ class Made:
 
 
 CELLS = tuple(
-    Cell(artefact, noise, share if artefact != "step gauge" or noise == "stated" else share / 2)
-    for noise, share in (("stated", 0.3), ("white", 0.02), ("set-up", 0.02))
-    for artefact in ("bars", "free bars", "step gauge")
+    Cell(artefact, noise, share if artefact not in FACES or noise == "stated" else share / 2)
+    for noise, share in (("stated", 0.235), ("white", 0.01), ("set-up", 0.01))
+    for artefact in ("bars", "free bars", *FACES)
 )
 
 
@@ -111,9 +113,9 @@ def _nominal() -> Known:
 def calibrated(cell: Cell, hidden: truth.Truth, sigma: float, offset: float, random: np.random.Generator) -> Artefact:
     """The recording of a calibration as the package reads it."""
     repeats = 1 if cell.noise == "stated" else 3
-    if cell.artefact == "step gauge":
+    if cell.artefact in FACES:
         growth = 1e-3 * U_GAUGE_UM / GAUGE_MM * random.standard_normal()
-        made = truth.step_gauge(hidden, growth, repeats, sigma, offset, random)
+        made = truth.step_gauge(hidden, growth, repeats, sigma, offset, random, FACES[cell.artefact])
         return StepGauge(ReferencedFacts(kind="step_gauge", u_um=U_GAUGE_UM, length_mm=GAUGE_MM), as_points(made))
     length = BAR_MM + 1e-3 * U_BAR_UM * random.standard_normal()
     made = truth.bars(hidden, length, repeats, sigma, offset, random)

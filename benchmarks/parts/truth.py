@@ -141,18 +141,18 @@ def bars(
 
 
 def step_gauge(
-    truth: Truth, growth: float, repeats: int, sigma: float, offset: float, random: np.random.Generator
+    truth: Truth, growth: float, repeats: int, sigma: float, offset: float, random: np.random.Generator, count: int = 6
 ) -> Recording:
-    """Seven lines of six faces, every second met from the other side: along the axes and the diagonals of the body."""
+    """Seven lines of so many faces, every second met from the other side: along the axes and the diagonals of the body."""
     diagonals = [unit(np.array([x, y, 1.0]) * np.ptp(TRAVEL, axis=1)) for x in (1, -1) for y in (1, -1)]
     parts: dict[str, list[np.ndarray]] = {name: [] for name in ("xyz", "m", "p", "r", "at", "travel")}
     for number, direction in enumerate([*diagonals, *np.eye(3)], 1):
         reach = 0.75 * np.min(np.ptp(TRAVEL, axis=1)[direction != 0] / np.abs(direction[direction != 0]))
-        faces = np.linspace(0, 20 * np.floor(min(reach, 800.0) / 20), 6)
+        faces = np.linspace(0, 20 * np.floor(min(reach, 800.0) / 20), count)
         room = np.ptp(TRAVEL, axis=1) - np.abs(direction) * faces[-1]
         low = TRAVEL[:, 0] + room * random.uniform(0.1, 0.9, 3)
         start = np.where(direction < 0, low + np.abs(direction) * faces[-1], low)
-        travel = np.where(np.arange(6)[:, None] % 2, -1.0, 1.0) * np.sign(
+        travel = np.where(np.arange(count)[:, None] % 2, -1.0, 1.0) * np.sign(
             np.where(np.abs(direction) > 1e-6, direction, 0.0)
         )
         points = truth.read(start + (1 + growth) * faces[:, None] * direction, np.zeros(3), travel)
@@ -160,9 +160,9 @@ def step_gauge(
         parts["xyz"].append(np.tile(points, (repeats, 1)))
         parts["travel"].append(np.tile(travel, (repeats, 1)))
         parts["at"].append(np.tile(faces, repeats))
-        parts["m"].append(np.full(6 * repeats, number))
-        parts["p"].append(np.tile(np.arange(1, 7), repeats))
-        parts["r"].append(np.repeat(np.arange(1, repeats + 1), 6))
+        parts["m"].append(np.full(count * repeats, number))
+        parts["p"].append(np.tile(np.arange(1, count + 1), repeats))
+        parts["r"].append(np.repeat(np.arange(1, repeats + 1), count))
     whole = {name: np.concatenate(each) for name, each in parts.items()}
     columns = {f"approach_{a}": whole["travel"][:, i] for i, a in enumerate("xyz")} | {"reference_mm": whole["at"]}
     xyz = whole["xyz"] + sigma * random.standard_normal(whole["xyz"].shape)

@@ -17,30 +17,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.inference.least_squares import LeastSquares
-from cmm_uq.inference.linear_model import LinearModel, Unknown, Whiten
+from cmm_uq.inference.linear_model import Whiten
 from cmm_uq.inference.marginal import Marginal
 from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.inference.sampling import sample_with_noise
-from cmm_uq.model.measurement import ARTEFACT, MeasurementModel
+from cmm_uq.model.measurement import MeasurementModel
 from cmm_uq.model.noise import noise_of
 from cmm_uq.parts.drawn_periods import DrawnPeriod, drawable
 from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled
-from cmm_uq.parts.periods import linear
+from cmm_uq.parts.periods import GivenPeriod
 from cmm_uq.parts.recorded_noise import stated_noise
+from cmm_uq.parts.together import Together, open_size
 from cmm_uq.parts.with_periods import Conditioned, Noises
-from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats, Ints
-from cmm_uq.units import MICROMETRE, unit
+from cmm_uq.units import MICROMETRE
 
 DRAWS = 10_000
-
-_UNSEEN = 0.01
-"""Of the scatter of the residuals: what a combination of errors adds to the observations below which they do not show it."""
-
-_SMALLEST = 1e-6
-"""mm: the smallest noise that is sampled."""
 
 _EFFECTIVE = 0.2
 """Part of the draws that weights must leave for periods to be drawn; else errors with a period are normal sums."""
@@ -50,63 +42,6 @@ NOISES = 20
 
 _UNTOLD = 100.0
 """Ratio of the 95 % to the 5 % quantile of the noise from which on the recording does not tell it from errors left out."""
-
-
-@dataclass(frozen=True, eq=False)
-class Together:
-    """The linear model of a calibration with what it left out.
-
-    Attributes
-    ----------
-    linear : of the calibration's unknowns, then of combinations of what it left out, standard normal beforehand.
-    estimate : least squares of the calibration, where these are zero.
-    which : places of what takes part in what was left out.
-    effects : those, linear.
-    sd : (f,) of their coefficients beforehand.
-    seen : (r, f) orthonormal rows: the combinations of the coefficients over their standard deviations.
-    """
-
-    linear: LinearModel
-    estimate: LeastSquares
-    which: tuple[int, ...]
-    effects: tuple[Effect, ...]
-    sd: Floats
-    seen: Floats
-
-    @classmethod
-    def of(cls, model: MeasurementModel, further: Sequence[Unmodelled]) -> Together:
-        """Of a calibration and of what it left out; what needs columns that were not recorded takes no part."""
-        recorded = model.artefact.points.columns
-        which = tuple(i for i, one in enumerate(further) if all(name in recorded for name in one.effect.columns))
-        effects = tuple(linear(further[i].effect) for i in which)
-        # the recording itself says how large an error may be that it shows: beforehand it is what physics allows
-        sd = np.array([c.prior_sd for effect in effects for c in effect.coefficients])
-        estimate = model.estimate()
-        own = estimate.linear
-        shown = [model.seen(model.columns(effect, (), estimate.about), estimate.about) for effect in effects]
-        columns = np.hstack([np.zeros((len(own.observed), 0)), *shown]) * sd
-        # what a placing reaches shows nothing
-        left = own.reduce(columns) * own.noise_scale[:, None]
-        _, s, Vt = np.linalg.svd(np.linalg.qr(left, mode="r"), full_matrices=False)
-        kept = s > max(_SMALLEST, _UNSEEN * estimate.least_squares.sigma_of_residuals)
-        one = unit("1")
-        combined = tuple(Unknown(("left out", str(j)), one, 0.0, 1.0, 1.0) for j in range(int(kept.sum())))
-        whole = replace(own, design=np.hstack([own.design, left @ Vt[kept].T]), unknowns=(*own.unknowns, *combined))
-        value = np.append(estimate.least_squares.value, np.zeros(len(combined)))
-        return cls(whole, replace(estimate.least_squares, value=value), which, effects, sd, Vt[kept])
-
-    def coefficients(self, draws: Floats, random: np.random.Generator) -> Floats:
-        """(N, k + f) of the calibration's effects, then of what it left out, of draws (N, …) of the linear model."""
-        k = len(draws[0]) - len(self.seen) - self._sizes
-        combined = draws[:, len(draws[0]) - len(self.seen) :]
-        free = random.standard_normal((len(draws), len(self.sd)))
-        found = free + (combined - free @ self.seen.T) @ self.seen
-        return np.hstack([draws[:, :k], found * self.sd])
-
-    @property
-    def _sizes(self) -> int:
-        """How many of the calibration's unknowns are sizes of its artefact."""
-        return sum(unknown.key[0] == ARTEFACT for unknown in self.linear.unknowns)
 
 
 def joint_posterior(
@@ -130,22 +65,15 @@ def joint_posterior(
     CmmUqError : the recording leaves even the sizes of the artefact open.
     """
     whole = Together.of(model, further)
-    rows, given = whole.linear.priors
-    scale = np.array([unknown.scale for unknown in whole.linear.unknowns])
-    root = np.vstack([whole.linear.reduced.design / sigma_mm, rows]) * scale
-    target = np.append(whole.linear.reduced.observed / sigma_mm, given)
-    if np.linalg.matrix_rank(root) < root.shape[1]:
-        raise _open()
-    inverse = np.linalg.pinv(root)
-    mean, covariance = scale * (inverse @ target), np.outer(scale, scale) * (inverse @ inverse.T)
+    mean, root = whole.white(sigma_mm)
+    covariance = root.T @ root
     k = sum(len(effect.coefficients) for effect in model.effects)
     at = np.r_[:k, len(mean) - len(whole.seen) : len(mean)]
     into = np.zeros((k + len(whole.sd), len(at)))
     into[:k, :k] = np.eye(k)
-    into[k:, k:] = whole.sd[:, None] * whole.seen.T
-    unseen = np.zeros((len(into), len(into)))
-    unseen[k:, k:] = np.outer(whole.sd, whole.sd) * (np.eye(len(whole.sd)) - whole.seen.T @ whole.seen)
-    return whole.which, into @ mean[at], into @ covariance[np.ix_(at, at)] @ into.T + unseen
+    into[k:, k:] = whole.gain.T
+    free = np.vstack([np.zeros((k, len(whole.sd))), np.diag(whole.sd) - whole.gain.T @ whole.seen])
+    return whole.which, into @ mean[at], into @ covariance[np.ix_(at, at)] @ into.T + free @ free.T
 
 
 def draws_given(whole: Together, components: Components, sizes: Sizes, random: np.random.Generator) -> Floats:
@@ -180,8 +108,8 @@ def given_recording(
             found = apart.drawn([(sigma_mm, None)], None, draws, seed)
             if found is not None:
                 return _with(apart.state, model, apart.whole, found[1], noise, found[2])
-        _, mean, covariance = joint_posterior(model, state.unmodelled, sigma_mm)
-        drawn = random.multivariate_normal(mean, covariance, draws, method="svd")
+        mean, root = whole.white(sigma_mm)
+        drawn = whole.coefficients(mean + random.standard_normal((draws, len(root))) @ root, random)
         return _with(state, model, whole, drawn, noise)
     components = replace(noise_of(model), known=model.least_noise)
     posterior = sample_with_noise(whole.linear, components, whole.estimate, seed)
@@ -250,7 +178,7 @@ class _Apart:
         linear, random = self.whole.linear, np.random.default_rng(seed)
         usual = Conditioned(self.model, linear, noises[0][0], self.periodic, noises[0][1])
         if usual.open:
-            raise _open()
+            raise open_size()
         stood = usual.without_noise()
         usual = Conditioned(self.model, linear, noises[0][0], self.periodic, noises[0][1], stood)
         found = usual.combinations(draws, random)
@@ -286,7 +214,7 @@ def _with(
 ) -> MachineState:  # fmt: skip
     """The state with draws (N, k + f) of all errors together."""
     if not np.isfinite(drawn).all():
-        raise _open()
+        raise open_size()
     acting = {one.name for one in state.effects}
     own = [effect.name in acting for effect in model.effects for _ in effect.coefficients]
     kept = np.flatnonzero(np.append(own, np.ones(len(whole.sd), dtype=bool)))
@@ -305,6 +233,9 @@ def _shares(state: MachineState) -> dict[str, float]:
     for effect in state.effects:
         own = state.draws[:, start : start + len(effect.coefficients)]
         start += len(effect.coefficients)
+        if isinstance(effect, GivenPeriod):
+            found[effect.name] = effect.share(own)
+            continue
         prior = sum(coefficient.prior_sd**2 for coefficient in effect.coefficients)
         found[effect.name] = float(np.sqrt(own.var(axis=0).sum() / prior)) if prior else 0.0
     for one in state.periodic:
@@ -315,8 +246,3 @@ def _shares(state: MachineState) -> dict[str, float]:
 
 def _evenly(count: int, wanted: int) -> Ints:
     return np.linspace(0, count - 1, min(wanted, count)).astype(np.int64)
-
-
-def _open() -> CmmUqError:
-    return CmmUqError("the recording leaves a size of its artefact open, of which nothing is known beforehand",
-                      where="the calibration", fix="Give the artefact's length")  # fmt: skip

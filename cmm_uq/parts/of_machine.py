@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cmm_uq.messages import say
 from cmm_uq.parts.causes import Cause, Common, Draw, Drawn, Rows, Scatter, field_along
 from cmm_uq.parts.drawn_periods import columns_at_each
 from cmm_uq.parts.machine import MachineState, Unmodelled
+from cmm_uq.parts.periods import GivenPeriod
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.qualifying import Qualified
 from cmm_uq.physics.superposition import About, Superposition
@@ -30,31 +33,54 @@ def mean_errors(state: MachineState, qualified: Qualified, pose: Pose, measured:
     ----------
     measured : see :func:`modelled`.
     """
-    periodic = _mean_periodic(state, qualified, pose, measured)
     if np.array_equal(state.corrects, state.mean):
-        return periodic
+        return _mean_periodic(state, qualified, pose, measured)
     points = qualified.both
     indicated = points.xyz.copy()
-    acting = Superposition(state.effects, state.shapes)
+    acting, mean, corrects = _plain(state)
     for _ in range(_ROUNDS):
-        change = points.xyz - acting.errors(points.at(indicated), state.mean) - indicated
+        change = points.xyz - acting.errors(points.at(indicated), mean) - indicated
         indicated += change
         if np.abs(change).max(initial=0.0) < _SETTLED:
             break
-    indicated = indicated + acting.errors(points.at(indicated), state.corrects)
-    return pose.back(qualified.left((indicated - points.xyz)[:, :, None])[:, :, 0]) + periodic
+    indicated = indicated + acting.errors(points.at(indicated), corrects)
+    plain = pose.back(qualified.left((indicated - points.xyz)[:, :, None])[:, :, 0])
+    return plain + _mean_periodic(state, qualified, pose, measured)
+
+
+def _plain(state: MachineState) -> tuple[Superposition, Floats, Floats]:
+    """The effects whose errors do not go by the reading of a scale to less than a millimetre; mean and what is corrected."""
+    kept = np.array([not isinstance(one, GivenPeriod) for one in state.effects for _ in one.coefficients], dtype=bool)
+    effects = tuple(one for one in state.effects if not isinstance(one, GivenPeriod))
+    return Superposition(effects, state.shapes), state.mean[kept], state.corrects[kept]
 
 
 def _mean_periodic(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None) -> Floats:
-    """(n, 3) displacements by the means of errors with one period a draw."""
-    if not state.periodic:
+    """(n, 3) displacements by the means of errors with a period, which no machine corrects."""
+    given = [isinstance(effect, GivenPeriod) for effect in state.effects]
+    if not state.periodic and not any(given):
         return np.zeros_like(qualified.part.xyz)
-    acting = Superposition(state.effects, state.shapes)
-    read, about = _read(state, qualified, pose, measured), acting.about(qualified.both, state.mean)
+    read, about = _read(state, qualified, pose, measured), _about(state, qualified)
     e = np.zeros((len(qualified.both), 3))
     for one in state.periodic:
         e += columns_at_each(about, one.effect) @ one.at(read.readings[one.axis]).mean(axis=0)
+    start = 0
+    for effect in state.effects:
+        own = state.mean[start : start + len(effect.coefficients)]
+        start += len(effect.coefficients)
+        if isinstance(effect, GivenPeriod):
+            e += _as_read(about, read).columns(effect) @ own
     return -pose.back(qualified.left(e[:, :, None])[:, :, 0])
+
+
+def _about(state: MachineState, qualified: Qualified) -> About:
+    acting, mean, _ = _plain(state)
+    return acting.about(qualified.both, mean)
+
+
+def _as_read(about: About, read: Points) -> About:
+    """The same with what scales read, by which errors with a period go."""
+    return replace(about, points=replace(read, directions=about.points.directions))
 
 
 def _read(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None) -> Points:
@@ -63,9 +89,9 @@ def _read(state: MachineState, qualified: Qualified, pose: Pose, measured: Float
     shown = points.xyz.copy()
     if measured is not None:
         shown[:n] += pose.turned(measured)
-    indicated, acting = shown.copy(), Superposition(state.effects, state.shapes)
-    for _ in range(_ROUNDS if state.corrects.any() else 0):
-        change = shown - acting.errors(points.at(indicated), state.corrects) - indicated
+    indicated, (acting, _, corrects) = shown.copy(), _plain(state)
+    for _ in range(_ROUNDS if corrects.any() else 0):
+        change = shown - acting.errors(points.at(indicated), corrects) - indicated
         indicated += change
         if np.abs(change).max(initial=0.0) < _SETTLED:
             break
@@ -83,13 +109,20 @@ def modelled(state: MachineState, qualified: Qualified, pose: Pose, measured: Fl
     measured : (n, 3) by how much points were measured beside the plan's, in the frame of the part: what scales read there
         says the phase of a short period.
     """
-    acting = Superposition(state.effects, state.shapes)
-    about = acting.about(qualified.both, state.mean)
-    columns = acting.derivatives(about)
+    about = _about(state, qualified)
+    given = any(isinstance(effect, GivenPeriod) for effect in state.effects)
+    read = _read(state, qualified, pose, measured) if given or state.periodic else qualified.both
+    columns = np.concatenate([
+        np.zeros((len(qualified.both), 3, 0)),
+        *(
+            _as_read(about, read).columns(effect) if isinstance(effect, GivenPeriod)
+            else about.columns(effect, state.shapes.get(effect.name, ()))
+            for effect in state.effects
+        ),
+    ], axis=2)  # fmt: skip
     factors = [effect.name for effect in state.effects for _ in effect.coefficients]
     deviations = state.draws - state.mean
     if state.periodic:
-        read = _read(state, qualified, pose, measured)
         each = [one.at(read.readings[one.axis]) for one in state.periodic]
         columns = np.concatenate([columns, *(columns_at_each(about, one.effect) for one in state.periodic)], axis=2)
         deviations = np.hstack([deviations, *(values - values.mean(axis=0) for values in each)])

@@ -18,13 +18,14 @@ from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.drawn_noise import Noise
 from cmm_uq.model.noise import noise_of
-from cmm_uq.parts.conditional import Together, draws_given, given_recording, joint_posterior
+from cmm_uq.parts.conditional import draws_given, given_recording, joint_posterior
 from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled, of_machine
 from cmm_uq.parts.machine_stated import flat_draws, machine_stated
 from cmm_uq.parts.periods import TRIED, EveryPeriod
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Characteristic, Plan
 from cmm_uq.parts.recorded_noise import stated_noise
+from cmm_uq.parts.together import Together
 from cmm_uq.parts.virtual import AtPose, Circumstances
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import Floats

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.parts.conditional import Together, given_recording
+from cmm_uq.parts.conditional import given_recording
 from cmm_uq.parts.drawn_periods import shown
 from cmm_uq.parts.machine import MachineState
+from cmm_uq.parts.together import Together
 from cmm_uq.parts.with_periods import Conditioned, Noises
 from cmm_uq.physics.catalogue import effects
 from tests.parts.test_conditional import BARS, MODELLED, calibration, left_out
