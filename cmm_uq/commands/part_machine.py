@@ -6,6 +6,7 @@ import datetime as dt
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ from cmm_uq.commands.part_history import FILE as HISTORY
 from cmm_uq.commands.part_machine_warnings import machine_warnings, temperatures
 from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.written import Stage, silent
+from cmm_uq.diagnosis.compared import compared_on
 from cmm_uq.documents.clauses import draft
 from cmm_uq.documents.part.found import Checked, Source, Standing
 from cmm_uq.errors import CmmUqError
@@ -28,7 +30,8 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.reading import sha256 as hashes
 from cmm_uq.kinds import kind_of
-from cmm_uq.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.messages import NOTHING, Text, Verbatim, after, say
+from cmm_uq.model import MeasurementModel
 from cmm_uq.parts.conditional import given_recording
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.machine_stated import machine_stated
@@ -42,6 +45,10 @@ WHERE = "job.toml [machine_state]"
 
 CALIBRATION = "machine-job/"
 """Before the names of inputs of the machine's own job, where they are attached to a part's report."""
+
+_MOST = 200
+"""Quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
+show of errors left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -385,12 +392,24 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
     try:
         model, _ = screened_model(job)
         model, _, _ = with_noise(model)
+        count, observe = int(model.used.sum()), kind_of(job).observing("the machine of a part")
+        most = _MOST * count // max(_quantities(model), 1)
+        model = compared_on(model, partial(observe, job.facts.artefact, where=job.recording_path), seed, most)
         together = given_recording(state, model, seed=seed)
     except CmmUqError as error:
         why = Verbatim(error.problem)
         told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)
         return state, told, False
-    text = say(
+    text: Text = say(
         "All errors are drawn together, given the recording of the calibration, those included that it did not model."
     )
+    if (some := int(model.used.sum())) < count:
+        text = after(text, say("{some} of its {count} observations are reckoned with.", some=some, count=count))
     return together, text, True
+
+
+def _quantities(model: MeasurementModel) -> int:
+    """How many of the used observations are no repeats of others."""
+    artefact = model.artefact
+    first = artefact.points.point[artefact.rows[model.used, 0]]
+    return len(np.unique(np.column_stack([artefact.measurement[model.used], first]), axis=0))

@@ -21,7 +21,7 @@ from cmm_uq.model.noise import noise_of
 from cmm_uq.parts.conditional import draws_given, given_recording, joint_posterior
 from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled, of_machine
 from cmm_uq.parts.machine_stated import flat_draws, machine_stated
-from cmm_uq.parts.periods import TRIED, EveryPeriod
+from cmm_uq.parts.periods import TRIED, EveryPeriod, GivenPeriod, covariance
 from cmm_uq.parts.placing import Pose
 from cmm_uq.parts.plan import Characteristic, Plan
 from cmm_uq.parts.recorded_noise import stated_noise
@@ -65,9 +65,10 @@ def test_the_joint_posterior_is_the_normal_distribution_of_parameters_given_obse
 
 
 def test_what_cannot_be_told_from_the_recording_stays_on_its_own() -> None:
-    which, mean, _ = joint_posterior(calibration(), left_out("hysteresis_x", "rotation_x_x", "periodic_scale_y"), SIGMA)
+    further = left_out("hysteresis_x", "rotation_x_x", "periodic_scale_y")
+    which, mean, _ = joint_posterior(calibration(), further, SIGMA)
     assert which == (1, 2)  # play needs directions of approach
-    assert len(mean) == 6 + 1 + 2 * TRIED
+    assert len(mean) == 6 + 1 + 2 * TRIED + len(Together.of(calibration(), further).seen)
 
 
 def test_all_trial_periods_together_have_nearly_the_covariance_of_a_period_that_nobody_knows() -> None:
@@ -83,6 +84,51 @@ def test_all_trial_periods_together_have_nearly_the_covariance_of_a_period_that_
     off = shown @ shown.T / 0.01**2 - np.where(apart > 0, mean, 1.0)
     assert np.sqrt(np.mean(off**2)) < 0.1
     np.testing.assert_allclose(np.diagonal(off), 0.0, atol=1e-12)
+
+
+def gauge() -> MeasurementModel:
+    """The example's step gauge: seven lines of 7 to 15 faces, three times."""
+    model, _ = recorded_model(cmm_uq.read(ROOT / "examples" / "step-gauge-simulated"))
+    return replace(model, effects=effects(MODELLED))
+
+
+def beside(model: MeasurementModel, sigma: float, between: Floats) -> tuple[Floats, Floats]:
+    """Mean (t,) and covariance (t, t), mm, of a periodic error of y at readings, in the space of observations with its
+    covariance itself: K** − K*(K + D·P·Dᵀ + σ²)⁻¹K*ᵀ (Rasmussen, Williams 2006, eq. 2.24); each reading moved by 1 mm."""
+    (periodic,), linear = effects(["periodic_scale_y"]), model.estimate().linear
+    about, n = model.estimate().about, len(model.artefact.points)
+    moved = np.zeros((n, 3, n))
+    moved[np.arange(n), 1, np.arange(n)] = 1.0
+    directions = model._about(about).points.directions
+    moved = moved if directions is None else np.einsum("k,nm->nkm", directions[1], np.eye(n))
+    impulse = linear.reduce(model.seen(moved, about))
+    rows, given = linear.priors
+    D, y = linear.reduced.design, linear.reduced.observed
+    prior = np.linalg.inv(rows.T @ rows)
+    start = prior @ rows.T @ given
+    readings = model.artefact.points.readings["y"]
+    cross = covariance(periodic, between, readings) @ impulse.T
+    whole = impulse @ covariance(periodic, readings, readings) @ impulse.T + D @ prior @ D.T + sigma**2 * np.eye(len(y))
+    gain = np.linalg.solve(whole, cross.T).T
+    return gain @ (y - D @ start), covariance(periodic, between, between) - gain @ cross.T
+
+
+def test_what_a_recording_says_of_an_error_with_a_period_is_what_its_covariance_says() -> None:
+    """Of a gauge with 282 readings: errors in between have the mean of the exact algebra and, over pairs 12 mm apart, its
+    variance, but for what correlations of 64 trial periods are off by beforehand."""
+    model, sigma = gauge(), 1e-3
+    further, between = left_out("periodic_scale_y"), np.linspace(333.0, 800.0, 40)
+    mean, variance = beside(model, sigma, between)
+    _, found, spread = joint_posterior(model, further, sigma)
+    (effect,) = Together.of(model, further).effects
+    assert isinstance(effect, GivenPeriod)
+    at = effect.at(between)
+    np.testing.assert_allclose(at @ found[6:], mean, atol=0.02 * float(np.sqrt(np.diagonal(variance).mean())))
+    said = at @ spread[6:, 6:] @ at.T
+    apart = np.eye(40)[:-1] - np.eye(40)[1:]
+    ratio = np.diagonal(apart @ said @ apart.T) / np.diagonal(apart @ variance @ apart.T)
+    assert 0.7 < ratio.min() < ratio.max() < 1.4
+    assert ratio.mean() == pytest.approx(1.0, abs=0.1)
 
 
 def repeated(times: int) -> MeasurementModel:
