@@ -95,11 +95,13 @@ class Made:
     one_period: bool = False
 
 
-CELLS = tuple(
-    Cell(artefact, noise, share if artefact not in FACES or noise == "stated" else share / 2)
-    for noise, share in (("stated", 0.235), ("white", 0.01), ("set-up", 0.01))
-    for artefact in ("bars", "free bars", *FACES)
-)
+CELLS = (
+    *(Cell(artefact, "stated", 0.2375) for artefact in ("bars", "free bars", *FACES)),
+    *(
+        Cell(artefact, noise, 0.01 if artefact not in FACES else 0.005)
+        for noise in ("white", "set-up") for artefact in ("bars", "free bars", "step gauge")
+    ),
+)  # fmt: skip
 
 
 @cache
@@ -177,7 +179,7 @@ def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, 
 
 
 GROUPS = {"all": ("",), "bars": ("bars, ",), "free bars": ("free bars, ",), "step gauge": ("step gauge, ",),
-          "noise to be found": (", white", ", set-up")}  # fmt: skip
+          "dense gauge": ("dense gauge, ",), "noise to be found": (", white", ", set-up")}  # fmt: skip
 """Columns of the page: cells whose name has one of these in it; "bars, " at its beginning."""
 
 
