@@ -144,7 +144,9 @@ def conforming(plan: Plan, errors: Floats, measured: Floats) -> tuple[Floats, fl
     if not limited.any():
         return each, float("nan")
     together = _share(*(np.asarray(of[:, limited].all(axis=1)) for of in (inside, possible)))
-    return each, within_bounds(together, each[limited])  # what is possible of all at once is not what is possible of each
+    return each, within_bounds(
+        together, each[limited]
+    )  # what is possible of all at once is not what is possible of each
 
 
 def within_bounds(together: float, each: Floats) -> float:
