@@ -88,6 +88,19 @@ class GivenPeriod(Effect):
         waves = MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
         return np.hstack([waves, covariance(self.of, reading, self.readings) @ self.into])
 
+    def beforehand(self, random: np.random.Generator, count: int) -> Floats:
+        """Draws (N, j) of the coefficients over their standard deviations, without the recording: of one trial period each.
+
+        Mean and covariance are those of all at once; errors of a linear estimate are then distributed as those of machines
+        with one period.
+        """
+        trials, waves = len(self.sum.at), len(self.of.coefficients)
+        found = np.zeros((count, trials, waves))
+        found[np.arange(count), random.integers(trials, size=count)] = np.sqrt(trials) * random.standard_normal(
+            (count, waves)
+        )
+        return np.hstack([found.reshape(count, -1), np.zeros((count, self.into.shape[1]))])
+
     def share(self, draws: Floats) -> float:
         """Standard deviation of errors by draws (N, j), between the readings of the recording, over that beforehand."""
         between = np.linspace(self.readings.min(), self.readings.max(), _LOOKED_AT)

@@ -175,12 +175,21 @@ class Together:
         found[:, :k] = draws[:, :k]
         for start in range(0, len(draws), _ROWS):
             rows = slice(start, start + _ROWS)
-            free = random.standard_normal((len(draws[rows]), len(self.sd)))
+            free = self._beforehand(random, len(draws[rows]))
             more = draws[rows, len(draws[0]) - len(self.seen) :] - free @ self.seen.T
             free *= self.sd
             free += more @ self.gain
             found[rows, k:] = free
         return found
+
+    def _beforehand(self, random: np.random.Generator, count: int) -> Floats:
+        """Draws (N, f) of the coefficients over their standard deviations, without the recording."""
+        each = [
+            effect.beforehand(random, count) if isinstance(effect, GivenPeriod)
+            else random.standard_normal((count, len(effect.coefficients)))
+            for effect in self.effects
+        ]  # fmt: skip
+        return np.hstack([np.zeros((count, 0)), *each])
 
     @property
     def _sizes(self) -> int:
