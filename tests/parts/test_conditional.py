@@ -132,7 +132,7 @@ def test_what_a_recording_says_of_an_error_with_a_period_is_what_its_covariance_
 
 
 def test_a_draw_of_an_error_with_a_period_has_one_beforehand_with_the_covariance_of_all() -> None:
-    """Of products of two coefficients 100 000 draws scatter by √(3·64)/316 at most, a mixture of 64 normals; six times that."""
+    """Products of two coefficients scatter by √(3·64/100 000) at most, a mixture of 64 normals; six times that."""
     model, further = gauge(), left_out("periodic_scale_y")
     (effect,) = Together.of(model, further).effects
     assert isinstance(effect, GivenPeriod)
