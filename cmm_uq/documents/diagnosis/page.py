@@ -180,6 +180,7 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
     if not d.effects:
         return ()
     expanded, gain = _expanded(d), d.improvement
+    left = alike(gain.rms_before_um, gain.rms_after_um)
     plot = length_plot(
         d.before.artefact.measurement.astype(np.float64),
         _residuals(d.before),
@@ -197,7 +198,8 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
         ),
         alternative=say(
             "Residual rms {before} µm before and {after} µm after.",
-            **dict(zip(("before", "after"), alike(gain.rms_before_um, gain.rms_after_um), strict=True)),
+            before=left[0],
+            after=left[1],
         ),
     )
     table = improvement_table(
