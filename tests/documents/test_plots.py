@@ -11,16 +11,9 @@ import numpy as np
 import pytest
 
 from cmm_uq.documents.document import Plot
+from cmm_uq.documents.narrowing import NAMES_MM, narrowed, told_apart
 from cmm_uq.documents.plot_style import ACCENT, DIVERGING, MUTED, WIDTH_MM, as_svg, dots, house_style, new_figure
-from cmm_uq.documents.plots import (
-    NAMES_MM,
-    budget_bars,
-    curve_with_band,
-    length_plot,
-    narrowed,
-    told_apart,
-    volume_plot,
-)
+from cmm_uq.documents.plots import budget_bars, curve_with_band, length_plot, volume_plot
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Verbatim
 from tests.documents.samples import plots

@@ -11,7 +11,7 @@ from cmm_uq.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD, Explan
 from cmm_uq.jobs.column_words import in_words
 from cmm_uq.messages import Verbatim, say
 from cmm_uq.model import MeasurementModel
-from cmm_uq.physics.effect import Nonparametric
+from cmm_uq.physics.effect import Effect, Nonparametric
 from cmm_uq.points import AXES, Floats, Points
 
 LENGTH_SCALES = (0.6, 0.25, 0.1)
@@ -106,11 +106,22 @@ def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterato
         if half < 1.0:
             continue
         lever = (readings / half)[:, None]
-        free = any(effect.name == f"scale_{axis}" for effect in model.effects)
-        functions = _functions(time) if free else _one_sided(_functions(time))
+        constant = any(_in_proportion(effect, points, axis) for effect in model.effects)
+        functions = _functions(time) if constant else _one_sided(_functions(time))
         members = tuple(Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in functions)
         name = say("scale of {axis} as a function of time", axis=Verbatim(axis.upper()))
         yield Explanation(name, UNKNOWN, members, time, "time_s", Nonparametric("time_s", axis, scale=True))
+
+
+def _in_proportion(effect: Effect, points: Points, axis: str) -> bool:
+    """Whether an effect moves points along an axis in proportion to its reading, and by nothing else."""
+    if effect.shape or len(effect.coefficients) > 1:
+        return False
+    moved = effect.basis(points)[:, :, 0]
+    read = np.zeros_like(moved)
+    read[:, AXES.index(axis)] = points.readings[axis]
+    factor = float(np.sum(moved * read) / np.sum(read**2))
+    return bool(factor and np.allclose(moved, factor * read, atol=1e-9 * abs(factor) * np.abs(read).max()))
 
 
 def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:
