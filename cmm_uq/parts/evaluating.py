@@ -20,7 +20,7 @@ from cmm_uq.parts.characteristics import Evaluation, Key, Measured
 from cmm_uq.parts.common_datums import ProbedCommon
 from cmm_uq.parts.datums import BEST_FIT, BestFit, DatumSystem
 from cmm_uq.parts.plan import FORMS, Feature, Plan
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 
 Known = dict[tuple[str, Association, bytes], ProbedFeature]
 """Features by name, association and points."""
@@ -50,18 +50,25 @@ class Movement:
     points: Mapping[str, Floats]
     whole: Floats | None = None
 
-    def plus(self, other: Movement, factor: float = 1.0) -> Movement:
-        """With a multiple of another; one of a single row moves all."""
+    def plus(self, other: Movement) -> Movement:
+        """With another; one of a single row moves all."""
         return Movement(
-            self.change + factor * other.change,
-            {name: moved + factor * other.points[name] for name, moved in self.points.items()},
-            None if self.whole is None or other.whole is None else self.whole + factor * other.whole,
+            self.change + other.change,
+            {name: moved + other.points[name] for name, moved in self.points.items()},
+            None if self.whole is None or other.whole is None else self.whole + other.whole,
         )
 
-    def row(self, i: int) -> Movement:
-        """One of its draws."""
-        points = {name: moved[i : i + 1] for name, moved in self.points.items()}
-        return Movement(self.change[i : i + 1], points, None if self.whole is None else self.whole[i : i + 1])
+    def times(self, factors: float | Floats) -> Movement:
+        """So many times; (N,) each draw a number of its own."""
+        return self._each(lambda moved: moved * np.reshape(factors, (-1, *[1] * (moved.ndim - 1))))
+
+    def rows(self, which: Ints) -> Movement:
+        """Some of its draws, again where they are named again."""
+        return self._each(lambda moved: moved[which])
+
+    def _each(self, become: Callable[[Floats], Floats]) -> Movement:
+        points = {name: become(moved) for name, moved in self.points.items()}
+        return Movement(become(self.change), points, None if self.whole is None else become(self.whole))
 
 
 class Evaluator:

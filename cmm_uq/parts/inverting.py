@@ -18,14 +18,18 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.special import ndtr
 
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 
-NODES = 7
-"""Deviations at which measurements are drawn; squares of their quantiles are nearly quadratic between them."""
+NODES = 11
+"""True widths at which measurements are drawn, closer together near the least one, where fewest draws are possible; squares of
+their quantiles are nearly quadratic between them."""
 
-_QUANTILES = ndtr(np.linspace(-3.1, 3.1, 63))
+_NEAR = 8
+"""Of the trial parts, one in so many stands for each width: few enough to be as wide, enough for every direction of errors."""
+
+_QUANTILES = ndtr(np.linspace(-3.1, 3.1, 249))
 _FINE = 600
-_ENDS = 6
+_ENDS = 24
 """Quantiles at each end by which the line is laid that goes on beyond it."""
 
 
@@ -54,8 +58,8 @@ class Inverse:
         return np.asarray(found)
 
 
-def nodes_of(found: float, perfect: Floats, one: float) -> Floats:
-    """(m,) multiples λ of deviations, between which everything lies that may have been measured as ``found``.
+def nodes_of(found: float, perfect: Floats) -> Floats:
+    """(m,) true widths between which everything lies that may have been measured as ``found``.
 
     A zone is a seminorm of the deviations: errors change it by no more than their own zone.
 
@@ -63,23 +67,24 @@ def nodes_of(found: float, perfect: Floats, one: float) -> Floats:
     ----------
     found : the width that was measured.
     perfect : (n,) what a perfect part would be measured as, g(0).
-    one : θ(1).
     """
     beyond = float(np.abs(np.quantile(perfect, _QUANTILES[[0, -1]])).max())
-    return np.linspace(max(0.0, found - beyond), found + beyond, NODES) / one
+    least = max(0.0, found - beyond)
+    return least + (found + beyond - least) * np.linspace(0, 1, NODES) ** 2
 
 
-def mixed_in(shape: float, errors: float) -> float:
-    """How much of a typical draw of errors a trial part has: all where the shape has no zone, none where its own is wider.
-
-    Added with the sign that gives the wider zone, the zone is no narrower than the shape's or than this much of the errors',
-    so that λ stays within some times of what errors make.
+def alike(widths: Floats, width: float) -> Ints:
+    """(n,) which of n trial parts stands for one of this width with each of n draws of errors: those nearest to it, in turn.
 
     Parameters
     ----------
-    shape, errors : widths of their zones.
+    widths : (n,) of trial parts' zones.
     """
-    return max(0.0, 1 - shape / errors) if errors > 0 else 0.0
+    order = np.argsort(widths)
+    some = max(1, len(widths) // _NEAR)
+    first = np.searchsorted(widths[order], width) - some // 2
+    chosen = order[np.clip(first, 0, len(widths) - some) :][:some]
+    return np.resize(chosen, len(widths))
 
 
 def inverse(found: float, again: Floats, perfect: Floats, true: Floats, measured: Floats) -> Inverse:

@@ -22,7 +22,7 @@ from cmm_uq.parts.causes import Cause, Common, Drawn, normal
 from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.condensing import LARGE, condensed
 from cmm_uq.parts.evaluating import Evaluator, Known, Movement, characteristics_of
-from cmm_uq.parts.inverting import Inverse, inverse, mixed_in, nodes_of
+from cmm_uq.parts.inverting import Inverse, alike, inverse, nodes_of
 from cmm_uq.parts.machine import MachineState
 from cmm_uq.parts.of_form import Form, forms, whole_surfaces
 from cmm_uq.parts.of_machine import mean_errors, modelled, noise, not_modelled
@@ -32,7 +32,6 @@ from cmm_uq.parts.of_temperature import Surroundings, mean_expansion, temperatur
 from cmm_uq.parts.placing import Pose, placed
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.qualifying import Qualified
-from cmm_uq.parts.trial_shapes import shape_of
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 
@@ -68,9 +67,6 @@ _KEPT = 1_600_000
 
 _PILOT_SEED = 20_101
 """Of these, in every place alike, so that places are compared by the same."""
-
-_SHOWN = 0.5
-"""Of a zone, that the deviations which make it have to show by themselves; else it is of second order, and all are taken."""
 
 
 _PilotBlock = Callable[[], tuple[Movement, Floats]]
@@ -159,8 +155,7 @@ class AtPose:
             self.still = characteristics_of(plan, plan.points + deviations, known)
             self.measured = Evaluator(plan, deviations, self.causes, known)
             self.inferred = np.flatnonzero(never_negative(plan)).tolist()
-            shapes = [shape_of(self.measured.evaluations[i], deviations) for i in self.inferred]
-            self.measured.causes = [*self.causes, _multiples([deviations, *shapes])]
+            self.measured.causes = [*self.causes, _multiples(deviations)]
             self.shift = characteristics_of(plan, given.measured, known) - self.still
         self._known = known
         if drawn:
@@ -240,66 +235,41 @@ class AtPose:
         return self._inverses[exact]
 
     def _inverted(self, *, exact: bool) -> dict[int, Inverse]:
-        """Of parts that deviate λ times as the measured one does, as far as that makes the zone (:mod:`.trial_shapes`)."""
-        known = self.measured.movement([*[None] * len(self.causes), np.eye(1 + len(self.inferred))], exact=exact)
-        deviations = known.row(0)
-        perfect = deviations.plus(deviations, -2.0)  # from the part as measured to the nominal one
+        """Of trial parts with zones of several widths, which may be what was measured with other errors (:func:`.alike`)."""
+        perfect = self.measured.movement([*[None] * len(self.causes), -np.ones((1, 1))], exact=exact)
         blocks = self._pilot_blocks(exact=exact)
-        again, alone = self._of_pilot(blocks, {None: [None, perfect]}, exact=exact)[None]
-        first = blocks[0]()[0]
-        shapes = dict[int, Movement]()
-        for place, i in enumerate(self.inferred):
-            own = known.row(1 + place)
-            if self._true(i, perfect.plus(own), exact=exact) < _SHOWN * self.still[i]:
-                own = deviations
-            typical = int(np.argsort(alone[: len(first.change), i])[len(first.change) // 2])
-            shapes[i] = self._mixed(i, perfect, own, first.row(typical), float(alone[typical, i]), exact=exact)
-        parts = dict[int | None, list[Movement]]()
-        for i in self.inferred:
-            if np.ptp(alone[:, i]) > ROUNDING:
-                one = self._true(i, perfect.plus(shapes[i]), exact=exact)
-                nodes = nodes_of(float(self.still[i]), alone[:, i], one).tolist()
-                parts[i] = [perfect.plus(shapes[i], node) for node in nodes]
-        read = self._of_pilot(blocks, parts, exact=exact)
+        again = np.concatenate([self.measured.of(moved, exact=exact) + beside for moved, beside in map(_made, blocks)])
+        alone = np.concatenate(
+            [self.measured.of(moved.plus(perfect), exact=exact) + beside for moved, beside in map(_made, blocks)]
+        )
+        nodes = {
+            i: nodes_of(float(self.still[i]), alone[:, i]) for i in self.inferred if np.ptp(alone[:, i]) > ROUNDING
+        }
+        read: dict[int, list[Floats]] = {i: [] for i in nodes}
+        for moved, beside in map(_made, blocks):
+            for i, sizes in nodes.items():
+                read[i].append(self._trials(i, sizes, moved, perfect, exact=exact) + beside[:, i])
         return {
-            i: inverse(float(self.still[i]), again[:, i], alone[:, i],
-                       np.array([self._true(i, part, exact=exact) for part in parts[i]]), read[i][:, :, 0])
-            for i in self.inferred if i in parts
-        }  # fmt: skip
+            i: inverse(float(self.still[i]), again[:, i], alone[:, i], sizes, np.concatenate(read[i], axis=1))
+            for i, sizes in nodes.items()
+        }
 
-    def _mixed(
-        self, i: int, perfect: Movement, own: Movement, typical: Movement, size: float, *, exact: bool
-    ) -> Movement:  # fmt: skip
-        """A shape with a draw of errors, whose zone is of this size, where the shape's is narrower (:func:`.mixed_in`)."""
-        much = mixed_in(self._true(i, perfect.plus(own), exact=exact), size if size > ROUNDING else 0.0)
-        if not much:
-            return own
-        both = [own.plus(typical, sign * much) for sign in (1.0, -1.0)]
-        return max(both, key=lambda shape: self._true(i, perfect.plus(shape), exact=exact))
+    def _trials(self, i: int, sizes: Floats, moved: Movement, perfect: Movement, *, exact: bool) -> Floats:
+        """(m, n) as parts of ``sizes`` (m,) of a zone would be measured with the errors of ``moved``.
 
-    def _true(self, i: int, part: Movement, *, exact: bool) -> float:
-        """A characteristic of a part without errors."""
-        return float(self.measured.of(part, exact=exact, only=i)[0, 0])
-
-    def _of_pilot(
-        self, blocks: Sequence[_PilotBlock], parts: Mapping[int | None, Sequence[Movement | None]], *, exact: bool
-    ) -> dict[int | None, Floats]:  # fmt: skip
-        """(m, n, c) as m parts would be measured, of their movements from the part that was, with the pilot's n draws.
-
-        Parameters
-        ----------
-        parts : by the characteristic that they are asked for; by ``None`` for all.
+        A trial part is the measured one less another draw of errors, with deviations so many times as its zone then has the
+        size: from the part as measured, δ, it is (1 − λ)(−δ) − λe away.
         """
-        found = {only: [list[Floats]() for _ in each] for only, each in parts.items()}
-        for block in blocks:
-            moved, beside = block()
-            for only, each in parts.items():
-                own = moved if only is None else self.measured.needed(moved, only)
-                added = beside if only is None else beside[:, [only]]
-                for so_far, part in zip(found[only], each, strict=True):
-                    there = own if part is None else own.plus(part)
-                    so_far.append(self.measured.of(there, exact=exact, only=only) + added)
-        return {only: np.array([np.concatenate(so_far) for so_far in each]) for only, each in found.items()}
+        only = self.measured.needed(moved, i)
+        perfect = self.measured.needed(perfect, i)
+        truly = self.measured.of(only.times(-1.0), exact=exact, only=i)[:, 0]
+        found = np.empty((len(sizes), len(truly)))
+        for k, size in enumerate(sizes):
+            like = alike(truly, size)
+            often = size / np.maximum(truly[like], ROUNDING)
+            part = only.rows(like).times(-often).plus(perfect.rows(np.zeros_like(like)).times(1 - often))
+            found[k] = self.measured.of(only.plus(part), exact=exact, only=i)[:, 0]
+        return found
 
     def _pilot_blocks(self, *, exact: bool) -> list[_PilotBlock]:
         """The pilot's blocks, made once and kept where all of them together are small."""
@@ -332,12 +302,13 @@ def _affordable(pilot: int, plan: Plan) -> int:
     return max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
 
 
-def _multiples(deviations: Sequence[Floats]) -> Common:
-    """Deviations (n, 3) of a part, each as often again as its coefficient says."""
-    count = len(deviations)
-    return Common(
-        name="part", factors=("deviations",) * count, draw=normal(np.zeros(count)), basis=np.array(deviations)
-    )
+def _multiples(deviations: Floats) -> Common:
+    """Deviations (n, 3) of a part, as often again as the coefficient says."""
+    return Common(name="part", factors=("deviations",), draw=normal(np.zeros(1)), basis=deviations[None])
+
+
+def _made(block: _PilotBlock) -> tuple[Movement, Floats]:
+    return block()
 
 
 class Virtual:

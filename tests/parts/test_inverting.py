@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.parts.inverting import Inverse, inverse, mixed_in, nodes_of
+from cmm_uq.parts.inverting import Inverse, alike, inverse, nodes_of
 from cmm_uq.parts.result import middle, possible_interval
 from cmm_uq.points import Floats
 
@@ -25,12 +25,11 @@ WIDTHS: dict[str, tuple[int, Width]] = {
 def turned_round(width: Width, measured: Floats, errors: Floats) -> Inverse:
     """As :class:`cmm_uq.parts.virtual.AtPose` does it."""
     found, alone = float(width(measured)), width(errors)
-    typical = errors[np.argsort(alone)[len(alone) // 2]]
-    much = mixed_in(found, float(width(typical)))
-    shape = max((measured + sign * much * typical for sign in (1.0, -1.0)), key=lambda one: float(width(one)))
-    nodes = nodes_of(found, alone, float(width(shape)))
-    read = np.array([width(node * shape + errors) for node in nodes])
-    return inverse(found, width(measured + errors), alone, nodes * width(shape), read)
+    parts = measured - errors
+    truly = width(parts)
+    nodes = nodes_of(found, alone)
+    trials = [parts[like] * (node / truly[like])[:, None] for node in nodes for like in [alike(truly, node)]]
+    return inverse(found, width(measured + errors), alone, nodes, np.array([width(part + errors) for part in trials]))
 
 
 @pytest.mark.parametrize("found", [0.5, 1.5, 3.0, 10.0])
