@@ -101,10 +101,18 @@ def inverse(found: float, again: Floats, perfect: Floats, true: Floats, measured
     curves = CubicSpline(true, _square(np.quantile(measured, _QUANTILES, axis=1).T))
     sizes = np.linspace(true[0], true[-1], _FINE)
     rising = np.maximum.accumulate(curves(sizes), axis=0)
-    solved = np.array([np.interp(found**2, curve, sizes) for curve in rising.T])
+    solved = _reaching(found**2, sizes, rising)
     lacking = _square(np.quantile(perfect, _QUANTILES)) - found**2
     solved = np.where(lacking > 0, -np.sqrt(np.maximum(lacking, 0.0)), solved)
     return Inverse(np.quantile(again, _QUANTILES), np.minimum.accumulate(solved))
+
+
+def _reaching(value: float, at: Floats, rising: Floats) -> Floats:
+    """(k,) where curves (m, k) over ``at`` (m,) reach a value; the first or last place of one that is above or below it."""
+    left = np.clip(np.count_nonzero(rising <= value, axis=0) - 1, 0, len(at) - 2)
+    low, high = (np.take_along_axis(rising, (left + i)[None], axis=0)[0] for i in (0, 1))
+    share = np.clip((value - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+    return np.asarray(at[left] + np.where(high <= value, 1.0, share) * (at[left + 1] - at[left]))
 
 
 def _square(values: Floats) -> Floats:
