@@ -3,7 +3,8 @@
     python -m benchmarks.parts.zones [MEASUREMENTS]
 
 Errors of one along each coordinate, 1500 measurements of each true zone by default, 2000 draws of errors each; the table is
-that of docs/machine/parts.md.
+that of docs/machine/parts.md. Then how often the upper end fails of a sum of two sides, with errors of 3 and 1 along them and a
+part that is off in any direction.
 """
 
 from __future__ import annotations
@@ -49,6 +50,24 @@ def held(name: str, shape: Floats, times: float, measurements: int, seed: int = 
     return inside / measurements, length / measurements
 
 
+def short(times: float, measurements: int, seed: int = 11) -> float:
+    """Share of upper ends below a true sum of two sides, so many times the median of what a perfect part is measured as."""
+    random, sides = np.random.default_rng(seed), np.array([3.0, 1.0])
+
+    def width(z: Floats) -> Floats:
+        return np.asarray(np.abs(z).sum(axis=-1))
+
+    true, failed = times * float(np.median(width(sides * random.standard_normal((5000, 2))))), 0
+    for _ in range(measurements):
+        part = random.standard_normal(2)
+        measured = true * part / width(part) + sides * random.standard_normal(2)
+        inverted = turned_round(width, measured, sides * random.standard_normal((DRAWS, 2)))
+        failed += (
+            possible_interval(inverted(width(measured + sides * random.standard_normal((DRAWS, 2)))), 0.95)[1] < true
+        )
+    return failed / measurements
+
+
 def main(measurements: int = 1500) -> None:
     """Print the table."""
     print("true zone over u:", *TIMES)
@@ -56,6 +75,8 @@ def main(measurements: int = 1500) -> None:
         for form, shape in forms(count).items():
             found = [held(name, shape, times, measurements) for times in TIMES]
             print(f"{name}{form}:", *(f"{100 * share:.1f} % ({length:.2f} u)" for share, length in found), flush=True)
+    for times in (1.0, 3.0):
+        print(f"upper end of {times:g} times the median too low: {100 * short(times, measurements):.1f} %", flush=True)
 
 
 if __name__ == "__main__":
