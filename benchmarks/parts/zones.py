@@ -3,8 +3,8 @@
     python -m benchmarks.parts.zones [MEASUREMENTS]
 
 Errors of one along each coordinate, 1500 measurements of each true zone by default, 2000 draws of errors each; the table is
-that of docs/machine/parts.md. Then how often the upper end fails of a sum of two sides, with errors of 3 and 1 along them and a
-part that is off in any direction.
+that of docs/machine/parts.md. Then how often the upper end fails of a sum of two sides, with errors of 3 and 1 along them and
+a part that is off in any direction.
 """
 
 from __future__ import annotations
