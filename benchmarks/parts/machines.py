@@ -6,7 +6,7 @@ the machine corrects its estimates; parts are measured on the truth, and their i
 ``cmm-uq part`` does.
 
 Run: ``python -m benchmarks.parts.machines FOLDER [--machines N] [--only WORDS]``, of other parts with ``--place-um``,
-``--form-um``, and with ``--one-period`` a draw; ``--page`` writes the table of the page of what is there.
+``--form-um``; ``--page`` writes the table of the page of what is there.
 Every machine is appended to ``FOLDER/<cell>.jsonl`` as it is done: a run can be stopped and taken up again.
 """
 
@@ -86,13 +86,11 @@ class Made:
     ----------
     place_um, form_um : by how much the part is off (:func:`benchmarks.parts.truth.made_part`).
     periods : whether machines have periodic errors, and reckon with them.
-    one_period : whether they are reckoned with as one period a draw, not as a normal sum.
     """
 
     place_um: float = 20.0
     form_um: float = 2.0
     periods: bool = True
-    one_period: bool = False
 
 
 CELLS = (
@@ -155,7 +153,7 @@ def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, 
     _, mean, _ = joint_posterior(model, (), sigma)
     certificate = MachineState(MACHINE, NAMED, mean[None], StatedNoise(np.full(3, sigma)), unmodelled=unmodelled,
                                corrections=mean)  # fmt: skip
-    state = given_recording(certificate, model, given, TRIALS, int(random.integers(2**31)), one_period=made.one_period)
+    state = given_recording(certificate, model, given, TRIALS, int(random.integers(2**31)))
     growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
         PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()
     ) - PART.cte_per_k * (PART.temperature_c - 20)
@@ -225,9 +223,8 @@ def main() -> None:
     parser.add_argument("--place-um", type=float, default=Made.place_um, help="by how much features are off")
     parser.add_argument("--form-um", type=float, default=Made.form_um, help="form of every feature")
     parser.add_argument("--without-periods", action="store_true", help="machines have no periodic errors")
-    parser.add_argument("--one-period", action="store_true", help="one period a draw in place of a normal sum")
     chosen = parser.parse_args()
-    made = Made(chosen.place_um, chosen.form_um, not chosen.without_periods, chosen.one_period)
+    made = Made(chosen.place_um, chosen.form_um, not chosen.without_periods)
     if not chosen.page:
         some = [cell for cell in CELLS if not chosen.only or any(word in cell.name for word in chosen.only)]
         tasks = [

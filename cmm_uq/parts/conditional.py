@@ -13,32 +13,22 @@ and what it does not see of each keeps its prior.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.inference.linear_model import Whiten
 from cmm_uq.inference.marginal import Marginal
 from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.model.measurement import MeasurementModel
 from cmm_uq.model.noise import noise_of
-from cmm_uq.parts.drawn_periods import DrawnPeriod, drawable
 from cmm_uq.parts.machine import MachineState, StatedNoise, Unmodelled
 from cmm_uq.parts.periods import GivenPeriod
 from cmm_uq.parts.recorded_noise import stated_noise
 from cmm_uq.parts.together import Together, open_size
-from cmm_uq.parts.with_periods import Conditioned, Noises
 from cmm_uq.points import Floats, Ints
-from cmm_uq.units import MICROMETRE
 
 DRAWS = 10_000
-
-_EFFECTIVE = 0.2
-"""Part of the draws that weights must leave for periods to be drawn; else errors with a period are normal sums."""
-
-NOISES = 20
-"""Sizes of the noise, of which a draw with periods has one."""
 
 _UNTOLD = 100.0
 """Ratio of the 95 % to the 5 % quantile of the noise from which on the recording does not tell it from errors left out."""
@@ -82,9 +72,12 @@ def draws_given(whole: Together, components: Components, sizes: Sizes, random: n
 
 
 def given_recording(
-    state: MachineState, model: MeasurementModel, sigma_mm: float | None = None, draws: int = DRAWS, seed: int = 0,
-    *, one_period: bool = False,
-) -> MachineState:  # fmt: skip
+    state: MachineState,
+    model: MeasurementModel,
+    sigma_mm: float | None = None,
+    draws: int = DRAWS,
+    seed: int = 0,
+) -> MachineState:
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
 
     Parameters
@@ -93,8 +86,6 @@ def given_recording(
         much the calibration bounds an error that it did not model is of no matter here: its recording says that again.
     model : of the calibration, without the observations that its certificate set aside.
     sigma_mm : standard deviation of one recorded coordinate, where the noise is known and white; else it is sampled.
-    one_period : whether an error with an unknown period has one in each draw, where weights leave enough of the draws; else,
-        and without it, it is the normal sum of all.
 
     Raises
     ------
@@ -103,11 +94,6 @@ def given_recording(
     whole, random = Together.of(model, state.unmodelled), np.random.default_rng(seed)
     if sigma_mm is not None:
         noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
-        if one_period:
-            apart = _Apart.of(state, model)
-            found = apart.drawn([(sigma_mm, None)], None, draws, seed)
-            if found is not None:
-                return _with(apart.state, model, apart.whole, found[1], noise, found[2])
         mean, root = whole.white(sigma_mm)
         drawn = whole.coefficients(mean + random.standard_normal((draws, len(root))) @ root, random)
         return _with(state, model, whole, drawn, noise)
@@ -122,96 +108,12 @@ def given_recording(
         alone = sample_with_noise(estimate.linear, components, estimate.least_squares, seed)
         sizes = alone.sizes.at(_evenly(len(alone.draws), draws))
         drawn = draws_given(whole, components, sizes, random)
-    if one_period:
-        apart, some = _Apart.of(state, model), sizes.at(_evenly(len(sizes.slow), NOISES))
-        every_one = (sizes.typical, *(some.at(slice(i, i + 1)) for i in range(len(some.slow))))
-        noises = [(float(one.coordinate[0]), components.white(one)) for one in every_one]
-        found = apart.drawn(noises, _likelier(components, some, apart.whole, whole) if told else None, draws, seed)
-        if found is not None:
-            which, together, periods = found
-            return _with(
-                apart.state, model, apart.whole, together, stated_noise(model, components, some.at(which)), periods
-            )
     return _with(state, model, whole, drawn, stated_noise(model, components, sizes))
 
 
-@dataclass(frozen=True, eq=False)
-class _Apart:
-    """Errors with a period apart from all others.
-
-    Attributes
-    ----------
-    state : without them.
-    model : of the calibration.
-    periodic : those.
-    whole : all others together.
-    """
-
-    state: MachineState
-    model: MeasurementModel
-    periodic: tuple[Unmodelled, ...]
-    whole: Together
-
-    @classmethod
-    def of(cls, state: MachineState, model: MeasurementModel) -> _Apart:
-        periodic = tuple(one for one in state.unmodelled if drawable(one.effect))
-        others = tuple(one for one in state.unmodelled if one not in periodic)
-        return cls(replace(state, unmodelled=others), model, periodic, Together.of(model, others))
-
-    def drawn(
-        self, noises: Sequence[tuple[float, Whiten | None]], likelier: Floats | None, draws: int, seed: int
-    ) -> tuple[Ints, Floats, tuple[DrawnPeriod, ...]] | None:
-        """Which noise each draw has, coefficients (N, k + f) of the others, and draws with one period each.
-
-        Parameters
-        ----------
-        noises : standard deviation of a reading, and what makes observations uncorrelated; of several the first is a usual one
-            by which the others are only judged.
-        likelier : (s,) see :class:`Noises`.
-
-        Returns
-        -------
-        Nothing where no error has a period, or weights leave too few of the draws.
-        """
-        if not self.periodic:
-            return None
-        linear, random = self.whole.linear, np.random.default_rng(seed)
-        usual = Conditioned(self.model, linear, noises[0][0], self.periodic, noises[0][1])
-        if usual.open:
-            raise open_size()
-        stood = usual.without_noise()
-        usual = Conditioned(self.model, linear, noises[0][0], self.periodic, noises[0][1], stood)
-        found = usual.combinations(draws, random)
-        if found.effective < _EFFECTIVE:
-            return None
-        each = [Conditioned(self.model, linear, *one[:1], self.periodic, one[1], stood) for one in noises[1:]] or [
-            usual
-        ]
-        which, frequency, effective = Noises(usual, each, likelier).drawn(found, random)
-        if effective < _EFFECTIVE:
-            return None
-        own, parameters = np.empty((draws, 2 * len(self.periodic))), np.empty((draws, len(linear.unknowns)))
-        for i in np.unique(which):
-            rows = which == i
-            own[rows], parameters[rows] = each[i].drawn(frequency[rows], random)
-        periods = tuple(
-            DrawnPeriod(one.effect, frequency[:, i], own[:, 2 * i : 2 * i + 2]) for i, one in enumerate(self.periodic)
-        )
-        return which, self.whole.coefficients(parameters, random), periods
-
-
-def _likelier(components: Components, sizes: Sizes, apart: Together, whole: Together) -> Floats:
-    """(s,) log likelihood of sizes of the noise without errors that have a period, over that with them as normal sums."""
-    (log, squares), (log_all, squares_all) = (
-        Marginal(one.linear, components, one.estimate).log_likelihood(sizes) for one in (apart, whole)
-    )
-    return log - log_all - 0.5 * (squares - squares_all)
-
-
 def _with(
-    state: MachineState, model: MeasurementModel, whole: Together, drawn: Floats, noise: StatedNoise,
-    periodic: tuple[DrawnPeriod, ...] = (),
-) -> MachineState:  # fmt: skip
+    state: MachineState, model: MeasurementModel, whole: Together, drawn: Floats, noise: StatedNoise
+) -> MachineState:
     """The state with draws (N, k + f) of all errors together."""
     if not np.isfinite(drawn).all():
         raise open_size()
@@ -220,7 +122,7 @@ def _with(
     kept = np.flatnonzero(np.append(own, np.ones(len(whole.sd), dtype=bool)))
     none = np.zeros(len(whole.sd))
     together = replace(
-        state, effects=(*state.effects, *whole.effects), draws=drawn[:, kept], noise=noise, corrected=True, periodic=periodic,
+        state, effects=(*state.effects, *whole.effects), draws=drawn[:, kept], noise=noise, corrected=True,
         unmodelled=tuple(one for i, one in enumerate(state.unmodelled) if i not in whole.which),
         corrections=np.append(state.corrects, none), drift=np.append(state.drift, none),
     )  # fmt: skip
@@ -238,9 +140,6 @@ def _shares(state: MachineState) -> dict[str, float]:
             continue
         prior = sum(coefficient.prior_sd**2 for coefficient in effect.coefficients)
         found[effect.name] = float(np.sqrt(own.var(axis=0).sum() / prior)) if prior else 0.0
-    for one in state.periodic:
-        prior_mm = MICROMETRE * one.effect.coefficients[0].prior_sd
-        found[one.effect.name] = float(np.sqrt(np.mean(one.coefficients**2)) / prior_mm)
     return found
 
 

@@ -15,7 +15,6 @@ from datetime import date
 import numpy as np
 
 from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.parts.drawn_periods import DrawnPeriod
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import CONTRACT, Effect
 from cmm_uq.points import Floats, Machine
@@ -126,7 +125,6 @@ class MachineState:
         of 20 °C, or nobody knows.
     measured : day of the part's measurement.
     drift_unknown : effects of which nobody knows how they have changed since the calibration.
-    periodic : errors with one period a draw, of the same M draws, which no machine corrects.
 
     Raises
     ------
@@ -148,7 +146,6 @@ class MachineState:
     temperature_c: float | None = None
     measured: date | None = None
     drift_unknown: tuple[str, ...] = ()
-    periodic: tuple[DrawnPeriod, ...] = ()
 
     def __post_init__(self) -> None:
         k = sum(len(effect.coefficients) for effect in self.effects)
@@ -185,8 +182,7 @@ class MachineState:
     @property
     def free(self) -> tuple[str, ...]:
         """Effects that the calibration left to their priors."""
-        every = (*self.effects, *(one.effect for one in self.periodic))
-        return tuple(effect.name for effect in every if self.prior_share.get(effect.name, 0.0) > FREE)
+        return tuple(effect.name for effect in self.effects if self.prior_share.get(effect.name, 0.0) > FREE)
 
 
 def of_machine(effect: Effect) -> bool:

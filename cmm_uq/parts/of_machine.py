@@ -8,7 +8,6 @@ import numpy as np
 
 from cmm_uq.messages import say
 from cmm_uq.parts.causes import Cause, Common, Draw, Drawn, Rows, Scatter, field_along
-from cmm_uq.parts.drawn_periods import columns_at_each
 from cmm_uq.parts.machine import MachineState, Unmodelled
 from cmm_uq.parts.periods import GivenPeriod
 from cmm_uq.parts.placing import Pose
@@ -58,12 +57,10 @@ def _plain(state: MachineState) -> tuple[Superposition, Floats, Floats]:
 def _mean_periodic(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None) -> Floats:
     """(n, 3) displacements by the means of errors with a period, which no machine corrects."""
     given = [isinstance(effect, GivenPeriod) for effect in state.effects]
-    if not state.periodic and not any(given):
+    if not any(given):
         return np.zeros_like(qualified.part.xyz)
     read, about = _read(state, qualified, pose, measured), _about(state, qualified)
     e = np.zeros((len(qualified.both), 3))
-    for one in state.periodic:
-        e += columns_at_each(about, one.effect) @ one.at(read.readings[one.axis]).mean(axis=0)
     start = 0
     for effect in state.effects:
         own = state.mean[start : start + len(effect.coefficients)]
@@ -101,8 +98,7 @@ def _read(state: MachineState, qualified: Qualified, pose: Pose, measured: Float
 def modelled(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None = None) -> Common:
     """What the calibration modelled: differences of whole draws of its posterior from their mean, and drift since then.
 
-    The columns are those of small changes about the mean (:meth:`Superposition.about`), axes leaning as they do. Of an error
-    with one period a draw the coefficients are its values at the readings of the points.
+    The columns are those of small changes about the mean (:meth:`Superposition.about`), axes leaning as they do.
 
     Parameters
     ----------
@@ -111,7 +107,7 @@ def modelled(state: MachineState, qualified: Qualified, pose: Pose, measured: Fl
     """
     about = _about(state, qualified)
     given = any(isinstance(effect, GivenPeriod) for effect in state.effects)
-    read = _read(state, qualified, pose, measured) if given or state.periodic else qualified.both
+    read = _read(state, qualified, pose, measured) if given else qualified.both
     columns = np.concatenate([
         np.zeros((len(qualified.both), 3, 0)),
         *(
@@ -122,13 +118,6 @@ def modelled(state: MachineState, qualified: Qualified, pose: Pose, measured: Fl
     ], axis=2)  # fmt: skip
     factors = [effect.name for effect in state.effects for _ in effect.coefficients]
     deviations = state.draws - state.mean
-    if state.periodic:
-        each = [one.at(read.readings[one.axis]) for one in state.periodic]
-        columns = np.concatenate([columns, *(columns_at_each(about, one.effect) for one in state.periodic)], axis=2)
-        deviations = np.hstack([deviations, *(values - values.mean(axis=0) for values in each)])
-        factors += [
-            one.effect.name for one, values in zip(state.periodic, each, strict=True) for _ in range(values.shape[1])
-        ]
     drift = np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
 
     def draw(random: np.random.Generator, n: int) -> Drawn:

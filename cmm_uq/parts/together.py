@@ -16,7 +16,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.linear_model import LinearModel, Unknown
 from cmm_uq.model.measurement import ARTEFACT, MeasurementModel
-from cmm_uq.parts.drawn_periods import shown
+from cmm_uq.parts.at_each import shown
 from cmm_uq.parts.machine import Unmodelled
 from cmm_uq.parts.periods import GivenPeriod, covariance, linear
 from cmm_uq.physics.drives import PeriodicScale
