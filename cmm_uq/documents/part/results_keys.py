@@ -75,9 +75,13 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "characteristics[].value_is": (
             "", "mean: measured less mean_error; median: of the values that such a measurement may come from, zero at least."),
         "characteristics[].u": (OWN, "Standard uncertainty."),
-        "characteristics[].U": (OWN, "Half of the shortest 95 % interval."),
+        "characteristics[].U": (
+            OWN,
+            "Half of the shortest 95 % interval of the errors; of a width that was measured no less than half of interval95, and "
+            "to its end where it begins at zero.",
+        ),
         "characteristics[].k": ("", "U over u."),
-        "characteristics[].interval95": (OWN, "Ends of that interval; of the error where nothing was measured."),
+        "characteristics[].interval95": (OWN, "Ends of the 95 % interval; of the error where nothing was measured."),
         "characteristics[].worst_cause": ("", "Line of the budget with the largest share."),
         "characteristics[].limits.lower": (OWN, "Lower limit of the drawing."),
         "characteristics[].limits.upper": (OWN, "Upper limit."),
