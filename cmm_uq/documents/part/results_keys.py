@@ -77,7 +77,7 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "characteristics[].u": (OWN, "Standard uncertainty."),
         "characteristics[].U": (
             OWN,
-            "Half of the shortest 95 % interval of the errors; of a width that was measured no less than half of interval95, and "
+            "Half of the shortest 95 % interval of the errors; of a measured width no less than half of interval95, and "
             "to its end where it begins at zero.",
         ),
         "characteristics[].k": ("", "U over u."),
