@@ -2,10 +2,9 @@
 
 The width of a zone is never negative. Draws of its true value are quantiles of a confidence distribution
 (:mod:`cmm_uq.parts.inverting`), of which those with which even a perfect part would have been measured wider are negative.
-Its value is the median of all, as often too large as too small, and zero where that is negative. Its interval begins where
-2.5 % of all lie below, at zero where these are negative, and ends where 2.5 % of those that are possible lie above. The lower
-end fails as often as it says and the upper end no more often, and no interval is empty because a measurement happened to be
-better than its errors (the ratio of both tails: Read, J. Phys. G 28 (2002) 2693). Probabilities are those of possible draws.
+Its value is the median of all, as often too large as too small, and zero where that is negative. Its interval lies between the
+tails of :mod:`cmm_uq.parts.unified`: it holds as often however small the zone is, and is not empty because a measurement
+happened to be better than its errors. Probabilities are those of possible draws.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.evaluating import characteristics_of
 from cmm_uq.parts.plan import Plan
+from cmm_uq.parts.unified import tails
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated
 
@@ -37,7 +37,7 @@ class Stated:
     value : mm or rad, less the mean error, of a zone the median one, and zero at least; ``None`` where nothing was measured.
     error : mean of the errors: by how much such a measurement is off on average, mm or rad.
     u : standard uncertainty, mm or rad.
-    interval : shortest coverage interval of the value, of a zone with equal tails; where nothing was measured the shortest of
+    interval : shortest coverage interval of the value, of a zone the unified one; where nothing was measured the shortest of
         the error, with the opposite sign.
     k : half of the shortest interval of the errors over u; of a zone half of its own interval where that is more, and so much
         that U reaches to the end of an interval that begins at zero.
@@ -92,15 +92,15 @@ def middle(errors: Floats) -> float:
 
 
 def possible_interval(true: Floats, coverage: float) -> tuple[float, float]:
-    """From the lower end of all draws to the upper end of those that are not negative.
+    """Between tails of all draws that hold as often however small the zone is (:func:`.tails`).
 
     Where few are possible it ends where errors of a perfect part do: draws are negative by as much as these are larger.
     """
-    tail = 0.5 * (1 - coverage)
-    left = true[true >= 0]
-    low = float(np.quantile(true, tail))
-    high = float(np.quantile(left if len(left) >= SCARCE * len(true) else np.abs(true), 1 - tail))
-    return max(0.0, low), high
+    negative = float(np.mean(true < 0))
+    below, above = tails(negative, coverage)
+    scarce = 1 - negative < SCARCE
+    high = np.quantile(np.abs(true), coverage) if scarce else np.quantile(true, 1 - above)
+    return max(0.0, float(np.quantile(true, below))), float(high)
 
 
 def evaluated(plan: Plan, points: Floats) -> Floats:

@@ -29,14 +29,22 @@ def of(value: float) -> tuple[Stated, ...]:
     return stated(simulated, np.full(2, value + 0.25), PLAN, ERRORS)
 
 
-@pytest.mark.parametrize("value", [-1.0, 0.0, 1.0, 2.5])
-def test_the_interval_of_a_zone_ends_where_what_is_possible_ends(value: float) -> None:
-    """2.5 % of a normal distribution below, at zero at least; above, 2.5 % of the same cut at zero (scipy's)."""
+@pytest.mark.parametrize(
+    ("value", "low", "high"),
+    [
+        (-1.0, 0.0, float(stats.truncnorm(1.0, np.inf, -1.0, 1.0).ppf(0.95))),
+        (0.0, 0.0, 1.96),
+        (1.0, 0.0, 2.96),
+        (2.5, 0.761, 4.46),
+        (4.5, 4.5 - 1.96, 4.5 + 1.96),
+    ],
+)
+def test_the_interval_of_a_zone_is_the_unified_one(value: float, low: float, high: float) -> None:
+    """Feldman and Cousins' of a mean that is not negative (by their belt, :mod:`tests.parts.test_unified`); of what was
+    measured below zero the one whose upper end leaves 5 % of a normal distribution that is cut at zero (scipy's)."""
     zone, size = of(value)
-    cut = stats.truncnorm(-value, np.inf, value, 1.0)
-    begins_at_zero = value < 1.96
-    reach = max(1.96, float(cut.ppf(0.975)) - max(0.0, value)) if begins_at_zero else 1.96
-    assert zone.interval == pytest.approx((max(0.0, value - 1.96), float(cut.ppf(0.975))), abs=0.03)
+    reach = max(1.96, high - max(0.0, value), 0.5 * (high - low)) if low == 0 else max(1.96, 0.5 * (high - low))
+    assert zone.interval == pytest.approx((low, high), abs=0.03)
     assert zone.value == pytest.approx(max(0.0, value), abs=0.01)
     # to the end of an interval that begins at zero, no less than that of the measurement
     assert (zone.U, zone.k, size.U) == pytest.approx((reach, reach, 1.96), abs=0.04)
@@ -45,10 +53,10 @@ def test_the_interval_of_a_zone_ends_where_what_is_possible_ends(value: float) -
 
 
 def test_a_zone_far_below_zero_is_zero_and_no_smaller_than_its_error_may_be() -> None:
-    """With none of 200 000 draws possible it ends where 97.5 % of all lie, on the other side of zero."""
+    """With none of 200 000 draws possible it ends where 95 % of all lie, on the other side of zero."""
     zone, _ = of(-6.0)
     assert (zone.value, zone.interval[0]) == (0.0, 0.0)
-    assert zone.interval[1] == pytest.approx(6.0 + 1.96, abs=0.05)
+    assert zone.interval[1] == pytest.approx(6.0 + 1.645, abs=0.05)
     assert (zone.U, zone.k) == pytest.approx((zone.interval[1], zone.interval[1] / zone.u))
 
 
