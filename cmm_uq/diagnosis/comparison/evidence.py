@@ -287,7 +287,8 @@ class Comparison:
         given : explanations that it is conditional on.
         among : explanations that are wanted, by default all; of others the evidence may be minus infinity.
         """
-        return self.log_evidence_of(given, left), self._total(self._beside(left, given), among)
+        known = self._beside(left, given)
+        return self._of_given(known), self._total(known, among)
 
     def _total(self, known: Beside, among: Container[int] | None = None) -> Floats:
         """Log evidence (c, b) of each explanation, its versions and sizes summed."""
@@ -313,7 +314,7 @@ class Comparison:
         """
         known = self._beside(signal, ())
         known = replace(known, squares=known.squares + self.lengths(noise[:, None]))
-        return self._total(known) - log_sum(self.over_sigma(known.squares) + known.log[:, None], 0)
+        return self._total(known) - self._of_given(known)
 
     def beside(
         self, given: Sequence[Version] = (), among: Container[int] | None = None
@@ -358,9 +359,11 @@ class Comparison:
 
     def log_evidence_of(self, given: Sequence[Version], left: Floats | None = None) -> Floats:
         """Log evidence (b,) of what is given, at its size, for data (m, b)."""
-        known = self._beside(left, given)
-        every = self.over_sigma(known.squares) + known.log[:, None]
-        return log_sum(every, 0)
+        return self._of_given(self._beside(left, given))
+
+    def _of_given(self, known: Beside) -> Floats:
+        """Log evidence (b,) of what data are beside."""
+        return log_sum(self.over_sigma(known.squares) + known.log[:, None], 0)
 
     def noise_probability(self, given: Sequence[Version]) -> Floats:
         """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
