@@ -257,7 +257,7 @@ def searched(case: Case, *, knows_noise: bool, seed: int = 0) -> Found:
 
 
 def known_forms(case: Case, seed: int = 0) -> tuple[float, bool]:
-    """What could be seen at all of functions outside the catalogue: their form is told, their size and the noise are estimated.
+    """What could be seen at all of functions outside the catalogue: told the form, not the size or the noise.
 
     Returns
     -------
