@@ -253,7 +253,7 @@ class Found:
 
 def searched(case: Case, *, knows_noise: bool, seed: int = 0) -> Found:
     """Effects found one after the other until none is more surprising than noise alone makes one in a hundred."""
-    return _among(case, *forms(case), knows_noise=knows_noise, seed=seed)
+    return searched_among(case, *forms(case), knows_noise=knows_noise, seed=seed)
 
 
 def known_forms(case: Case, seed: int = 0) -> tuple[float, bool]:
@@ -267,14 +267,16 @@ def known_forms(case: Case, seed: int = 0) -> tuple[float, bool]:
     hidden = case.truth["hidden"]
     columns = [-case.placed.D @ outside(case.placed)[name](case.placed.true, case.context).ravel() for name in hidden]
     alone = Forms(np.stack(columns, axis=1)[:, :, None], np.arange(len(columns)))
-    seen = _among(case, list(hidden), [alone], knows_noise=False, seed=seed)
+    seen = searched_among(case, list(hidden), [alone], knows_noise=False, seed=seed)
     names, catalogue = forms(case)
     more = Forms(alone.columns, alone.owner + len(names))
-    found = _among(case, [*names, *hidden], [*catalogue, more], knows_noise=False, seed=seed)
+    found = searched_among(case, [*names, *hidden], [*catalogue, more], knows_noise=False, seed=seed)
     return seen.p_value, set(hidden) <= set(found.effects)
 
 
-def _among(case: Case, names: Sequence[str], all_forms: Sequence[Forms], *, knows_noise: bool, seed: int) -> Found:
+def searched_among(
+    case: Case, names: Sequence[str], all_forms: Sequence[Forms], *, knows_noise: bool, seed: int
+) -> Found:
     """See :func:`searched`, among forms of what is named."""
     random = np.random.default_rng([seed, int(knows_noise)])
     covariance = noises.of_observations(noises.of_coordinates(case.noise, case.placed), case.placed)
