@@ -31,7 +31,7 @@ def jumped(tmp_path_factory: pytest.TempPathFactory) -> MeasurementModel:
 def test_few_shapes_say_of_a_jump_with_time_what_many_say(
     jumped: MeasurementModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Against the integral by a hundred shapes, within what is worth no more than a mention; 100 : 1 is decisive (Jeffreys)."""
+    """Against the integral by a hundred shapes, within what is hardly worth a mention; 100 : 1 is decisive (Jeffreys)."""
     functions = [f for f in unknown(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
     odds = []
     for kept in (shapes.KEPT, 100):
