@@ -15,7 +15,7 @@ from scipy import linalg, special, stats
 
 from benchmarks.concealed.physics import kind_of
 from benchmarks.second import noises
-from benchmarks.second.cases import Case, Seen, baseline, visible
+from benchmarks.second.cases import Case, Seen, baseline, outside, visible
 from benchmarks.second.noises import Noise
 
 DRAWS = 199
@@ -253,8 +253,32 @@ class Found:
 
 def searched(case: Case, *, knows_noise: bool, seed: int = 0) -> Found:
     """Effects found one after the other until none is more surprising than noise alone makes one in a hundred."""
+    return searched_among(case, *forms(case), knows_noise=knows_noise, seed=seed)
+
+
+def known_forms(case: Case, seed: int = 0) -> tuple[float, bool]:
+    """What could be seen at all of functions outside the catalogue: told the form, not the size or the noise.
+
+    Returns
+    -------
+    p_value : of the likelihood ratio of these functions alone, among draws of noise alone.
+    named : whether they are what a search finds that has them in its catalogue.
+    """
+    hidden = case.truth["hidden"]
+    columns = [-case.placed.D @ outside(case.placed)[name](case.placed.true, case.context).ravel() for name in hidden]
+    alone = Forms(np.stack(columns, axis=1)[:, :, None], np.arange(len(columns)))
+    seen = searched_among(case, list(hidden), [alone], knows_noise=False, seed=seed)
+    names, catalogue = forms(case)
+    more = Forms(alone.columns, alone.owner + len(names))
+    found = searched_among(case, [*names, *hidden], [*catalogue, more], knows_noise=False, seed=seed)
+    return seen.p_value, set(hidden) <= set(found.effects)
+
+
+def searched_among(
+    case: Case, names: Sequence[str], all_forms: Sequence[Forms], *, knows_noise: bool, seed: int
+) -> Found:
+    """See :func:`searched`, among forms of what is named."""
     random = np.random.default_rng([seed, int(knows_noise)])
-    names, all_forms = forms(case)
     covariance = noises.of_observations(noises.of_coordinates(case.noise, case.placed), case.placed)
     seen = Seen(case.placed, case.named, case.certified, covariance, case.context, case.noise.sigma)
     B = baseline(seen)

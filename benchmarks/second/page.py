@@ -13,11 +13,14 @@ from benchmarks.second import judging
 from benchmarks.second.cases import EFFECTS, FAULTS, NOTHING
 from benchmarks.second.judging import proportion
 from benchmarks.second.missed import why
+from benchmarks.second.oracle import DRAWS, EXCEED
 
 Records = dict[str, dict[str, Any]]
 Pairs = list[tuple[dict[str, Any], dict[str, Any]]]
 MISSED = "**not kept**"
 ORACLES = ("estimates", "knows")
+LEAST_P = (1 + EXCEED) / (1 + DRAWS)
+"""Of an oracle's alarm, by the rank of a recording among draws of noise alone."""
 Rule = Callable[[str, dict, set[str]], tuple[bool, bool]]
 
 SAID = """\
@@ -50,6 +53,8 @@ and oracles (`benchmarks/second/`) share no code with the package; a test holds 
 - **The oracles** search by likelihood ratios among all effects of the catalogue, one after the other. One estimates the noise
   within the same kinds (white and one kind besides, of a few sizes, and t); the other is told the noise exactly (of real noise
   its size). Each draws 199 recordings of noise alone as it takes it to be; an alarm is what at most one of them exceeds.
+  Outside the catalogue a third one is told the form of what is hidden, not its size, and estimates the noise as the first
+  does: what it does not see is not there to be seen. A diagnosis has no such form; it searches functions of every form.
 - **Found** is what is named, alone or among effects said to be indistinguishable, of all that is hidden, or else a rival that
   leaves less than √λ = 2 of it. **Innocent** is what is named and is neither. **Blamed** for an artefact's fault is an effect
   of the machine with no word of the artefact in its group. A probability is *right* where the effect is there, *with its
@@ -66,8 +71,8 @@ def write(truths: list[dict], found: Records, oracles: Records, mark: str, asked
     pairs = [(t, found[t["name"]]) for t in truths if t["name"] in found and "fault" not in found[t["name"]]]
     both = [(t, f, oracles[t["name"]]) for t, f in pairs if "estimates" in oracles.get(t["name"], {})]
     page = ["# A second concealed study", "", *_state(truths, pairs, faults, mark, asked), *filter(None, [note]), ""]
-    for part in (_wanted(pairs, both), _nothing(pairs, oracles), _found(both), _artefact(pairs), _others(pairs), _said(pairs),
-                 _coverage(pairs)):  # fmt: skip
+    for part in (_wanted(pairs, both), _nothing(pairs, oracles), _found(both), _artefact(pairs), _others(pairs, oracles),
+                 _said(pairs), _coverage(pairs)):  # fmt: skip
         page += [*part, ""]
     page += [*_times([f["seconds"] for _, f in pairs], [o["seconds"] for *_, o in both], len(truths), asked), ""]
     print("\n".join(page))
@@ -229,7 +234,7 @@ def _artefact(pairs: Pairs) -> list[str]:
     return lines
 
 
-def _others(pairs: Pairs) -> list[str]:
+def _others(pairs: Pairs, oracles: Records) -> list[str]:
     out, shuffled, periods, sets = (
         _of(pairs, (kind,)) for kind in ("outside", "shuffled", "unresolved period", "maps")
     )
@@ -245,7 +250,8 @@ def _others(pairs: Pairs) -> list[str]:
     return [
         "## Beside these", "",
         f"- Outside the catalogue: {_share(sum(judging.recognised(f) for _, f in out), len(out))} recognised, "
-        f"{sum(f['verdict'] == 'consistent' for _, f in out)} not seen, {len(explained)} explained by an innocent effect.",
+        f"{sum(f['verdict'] == 'consistent' for _, f in out)} not seen, {len(explained)} explained by an innocent effect."
+        + _told_the_form(out, oracles),
         f"- The same rows in another order: {len(shuffled) - len(moved)} of {len(shuffled)} times the same verdict, effects, "
         "groups and values" + (f"; not in {', '.join(moved[:12])}." if moved else "."),
         f"- Periods with aliases: named in {len(said)} of {len(periods)}, and withheld as probable but not resolved in "
@@ -254,6 +260,19 @@ def _others(pairs: Pairs) -> list[str]:
         f"- Real error maps, an expansion of 3 to 15 µm/(m K) concealed: {_share(shown, len(grown))} "
         f"named, intervals hold {_share(sum(expansions), len(expansions))}; in {wrong} of {len(sets)} another one is named.",
     ]  # fmt: skip
+
+
+def _told_the_form(out: Pairs, oracles: Records) -> str:
+    """What an oracle sees of what is outside the catalogue that is told its form; nothing of runs before there was one."""
+    told = [(f, form) for t, f in out if (form := oracles.get(t["name"], {}).get("knows_form"))]
+    if not told:
+        return ""
+    seen = [f for f, form in told if form["p"] <= LEAST_P]
+    return (
+        f" An oracle that is told the form of what is hidden, and estimates its size and the noise, sees {len(seen)} of "
+        f"{len(told)}, and names it among the whole catalogue in {sum(form['named'] for _, form in told)}; of those that it "
+        f"sees {sum(map(judging.recognised, seen))} are recognised."
+    )
 
 
 def _assertions(pairs: Pairs, there: Rule = judging.there) -> tuple[list[float], list[float], list[bool], list[bool]]:

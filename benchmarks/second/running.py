@@ -54,13 +54,17 @@ def _written(made: Any, folder: Path) -> None:
 
 
 def _searched(made: Any, number: int) -> dict[str, Any]:
-    from benchmarks.second.oracle import searched
+    from benchmarks.second.oracle import known_forms, searched
 
     by = {
         "estimates": searched(made, knows_noise=False, seed=number),
         "knows": searched(made, knows_noise=True, seed=number),
     }
-    return {key: {"effects": list(found.effects), "p": found.p_value} for key, found in by.items()}
+    told: dict[str, Any] = {key: {"effects": list(found.effects), "p": found.p_value} for key, found in by.items()}
+    if made.truth["kind"] == "outside":
+        p_value, named = known_forms(made, seed=number)
+        told["knows_form"] = {"p": p_value, "named": named}
+    return told
 
 
 class ConsistentError(Exception):

@@ -7,11 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.diagnosis.comparison.explanations import EFFECT, Explanation
+from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.diagnosis.noise import Kind
-from cmm_uq.diagnosis.shapes import kinds
+from cmm_uq.diagnosis.shapes import kinds, unreached
+from cmm_uq.inference.linear_model import LinearModel
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.noise import noise_of
+from cmm_uq.points import Floats
 
 _FEW = 2
 """Columns."""
@@ -29,7 +31,23 @@ def noise_kinds(model: MeasurementModel, candidates: Sequence[Explanation]) -> l
     columns = [e.members[0].columns for e in candidates if e.kind == EFFECT and not e.shaped and not _doubled(e)]
     rivals = np.hstack(columns) if columns else np.zeros((len(estimate.linear.observed), 0))
     components = noise_of(replace(model, sigma=None))
-    return kinds(estimate.linear, components, estimate.least_squares, rivals, estimate.least_squares.residuals)
+    jumps = _jumps(estimate.linear, estimate.least_squares.residuals, candidates)
+    return kinds(estimate.linear, components, estimate.least_squares, rivals, estimate.least_squares.residuals, jumps)
+
+
+def _jumps(linear: LinearModel, residuals: Floats, candidates: Sequence[Explanation]) -> Floats:
+    """Columns (m, j), mm: of each function of time with a jump, the one that takes most of the residuals (m,), mm."""
+    functions = [each for each in candidates if each.kind == UNKNOWN and each.covariate_name == "time_s"]
+    found = [np.zeros((len(residuals), 0))]
+    left = linear.reduce(residuals[:, None])[:, 0]
+    for function in functions:
+        steps = [member.columns for member in function.members if member.columns.shape[1] == 1]
+        if steps:
+            rest = unreached(linear, np.hstack(steps))
+            squares = np.sum(rest**2, axis=0)
+            taken = (left @ rest) ** 2 / np.where(squares > 0, squares, np.inf)
+            found.append(steps[int(taken.argmax())])
+    return np.hstack(found)
 
 
 def _doubled(explanation: Explanation) -> bool:

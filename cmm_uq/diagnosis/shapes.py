@@ -28,6 +28,9 @@ SHAPES, KEPT = 512, 7
 _MORE, _ENOUGH = 256, 32
 """Drawn from what the recording says, with and without something missing; how many draws must matter for none of these."""
 
+_SLOW = 0.5
+"""Probability of slow noise from which it is asked what the noise is beside a jump."""
+
 _TRIED = 600
 """Draws by which it is found what the recording says of them, in each round."""
 
@@ -47,7 +50,12 @@ class Shapes:
 
 
 def kinds(
-    linear: LinearModel, components: Components, estimate: LeastSquares, rivals: Floats, residuals: Floats
+    linear: LinearModel,
+    components: Components,
+    estimate: LeastSquares,
+    rivals: Floats,
+    residuals: Floats,
+    jumps: Floats | None = None,
 ) -> list[Kind]:
     """Shapes of the noise that a recording could show.
 
@@ -58,6 +66,7 @@ def kinds(
     estimate : least squares of ``linear``.
     rivals : (m, r) columns, mm, of what could be missing, for coefficients of standard deviation one.
     residuals : (m,) of the estimate, mm.
+    jumps : (m, j) columns, mm, of what may jump with time: slow noise looks like it, and is not needed beside it.
     """
     components = _for_a_unit(Marginal(linear, components, estimate))
     either = (
@@ -75,7 +84,12 @@ def kinds(
             told = [_Density.of(*each, components) for each in zip(either, taken, strict=True)]
         shapes = _more(shapes, few, told)
         shares = [density.share(shapes) for density in told]
-    kept, weight = _representative(components.sizes(shapes.latent), shapes.weight, np.mean(shares, axis=0))
+    sizes = components.sizes(shapes.latent)
+    if jumps is not None and jumps.shape[1] and np.mean(shares, axis=0)[sizes.slow > 0].sum() > _SLOW:
+        beside = Marginal(_with_rivals(linear, jumps), components, _without_rivals(estimate, jumps.shape[1]))
+        used_up = _determined(linear, jumps, estimate.sigma_of_residuals)
+        shares.append(_Density.of(beside, used_up, components).share(shapes))
+    kept, weight = _representative(sizes, shapes.weight, np.mean(shares, axis=0))
     scale = linear.noise_scale
     found = [
         replace(
@@ -221,11 +235,16 @@ def _determined(linear: LinearModel, rivals: Floats, sigma: float) -> float:
     """How many coefficients of columns (m, r) with standard deviation one a recording determines beside its model."""
     if not rivals.shape[1]:
         return 0.0
-    basis, s, _ = np.linalg.svd(linear.reduced.design, full_matrices=False)
-    basis = basis[:, s > 1e-9 * s.max(initial=0.0)]
-    rest = linear.reduce(rivals)
-    strengths = np.linalg.eigvalsh((rest - basis @ (basis.T @ rest)).T @ rest) / max(sigma, _NANOMETRE) ** 2
+    rest = unreached(linear, rivals)
+    strengths = np.linalg.eigvalsh(rest.T @ linear.reduce(rivals)) / max(sigma, _NANOMETRE) ** 2
     return float(np.sum(np.maximum(strengths, 0.0) / (1 + np.maximum(strengths, 0.0))))
+
+
+def unreached(linear: LinearModel, columns: Floats) -> Floats:
+    """What a model leaves of columns (m, r), mm, in units of the noise scale."""
+    basis, s, _ = np.linalg.svd(linear.reduced.design, full_matrices=False)
+    basis, rest = basis[:, s > 1e-9 * s.max(initial=0.0)], linear.reduce(columns)
+    return np.asarray(rest - basis @ (basis.T @ rest))
 
 
 def _with_rivals(linear: LinearModel, rivals: Floats) -> LinearModel:
