@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from cmm_uq.cli import _NEW_OBJECTS
 from cmm_uq.points import Machine, Points
 from tests.recordings import TRAVEL, bars
 
@@ -33,6 +35,12 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["CMM_UQ_RECORDS"] = "none"  # what is tested of records names them
     if hasattr(config, "workerinput"):
         os.environ["CMM_UQ_TESTS_SHARE"] = str(Path(config.option.basetemp).parent)
+
+
+def pytest_collection_finish() -> None:
+    """Look for what refers to itself as seldom as the command does, and not at all through what the tests themselves are."""
+    gc.freeze()
+    gc.set_threshold(_NEW_OBJECTS)
 
 
 @pytest.fixture
