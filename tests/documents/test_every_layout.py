@@ -230,7 +230,10 @@ def picture(path: Path) -> np.ndarray:
 
 def texts(pdf: bytes) -> list[str]:
     """Of the pages, without spaces and hyphens, which line breaks put in and take away."""
-    return [plain(sheet.extract_text()) for sheet in PdfReader(io.BytesIO(pdf)).pages]
+    if shutil.which("pdftotext") is None:
+        return [plain(sheet.extract_text()) for sheet in PdfReader(io.BytesIO(pdf)).pages]
+    read = subprocess.run(["pdftotext", "-raw", "-", "-"], input=pdf, capture_output=True, check=True).stdout  # ten times as fast
+    return [plain(sheet) for sheet in read.decode().split("\f")[:-1]]
 
 
 def plain(text: str) -> str:
