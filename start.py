@@ -65,7 +65,7 @@ def test(arguments: list[str]) -> int:
     with subprocess.Popen(  # told when the tests are done, or its lines would stand among theirs
         [str(SCRIPTS / "mypy")], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as types:
-        results += [run("pytest", *(arguments or ["--numprocesses=auto", "--dist=loadfile"]))]
+        results += [run("pytest", *(arguments or ["--numprocesses=auto", "--dist=loadfile", "--no-loadscope-reorder"]))]
         print(types.communicate()[0], end="")
     return max(*results, types.returncode)
 
