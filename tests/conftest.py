@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from cmm_uq.cli import _NEW_OBJECTS
 from cmm_uq.points import Machine, Points
 from tests.recordings import TRAVEL, bars
 
@@ -33,6 +35,27 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["CMM_UQ_RECORDS"] = "none"  # what is tested of records names them
     if hasattr(config, "workerinput"):
         os.environ["CMM_UQ_TESTS_SHARE"] = str(Path(config.option.basetemp).parent)
+
+
+LONG = (
+    "documents/test_every_layout.py", "commands/test_verify_part_machine.py", "commands/test_verify_part.py",
+    "kinds/test_contract.py", "hostile/test_kills_and_collisions.py", "diagnosis/test_diagnosis.py",
+    "kinds/shift_plate/test_plane.py", "commands/test_new.py", "site/test_snippets.py", "commands/test_part.py",
+    "cli/test_ends.py", "commands/test_planning.py", "cli/test_outside_effect.py",
+)  # fmt: skip
+"""Files of twenty seconds and more: each runs on one core, so none is to be begun when the others are done."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that take longest; those of a folder otherwise stay in their order."""
+    long = {ROOT / "tests" / name for name in LONG}
+    items.sort(key=lambda item: item.path not in long)
+
+
+def pytest_collection_finish() -> None:
+    """Look for what refers to itself as seldom as the command does, and not at all through what the tests themselves are."""
+    gc.freeze()
+    gc.set_threshold(_NEW_OBJECTS)
 
 
 @pytest.fixture

@@ -58,7 +58,7 @@ def available() -> bool:
 
 
 def _strace(folder: Path, *more: str) -> list[str]:
-    return ["strace", "-f", "-qq", "-ttt", "-s", "60", "-o", str(folder / "trace"), *more]
+    return ["strace", "-f", "--seccomp-bpf", "-qq", "-ttt", "-s", "60", "-o", str(folder / "trace"), *more]
 
 
 def calls(command: str, *, over: bool) -> list[tuple[str, int]]:

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from cmm_uq.cli import NOT_VERIFIED, NOT_WHOLLY_CHECKED
 from cmm_uq.commands.part import part_found
 from cmm_uq.commands.part_machine import machine_found
-from cmm_uq.commands.part_written import Asked, contents_of, write_part
+from cmm_uq.commands.part_written import Asked, contents_of, write_part, written
 from cmm_uq.commands.verify import Verification, verify
 from cmm_uq.commands.verify_part import _asked_again
 from cmm_uq.documents.part.found import PartFound
@@ -26,10 +26,16 @@ from cmm_uq.documents.part.results import standing_data
 from cmm_uq.errors import CmmUqError
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of
-from tests.part_reports import TRIALS, plate_found, plate_report, put, with_inputs
+from tests.part_reports import TRIALS, found_again_once, plate_found, plate_report, put, with_inputs
 
 PDF, PAGE = "part-simulated.pdf", "part-simulated.html"
 OTHER = ROOT / "examples" / "part-plate-simulated" / "machine" / "certificate-simulated.pdf"
+
+
+@pytest.fixture
+def once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests whose report was made by :func:`plate_found`, that computing again has no part in."""
+    monkeypatch.setattr("cmm_uq.commands.part_written.found_of", found_again_once)
 
 
 def found_in(folder: Path, files: Mapping[str, bytes], *names: str, rerun: bool = False) -> Verification:
@@ -45,6 +51,7 @@ def told(found: Verification) -> str:
     return "\n".join(map(str, (*found.inquiry.findings, *found.inquiry.unchecked)))
 
 
+@pytest.mark.usefixtures("once")
 def test_a_report_is_verified_from_its_pdf_alone_and_computed_again_to_the_byte(tmp_path: Path) -> None:
     found = found_in(tmp_path, plate_report(), PDF, rerun=True)
     assert found.inquiry.word == "VERIFIED", told(found)
@@ -53,10 +60,8 @@ def test_a_report_is_verified_from_its_pdf_alone_and_computed_again_to_the_byte(
 
 
 def test_its_folder_is_held_to_its_manifest_with_the_folders_inside(tmp_path: Path) -> None:
-    for name, content in plate_files(by_results(), np.zeros((60, 3)), **THERE).items():
-        put(tmp_path / "job", {name: content})
     out = tmp_path / "out"
-    write_part(tmp_path / "job", out, asked=Asked(trials=TRIALS))
+    written(plate_found().job, plate_found, out)
     (out / "further").mkdir(exist_ok=True)
     manifest = json.loads((out / "manifest.json").read_bytes())
     if "further/job.toml" not in manifest["files"]:
@@ -87,6 +92,7 @@ def test_a_file_inside_that_was_exchanged_is_named(tmp_path: Path, name: str, ol
     assert any(name in one.file + one.place + one.problem for one in found.inquiry.findings), told(found)
 
 
+@pytest.mark.usefixtures("once")
 def test_another_expanded_uncertainty_in_all_documents_is_found_by_computing_again(tmp_path: Path) -> None:
     """Value, u, interval, U, k, page and PDF agree: nothing but the draws tells."""
     found = plate_found()

@@ -99,10 +99,12 @@ def refused(kind: Kind, what: str, run: Callable[[], object], out: Path) -> None
 
 
 @pytest.mark.parametrize("name", [*BUILT_IN, OUTSIDE])
-def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(name: str, tracker: Path, tmp_path: Path) -> None:
+def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(
+    name: str, installed: None, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     kind, truth = kind_named(name), tmp_path / "truth.toml"
     assert kind is not None
-    job = tracker if name == OUTSIDE else ROOT / "examples" / EXAMPLE[name]
+    job = request.getfixturevalue("tracker") if name == OUTSIDE else ROOT / "examples" / EXAMPLE[name]
     own, observed = kind.offers("own", OwnAnalysis) or OwnAnalysis(), kind.observe is not None
 
     truth.write_text(TRUTH, encoding="utf-8")

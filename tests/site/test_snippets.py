@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
@@ -18,6 +19,7 @@ import cmm_uq
 from benchmarks.examples.screens import PAGE, complete
 from cmm_uq.instruments.library import profile_of
 from cmm_uq.uncertainty.model_file import read_model_file
+from tests.cli.process import run as run_here
 from tests.conftest import ROOT
 from tests.site.pages import PAGES, Snippet, snippets
 
@@ -74,14 +76,14 @@ def obeyed(snippet: Snippet, project: Path) -> None:
 
 
 def run(words: list[str], here: Path) -> subprocess.CompletedProcess[str]:
-    """A command of the project, or one of the few of a shell that pages use."""
-    own = {"cmm-uq": ["-m", "cmm_uq"], "python": [], "python3": []}
-    assert words[0] in {*own, "cp", "mkdir", "cmp"}, words
-    command = [sys.executable, *own[words[0]]] if words[0] in own else words[:1]
+    """A command of the project in this process, or one of the few of a shell that pages use."""
+    assert words[0] in {"cmm-uq", "python", "python3", "cp", "mkdir", "cmp"}, words
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "80", "NO_COLOR": "1"}
-    return subprocess.run(
-        [*command, *words[1:]], cwd=here, env=environment, capture_output=True, text=True, check=False
-    )
+    if words[0] == "cmm-uq":
+        with mock.patch.dict(os.environ, environment):
+            return run_here(*words[1:], cwd=here)
+    command = [sys.executable if words[0].startswith("python") else words[0], *words[1:]]
+    return subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize("page", having("toml"))
