@@ -65,9 +65,9 @@ def _notes(every: Sequence[Figures]) -> tuple[Text, ...]:
         say(
             "u: standard uncertainty. 95 % interval: the shortest that holds 95 % of the virtual measurements; that of a "
             "measured form, orientation or location is never below zero, and as likely to hold a small width as a large one "
-            "(Feldman and Cousins, 1998); its value is the median. U = k · u is half of the errors' interval, of such a width no "
-            "less than half of its own, and reaches to the end of one that begins at zero; the value lies in the middle only "
-            "where errors to both sides are alike."
+            "(Feldman and Cousins, 1998); its value is the median. U = k · u is half of the errors' interval, of such a width "
+            "no less than half of its own, and reaches to the end of one that begins at zero; the value lies in the middle "
+            "only where errors to both sides are alike."
         )
     ]
     if every[0].stated.value is None:
