@@ -74,7 +74,9 @@ def nodes_of(found: float, perfect: Floats) -> Floats:
 
 
 def alike(widths: Floats, width: float) -> Ints:
-    """(n,) which of n trial parts stands for one of this width with each of n draws of errors: those nearest to it, in turn.
+    """(n,) which of n trial parts stands for one of this width with each of n draws of errors: the next wider ones, in turn.
+
+    They are made less of, and so stay parts; only the widest are made more of.
 
     Parameters
     ----------
@@ -82,9 +84,8 @@ def alike(widths: Floats, width: float) -> Ints:
     """
     order = np.argsort(widths)
     some = max(1, len(widths) // _NEAR)
-    first = np.searchsorted(widths[order], width) - some // 2
-    chosen = order[np.clip(first, 0, len(widths) - some) :][:some]
-    return np.resize(chosen, len(widths))
+    first = min(int(np.searchsorted(widths[order], width)), len(widths) - some)
+    return np.resize(order[first : first + some], len(widths))
 
 
 def inverse(found: float, again: Floats, perfect: Floats, true: Floats, measured: Floats) -> Inverse:

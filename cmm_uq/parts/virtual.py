@@ -30,8 +30,9 @@ from cmm_uq.parts.of_operator import Beside
 from cmm_uq.parts.of_stylus import styli
 from cmm_uq.parts.of_temperature import Surroundings, mean_expansion, temperatures
 from cmm_uq.parts.placing import Pose, placed
-from cmm_uq.parts.plan import Plan
+from cmm_uq.parts.plan import FORMS, Plan
 from cmm_uq.parts.qualifying import Qualified
+from cmm_uq.parts.trial_parts import trial_parts
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 
@@ -257,17 +258,18 @@ class AtPose:
     def _trials(self, i: int, sizes: Floats, moved: Movement, perfect: Movement, *, exact: bool) -> Floats:
         """(m, n) as parts of ``sizes`` (m,) of a zone would be measured with the errors of ``moved``.
 
-        A trial part is the measured one less another draw of errors, with deviations so many times as its zone then has the
-        size: from the part as measured, δ, it is (1 − λ)(−δ) − λe away.
+        A trial part is what the part may be with another draw, its deviations so many times as its zone then has the size:
+        a part that is t away from the measured one, whose deviations are δ, becomes one that is (1 − λ)(−δ) + λt away.
         """
-        only = self.measured.needed(moved, i)
-        perfect = self.measured.needed(perfect, i)
-        truly = self.measured.of(only.times(-1.0), exact=exact, only=i)[:, 0]
+        only, perfect = (self.measured.needed(each, i) for each in (moved, perfect))
+        form = self.measured.evaluations[i].characteristic.what in FORMS
+        trial = trial_parts(only, perfect, self.measured.plan, form=form)
+        truly = self.measured.of(trial, exact=exact, only=i)[:, 0]
         found = np.empty((len(sizes), len(truly)))
         for k, size in enumerate(sizes):
             like = alike(truly, size)
             often = size / np.maximum(truly[like], ROUNDING)
-            part = only.rows(like).times(-often).plus(perfect.rows(np.zeros_like(like)).times(1 - often))
+            part = trial.rows(like).times(often).plus(perfect.rows(np.zeros_like(like)).times(1 - often))
             found[k] = self.measured.of(only.plus(part), exact=exact, only=i)[:, 0]
         return found
 
