@@ -173,8 +173,8 @@ def test_what_the_diagnosis_would_find_is_larger_under_set_up_offsets(tmp_path: 
         (power,) = plan.start.powers
         assert power.detectable is not None
         found.append(power.detectable)
-    # √(1/3 + 4) over √(1/3) is 3.6; the test's own threshold has noise too
-    assert found[1] > 2 * found[0]
+    # √(1/3 + 4) over √(1/3) is 3.6 where it is known that there are none; a diagnosis reckons with some in either case
+    assert 1.5 < found[1] / found[0] < 3.6
 
 
 @pytest.mark.parametrize(("plan", "effects", "length", "said"), [
