@@ -55,6 +55,6 @@ def test_no_more_form_is_taken_off_than_was_measured() -> None:
 
 def test_displacements_along_normals_are_as_those_in_space() -> None:
     errors, perfect = moved(tilted() + waved(0.003)), moved(-waved(0.005) - tilted())
-    flat = [Movement(one.change, {"bore": along(one)}) for one in (errors, perfect)]
-    trial = trial_parts(*flat, PLAN, form=False)
+    flat, still = (Movement(one.change, {"bore": along(one)}) for one in (errors, perfect))
+    trial = trial_parts(flat, still, PLAN, form=False)
     np.testing.assert_allclose(trial.points["bore"], along(trial_parts(errors, perfect, PLAN, form=False)), atol=1e-15)
