@@ -140,7 +140,7 @@ def not_covered(found: PartFound) -> tuple[Text, ...]:
     told.append(
         say(
             "Tried on simulated machines whose scales err as much as physics allows, by any period: 95 % intervals hold the "
-            "truth in 94 to 98 of 100 cases."
+            "truth in 94 to 96 of 100 cases."
         )
     )
     return tuple(told)
