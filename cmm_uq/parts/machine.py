@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
+from functools import cached_property
 
 import numpy as np
 
@@ -160,7 +161,7 @@ class MachineState:
         if not len(self.drift):
             object.__setattr__(self, "drift", np.zeros(k))
 
-    @property
+    @cached_property
     def mean(self) -> Floats:
         """(k,) mean of the modelled coefficients."""
         return np.asarray(self.draws.mean(axis=0))
