@@ -61,6 +61,7 @@ def prepare(extra: str) -> None:
 def test(arguments: list[str]) -> int:
     """Lint, types beside the tests; all run even when one fails. Tests run on all cores, each with one thread."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each command that tests start compiles the package again
     results = [run("ruff", "check"), run("ruff", "format", "--check")]
     with subprocess.Popen(  # told when the tests are done, or its lines would stand among theirs
         [str(SCRIPTS / "mypy")], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
