@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, say
 from cmm_uq.physics.effect import Amount, Effect, Harmonic, Parameter
 from cmm_uq.points import AXES, Floats, Points
@@ -66,8 +67,14 @@ class ProbeLobing(Harmonic):
         return np.asarray(MICROMETRE * normals[:, :, None] * lobes[:, None, :], dtype=np.float64)
 
 
+_OFF_LINE = 0.05
+"""Of its length, by which the points of a bar or a gauge may lie beside the line from its first to its last."""
+
+
 class ArtefactSag(Effect):
     """Bar shortened by its own weight.
+
+    It is of points on one line: a plate, a triangle or a sphere is not shortened along a chord.
 
     As a displacement it draws the points apart along the bar, in proportion to their place on it, to where they would lie
     without sag.
@@ -89,7 +96,12 @@ class ArtefactSag(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
+        """See :meth:`Effect.basis`.
+
+        Raises
+        ------
+        CmmUqError : the points of a measurement do not lie on one line.
+        """
         basis = np.zeros((len(points), 3, 1))
         for rows in points.rows_of_groups:
             order = points.point[rows]
@@ -98,7 +110,12 @@ class ArtefactSag(Effect):
             if length == 0:
                 continue
             level = 1 - (bar[2] / length) ** 2
-            place = (points.xyz[rows] - points.xyz[rows].mean(axis=0)) @ bar / length**2
+            about = points.xyz[rows] - points.xyz[rows].mean(axis=0)
+            place = about @ bar / length**2
+            if np.linalg.norm(about - place[:, None] * bar, axis=1).max() > _OFF_LINE * length:
+                raise CmmUqError(f"{self.name} shortens a bar or a gauge, and the points of measurement "
+                                 f"{points.measurement[rows[0]]} do not lie on one line", where="job.toml [model] effects",
+                                 fix="Leave it out; what bends a plate by its own weight is artefact_bending")  # fmt: skip
             basis[rows, :, 0] = MICROMETRE * level * place[:, None] * bar / length
         return basis
 

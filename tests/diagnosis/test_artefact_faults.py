@@ -107,6 +107,19 @@ def test_in_two_attitudes_holes_drilled_by_a_machine_that_yaws_are_the_plates_ow
     assert abs(size.value - 40.0) < 4 * size.u
 
 
+def test_in_two_attitudes_a_plate_out_of_square_is_neither_a_sagging_bar_nor_a_guideway_across_it() -> None:
+    """Along its diagonal a sheared plate is a bar of another length; a straightness of Z is the same all over a level plate."""
+    sheared = np.zeros((9, 3))
+    sheared[:, 0] = -1e3 * 6.0 * SECOND * plate([AS_IT_LIES], pitch=160.0, side=3).xyz[:, 1]
+    found = diagnosed(recorded([AS_IT_LIES, TURNED], sheared))
+    assert [item.effect for item in found.effects][:1] == ["artefact_squareness_xy"]
+    size = found.effects[0].parameters["angle_arcsec"]
+    assert abs(size.value - 6.0) < 4 * size.u
+    named = {name for group in found.indistinguishable for name in group}
+    assert not named & {"artefact_sag", "straightness_z_x", "straightness_z_y"}
+    assert "artefact_sag" not in {str(name) for name, _ in found.rivals}
+
+
 def test_both_are_found_beside_each_other_with_their_sizes() -> None:
     found = diagnosed(recorded([AS_IT_LIES, TURNED], like_a_yaw(40.0), yaw=-25.0))
     sizes = {item.effect: item.parameters["arcsec_per_m"] for item in found.effects}

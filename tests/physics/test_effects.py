@@ -130,6 +130,20 @@ def test_a_sagging_bar_is_drawn_out_by_the_square_of_the_cosine_of_its_elevation
     np.testing.assert_allclose(bar_lengths(POINTS, e), expected, rtol=1e-13)
 
 
+def test_what_does_not_lie_on_a_line_does_not_sag_as_a_bar() -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0], [0.0, 300.0, 0.0], [300.0, 300.0, 0.0]])
+    flat = Points(corners, np.ones(4, int), np.arange(1, 5), np.ones(4, int), POINTS.machine, {}, np.arange(2, 6))
+    with pytest.raises(CmmUqError, match=r"measurement 1 do not lie on one line.*artefact_bending"):
+        CATALOGUE["artefact_sag"].displacement(flat, {"um": 6.0})
+    gauge = (
+        np.linspace(0, 600, 7)[:, None] * np.array([0.8, 0.6, 0.0])
+        + np.array([0.0, 0.0, 1.0]) * np.array([0, 9] * 3 + [0])[:, None]
+    )
+    faces = Points(gauge, np.ones(7, int), np.arange(1, 8), np.ones(7, int), POINTS.machine, {}, np.arange(2, 9))
+    e = CATALOGUE["artefact_sag"].displacement(faces, {"um": 6.0})
+    assert np.linalg.norm(faces.xyz[-1] + e[-1] - faces.xyz[0] - e[0]) == pytest.approx(600.006, abs=1e-9)
+
+
 @given(amplitude=st.floats(0.01, 50), phase=st.floats(-3.1, 3.1), period=st.floats(1, 500))
 def test_amplitude_and_phase_survive_the_way_through_linear_coefficients(
     amplitude: float, phase: float, period: float

@@ -18,7 +18,7 @@ from cmm_uq.model.artefact import Artefact
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect, Nonparametric
 from cmm_uq.plugins import BrokenPluginError
-from cmm_uq.points import Floats, Points
+from cmm_uq.points import AXES, Floats, Points
 
 EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
 
@@ -34,6 +34,9 @@ STEP = 0.35
 _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
 _ROUGH = 0.25
 """Probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest."""
+
+_SHORTEST_OVER = 0.1
+"""Of the largest extent of a recording, over which such a form differs; a plate that lies level has next to none along Z."""
 
 _BEYOND = 0.5
 """How readily an effect is thought of beyond the size that it mostly keeps to (:attr:`Effect.mostly`)."""
@@ -159,7 +162,10 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
     span = float(np.ptp(along))
     if span == 0:
         return
-    u = (2 * (along - along.min()) / span - 1)[:, None, None]
+    over = span
+    if effect.idealised_over in AXES:  # a guideway has no other form within a fraction of what was measured
+        over = max(span, _SHORTEST_OVER * float(np.ptp(points.machine_xyz, axis=0).max()))
+    u = (2 * (along - along.min()) / over - span / over)[:, None, None]
     forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
     basis = effect.mostly * model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
     for s, t in forms:

@@ -16,7 +16,7 @@ from cmm_uq.physics.effect import FURTHER
 from cmm_uq.plugins import BrokenPluginError
 from cmm_uq.points import Machine, Points
 from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
-from tests.recordings import bar_facts, bars
+from tests.recordings import TRAVEL, bar_facts, bars
 
 BROKEN = """
 from cmm_uq.physics.effect import Effect, Parameter
@@ -60,6 +60,19 @@ def test_a_fourth_of_an_idealised_effect_is_of_other_forms(ballbar_points: Point
             assert rough / (rough + own) == pytest.approx(0.25)
         else:
             assert rough == 0
+
+
+def test_a_guideway_has_no_other_form_along_an_axis_that_the_recording_hardly_moves() -> None:
+    """Bars level at one height but for 1 µm: other forms of Z are no more than Z's own, by what they vary along 1 µm."""
+    random = np.random.default_rng(4)
+    placed, angle = bars(random, 12, 400.0, Machine("test machine", "XYZ", TRAVEL)), random.uniform(0, np.pi, 12)
+    half = 200.0 * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(12)])
+    xyz = np.array([450.0, 275.0, -100.0]) + np.stack([-half, half], axis=1).reshape(-1, 3)
+    xyz[:, 2] += 1e-3 * random.standard_normal(len(xyz))
+    found = candidates(placed.at(xyz))["straightness_z_x"]
+    (own,) = (np.abs(member.columns).max() for member in found.members if not member.rough)
+    rough = [np.abs(member.columns).max() for member in found.members if member.rough]
+    assert max(rough) < 1.5 * own + 1e-3 * 150e-3
 
 
 def test_an_outside_effect_is_a_candidate(
