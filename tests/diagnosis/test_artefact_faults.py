@@ -108,7 +108,7 @@ def test_in_two_attitudes_holes_drilled_by_a_machine_that_yaws_are_the_plates_ow
 
 
 def test_in_two_attitudes_a_plate_out_of_square_is_neither_a_sagging_bar_nor_a_guideway_across_it() -> None:
-    """Along its diagonal a sheared plate is a bar of another length; a straightness of Z is the same all over a level plate."""
+    """Along its diagonal it is as a bar of another length; a straightness of Z is the same all over a level plate."""
     sheared = np.zeros((9, 3))
     sheared[:, 0] = -1e3 * 6.0 * SECOND * plate([AS_IT_LIES], pitch=160.0, side=3).xyz[:, 1]
     found = diagnosed(recorded([AS_IT_LIES, TURNED], sheared))
