@@ -68,7 +68,7 @@ class ProbeLobing(Harmonic):
 
 
 _OFF_LINE = 0.05
-"""Of its length, by which the points of a bar or a gauge may lie beside the line from its first to its last."""
+"""Of its length, by which the points of a bar or a gauge may lie beside the line from its first to its farthest."""
 
 
 class ArtefactSag(Effect):
@@ -104,8 +104,8 @@ class ArtefactSag(Effect):
         """
         basis = np.zeros((len(points), 3, 1))
         for rows in points.rows_of_groups:
-            order = points.point[rows]
-            bar = points.xyz[rows[np.argmax(order)]] - points.xyz[rows[np.argmin(order)]]
+            first = points.xyz[rows[np.argmin(points.point[rows])]]
+            bar = points.xyz[rows[np.argmax(np.linalg.norm(points.xyz[rows] - first, axis=1))]] - first
             length = float(np.linalg.norm(bar))
             if length == 0:
                 continue

@@ -135,13 +135,20 @@ def test_what_does_not_lie_on_a_line_does_not_sag_as_a_bar() -> None:
     flat = Points(corners, np.ones(4, int), np.arange(1, 5), np.ones(4, int), POINTS.machine, {}, np.arange(2, 6))
     with pytest.raises(CmmUqError, match=r"measurement 1 do not lie on one line.*artefact_bending"):
         CATALOGUE["artefact_sag"].displacement(flat, {"um": 6.0})
-    gauge = (
-        np.linspace(0, 600, 7)[:, None] * np.array([0.8, 0.6, 0.0])
-        + np.array([0.0, 0.0, 1.0]) * np.array([0, 9] * 3 + [0])[:, None]
-    )
-    faces = Points(gauge, np.ones(7, int), np.arange(1, 8), np.ones(7, int), POINTS.machine, {}, np.arange(2, 9))
+
+
+def test_a_gauge_that_is_measured_forth_and_back_sags_from_its_first_face_to_the_farthest() -> None:
+    """Nine faces, and back: the last point is the first face again. Every other face stands 9 mm beside the line."""
+    forth = np.linspace(0, 600, 9)[:, None] * np.array([0.8, 0.6, 0.0])
+    forth[1::2, 2] += 9.0
+    both = np.vstack([forth, forth[::-1]])
+    n = len(both)
+    faces = Points(both, np.ones(n, int), np.arange(1, n + 1), np.ones(n, int), POINTS.machine, {}, np.arange(2, n + 2))
     e = CATALOGUE["artefact_sag"].displacement(faces, {"um": 6.0})
-    assert np.linalg.norm(faces.xyz[-1] + e[-1] - faces.xyz[0] - e[0]) == pytest.approx(600.006, abs=1e-9)
+    along = e @ np.array([0.8, 0.6, 0.0])
+    assert along[8] - along[0] == pytest.approx(6e-3, rel=1e-9)
+    assert along[4] == pytest.approx(0.0, abs=1e-9), "in the middle nothing moves"
+    np.testing.assert_allclose(e[:9], e[:8:-1], atol=1e-12)
 
 
 @given(amplitude=st.floats(0.01, 50), phase=st.floats(-3.1, 3.1), period=st.floats(1, 500))
