@@ -21,6 +21,9 @@ from cmm_uq.points import Floats
 EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
 """Probability, beforehand, of none, one, two, three and four known effects that the job does not name."""
 
+FURTHER, MOST = 0.5, 12
+"""How many times less probable each further effect is where four are found, and the most that are looked for."""
+
 UNKNOWNS = (0.85, 0.12, 0.03)
 """Of none, one and two nonparametric terms."""
 
@@ -49,11 +52,13 @@ class Combinations:
     ----------
     explanations : of which they are made.
     found : by the indices of their explanations.
+    counts : probability, beforehand, of none, one, two … known effects, up to a constant.
     imitated : nonparametric terms that leave next to nothing of an effect in this recording.
     """
 
     explanations: Sequence[Explanation]
     found: Mapping[Key, Combination]
+    counts: tuple[float, ...] = EFFECTS
     imitated: Mapping[int, Key] = field(default_factory=dict)
 
     @cached_property
@@ -74,6 +79,11 @@ class Combinations:
             known = self.effects_of(key)
             total[known] = total.get(known, 0.0) + p
         return total
+
+    @property
+    def most_probable(self) -> Key:
+        """The most probable set of known effects."""
+        return max(self.of_effects, key=lambda key: self.of_effects[key])
 
     def versions(self, effects: Key) -> tuple[Version, ...]:
         """Of the most probable combination with these known effects, or more."""
@@ -129,8 +139,19 @@ def explore(comparison: Comparison, before: Combinations | None = None, changed:
     before : what was found of the same ones, but for some that have other versions now.
     changed : these.
     """
+    found = _explored(comparison, before, changed, EFFECTS if before is None else before.counts)
+    while len(found.most_probable) == len(found.counts) - 1 <= MOST - 2:  # there may be more than were looked for
+        more = found.counts[-1] * FURTHER, found.counts[-1] * FURTHER**2
+        found = _explored(comparison, found, frozenset(), (*found.counts, *more))
+    return found
+
+
+def _explored(
+    comparison: Comparison, before: Combinations | None, changed: Key, counts: tuple[float, ...]
+) -> Combinations:
+    """The same with so many known effects at the most."""
     known = {} if before is None else {key: one for key, one in before.found.items() if not key & changed}
-    search = _Search(comparison, known)
+    search = _Search(comparison, known, counts)
     level: list[Key] = [frozenset()]
     while level:
         for key in level:
@@ -146,7 +167,7 @@ def explore(comparison: Comparison, before: Combinations | None = None, changed:
             search.settle(fewer)
             search.expand(keyed(fewer))
         search.settle_best(len(best), SETTLED)
-    return Combinations(comparison.explanations, search.settled)
+    return Combinations(comparison.explanations, search.settled, counts)
 
 
 def keyed(versions: Iterable[Version]) -> Key:
@@ -157,11 +178,11 @@ def keyed(versions: Iterable[Version]) -> Key:
 class Prior:
     """Probability, beforehand, of every combination: of how many, and among as many by the product of their weights."""
 
-    def __init__(self, explanations: Sequence[Explanation]) -> None:
+    def __init__(self, explanations: Sequence[Explanation], effects: tuple[float, ...] = EFFECTS) -> None:
         self._weight = [(e.kind, float(np.log(e.weight))) for e in explanations]
         self._counts = {
             kind: np.log(counts) - np.log(_symmetric([e.weight for e in explanations if e.kind == kind], len(counts)))
-            for kind, counts in ((EFFECT, EFFECTS), (UNKNOWN, UNKNOWNS))
+            for kind, counts in ((EFFECT, effects), (UNKNOWN, UNKNOWNS))
         }
 
     def log(self, key: Iterable[int]) -> float:
@@ -192,10 +213,10 @@ def _symmetric(weights: Sequence[float], count: int) -> Floats:
 class _Search:
     """Combinations settled so far, and those that wait for it with an estimate of their posterior."""
 
-    def __init__(self, comparison: Comparison, known: Mapping[Key, Combination]) -> None:
+    def __init__(self, comparison: Comparison, known: Mapping[Key, Combination], counts: tuple[float, ...]) -> None:
         self.comparison = comparison
         self.known = known
-        self.prior = Prior(comparison.explanations)
+        self.prior = Prior(comparison.explanations, counts)
         self.candidates = {i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)}
         self.settled: dict[Key, Combination] = {}
         self._expanded: set[Key] = set()

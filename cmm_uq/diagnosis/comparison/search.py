@@ -293,7 +293,7 @@ def _gains(first: ModelComparison, explanation: Explanation, others: Sequence[Ve
 
 def asserted(combinations: Combinations) -> Key:
     """The most probable set of known effects, without those that something else could well be instead."""
-    chosen = max(combinations.of_effects, key=lambda key: combinations.of_effects[key])
+    chosen = combinations.most_probable
     if not chosen:
         return _in_place_of_functions(combinations)
     doubtful = [i for i in chosen if combinations.of(i) < ASSERTED and with_rivals(combinations, chosen, i) < ASSERTED]

@@ -152,3 +152,17 @@ def test_prior_probabilities_of_all_combinations_sum_to_one() -> None:
     total = sum(np.exp(prior.log(key)) for key in keys)
     assert total == pytest.approx(sum(EFFECTS) * sum(UNKNOWNS[:2]))
     assert prior.log({1}) == pytest.approx(prior.log({0}) + np.log(0.1))
+
+
+@pytest.mark.parametrize("count", [2, 5, 7])
+def test_as_many_effects_are_found_as_act(count: int) -> None:
+    """More than four are looked for where four are the most probable; where fewer are, nothing is otherwise than before."""
+    random = np.random.default_rng(12)
+    explanations = rivals(random, 10)
+    observed = random.normal(0, 0.02, M) + sum(e.members[0].columns[:, 0] * 0.5 for e in explanations[:count])
+    found = explore(comparison(np.asarray(observed), explanations))
+    assert found.most_probable == frozenset(range(count))
+    assert found.of_effects[found.most_probable] > 0.5
+    assert len(found.counts) == (len(EFFECTS) if count < 4 else len(EFFECTS) + 2 * -(-(count - 3) // 2))
+    assert found.counts[: len(EFFECTS)] == EFFECTS
+    assert np.allclose(np.divide(found.counts[5:], found.counts[4:-1]), 0.5)

@@ -1,0 +1,100 @@
+"""A machine with many errors against a model that is told of none: ``python -m benchmarks.told_nothing [--cases 40]``.
+
+So it is where an ideal machine was simulated. Sixty places of a bar of 500 mm, 1 µm of noise; of twenty errors, written out
+here, three to eight act. The script prints how many of them are found, how many others are named, and the verdicts.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from functools import partial
+from multiprocessing import Pool
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.diagnosis.diagnosis import diagnose
+from cmm_uq.kinds import artefact_facts, artefact_of
+from cmm_uq.model import MeasurementModel
+from cmm_uq.points import Machine, Points
+
+TRAVEL = np.array([[0.0, 1200.0], [0.0, 900.0], [-700.0, 0.0]])
+LENGTH, BARS, NOISE_UM, SEED = 500.0, 60, 1.0, 2026
+ARCSEC = np.pi / 648000
+
+Floats = NDArray[np.float64]
+
+
+def errors(xyz: Floats) -> dict[str, Floats]:
+    """By name, what is to be added to readings (n, 3), mm, of errors of ordinary size."""
+    x, y, z = xyz.T
+    none = np.zeros_like(x)
+    found = {
+        "scale_x": np.stack([20e-6 * x, none, none]), "scale_y": np.stack([none, -20e-6 * y, none]),
+        "scale_z": np.stack([none, none, 20e-6 * z]),
+        "squareness_xy": np.stack([-15 * ARCSEC * y, none, none]), "squareness_yz": np.stack([none, 15 * ARCSEC * z, none]),
+        "squareness_zx": np.stack([-15 * ARCSEC * z, none, none]),
+    }  # fmt: skip
+    for i, a in enumerate("xyz"):
+        t = 2 * (xyz[:, i] - TRAVEL[i, 0]) / (TRAVEL[i, 1] - TRAVEL[i, 0]) - 1
+        for j, b in enumerate("xyz"):
+            if j != i:
+                found[f"straightness_{a}_{b}"] = 0.025 * (1 - t**2) * np.eye(3)[:, [j]]
+    carried = {"x": np.stack([none, y, z], axis=1), "y": np.stack([none, none, z], axis=1)}
+    for a, turns in (("x", "xyz"), ("y", "xy")):
+        i = "xyz".index(a)
+        angle = 40 * ARCSEC * 1e-3 * (xyz[:, i] - TRAVEL[i, 0])
+        for b in turns:
+            found[f"rotation_{a}_{b}"] = np.cross(angle[:, None] * np.eye(3)["xyz".index(b)], carried[a]).T
+    return {name: e.T for name, e in found.items()}
+
+
+def case(seed: int) -> tuple[list[str], list[tuple[str, float]], str]:
+    """What acts, what is named with its probability, and the verdict."""
+    random = np.random.default_rng([SEED, seed])
+    ends = list[Floats]()
+    while len(ends) < BARS:
+        direction = random.standard_normal(3)
+        half = 0.5 * LENGTH * direction / np.linalg.norm(direction)
+        both = random.uniform(*TRAVEL.T) + np.stack([-half, half])
+        if np.all((both >= TRAVEL[:, 0]) & (both <= TRAVEL[:, 1])):
+            ends.append(both)
+    true = np.concatenate(ends)
+    possible = errors(true)
+    hidden = random.choice(list(possible), random.integers(3, 9), replace=False).tolist()
+    read = true - sum(random.choice([-1, 1]) * possible[name] for name in hidden)
+    read = read + random.normal(0, 1e-3 * NOISE_UM, read.shape)
+    number = np.repeat(np.arange(1, BARS + 1), 2)
+    points = Points(read, number, np.tile([1, 2], BARS), np.ones_like(number), Machine("m", "XYZ", TRAVEL), {},
+                    np.arange(2, 2 * BARS + 2))  # fmt: skip
+    facts = artefact_facts(kind="ballbar", length_mm=LENGTH, u_um=0.5)
+    found = diagnose(MeasurementModel(artefact_of(facts, points), ()), stated_um=None, alpha=0.01, seed=0)
+    return hidden, [(item.effect, item.probability) for item in found.effects], found.verdict
+
+
+def main() -> None:
+    """Draw the cases and print what was found."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=40)
+    parser.add_argument("--processes", type=int, default=1)
+    asked = parser.parse_args()
+    acting, right, wrong, sure, verdicts = Counter[int](), Counter[int](), 0, 0, Counter[str]()
+    with Pool(asked.processes) as pool:
+        for hidden, named, verdict in pool.imap(partial(case), range(asked.cases)):
+            acting[len(hidden)] += len(hidden)
+            right[len(hidden)] += len(set(hidden) & {name for name, _ in named})
+            others = [(name, p) for name, p in named if name not in hidden]
+            wrong, sure = wrong + len(others), sure + sum(p > 0.9 for _, p in others)
+            verdicts[verdict] += 1
+            print(f"{len(hidden)} acting, missed {sorted(set(hidden) - {name for name, _ in named})}, besides {others}, {verdict}",
+                  flush=True)  # fmt: skip
+    for count in sorted(acting):
+        print(f"{count} acting: {right[count]} of {acting[count]} found")
+    print(
+        f"together {sum(right.values())} of {sum(acting.values())}; others named {wrong}, with more than 90 % {sure}; {dict(verdicts)}"
+    )
+
+
+if __name__ == "__main__":
+    main()
