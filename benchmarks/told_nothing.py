@@ -63,7 +63,7 @@ def case(seed: int) -> tuple[list[str], list[tuple[str, float]], str]:
     true = np.concatenate(ends)
     possible = errors(true)
     hidden = random.choice(list(possible), random.integers(3, 9), replace=False).tolist()
-    read = true - sum(random.choice([-1, 1]) * possible[name] for name in hidden)
+    read = true - sum(random.choice([-1, 1]) * random.uniform(0.5, 1.5) * possible[name] for name in hidden)
     read = read + random.normal(0, 1e-3 * NOISE_UM, read.shape)
     number = np.repeat(np.arange(1, BARS + 1), 2)
     points = Points(read, number, np.tile([1, 2], BARS), np.ones_like(number), Machine("m", "XYZ", TRAVEL), {},
@@ -87,13 +87,12 @@ def main() -> None:
             others = [(name, p) for name, p in named if name not in hidden]
             wrong, sure = wrong + len(others), sure + sum(p > 0.9 for _, p in others)
             verdicts[verdict] += 1
-            print(f"{len(hidden)} acting, missed {sorted(set(hidden) - {name for name, _ in named})}, besides {others}, {verdict}",
-                  flush=True)  # fmt: skip
+            missed = sorted(set(hidden) - {name for name, _ in named})
+            print(f"{len(hidden)} acting, missed {missed}, besides {others}, {verdict}", flush=True)
     for count in sorted(acting):
         print(f"{count} acting: {right[count]} of {acting[count]} found")
-    print(
-        f"together {sum(right.values())} of {sum(acting.values())}; others named {wrong}, with more than 90 % {sure}; {dict(verdicts)}"
-    )
+    print(f"together {sum(right.values())} of {sum(acting.values())}; {dict(verdicts)}")
+    print(f"others named {wrong}, with more than 90 % {sure}")
 
 
 if __name__ == "__main__":

@@ -85,6 +85,11 @@ class Combinations:
         """The most probable set of known effects."""
         return max(self.of_effects, key=lambda key: self.of_effects[key])
 
+    @property
+    def most_members(self) -> int:
+        """How many explanations, unknown functions too, the most probable combination has."""
+        return len(max(self.found, key=lambda key: self.found[key].log_posterior))
+
     def versions(self, effects: Key) -> tuple[Version, ...]:
         """Of the most probable combination with these known effects, or more."""
         keys = [key for key in self.found if self.effects_of(key) >= effects]
@@ -140,7 +145,8 @@ def explore(comparison: Comparison, before: Combinations | None = None, changed:
     changed : these.
     """
     found = _explored(comparison, before, changed, EFFECTS if before is None else before.counts)
-    while len(found.most_probable) == len(found.counts) - 1 <= MOST - 2:  # there may be more than were looked for
+    # there may be more than were looked for; unknown functions may stand for several of them
+    while len(found.counts) - 1 <= min(found.most_members, MOST - 2):
         more = found.counts[-1] * FURTHER, found.counts[-1] * FURTHER**2
         found = _explored(comparison, found, frozenset(), (*found.counts, *more))
     return found
