@@ -16,7 +16,7 @@ from scipy import special
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.diagnosis.comparison.stack import Version
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 
 EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
 """Probability, beforehand, of none, one, two, three and four known effects that the job does not name."""
@@ -29,6 +29,9 @@ UNKNOWNS = (0.85, 0.12, 0.03)
 
 WINDOW = 7.0
 """A combination less probable than one of its parts by more than this, in logarithm, is not followed."""
+
+LIKE = 0.02
+"""Part of an effect's squared visible length up to which two others that leave no more of it are tried in its place."""
 
 SETTLED, FOLLOWED = 24, 8
 """How many combinations of each size have their evidence computed, and are followed to the next size."""
@@ -156,7 +159,11 @@ def _explored(
     comparison: Comparison, before: Combinations | None, changed: Key, counts: tuple[float, ...]
 ) -> Combinations:
     """The same with so many known effects at the most."""
-    known = {} if before is None else {key: one for key, one in before.found.items() if not key & changed}
+    known = (
+        {}
+        if before is None
+        else {key: one for key, one in before.found.items() if not key & changed and np.isfinite(one.log_posterior)}
+    )  # one of more effects than were looked for may be possible now
     search = _Search(comparison, known, counts)
     level: list[Key] = [frozenset()]
     while level:
@@ -172,6 +179,9 @@ def _explored(
             fewer = tuple(v for v in search.settled[best].versions if v.explanation != i)
             search.settle(fewer)
             search.expand(keyed(fewer))
+            for pair in search.pairs_like(i):
+                if not best & frozenset(pair):
+                    search.settle(search.with_more(fewer, pair))
         search.settle_best(len(best), SETTLED)
     return Combinations(comparison.explanations, search.settled, counts)
 
@@ -270,6 +280,44 @@ class _Search:
         for key in chosen:
             self.settle(self._waiting.pop(key)[1])
         return chosen
+
+    @cached_property
+    def _forms(self) -> tuple[Ints, Floats]:
+        """Known effects of one coefficient that are seen, and the form (m, n) of each, of length one."""
+        numbers, forms = list[int](), list[Floats]()
+        for i in sorted(self.candidates & self.comparison.visible):
+            first = self.comparison.explanations[i].members[0]
+            if self.comparison.explanations[i].kind == EFFECT and first.columns.shape[1] == 1 and not first.shape:
+                form = self.comparison.rest(first.columns / self.comparison.noise_scale[:, None])[:, 0]
+                length = float(np.linalg.norm(form))
+                if length > 0:
+                    numbers.append(i)
+                    forms.append(form / length)
+        return np.array(numbers, dtype=np.intp), np.array(forms).reshape(len(forms), -1).T
+
+    def pairs_like(self, index: int) -> list[tuple[int, int]]:
+        """Pairs of other known effects that together leave next to nothing of one, and neither of them does alone.
+
+        A bar that sags is as two scales at once: no exchange of one for one leads from that to these.
+        """
+        numbers, forms = self._forms
+        own = np.flatnonzero(numbers == index)
+        if not len(own):
+            return []
+        others = np.flatnonzero(numbers != index)
+        cosines, among = forms[:, others].T @ forms[:, own[0]], forms[:, others].T @ forms[:, others]
+        a, b = np.triu_indices(len(others), 1)
+        apart = 1 - among[a, b] ** 2
+        together = cosines[a] ** 2 + cosines[b] ** 2 - 2 * cosines[a] * cosines[b] * among[a, b]
+        alone = np.maximum(np.abs(cosines[a]), np.abs(cosines[b])) ** 2
+        like = (apart > LIKE) & (1 - alone > LIKE) & (together > (1 - LIKE) * apart)
+        return [(int(numbers[others[i]]), int(numbers[others[j]])) for i, j in zip(a[like], b[like], strict=True)]
+
+    def with_more(self, versions: tuple[Version, ...], more: Iterable[int]) -> tuple[Version, ...]:
+        """The same with others, the size of each at its best beside those before it."""
+        for i in more:
+            versions = (*versions, self.comparison.beside(versions, (i,))[i][1])
+        return versions
 
     def settle(self, versions: tuple[Version, ...]) -> None:
         """Find the best sizes of a combination, and its evidence."""

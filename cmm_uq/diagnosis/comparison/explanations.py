@@ -163,7 +163,7 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
     if span == 0:
         return
     over = span
-    if effect.idealised_over in AXES:  # a guideway has no other form within a fraction of what was measured
+    if effect.idealised_over in tuple(AXES):  # a guideway has no other form within a fraction of what was measured
         over = max(span, _SHORTEST_OVER * float(np.ptp(points.machine_xyz, axis=0).max()))
     u = (2 * (along - along.min()) / over - span / over)[:, None, None]
     forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
