@@ -166,3 +166,18 @@ def test_as_many_effects_are_found_as_act(count: int) -> None:
     assert len(found.counts) == (len(EFFECTS) if count < 4 else len(EFFECTS) + 2 * -(-(count - 3) // 2))
     assert found.counts[: len(EFFECTS)] == EFFECTS
     assert np.allclose(np.divide(found.counts[5:], found.counts[4:-1]), 0.5)
+
+
+def test_two_that_together_are_as_one_are_tried_in_its_place() -> None:
+    """The first is the sum of two others, as a bar that sags is as two scales: no single exchange leads there."""
+    random = np.random.default_rng(21)
+    explanations = rivals(random, 8)
+    a, b = (explanations[i].members[0].columns for i in (3, 6))
+    explanations[0] = replace(explanations[0], members=(Member(a + b),))
+    observed = (
+        random.normal(0, 0.02, M) + 0.5 * (a + b)[:, 0] + sum(e.members[0].columns[:, 0] for e in explanations[1:3])
+    )
+    found = explore(comparison(np.asarray(observed), explanations))
+    assert found.most_probable == {0, 1, 2}
+    both = found.of_effects[frozenset({1, 2, 3, 6})]
+    assert 1e-6 < both < found.of_effects[frozenset({0, 1, 2})]
