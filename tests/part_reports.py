@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -13,6 +15,11 @@ from cmm_uq.commands.part import part_found
 from cmm_uq.commands.part_written import Asked, contents_of, found_of
 from cmm_uq.commands.written import Stage, silent
 from cmm_uq.documents.part.found import PartFound
+from cmm_uq.inference.least_squares import LeastSquares
+from cmm_uq.inference.linear_model import LinearModel
+from cmm_uq.inference.noise import Components
+from cmm_uq.inference.posterior import NoisyPosterior
+from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.jobs.part.job import PartJob
 from tests.part_machines import by_certificate, plate_of
 
@@ -34,6 +41,15 @@ def plate_report() -> Mapping[str, bytes]:
 
 
 _AGAIN: dict[tuple[object, ...], PartFound] = {}
+_SAMPLED: dict[bytes, NoisyPosterior] = {}
+
+
+def sampled_once(model: LinearModel, noise: Components, estimate: LeastSquares, seed: int) -> NoisyPosterior:
+    """The posterior of a machine's recording, sampled once for all tests that are not about sampling it again."""
+    key = hashlib.sha256(pickle.dumps((model, noise, estimate, seed))).digest()
+    if key not in _SAMPLED:
+        _SAMPLED[key] = sample_with_noise(model, noise, estimate, seed)
+    return _SAMPLED[key]
 
 
 def found_again_once(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:

@@ -21,10 +21,15 @@ from tests.cli.test_due import recorded
 from tests.cli.test_history import scale
 from tests.part_machines import PDF as MACHINE_PDF
 from tests.part_machines import by_certificate, plate_of
-from tests.part_reports import TRIALS, put
+from tests.part_reports import TRIALS, put, sampled_once
 
 PDF = "part-simulated.pdf"
 BRIDGE = {"serial": "", "name": "Simulated bridge machine", "manufacturer": "", "model": "", "place": ""}
+
+
+@pytest.fixture(autouse=True)
+def once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmm_uq.parts.conditional.sample_with_noise", sampled_once)
 
 
 def records(folder: Path) -> Path:
