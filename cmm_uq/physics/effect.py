@@ -24,6 +24,9 @@ CONTRACT, FURTHER, OWN = "contract", "further", "own"
 """Tiers: effects that every job file may count on, rarer ones that only some machines and recordings show, and faults of the
 artefact itself."""
 
+EVERYWHERE = 5.0
+"""How readily an error that every machine has to some degree is thought of, beside one of which that is not so."""
+
 PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1, OWN: 0.1}
 """How readily an effect of a tier is thought of, beside others: a judgement of how many machines show it. A fault of the
 artefact has a weight by what is known of that artefact."""
@@ -117,6 +120,7 @@ class Effect(ABC):
     shape : what shapes the basis, if anything.
     columns : columns that the recording must have.
     tier : ``contract`` or ``further``: how readily it is to be thought of.
+    everywhere : whether every machine has it to some degree, as scales and squareness.
     idealised_over : axis, or column, over which its form is the simplest of many that its mechanism can have, if it is that.
     imitated_by : nonparametric terms that could pass for it.
     stands_for : nonparametric terms that are nothing else than it.
@@ -135,6 +139,7 @@ class Effect(ABC):
     shape: tuple[Shape, ...] = ()
     columns: tuple[str, ...] = ()
     tier: str = CONTRACT
+    everywhere: bool = False
     idealised_over: str | None = None
     imitated_by: tuple[Nonparametric, ...] = ()
     stands_for: tuple[Nonparametric, ...] = ()
@@ -146,7 +151,7 @@ class Effect(ABC):
     @property
     def prior_weight(self) -> float:
         """How readily it is thought of in a diagnosis, beside others."""
-        return PRIOR_WEIGHT[self.tier]
+        return EVERYWHERE if self.everywhere else PRIOR_WEIGHT[self.tier]
 
     @abstractmethod
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:

@@ -26,6 +26,7 @@ class Scale(Effect):
     formula = "e_a = s · a"
     mechanism = "scale"
     points_to = say("the scale or its compensation: check the linear compensation of this axis")
+    everywhere = True
 
     coefficients = (Parameter("ppm", unit("ppm"), 300.0),)
 
@@ -67,6 +68,7 @@ class Squareness(Lean):
 
     formula = "xy: e_x = −S·y; yz: e_y = −S·z; zx: e_x = −S·z"
     points_to = say("the axes are not square: adjust the guideways or the squareness in the compensation")
+    everywhere = True
 
     coefficients = (Parameter("angle_arcsec", unit("″"), 500.0),)
 

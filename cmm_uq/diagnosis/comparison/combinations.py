@@ -147,12 +147,31 @@ def explore(comparison: Comparison, before: Combinations | None = None, changed:
     before : what was found of the same ones, but for some that have other versions now.
     changed : these.
     """
-    found = _explored(comparison, before, changed, EFFECTS if before is None else before.counts)
+    found = _explored(comparison, before, changed, _counts(comparison) if before is None else before.counts)
     # there may be more than were looked for; unknown functions may stand for several of them
     while len(found.counts) - 1 <= min(found.most_members, MOST - 2):
-        more = found.counts[-1] * FURTHER, found.counts[-1] * FURTHER**2
-        found = _explored(comparison, found, frozenset(), (*found.counts, *more))
+        found = _explored(comparison, found, frozenset(), _with_two(found.counts))
     return found
+
+
+def _counts(comparison: Comparison) -> tuple[float, ...]:
+    """Probability of none, one, two … known effects: of one more at least than are everywhere."""
+    counts: tuple[float, ...] = EFFECTS
+    while len(counts) - 1 <= len(everywhere(comparison)):
+        counts = _with_two(counts)
+    return counts
+
+
+def _with_two(counts: tuple[float, ...]) -> tuple[float, ...]:
+    return (*counts, counts[-1] * FURTHER, counts[-1] * FURTHER**2)
+
+
+def everywhere(comparison: Comparison) -> list[int]:
+    """Effects that every machine has to some degree and this recording shows."""
+    return [
+        i for i in sorted(comparison.visible)
+        if (effect := comparison.explanations[i].effect) is not None and effect.everywhere
+    ]  # fmt: skip
 
 
 def _explored(
@@ -165,13 +184,11 @@ def _explored(
         else {key: one for key, one in before.found.items() if not key & changed and np.isfinite(one.log_posterior)}
     )  # one of more effects than were looked for may be possible now
     search = _Search(comparison, known, counts)
-    level: list[Key] = [frozenset()]
-    while level:
-        for key in level:
-            search.expand(key)
-        size = len(level[0]) + 1
-        level = [key for key in search.settle_best(size, SETTLED) if search.worth(key)]
-        level = search.best_of(level, FOLLOWED)
+    search.climb(frozenset())
+    # one of many coefficients can explain all of these at once, and then none of them is worth adding by itself
+    if together := search.with_more((), everywhere(comparison)):
+        search.settle(together)
+        search.climb(keyed(together))
     exchanged: set[Key] = set()
     while (best := search.best()) not in exchanged:
         exchanged.add(best)
@@ -239,6 +256,16 @@ class _Search:
         self._waiting: dict[Key, tuple[float, tuple[Version, ...]]] = {}
         self.settle(())
 
+    def climb(self, start: Key) -> None:
+        """Follow the most probable combinations from one to those with more, level by level."""
+        level = [start]
+        while level:
+            for key in level:
+                self.expand(key)
+            size = len(level[0]) + 1
+            level = [key for key in self.settle_best(size, SETTLED, start) if self.worth(key)]
+            level = self.best_of(level, FOLLOWED)
+
     def best(self) -> Key:
         """The most probable combination."""
         return max(self.settled, key=lambda key: self.settled[key].log_posterior)
@@ -272,9 +299,11 @@ class _Search:
                 continue
             self._waiting[larger] = estimate, (*known.versions, version)
 
-    def settle_best(self, size: int, count: int) -> list[Key]:
-        """Settle the most probable of this size that wait, half of the places kept for known effects alone."""
-        order = sorted((key for key in self._waiting if len(key) == size), key=lambda key: -self._waiting[key][0])
+    def settle_best(self, size: int, count: int, within: Key = frozenset()) -> list[Key]:
+        """Settle the most probable of this size and with ``within`` that wait, half of the places for known effects alone."""
+        order = sorted(
+            (key for key in self._waiting if len(key) == size and within <= key), key=lambda key: -self._waiting[key][0]
+        )
         known = [key for key in order if not self._unknown(key)][: count // 2]
         chosen = known + [key for key in order if key not in known][: count - len(known)]
         for key in chosen:
