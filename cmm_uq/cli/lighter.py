@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from importlib.util import LazyLoader
-from types import FunctionType, ModuleType
+from types import ModuleType
 from typing import Any
 
 LATER = ("fontTools.agl", "h5py", "numpy.core", "numpy.ctypeslib", "numpy.f2py", "numpy.testing")
@@ -35,31 +35,32 @@ def lighten() -> None:
 _WITHOUT = {"emcee.moves.kde": "KDEMove", "mpl_toolkits.mplot3d": "Axes3D"}
 """Modules that nothing is used of, and what is taken from them. The move needs all of scipy.stats, a fifth of a report."""
 
-_SELDOM = ("__delattr__", "__eq__", "__hash__", "__repr__", "__setattr__")
-"""Methods of dataclasses that most classes are never asked for."""
-
 
 def _methods_when_used() -> None:
-    """Have such methods compiled when they are first called: there are a thousand, and to compile them takes 0.1 s.
+    """Have methods of dataclasses compiled when they are first called: of more than a thousand, few ever are.
 
-    Only where Python compiles each by itself, before 3.13.
+    Only where Python compiles each by itself, before 3.13. What other packages may ask for the names of its arguments,
+    ``__init__`` of a class that is not ours, is left as it is.
     """
     if sys.version_info >= (3, 13):
         return
-    compiled: Callable[..., FunctionType] = vars(dataclasses)["_create_fn"]
+    compiled: Callable[..., Any] = vars(dataclasses)["_create_fn"]
 
-    def create(name: str, *how: Any, **further: Any) -> FunctionType:
-        if name not in _SELDOM:
+    def create(name: str, *how: Any, **further: Any) -> Any:
+        if name == "__init__" and not further["globals"].get("__name__", "").startswith("cmm_uq."):
             return compiled(name, *how, **further)
-        made: list[FunctionType] = []
+        made: list[Any] = []
 
-        def method(*given: Any) -> Any:
+        def method(*given: Any, **named: Any) -> Any:
             if not made:
                 made.append(compiled(name, *how, **further))
-            return made[0](*given)
+                for owner in type(given[0]).__mro__:
+                    if vars(owner).get(name) is method:
+                        setattr(owner, name, made[0])
+            return made[0](*given, **named)
 
         method.__name__ = name
-        return method  # type: ignore[return-value]
+        return method
 
     vars(dataclasses)["_create_fn"] = create
 
