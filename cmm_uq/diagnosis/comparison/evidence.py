@@ -10,7 +10,7 @@ the evidence of one more explanation beside them needs nothing but the inner pro
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Collection, Container, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -317,9 +317,23 @@ class Comparison:
         return self._total(known) - self._of_given(known)
 
     def beside(
-        self, given: Sequence[Version] = (), among: Container[int] | None = None
+        self, given: Sequence[Version] = (), among: Collection[int] | None = None
     ) -> dict[int, tuple[float, Version]]:
         """Log evidence of each explanation beside what is given, at least of those wanted, and its best version."""
+        known = self._found.setdefault(frozenset(given), {})
+        if among is None or not known.keys() >= set(among):
+            found = self._beside_each(given, among)
+            known.update(found if among is None else {i: found[i] for i in found.keys() & set(among)})
+        return known
+
+    @cached_property
+    def _found(self) -> dict[frozenset[Version], dict[int, tuple[float, Version]]]:
+        """What was found beside what: a search asks again for what it found when it looked for one more."""
+        return {}
+
+    def _beside_each(
+        self, given: Sequence[Version], among: Collection[int] | None
+    ) -> dict[int, tuple[float, Version]]:  # fmt: skip
         total = np.full(len(self.explanations), -np.inf)
         most, best = total.copy(), {}
         for group, cube in self.each(None, given, among):
