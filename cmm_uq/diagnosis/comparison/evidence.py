@@ -429,7 +429,7 @@ class Comparison:
         kinds = len(known.squares)
         if kept:
             columns = group.where
-            shape = kinds, columns.stop - columns.start, known.seen_by.shape[1] // kinds
+            shape = kinds, columns.stop - columns.start, known.width
             found = np.zeros(shape)
             found[:, :, :1] = self._left_with_all[:, columns]
             for basis, factor in known.made_of or ():
@@ -531,7 +531,7 @@ class Comparison:
         kept, key = self._besides, frozenset(given)
         if key not in kept:
             new = self._weigh(None, given)
-            most = max(1, _KEPT // new.seen_by.size)
+            most = max(1, _KEPT // (len(new.squares) * len(self.left) * new.width))
             while len(kept) >= most:
                 del kept[next(iter(kept))]
             kept[key] = new
