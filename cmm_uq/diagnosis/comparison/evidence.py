@@ -482,11 +482,10 @@ class Comparison:
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
         gain, square = variance / (1 + ratio), shown**2
         constant = known.log[:, None, None] - 0.5 * np.einsum("kmar->kma", np.log1p(ratio))
-        axis = 0 if sizes else (0, 2)
         if b > 1 and self._table is None and self.degrees_of_freedom:
-            log = self._of_many(known.squares, gain, square, constant, axis)
+            log = self._of_many(known.squares, gain, square, constant, sizes)
         else:
-            log = log_sum_in(self._integrated(known.squares, gain, square, constant), axis)
+            log = log_sum_in(self._integrated(known.squares, gain, square, constant), 0 if sizes else (0, 2))
         return log.reshape(len(amplitudes), -1, b)
 
     def _integrated(self, squares: Floats, gain: Floats, square: Floats, constant: Floats) -> Floats:
@@ -507,17 +506,20 @@ class Comparison:
         found += constant[..., None]
         return found
 
-    def _of_many(
-        self, squares: Floats, gain: Floats, square: Floats, constant: Floats, axis: int | tuple[int, ...]
-    ) -> Floats:
-        """Logarithm of sums over axes of what :meth:`_integrated` gives the logarithms of, for many data, in closed form.
+    def _of_many(self, squares: Floats, gain: Floats, square: Floats, constant: Floats, sizes: bool) -> Floats:
+        """Logarithm of sums over the kinds, or the sizes too, of what :meth:`_integrated` has the logarithms of; closed form.
 
-        Constants are factors of the squares, which are few ahead of the data, and powers need no logarithms.
+        Constants are factors of the squares, which are few ahead of many data.
         """
         half, most = 0.5 * self.degrees_of_freedom, float(constant.max())
         factor = np.exp(np.minimum((most - constant) / half, _LARGEST_EXPONENT))[..., None]
         found = np.concatenate([-factor * gain, factor], axis=3) @ _with(squares, square)
-        return log_sum_of_powers(found, self.degrees_of_freedom, axis) + (most + self._uniform)
+        if not sizes:
+            return log_sum_of_powers(found, self.degrees_of_freedom, (0, 2)) + (most + self._uniform)
+        # of versions that nothing parts the last digit chooses one: it stays the one that logarithms give
+        np.log(np.maximum(found, 1e-300, out=found), out=found)
+        found *= -half
+        return log_sum_in(found, 0) + (most + self._uniform)
 
     @cached_property
     def _axes(self) -> dict[int, tuple[Floats, Floats]]:

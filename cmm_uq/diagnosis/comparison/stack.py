@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import linalg
 
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.points import Floats, Ints
@@ -107,29 +108,32 @@ def stacked(
     least_noise : mm; with it the largest coefficients are as large as physics allows.
     degrees_of_freedom : how many observations are left.
     """
+    found: dict[int, list[tuple[int, int, float, Floats, float]]] = {}
     whole = [
-        (owner, j, np.log(member.weight / total), member.columns)
+        (owner, j, np.log(member.weight / total), member.columns / noise_scale[:, None])
         for owner, explanation in enumerate(explanations)
         for total in [sum(member.weight for member in explanation.members)]
         for j, member in enumerate(explanation.members)
-        if member.columns.shape[1]
     ]
-    if not whole:
-        return np.zeros((len(noise_scale), 0)), ()
-    columns = np.hstack([each for *_, each in whole]) / noise_scale[:, None]
-    left = np.asarray_chkfinite(rest(columns))
-    width = np.array([each.shape[1] for *_, each in whole])
-    begin = np.cumsum(width) - width
-    length, before = (np.sqrt(np.add.reduceat(np.einsum("mk,mk->k", c, c), begin)) for c in (left, columns))
-    shown = length > _ABSORBED * before
-    owners, members, weights = (np.array([item[k] for item in whole]) for k in range(3))
-    groups, order, largest = [], [np.zeros(0, dtype=np.int64)], 1 / least_noise
-    for r in np.unique(width[shown]).tolist():
-        chosen = np.flatnonzero(shown & (width == r))
-        rms = length[chosen] / np.sqrt(max(degrees_of_freedom, 1))
+    lefts = np.split(
+        rest(np.hstack([columns for *_, columns in whole])),
+        np.cumsum([columns.shape[1] for *_, columns in whole])[:-1], axis=1,
+    ) if whole else []  # fmt: skip
+    for (owner, j, log, columns), left in zip(whole, lefts, strict=True):
+        length = float(linalg.norm(left))
+        if length > _ABSORBED * linalg.norm(columns):
+            found.setdefault(columns.shape[1], []).append((owner, j, log, left, length))
+    groups, stack, start = [], [np.zeros((len(noise_scale), 0))], 0
+    for r in sorted(found):
+        chosen = found[r]
+        rms = np.array([length for *_, length in chosen]) / np.sqrt(max(degrees_of_freedom, 1))
+        largest = 1 / least_noise
         smallest = np.minimum(_SMALLEST / rms, largest)
         amplitudes = largest * (smallest / largest)[:, None] ** np.linspace(0, 1, AMPLITUDES)
-        starts = sum(map(len, order)) + r * np.arange(len(chosen))
-        groups.append(Group(owners[chosen], members[chosen], weights[chosen], starts, amplitudes, r))
-        order.append((begin[chosen, None] + np.arange(r)).ravel())
-    return np.take(left, np.concatenate(order), axis=1), tuple(groups)
+        explanation, member = (np.array([item[k] for item in chosen], dtype=np.int64) for k in (0, 1))
+        weight = np.array([item[2] for item in chosen])
+        starts = start + r * np.arange(len(chosen))
+        groups.append(Group(explanation, member, weight, starts, amplitudes, r))
+        stack += [left for *_, left, _ in chosen]
+        start += r * len(chosen)
+    return np.hstack(stack), tuple(groups)
