@@ -82,7 +82,7 @@ for where in ("cmm_uq.outside", "outside"):
         except FrozenInstanceError:
             continue
         raise AssertionError
-    for wrong in (lambda: Point(), lambda: Point(1.0, z=2.0), lambda: Named(1.0, name="b")):
+    for wrong in (lambda: Point(), lambda: Point(1.0, z=2.0), lambda: Named(1.0, 2.0, "b")):
         try:
             wrong()
         except TypeError:
