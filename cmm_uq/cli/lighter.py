@@ -42,9 +42,9 @@ def _methods_when_used() -> None:
     Only where Python compiles each by itself, before 3.13. What other packages may ask for the names of its arguments,
     ``__init__`` of a class that is not ours, is left as it is.
     """
-    if sys.version_info >= (3, 13):
+    compiled: Callable[..., Any] | None = vars(dataclasses).get("_create_fn")
+    if compiled is None or compiled.__module__ == __name__:
         return
-    compiled: Callable[..., Any] = vars(dataclasses)["_create_fn"]
 
     def create(name: str, *how: Any, **further: Any) -> Any:
         if name == "__init__" and not further["globals"].get("__name__", "").startswith("cmm_uq."):
