@@ -7,7 +7,7 @@ first.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -67,7 +67,7 @@ class Place:
     data: tuple[Floats, Floats, Floats] = field(default_factory=lambda: (np.zeros(0), np.zeros(0), np.zeros(0)))
 
 
-def located(compared: ModelComparison, alpha: float, effects: Container[int] = ()) -> tuple[Place, ...]:
+def located(compared: ModelComparison, alpha: float, effects: Collection[int] = ()) -> tuple[Place, ...]:
     """Where the evidence is that something is missing, significant at ``alpha``, the place with most of it first.
 
     Parameters
@@ -103,7 +103,7 @@ def located(compared: ModelComparison, alpha: float, effects: Container[int] = (
 
 
 def _beside(
-    compared: ModelComparison, given: Sequence[Version], functions: Container[int]
+    compared: ModelComparison, given: Sequence[Version], functions: Collection[int]
 ) -> dict[int, tuple[float, Version]]:
     """Log odds of each function beside those given, and its best version."""
     comparison = compared.comparison
@@ -120,7 +120,7 @@ def _p_value(compared: ModelComparison, log_odds: float) -> float:
     return tail_probability(compared.null_maximum, log_odds)
 
 
-def _has_form(compared: ModelComparison, function: int, effects: Container[int]) -> bool:
+def _has_form(compared: ModelComparison, function: int, effects: Collection[int]) -> bool:
     """Whether one of the effects found could be this function."""
     own = compared.explanations[function]
     return any(own.could_be(effect) for i, effect in enumerate(compared.explanations) if i in effects)

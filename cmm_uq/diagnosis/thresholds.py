@@ -53,7 +53,8 @@ def thresholds(view: View, which: Sequence[int], columns: Floats, alpha: float) 
         statistic = special.logsumexp(prior[:, None] + each, axis=0)
         if pair is not None:
             statistic = np.logaddexp(statistic, pair + each[index])
-        yield Thresholds(_passes(statistic - gate), *_rivals(naming, each, index), view.known, view.left)
+        (detected,) = _passes((statistic - gate)[None])
+        yield Thresholds(float(detected), *_rivals(naming, each, index), view.known, view.left)
 
 
 def _between(v: Floats, odds: Floats, at: Floats) -> Floats:
@@ -80,15 +81,17 @@ def _gate(null: Floats, alpha: float) -> float:
     return root(lambda value: float(np.log(tail_probability(null, value) / alpha)), low, high, 1e-6)
 
 
-def _passes(margin: Floats) -> float:
-    """Length from which on a margin (d,) over :data:`LENGTHS` stays positive; infinite where it never does."""
-    below = np.flatnonzero(margin <= 0)
-    if not len(below):
-        return float(LENGTHS[0])
-    i = int(below[-1])
-    if i == len(LENGTHS) - 1:
-        return float(np.inf)
-    return float(np.interp(0.0, margin[i : i + 2], LENGTHS[i : i + 2]))
+def _passes(margins: Floats) -> Floats:
+    """Length (r,) from which on margins (r, d) over :data:`LENGTHS` stay positive; infinite where one never does."""
+    count = len(LENGTHS)
+    last = count - 1 - np.argmax(margins[:, ::-1] <= 0, axis=1)  # where it is not positive for the last time
+    before, each = np.minimum(last, count - 2), np.arange(len(margins))
+    low, high = margins[each, before], margins[each, before + 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = -low * ((LENGTHS[before + 1] - LENGTHS[before]) / (high - low)) + LENGTHS[before]
+    found[last == count - 1] = np.inf
+    found[(margins > 0).all(axis=1)] = LENGTHS[0]
+    return np.asarray(found, dtype=np.float64)
 
 
 def _rivals(naming: Naming, odds: Floats, true: int) -> tuple[Floats, Floats]:
@@ -105,7 +108,7 @@ def _rivals(naming: Naming, odds: Floats, true: int) -> tuple[Floats, Floats]:
     known = (kinds == EFFECT) & (np.arange(len(kinds)) != true)
     functions = special.logsumexp(weight[kinds == UNKNOWN], axis=0, keepdims=True)
     others = np.vstack([weight[known] + CERTAIN, functions])
-    lengths = np.array([_passes(margin) for margin in weight[true] - others])
+    lengths = _passes(weight[true] - others)
     closest = np.argsort(-lengths, kind="stable")[:_RIVALS]
     at = np.searchsorted(LENGTHS, np.minimum(lengths[closest], LONGEST)).clip(1, len(LENGTHS) - 1)
     own, other = (rows[..., at] - rows[..., at - 1] for rows in (weight[true], others[closest]))

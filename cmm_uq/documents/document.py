@@ -12,6 +12,7 @@ import datetime as dt
 import re
 from collections import Counter
 from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Any, ClassVar, Literal
 
 from cmm_uq.documents.view_words import label
@@ -218,26 +219,36 @@ def _measure(table: dict[str, Any], *, english: bool) -> None:
 
 def _letters(line: str) -> int:
     """Of a line, in letters; a Chinese or Japanese character has the room of two."""
-    return len(line) + len(_WIDE.findall(line))
+    return len(line) + _wide(line)
 
 
 def _parts(line: str, separator: str | None) -> list[str]:
     """What a line is not broken within: words; Japanese, which is written without spaces, a few characters at a time."""
     words = line.split(separator)
-    return [part for word in words for part in (_WIDE_PARTS.findall(word) if _WIDE.search(word) else [word])]
+    return [part for word in words for part in (_patterns()[1].findall(word) if _wide(word) else [word])]
 
 
 def _width(line: str) -> float:
     """Of a line, roughly, in widths of a small letter."""
-    return len(_WIDE.findall(line)) + sum(
+    return _wide(line) + sum(
         1.5 if c in "mwMW%—" else 0.6 if c in "fijlrtI.,:;'|()[] −-" else 1.2 if c.isupper() else 1.0 for c in line
     )
+
+
+def _wide(line: str) -> int:
+    """How many characters of a line are Chinese, Japanese or Korean."""
+    return len(_patterns()[0].findall(line)) if max(line, default="") >= _CHARACTERS[0] else 0
+
+
+@cache
+def _patterns() -> tuple[re.Pattern[str], re.Pattern[str]]:
+    """One such character, and a few or what is between: compiled where there is any, as long as a command's tables take."""
+    return re.compile(f"[{_CHARACTERS}]"), re.compile(f"[{_CHARACTERS}]{{1,6}}|[^{_CHARACTERS}]+")
 
 
 _LONGEST_FIGURE = 28
 _CHARACTERS = "\u2e80-\ua4cf\uac00-\ud7a3\uf900-\ufaff\uff00-\uff60"
 """Of Chinese, Japanese and Korean."""
-_WIDE, _WIDE_PARTS = re.compile(f"[{_CHARACTERS}]"), re.compile(f"[{_CHARACTERS}]{{1,6}}|[^{_CHARACTERS}]+")
 
 _LEFT_OUT = re.compile("[\u202a-\u202e\u2066-\u2069\ufeff]")
 _UNPRINTABLE = re.compile(

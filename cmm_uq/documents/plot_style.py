@@ -84,6 +84,7 @@ _SETTINGS = {
     "ytick.major.width": 0.6,
     "xtick.major.size": 2.5,
     "ytick.major.size": 2.5,
+    "axes.titley": 1.0,  # or matplotlib looks through all ticks for one that a title could touch; none is above
     "legend.frameon": False,
     "legend.fontsize": SMALL,
 }

@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.special import ndtr
 
 from cmm_uq.points import Floats, Ints
@@ -99,6 +98,8 @@ def inverse(found: float, again: Floats, perfect: Floats, true: Floats, measured
     true : (m,) θ of :func:`nodes_of`.
     measured : (m, n) the same of these.
     """
+    from scipy.interpolate import CubicSpline  # takes longer to import than parts without a zone have left to do
+
     curves = CubicSpline(true, _square(np.quantile(measured, _QUANTILES, axis=1).T))
     sizes = np.linspace(true[0], true[-1], _FINE)
     rising = np.maximum.accumulate(curves(sizes), axis=0)

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
+
+from cmm_uq.inference.root import root
 
 
 def tails(negative: float, coverage: float) -> tuple[float, float]:
@@ -40,7 +41,7 @@ def _lower(at: float, missed: float) -> float:
         """Share of measurements that are less likely than this one, beside the best mean of each."""
         return float(ndtr(mean - at) + ndtr(_least(mean, at) - mean)) - missed
 
-    return float(ndtr(brentq(refused, 1e-9, at - 1e-9) - at))
+    return float(ndtr(root(refused, 1e-9, at - 1e-9, 2e-12) - at))
 
 
 def _least(mean: float, most: float) -> float:

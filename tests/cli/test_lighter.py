@@ -50,6 +50,68 @@ assert round(scipy.stats.norm.cdf(1.96), 3) == 0.975
     assert (run.returncode, run.stderr) == (0, "")
 
 
+def test_what_dataclasses_can_do_is_the_same_though_it_is_compiled_when_it_is_asked_for() -> None:
+    """Of a class of this package, all of which is compiled later, and of another's; inherited, frozen, ordered, with slots."""
+    command = """
+import inspect
+from cmm_uq.cli.lighter import lighten
+lighten()
+from dataclasses import FrozenInstanceError, dataclass, field, replace
+for where in ("cmm_uq.outside", "outside"):
+    __name__ = where
+
+    @dataclass(frozen=True, order=True)
+    class Point:
+        x: float
+        y: float = field(default=0.0, repr=False)
+
+    @dataclass(frozen=True, slots=True, kw_only=True)
+    class Named(Point):
+        name: str
+
+        def __post_init__(self):
+            assert self.name
+
+    a, b = Point(1.0), Named(x=1.0, y=2.0, name="b")
+    assert repr(a).endswith("Point(x=1.0)"), repr(a)
+    assert a == Point(1.0, 0.0) != b and Point(1.0) < Point(1.0, 3.0) and hash(a) == hash(Point(1.0))
+    assert (replace(b, name="c").name, b.name, {a: 1}[Point(1.0)]) == ("c", "b", 1)
+    for change in (lambda: setattr(a, "x", 2.0), lambda: delattr(a, "x")):
+        try:
+            change()
+        except FrozenInstanceError:
+            continue
+        raise AssertionError
+    for wrong in (lambda: Point(), lambda: Point(1.0, z=2.0), lambda: Named(1.0, 2.0, "b")):
+        try:
+            wrong()
+        except TypeError:
+            continue
+        raise AssertionError
+assert list(inspect.signature(Point).parameters) == ["x", "y"]
+"""
+    run = subprocess.run([sys.executable, "-c", command], capture_output=True, check=False, text=True)
+    assert (run.returncode, run.stderr) == (0, "")
+
+
+def test_docstrings_of_scipy_that_are_asked_for_are_taken_apart() -> None:
+    command = """
+from cmm_uq.cli.lighter import lighten
+lighten()
+import scipy.linalg, scipy.stats
+from scipy._lib._docscrape import FunctionDoc
+assert "Compute the inverse of a matrix" in scipy.linalg.inv.__doc__
+doc = FunctionDoc(scipy.linalg.inv)
+doc["Notes"].append("left out")
+assert [one.name for one in doc["Parameters"]][:1] == ["a"]
+doc["Notes"] = ["taken in"]
+assert "taken in" in str(doc) and "left out" not in str(doc)
+assert "nan_policy" in scipy.stats.skew.__doc__
+"""
+    run = subprocess.run([sys.executable, "-c", command], capture_output=True, check=False, text=True)
+    assert (run.returncode, run.stderr) == (0, "")
+
+
 def _without_ids(svg: str) -> str:
     """Matplotlib salts the names of its clip paths."""
     return re.sub(r"[pm][0-9a-f]{10}", "", svg)

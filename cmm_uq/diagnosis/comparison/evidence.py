@@ -10,7 +10,7 @@ the evidence of one more explanation beside them needs nothing but the inner pro
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Collection, Container, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -22,7 +22,15 @@ from cmm_uq.diagnosis.comparison.drawn import drawn, standing_of, widths
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.diagnosis.comparison.given import Beside, Given
 from cmm_uq.diagnosis.comparison.precision import Precision, precisions
-from cmm_uq.diagnosis.comparison.quick import corrected, eigen, interpolated, log_sum, log_sum_in, squared
+from cmm_uq.diagnosis.comparison.quick import (
+    corrected,
+    eigen,
+    interpolated,
+    log_sum,
+    log_sum_in,
+    log_sum_of_powers,
+    squared,
+)
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
 from cmm_uq.diagnosis.noise import OFTEN, Kind, probable_tails
 from cmm_uq.model.display import Display
@@ -317,9 +325,23 @@ class Comparison:
         return self._total(known) - self._of_given(known)
 
     def beside(
-        self, given: Sequence[Version] = (), among: Container[int] | None = None
+        self, given: Sequence[Version] = (), among: Collection[int] | None = None
     ) -> dict[int, tuple[float, Version]]:
         """Log evidence of each explanation beside what is given, at least of those wanted, and its best version."""
+        known = self._found.setdefault(frozenset(given), {})
+        if among is None or not known.keys() >= set(among):
+            found = self._beside_each(given, among)
+            known.update(found if among is None else {i: found[i] for i in found.keys() & set(among)})
+        return known
+
+    @cached_property
+    def _found(self) -> dict[frozenset[Version], dict[int, tuple[float, Version]]]:
+        """What was found beside what: a search asks again for what it found when it looked for one more."""
+        return {}
+
+    def _beside_each(
+        self, given: Sequence[Version], among: Collection[int] | None
+    ) -> dict[int, tuple[float, Version]]:  # fmt: skip
         total = np.full(len(self.explanations), -np.inf)
         most, best = total.copy(), {}
         for group, cube in self.each(None, given, among):
@@ -407,7 +429,7 @@ class Comparison:
         kinds = len(known.squares)
         if kept:
             columns = group.where
-            shape = kinds, columns.stop - columns.start, known.seen_by.shape[1] // kinds
+            shape = kinds, columns.stop - columns.start, known.width
             found = np.zeros(shape)
             found[:, :, :1] = self._left_with_all[:, columns]
             for basis, factor in known.made_of or ():
@@ -460,38 +482,44 @@ class Comparison:
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
         gain, square = variance / (1 + ratio), shown**2
         constant = known.log[:, None, None] - 0.5 * np.einsum("kmar->kma", np.log1p(ratio))
-        log, offset = self._integrated(known.squares, gain, square, constant)
-        return (log_sum_in(log, 0 if sizes else (0, 2)) + offset).reshape(len(amplitudes), -1, b)
+        if b > 1 and self._table is None and self.degrees_of_freedom:
+            log = self._of_many(known.squares, gain, square, constant, sizes)
+        else:
+            log = log_sum_in(self._integrated(known.squares, gain, square, constant), 0 if sizes else (0, 2))
+        return log.reshape(len(amplitudes), -1, b)
 
-    def _integrated(
-        self, squares: Floats, gain: Floats, square: Floats, constant: Floats
-    ) -> tuple[Floats, float]:  # fmt: skip
-        """Log evidence (k, M, a, b), but for a number that is to be added, over the noise.
+    def _integrated(self, squares: Floats, gain: Floats, square: Floats, constant: Floats) -> Floats:
+        """Log evidence (k, M, a, b) over the noise.
 
         Parameters
         ----------
         squares : (k, b) of the data; members with gains (k, M, a, r) explain of them the squares (k, M, r, b) along them.
         constant : (k, M, a) to be added.
         """
-        half = 0.5 * self.degrees_of_freedom
-        every = squares[:, None, None, :]
         if squares.shape[1] == 1:
-            found = self._over_sigma(every - np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None])
-            found += constant[..., None]
-            return found, 0.0
-        whole = np.concatenate([square, np.broadcast_to(every, (*square.shape[:2], 1, every.shape[3]))], axis=2)
-        if self._table is not None or not half:
-            found = self._over_sigma(np.concatenate([-gain, np.ones_like(gain[..., :1])], axis=3) @ whole)
-            found += constant[..., None]
-            return found, 0.0
-        # of many data: constants are factors of the squares ahead of the logarithm, where they are few
-        most = float(constant.max())
+            explained = np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None]
+            found = self._over_sigma(squares[:, None, None, :] - explained)
+        else:
+            found = self._over_sigma(
+                np.concatenate([-gain, np.ones_like(gain[..., :1])], axis=3) @ _with(squares, square)
+            )
+        found += constant[..., None]
+        return found
+
+    def _of_many(self, squares: Floats, gain: Floats, square: Floats, constant: Floats, sizes: bool) -> Floats:
+        """Logarithm of sums over the kinds, or the sizes too, of what :meth:`_integrated` has the logarithms of; closed form.
+
+        Constants are factors of the squares, which are few ahead of many data.
+        """
+        half, most = 0.5 * self.degrees_of_freedom, float(constant.max())
         factor = np.exp(np.minimum((most - constant) / half, _LARGEST_EXPONENT))[..., None]
-        found = np.concatenate([-factor * gain, factor], axis=3) @ whole
-        np.maximum(found, 1e-300, out=found)
-        np.log(found, out=found)
+        found = np.concatenate([-factor * gain, factor], axis=3) @ _with(squares, square)
+        if not sizes:
+            return log_sum_of_powers(found, self.degrees_of_freedom, (0, 2)) + (most + self._uniform)
+        # of versions that nothing parts the last digit chooses one: it stays the one that logarithms give
+        np.log(np.maximum(found, 1e-300, out=found), out=found)
         found *= -half
-        return found, most + self._uniform
+        return log_sum_in(found, 0) + (most + self._uniform)
 
     @cached_property
     def _axes(self) -> dict[int, tuple[Floats, Floats]]:
@@ -505,7 +533,7 @@ class Comparison:
         kept, key = self._besides, frozenset(given)
         if key not in kept:
             new = self._weigh(None, given)
-            most = max(1, _KEPT // new.seen_by.size)
+            most = max(1, _KEPT // (len(new.squares) * len(self.left) * new.width))
             while len(kept) >= most:
                 del kept[next(iter(kept))]
             kept[key] = new
@@ -530,3 +558,9 @@ class Comparison:
     def _left_with_all(self) -> Floats:
         """Inner products (k, K, 1) of the stack's columns with what the baseline leaves."""
         return self._given.with_all(self._left_weighed)
+
+
+def _with(squares: Floats, square: Floats) -> Floats:
+    """Squares (k, M, r, b) along members, and (k, b) of the data below them (k, M, r + 1, b)."""
+    every = np.broadcast_to(squares[:, None, None, :], (*square.shape[:2], 1, squares.shape[1]))
+    return np.concatenate([square, every], axis=2)

@@ -35,19 +35,38 @@ Basis = tuple[Member, bool]
 class Beside:
     """Data beside what is given, under each of k kinds of noise.
 
-    ``seen_by`` (m, k·(b + g)): of each kind Σ⁻¹·data and the rows of what is given, side by side; ``squares`` (k, b)
-    dataᵀ·Σ⁻¹·data; ``log`` (k,) probability of the noise less that of its determinant.
-
     With Σ = N + C·Cᵀ and rows = root(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, any square root, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
 
-    Of the recording's own data beside few columns, ``made_of`` says how ``seen_by`` follows from what the members that are
-    given are by themselves, besides N⁻¹·data: a factor (k, r, b + g) of each.
+    Parameters
+    ----------
+    weighed : (k, m, b) N⁻¹·data.
+    rows : (k, g, m) of what is given.
+    seen : (k, g, b) rows·data.
+    squares : (k, b) dataᵀ·Σ⁻¹·data.
+    log : (k,) probability of the noise less that of its determinant.
+    made_of : of the recording's own data beside few columns, how ``seen_by`` follows from what the members that are given
+        are by themselves, besides N⁻¹·data: a factor (k, r, b + g) of each.
     """
 
-    seen_by: Floats
+    weighed: Floats
+    rows: Floats
+    seen: Floats
     squares: Floats
     log: Floats
     made_of: tuple[tuple[Basis, Floats], ...] | None = None
+
+    @property
+    def width(self) -> int:
+        """How many columns of ``seen_by`` each kind of noise has, b + g."""
+        return int(self.weighed.shape[2] + self.rows.shape[1])
+
+    @cached_property
+    def seen_by(self) -> Floats:
+        """Of each kind Σ⁻¹·data and the rows, side by side (m, k·(b + g)): needed where no inner products are kept."""
+        if not self.rows.shape[1]:
+            return _flat(self.weighed)
+        turned = self.rows.swapaxes(1, 2)
+        return _flat(np.concatenate([self.weighed - turned @ self.seen, turned], axis=2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +97,10 @@ class Given:
         """
         squares = np.einsum("mb,kmb->kb", plain, weighed)
         if not given:
-            return Beside(_flat(weighed), squares, log, () if own else None)
+            none = np.zeros((len(weighed), 0, len(plain)))
+            return Beside(weighed, none, none @ plain, squares, log, () if own else None)
         order, rows, mixing, logs = self._rows(given)
         seen = rows @ plain
-        turned = rows.swapaxes(1, 2)
-        whole = np.concatenate([weighed - turned @ seen, turned], axis=2)
         made_of = None
         if own and _FEW * mixing.shape[2] <= len(plain):
             mixed = mixing.swapaxes(1, 2)
@@ -91,7 +109,7 @@ class Given:
             first = max(columns) >= _WIDE  # and then along its principal axes
             bases = [((v.explanation, v.member), first and i == 0) for i, v in enumerate(order)]
             made_of = tuple(zip(bases, np.split(factor, np.cumsum(columns)[:-1], axis=1), strict=True))
-        return Beside(_flat(whole), squares - np.sum(seen**2, axis=1), log - logs, made_of)
+        return Beside(weighed, rows, seen, squares - np.sum(seen**2, axis=1), log - logs, made_of)
 
     def columns(self, version: Version) -> Floats:
         """Of a version (m, r), for coefficients of one."""

@@ -12,6 +12,9 @@ from cmm_uq.points import Floats
 _LEAST_PIVOT = 1e-3
 """Of a factor of one less what is taken: six digits of sixteen are lost there."""
 
+_LEAST_BASE = 1e-300
+"""Of a sum of squares that rounding took below it."""
+
 
 def log_sum(log: Floats, axis: int) -> Floats:
     """Logarithm of sums of what has these finite logarithms, in the steps of ``scipy.special.logsumexp``.
@@ -44,6 +47,28 @@ def log_sum_in(log: Floats, axis: int | tuple[int, ...]) -> Floats:
     log -= largest
     np.exp(log, out=log)
     return np.asarray(np.log(log.sum(axis=axis)) + largest.squeeze(axis), dtype=np.float64)
+
+
+def log_sum_of_powers(base: Floats, degrees: int, axis: int | tuple[int, ...]) -> Floats:
+    """Logarithm of sums of bases, not negative but by rounding, to the power of −degrees/2; the bases are overwritten."""
+    least = base.min(axis=axis, keepdims=True)
+    if least.min() < _LEAST_BASE:
+        np.maximum(base, _LEAST_BASE, out=base)
+        np.maximum(least, _LEAST_BASE, out=least)
+    total = _raised(np.divide(least, base, out=base), degrees).sum(axis=axis)
+    return np.asarray(np.log(total) - 0.5 * degrees * np.log(least.squeeze(axis)), dtype=np.float64)
+
+
+def _raised(parts: Floats, degrees: int) -> Floats:
+    """Numbers from nought to one, which are overwritten, to the power of degrees/2, by multiplications."""
+    power, found = degrees // 2, np.sqrt(parts) if degrees % 2 else None
+    while power:
+        if power % 2:
+            found = parts.copy() if found is None else np.multiply(found, parts, out=found)
+        power //= 2
+        if power:
+            parts *= parts
+    return np.ones_like(parts) if found is None else found
 
 
 def eigen(blocks: Floats) -> tuple[Floats, Floats]:

@@ -108,7 +108,7 @@ def stacked(
     least_noise : mm; with it the largest coefficients are as large as physics allows.
     degrees_of_freedom : how many observations are left.
     """
-    found: dict[int, list[tuple[int, int, float, Floats]]] = {}
+    found: dict[int, list[tuple[int, int, float, Floats, float]]] = {}
     whole = [
         (owner, j, np.log(member.weight / total), member.columns / noise_scale[:, None])
         for owner, explanation in enumerate(explanations)
@@ -120,12 +120,13 @@ def stacked(
         np.cumsum([columns.shape[1] for *_, columns in whole])[:-1], axis=1,
     ) if whole else []  # fmt: skip
     for (owner, j, log, columns), left in zip(whole, lefts, strict=True):
-        if linalg.norm(left) > _ABSORBED * linalg.norm(columns):
-            found.setdefault(columns.shape[1], []).append((owner, j, log, left))
+        length = float(linalg.norm(left))
+        if length > _ABSORBED * linalg.norm(columns):
+            found.setdefault(columns.shape[1], []).append((owner, j, log, left, length))
     groups, stack, start = [], [np.zeros((len(noise_scale), 0))], 0
     for r in sorted(found):
         chosen = found[r]
-        rms = np.array([linalg.norm(left) for *_, left in chosen]) / np.sqrt(max(degrees_of_freedom, 1))
+        rms = np.array([length for *_, length in chosen]) / np.sqrt(max(degrees_of_freedom, 1))
         largest = 1 / least_noise
         smallest = np.minimum(_SMALLEST / rms, largest)
         amplitudes = largest * (smallest / largest)[:, None] ** np.linspace(0, 1, AMPLITUDES)
@@ -133,6 +134,6 @@ def stacked(
         weight = np.array([item[2] for item in chosen])
         starts = start + r * np.arange(len(chosen))
         groups.append(Group(explanation, member, weight, starts, amplitudes, r))
-        stack += [left for *_, left in chosen]
+        stack += [left for *_, left, _ in chosen]
         start += r * len(chosen)
     return np.hstack(stack), tuple(groups)

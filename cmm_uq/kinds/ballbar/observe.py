@@ -46,6 +46,7 @@ class Ballbar(Artefact):
         self.measurement, self.repeat = points.measurement[first], points.repeat[first]
         self.noise_scale = np.full(len(first), np.sqrt(2.0))
         self.expansion = expansion(facts, points)[self.rows].mean(axis=1)
+        self._known = (np.zeros((0, 3)), np.zeros((0, 3)))
         lengths = self.lengths()
         if np.any(lengths == 0):
             line = points.lines[first[np.argmin(lengths)]] if len(points.lines) else 0
@@ -108,10 +109,18 @@ class Ballbar(Artefact):
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
         """See :meth:`Artefact.project`: relative displacement of the ends along the bar."""
-        bars = self._bars(xyz)
-        directions = bars / np.linalg.norm(bars, axis=1, keepdims=True)
         relative = displacement[self.rows[:, 1]] - displacement[self.rows[:, 0]]
-        return np.asarray(np.einsum("mi,mik->mk", directions, relative), dtype=np.float64)
+        return np.asarray(np.einsum("mi,mik->mk", self._directions(xyz), relative), dtype=np.float64)
+
+    def _directions(self, xyz: Floats) -> Floats:
+        """From one end to the other, (m, 3), kept for points that nobody can change: a diagnosis asks thousands of times."""
+        if self._known[0] is not xyz:
+            bars = self._bars(xyz)
+            bars /= np.linalg.norm(bars, axis=1, keepdims=True)
+            if xyz.flags.writeable:
+                return bars
+            self._known = xyz, bars
+        return self._known[1]
 
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`."""

@@ -130,6 +130,20 @@ def test_the_best_version_of_each_explanation_is_the_one_of_most_evidence() -> N
         assert version.amplitude == pytest.approx(amplitude)
 
 
+def test_what_was_found_beside_something_is_what_is_found_of_one_explanation_alone() -> None:
+    """Whichever was asked for first: one explanation, others, or all; against a comparison that was never asked before."""
+    given = [Version(2, 0, 1.5)]
+    asked = wide(5)
+    every = wide(5).beside(given)
+    assert asked.beside(given, (1,)) == wide(5).beside(given, (1,))
+    assert set(asked.beside(given, (0, 1))) >= {0, 1}
+    for i in (0, 1):
+        alone, version = wide(5).beside(given, (i,))[i]
+        for found in (every, asked.beside(given), asked.beside(given, (i,))):
+            assert found[i][0] == pytest.approx(alone, abs=1e-10)
+            assert found[i][1] == version
+
+
 def wide(columns: int) -> Comparison:
     """Two narrow explanations and a wide one in fifty observations."""
     random, m = np.random.default_rng(8), 50

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy import special
 
-from cmm_uq.diagnosis.comparison.quick import corrected, eigen, interpolated, log_sum, squared
+from cmm_uq.diagnosis.comparison.quick import (
+    corrected,
+    eigen,
+    interpolated,
+    log_sum,
+    log_sum_of_powers,
+    squared,
+)
 
 
 def test_a_table_with_equal_steps_is_read_as_numpy_reads_any() -> None:
@@ -36,6 +43,17 @@ def test_sums_of_logarithms_are_scipys_to_the_last_bit(shape: tuple[int, ...], a
     log = random.normal(-50, 20, shape)
     for values in (log, np.round(log), np.zeros(shape)):  # the largest once, now and then several times, always
         np.testing.assert_array_equal(log_sum(values, axis), special.logsumexp(values, axis=axis))
+
+
+@pytest.mark.parametrize("degrees", [1, 2, 3, 18, 19, 310, 4985])
+@pytest.mark.parametrize("axis", [0, (0, 2)])
+def test_powers_by_multiplications_have_the_sum_that_logarithms_give(degrees: int, axis: int | tuple[int, ...]) -> None:
+    """Against scipy; of bases over sixty orders of magnitude, and of one that rounding took below nought."""
+    bases = np.exp(np.random.default_rng(4).normal(0, 40 / np.sqrt(degrees), (4, 5, 7, 3)))
+    expected = special.logsumexp(-0.5 * degrees * np.log(bases), axis=axis)
+    np.testing.assert_allclose(log_sum_of_powers(bases.copy(), degrees, axis), expected, rtol=1e-12, atol=1e-11)
+    bases[1, 2, 3, 0] = -1e-17
+    assert np.isfinite(log_sum_of_powers(bases, degrees, axis)).all()
 
 
 def test_columns_beside_others_explain_what_the_whole_covariance_says() -> None:
