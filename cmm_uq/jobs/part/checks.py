@@ -124,8 +124,13 @@ def _common_faces(facts: PartFile, features: Mapping[str, Probed], places: Place
 def _alignment(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
     given = facts.alignment
     if given.datums:
-        if free := freedoms([_named(name, features) for name in given.datums]):
+        named = [_named(name, features) for name in given.datums]
+        if free := freedoms(named):
             yield _unfixed(free, places.of("alignment", "datums"))
+        elif not freedoms(named[:-1]):
+            said = f"the datum {given.datums[-1]!r} fixes nothing: those before it fix the part already"
+            fix = f"Leave it out, or make one datum of all, that heeds each: {BETWEEN.join(given.datums)!r}"
+            yield CmmUqError(said, where=places.of("alignment", "datums"), fix=fix)
     elif not given.best_fit:
         asking = [(i, one) for i, one in enumerate(facts.characteristic) if one.asks.framed and not one.datums]
         if asking:

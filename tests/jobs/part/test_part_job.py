@@ -90,6 +90,9 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     # two targets of one face are no plane, though with all others they fix the part
     ({**features(*(target(f"t{i}", x) for i, x in enumerate((10.0, 90.0)))), "alignment": {"datums": ["A", "t0-t1", "C"]}},
      r"\[alignment\] datums: the datum 't0-t1' is on 2 points of one face"),
+    # a point on its own fixes all of its place: after two of them nothing is left to a third
+    ({**features(*(target(f"t{i}", x) for i, x in enumerate((10.0, 90.0, 50.0)))),
+      "alignment": {"datums": ["A", "t0", "t1", "t2"]}}, "the datum 't2' fixes nothing"),
     # characteristics
     (asked(what="size", features=["bore"], association="tangent"), "'bore' is a cylinder, which has no association 'tangent'"),
     (asked(what="symmetry", features=["A"], datums=["B"], tolerance_mm=0.1), "is a symmetry: the median plane"),
