@@ -265,7 +265,8 @@ def characteristics(points: Mapping[str, np.ndarray]) -> dict[str, float]:
     )  # fmt: skip
     depth = float(np.mean(DEPTHS))
     (p1, w1, r1, off1), (p2, w2, r2, _) = (
-        cylinder(points[name], np.array([*CENTRES[name], depth]), RADII[name]) for name in ("h1", "h2")
+        cylinder(points[name], np.array([*CENTRES[name], points[name][:, 2].mean()]), RADII[name])
+        for name in ("h1", "h2")
     )
     middle, ball = sphere(points["S"])
     # the frame of A, B, C: up, then across the front as it is seen along up, through the corner of all three

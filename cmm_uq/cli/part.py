@@ -55,7 +55,7 @@ def command(
     records: Annotated[
         str | None,
         typer.Option(
-            help="Records of the machine's history, from which its drift is known.",
+            help="Records of the machine's history, from which its drift is known: a file, a postgresql:// URL, or none.",
             metavar="WHERE",
             show_default="none",
         ),

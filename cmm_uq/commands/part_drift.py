@@ -13,6 +13,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, commas, plural, say
 from cmm_uq.parts.drift import aged
 from cmm_uq.parts.machine import MachineState
+from cmm_uq.records.place import NONE
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ def with_drift(
     state : as its certificate states it, with the day of its calibration.
     serial : of the machine, or its name.
     on : day of the part's measurement.
-    records : of its history; ``None`` for none.
+    records : of its history; ``None`` or ``none`` for none.
     where : names the certificate, for messages.
     kept : the history that an earlier report has inside (:mod:`cmm_uq.commands.part_history`); then records are not asked.
 
@@ -49,7 +50,7 @@ def with_drift(
     CmmUqError : the records cannot be read, or the machine was adjusted after its calibration.
     """
     since = state.calibrated or on
-    if kept is None and records is None:
+    if kept is None and (records is None or str(records) == NONE):
         found = aged(state, on)
         return Aged(found, _not_known(found))
     if kept is None:

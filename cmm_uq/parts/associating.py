@@ -15,7 +15,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.geometry.association import Association
 from cmm_uq.geometry.repeated import MANY, Drawn, Raised, Repeated, one_by_one
-from cmm_uq.parts.plan import DIRECTED, Feature
+from cmm_uq.parts.plan import DIRECTED, Feature, FeatureKind
 from cmm_uq.points import Floats
 
 _STEP = 1e-3
@@ -23,6 +23,9 @@ _STEP = 1e-3
 
 _NEAR = 1e-2
 """Of a feature's extent: how far points may be from those that it was prepared for."""
+
+_SLIDING: tuple[FeatureKind, ...] = ("line", "circle", "cylinder", "cone")
+"""Features that lie anywhere along their axis by their fit."""
 
 VALUES = 8
 """Numbers that a feature is told by: position (3), direction (3), diameter, half angle."""
@@ -129,15 +132,17 @@ class ProbedFeature:
             values = np.zeros((len(displacements), VALUES))
             values[:, :3] = (self.points + displacements).mean(axis=1)
             return Features(values, np.zeros(len(displacements)), points)
-        drawn = self._associated(self._in_own_plane(displacements + self._offset))
-        return Features(self._values(drawn), drawn.form, points)
+        moved = displacements + self._offset
+        drawn = self._associated(self._in_own_plane(moved))
+        return Features(self._slid(self._values(drawn), moved.mean(axis=1)), drawn.form, points)
 
     def _of_raised(self, heights: Floats, *, with_points: bool) -> Features:
         normals = self.feature.normals
         raised = Raised(heights, self._in_own_plane(normals), self._in_own_plane(self._offset))
         points = self.points + heights[:, :, None] * normals if with_points else np.zeros((0, 0, 3))
         drawn = self._associated(raised)
-        return Features(self._values(drawn), drawn.form, points)
+        mean = self._offset.mean(axis=0) + heights @ normals / self.n
+        return Features(self._slid(self._values(drawn), mean), drawn.form, points)
 
     def _associated(self, displacements: Floats | Raised) -> Drawn:
         if self.association == "least_squares":
@@ -181,6 +186,32 @@ class ProbedFeature:
         return values
 
     @cached_property
+    def _unsaid(self) -> Floats:
+        """(k, 3) directions in which no fit says where a feature lies: along its axis, of a line across its surface too."""
+        if self.feature.kind not in _SLIDING:
+            return np.zeros((0, 3))
+        axis = np.asarray(self.feature.nominal.direction)
+        return np.array([axis, np.cross(*self._plane)]) if self.feature.kind == "line" else axis[None]
+
+    def _slid(self, values: Floats, mean: Floats) -> Floats:
+        """Values (N, 8) whose position goes with the points, which moved by a mean (N, 3), where no fit says where it lies.
+
+        A circle lies as high as it is probed; what moves points and datums together leaves it where it is in the part.
+        """
+        by = mean @ self._unsaid.T
+        return np.asarray(values + sum(by[..., i, None] * each for i, each in enumerate(self._sliding(values))))
+
+    def _sliding(self, values: Floats) -> list[Floats]:
+        """Changes (N, 8) of values for 1 mm in each of these directions; on the axis as it is measured."""
+        found = [np.zeros_like(values) for _ in self._unsaid]
+        for i, each in enumerate(found):
+            own = values[:, 3:6] / (values[:, 3:6] @ self._unsaid[0])[:, None]
+            each[:, :3] = self._unsaid[i] if i else own
+            if (half := self.feature.nominal.half_angle_rad) is not None:
+                each[:, 6] = 2 * np.tan(np.copysign(values[:, 7], half)) * np.linalg.norm(own, axis=1)
+        return found
+
+    @cached_property
     def base(self) -> Floats:
         """(8,) values without any draw."""
         return np.asarray(self.of(np.zeros((1, self.n, 3))).values[0])
@@ -191,11 +222,13 @@ class ProbedFeature:
         if self.feature.kind == "point" or self.n <= MANY:
             return self.by_differences(lambda displacements: self.of(displacements).values)
         states, followed = self._repeated.followed(self._in_own_plane(self._offset), _STEP)
-        up, down = np.split(self._values(self._repeated.drawn(states)), 2)
+        up, down = np.split(self._slid(self._values(self._repeated.drawn(states)), self._offset.mean(axis=0)), 2)
         by_coordinate = (0.5 * followed @ (up - down)).reshape(self.n, -1, VALUES)
         if self.feature.kind == "line":
             by_coordinate = np.einsum("nbv,bi->niv", by_coordinate, self._plane)
-        return np.asarray(np.moveaxis(by_coordinate, 2, 0))
+        sliding = [each[0] for each in self._sliding(self.base[None])]
+        slid = np.einsum("kv,ki->vi", np.array(sliding).reshape(-1, VALUES), self._unsaid) / self.n
+        return np.asarray(np.moveaxis(by_coordinate, 2, 0) + slid[:, None])
 
     def by_differences(self, values: Callable[[Floats], Floats]) -> Floats:
         """(8, n, 3) derivative of values (N, 8) of displacements (N, n, 3) by the coordinates of each point."""

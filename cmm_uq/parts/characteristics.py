@@ -147,6 +147,15 @@ class Evaluation:
         """Its first feature, as planned."""
         return self.plan.feature(self.characteristic.features[0])
 
+    def place(self, name: str, measured: Features) -> Floats:
+        """(N, 3) where a feature lies: of a cone where it has its nominal diameter (ISO 3040), else its position."""
+        nominal = self.plan.feature(name).nominal
+        if nominal.diameter_mm is None or nominal.half_angle_rad is None:
+            return measured.position
+        widening = 2 * np.tan(np.copysign(measured.values[:, 7], nominal.half_angle_rad))
+        by = (nominal.diameter_mm - measured.diameter) / widening
+        return np.asarray(measured.position + by[:, None] * measured.direction)
+
     @cached_property
     def ends(self) -> Floats:
         """(2,) of the first feature's measured length along its axis, from its position, mm."""
@@ -231,11 +240,12 @@ def _form(of: Evaluation, measured: Measured) -> Floats:
 
 def _distance(of: Evaluation, measured: Measured) -> Floats:
     """Along the normal of a plane, else across an axis, else between two places; of two alike, the first's."""
-    one, other = (measured.features[key] for key in of.keys)
-    kinds = [of.plan.feature(name).kind for name, _ in of.keys]
+    first, second = of.characteristic.features
+    kinds = [of.plan.feature(name).kind for name in (first, second)]
     if kinds[0] != "plane" and (kinds[1] == "plane" or kinds[0] not in _ROUND):
-        one, other, kinds = other, one, kinds[::-1]
-    apart = other.position - one.position
+        first, second, kinds = second, first, kinds[::-1]
+    one, other = (measured.features[key] for name in (first, second) for key in of.keys if key[0] == name)
+    apart = of.place(second, other) - of.place(first, one)
     if kinds[0] == "plane":
         return np.asarray(np.abs(np.einsum("ni,ni->n", apart, one.direction)))
     if kinds[0] in _ROUND:
@@ -298,7 +308,7 @@ def _coaxiality(of: Evaluation, measured: Measured) -> Floats:
 
 
 def _coordinate(of: Evaluation, measured: Measured) -> Floats:
-    at = of.frame(measured).points(of.first(measured).position)
+    at = of.frame(measured).points(of.place(of.feature.name, of.first(measured)))
     return np.asarray(at[:, AXES.index(of.characteristic.what)])
 
 

@@ -38,6 +38,13 @@ def test_without_records_the_age_is_told_and_nothing_is_drawn() -> None:
     assert found.state.drift_unknown == ("scale_x", "scale_y")
 
 
+def test_the_word_none_is_no_records_as_in_the_other_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert (
+        with_drift(STATE, "1102", ON, "none", "job.toml").told == with_drift(STATE, "1102", ON, None, "job.toml").told
+    )
+
+
 def test_on_the_day_of_the_calibration_nothing_has_changed() -> None:
     assert "on the day of the measurement" in with_drift(STATE, "1102", CALIBRATED, None, "job.toml").told
 

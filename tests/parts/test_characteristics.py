@@ -268,7 +268,7 @@ PREPARED = {"cylinder": BLOCK[4], "cone": cone("cone")}
 @pytest.mark.parametrize("kind", PREPARED)
 @pytest.mark.parametrize("how", ["least_squares", "minimum_zone"])
 def test_a_feature_prepared_at_its_nominal_points_is_the_same_a_little_elsewhere(kind: str, how: Association) -> None:
-    """30 µm away, with form: the same axis, of which the point over the middle of the nominal points is told."""
+    """30 µm away, with form: the same axis, and the same point of it, over the middle of the measured points."""
     feature, random = PREPARED[kind], np.random.default_rng(1)
     points = feature.points + random.normal(0.03, 0.01, feature.points.shape)
     nominal = ProbedFeature(feature, feature.points, "least_squares")
@@ -279,7 +279,7 @@ def test_a_feature_prepared_at_its_nominal_points_is_the_same_a_little_elsewhere
     along = (alone[:3] - shared[:3]) @ alone[3:6]
     np.testing.assert_allclose(shared[:3] + along * alone[3:6], alone[:3], atol=1e-8)
     assert alone[6] - shared[6] == pytest.approx(2 * along * np.tan(alone[7]), abs=1e-8)
-    assert shared[:3] @ shared[3:6] == pytest.approx(feature.points.mean(axis=0) @ shared[3:6], abs=1e-4)
+    assert shared[:3] @ shared[3:6] == pytest.approx(points.mean(axis=0) @ shared[3:6], abs=1e-4)
     again = ProbedFeature(feature, feature.points, how, ProbedFeature(feature, points, how, nominal))
     np.testing.assert_allclose(again.base, ProbedFeature(feature, feature.points, how).base, atol=1e-8)
 
@@ -293,3 +293,36 @@ def test_a_feature_that_lies_far_away_is_prepared_anew() -> None:
     found = ProbedFeature(feature, far, "least_squares", nominal).base
     assert found[6] == pytest.approx(22.0, abs=NANOMETRE)
     np.testing.assert_allclose(found[:2], middle[:2], atol=NANOMETRE)
+
+
+SEAT = cone("seat")
+"""Half an angle of 10°, widening upwards, 20 mm wide at z = 0."""
+
+
+@pytest.mark.parametrize(("one", "moves", "value"), [
+    # a circle lies as high as it is probed
+    (Characteristic("", "z", ("ring",), ABC), {"ring": shifted(0.0, 0.0, 0.02)}, -4.98),
+    (Characteristic("", "distance", ("ring", "A")), {"A": shifted(0.0, 0.0, 0.02)}, 5.02),
+    (Characteristic("", "distance", ("ring", "below")), {"below": shifted(0.3, 0.0, -0.02)}, np.hypot(0.3, 10.02)),
+    (Characteristic("", "z", ("h1",), ABC), {"h1": shifted(0.0, 0.0, 0.02)}, -35 / 3 + 0.02),
+    # a cone where it is 20 mm wide: points that stand in or out by h move that place along the axis by h / sin 10°
+    (Characteristic("", "z", ("seat",), ABC), {}, 0.0),
+    (Characteristic("", "z", ("seat",), ABC), {"seat": lambda p, n: p + 0.01 * n}, -0.01 / np.sin(np.radians(10))),
+    (Characteristic("", "z", ("seat",), ABC), {"seat": shifted(0.0, 0.0, 0.02)}, 0.02),
+    (Characteristic("", "distance", ("D", "seat")), {"seat": shifted(0.02, 0.0, 0.0)}, 199.98),
+])  # fmt: skip
+def test_places_along_an_axis_are_measured_too(
+    one: Characteristic, moves: dict[str, Move], value: float
+) -> None:  # fmt: skip
+    features = (*BLOCK, circle("ring", [100, 50, -5], 8.0), circle("below", [100, 50, -15], 8.0), SEAT)
+    assert measured(features, one, moves) == pytest.approx(value, abs=2e-7)
+
+
+@pytest.mark.parametrize("what", ["x", "y", "z"])
+def test_what_carries_datums_and_feature_together_changes_no_coordinate(what: str) -> None:
+    features = (*BLOCK, circle("ring", [100, 50, -5], 8.0), SEAT)
+    for name in ("ring", "h2", "seat"):
+        one = Characteristic("", what, (name,), ABC)
+        still = measured(features, one, {})
+        carried = measured(features, one, {each.name: shifted(0.2, -0.1, 0.3) for each in features})
+        assert carried == pytest.approx(still, abs=1e-8)

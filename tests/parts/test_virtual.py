@@ -16,7 +16,7 @@ from cmm_uq.parts.causes import Rows, Scatter
 from cmm_uq.parts.evaluating import Evaluator, characteristics_of
 from cmm_uq.parts.of_temperature import Expansion, Surroundings
 from cmm_uq.parts.placing import Pose, placed
-from cmm_uq.parts.plan import Alignment, Characteristic, Plan, Stylus
+from cmm_uq.parts.plan import Alignment, Characteristic, Nominal, Plan, Stylus
 from cmm_uq.parts.result import conforming, evaluated, stated
 from cmm_uq.parts.virtual import AtPose, Circumstances, Virtual
 from cmm_uq.points import Machine
@@ -45,6 +45,23 @@ def test_a_corrected_machine_errs_by_the_difference_of_each_draw_from_the_mean()
     draws = np.array([[40.0], [60.0]])
     found = errors(pair(), Circumstances(machine(["scale_x"], draws)))[:, 0]
     np.testing.assert_allclose(np.unique(found.round(9)), [-300 * 10e-6, 300 * 10e-6], rtol=1e-6)
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_the_height_of_a_circle_errs_by_the_scale_over_its_distance_from_the_datum_face(exact: bool) -> None:
+    """Of 10 ppm over 5 mm, not over the 300 mm from where the scale begins; of a bore that leans by 36.9° likewise."""
+    lean = np.array([[0.8, 0.0, -0.6], [0.0, 1.0, 0.0], [0.6, 0.0, 0.8]])
+    upright, centre = bore("leaning", [0, 0, 0], 10.0, (6.0, 0.0, -6.0)), np.array([100.0, 50.0, -5.0])
+    leaning = replace(
+        upright,
+        points=upright.points @ lean + centre,
+        normals=upright.normals @ lean,
+        nominal=Nominal(centre, lean[2], 20.0),
+    )
+    asked = tuple(Characteristic(name, "z", (name,), ("A", "B", "C")) for name in ("ring", "leaning"))
+    plan = Plan((*block()[0][:4], circle("ring", centre, 8.0), leaning), asked)
+    found = errors(plan, Circumstances(machine(["scale_z"], [[20.0], [40.0]])), exact=exact)
+    np.testing.assert_allclose(np.abs(found), 5 * 10e-6, rtol=1e-3)
 
 
 @pytest.mark.parametrize(("other", "error"), [((100.0, 0, 0), 0.0), ((100.0, 100.0, 0), 0.5 * np.sqrt(2) * 100)])

@@ -8,7 +8,8 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts, with_article
-from cmm_uq.jobs.part.common import as_one, members
+from cmm_uq.jobs.part.common import BETWEEN, as_one, members
+from cmm_uq.jobs.part.feature import ASSOCIATIONS, FEWEST
 from cmm_uq.jobs.part.file import PartFile
 from cmm_uq.jobs.part.freedoms import freedoms
 from cmm_uq.jobs.part.located import Places
@@ -86,7 +87,7 @@ def check_plan(facts: PartFile, features: Mapping[str, Probed], places: Places, 
     ----------
     features : by name.
     """
-    for check in (_tips, _alignment, _characteristics, _travel):
+    for check in (_tips, _common_faces, _alignment, _characteristics, _travel):
         for error in check(facts, features, places):
             wrong.add(error)
 
@@ -100,11 +101,36 @@ def _tips(facts: PartFile, features: Mapping[str, Probed], places: Places) -> It
                              where=places.of("feature", "diameter_mm", i), fix="Name a smaller stylus")  # fmt: skip
 
 
+def _common_faces(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
+    """That a common datum on points of one face has as many as a plane needs."""
+    tables = [("alignment", None, facts.alignment.datums), *(
+        ("characteristic", i, one.datums) for i, one in enumerate(facts.characteristic)
+    )]  # fmt: skip
+    told: set[str] = set()
+    for table, number, datums in tables:
+        for name in datums:
+            own = _named(name, features)
+            if len(own) < 2 or name in told or as_one(own)[0] != "plane":
+                continue
+            if sum(len(one.points) for one in own) < FEWEST["plane"]:
+                told.add(name)
+                every = BETWEEN.join(datums)
+                yield CmmUqError(f"the datum {name!r} is on {len(own)} points of one face, which are no plane",
+                                 where=places.of(table, "datums", number),
+                                 fix=f"Of targets (3-2-1) make one datum of all that fix the part: {every!r}, "
+                                     "or probe a line or a plane there")  # fmt: skip
+
+
 def _alignment(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
     given = facts.alignment
     if given.datums:
-        if free := freedoms([_named(name, features) for name in given.datums]):
+        named = [_named(name, features) for name in given.datums]
+        if free := freedoms(named):
             yield _unfixed(free, places.of("alignment", "datums"))
+        elif not freedoms(named[:-1]):
+            said = f"the datum {given.datums[-1]!r} fixes nothing: those before it fix the part already"
+            fix = f"Leave it out, or make one datum of all, that heeds each: {BETWEEN.join(given.datums)!r}"
+            yield CmmUqError(said, where=places.of("alignment", "datums"), fix=fix)
     elif not given.best_fit:
         asking = [(i, one) for i, one in enumerate(facts.characteristic) if one.asks.framed and not one.datums]
         if asking:
@@ -143,7 +169,7 @@ def unfit(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str
     ----------
     features : by name; all of its own are there.
     """
-    checks: tuple[_Check, ...] = (_of_its_kinds, _nominal_orientation, _limits_of_the_value, _whole_frame)
+    checks: tuple[_Check, ...] = (_of_its_kinds, _association, _nominal_orientation, _limits_of_the_value, _whole_frame)
     return next((found for check in checks if (found := check(one, features))), None)
 
 
@@ -161,6 +187,16 @@ def _of_its_kinds(one: CharacteristicFacts, features: Mapping[str, Probed]) -> t
                 said = f"a {kind}" if len(parts) == 1 else _AS_ONE[kind]
                 return (f"{with_article(one.what)} {of} a {' or '.join(kinds)}, and {name!r} is {said}", key,
                         "Name another feature, or another characteristic")  # fmt: skip
+    return None
+
+
+def _association(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+    """That its features can be made of their points as it says."""
+    for name in one.features:
+        kind = features[name].facts.kind
+        if one.association and one.association not in ASSOCIATIONS[kind]:
+            return (f"{name!r} is a {kind}, which has no association {one.association!r}", "association",
+                    f"Give one of {', '.join(ASSOCIATIONS[kind])}, or leave it out")  # fmt: skip
     return None
 
 

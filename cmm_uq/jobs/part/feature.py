@@ -38,12 +38,13 @@ ROUND: tuple[Kind, ...] = ("circle", "sphere", "cylinder", "cone")
 DIRECTED: tuple[Kind, ...] = ("point", "line", "plane", "circle", "cylinder", "cone")
 """Kinds that are nothing without a direction: that in which a point is probed is against its normal."""
 
-_ASSOCIATIONS: Mapping[Kind, tuple[Association, ...]] = {
+ASSOCIATIONS: Mapping[Kind, tuple[Association, ...]] = {
     "point": ("least_squares",), "line": ("least_squares", "minimum_zone", "tangent"),
     "plane": ("least_squares", "minimum_zone", "tangent"),
     "circle": get_args(Association)[:4], "sphere": get_args(Association)[:4], "cylinder": get_args(Association)[:4],
     "cone": get_args(Association)[:2],
 }  # fmt: skip
+"""Ways in which each kind is made of its points."""
 
 KEYS: Mapping[str, tuple[Kind, ...]] = {
     "diameter_mm": (*ROUND, "plane"), "inner_diameter_mm": ("plane",), "angle_deg": ("cone",), "inner": ROUND,
@@ -188,8 +189,8 @@ class FeatureFacts(Table):
             raise ValueError("a cone needs angle_deg: give its whole angle")
         if self.kind == "line" and self.normal is None:
             raise ValueError("a line needs normal: out of the material of the surface that it lies on")
-        if self.association not in _ASSOCIATIONS[self.kind]:
-            known = ", ".join(_ASSOCIATIONS[self.kind])
+        if self.association not in ASSOCIATIONS[self.kind]:
+            known = ", ".join(ASSOCIATIONS[self.kind])
             raise ValueError(f"a {self.kind} has no association {self.association!r}: give one of {known}")
         return self
 

@@ -36,6 +36,10 @@ def asked(**keys: Any) -> dict[str, Any]:
     return {"characteristic": [{"name": "1", **keys}]}
 
 
+def target(name: str, x: float) -> dict[str, Any]:
+    return {"name": name, "kind": "point", "point_mm": [x, 0.0, -5.0], "direction": [0.0, -1.0, 0.0]}
+
+
 def styli(*tips: float) -> dict[str, Any]:
     return {"stylus": [{"name": f"tip {i}", "diameter_mm": tip} for i, tip in enumerate(tips)]}
 
@@ -83,7 +87,14 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
      "position of 'bore' is to datums that leave free shift along x, which is not modelled"),
     (asked(what="position", features=["bore"], datums=["A", "B(M)", "C"], tolerance_mm=0.1),
      r"the datum 'B\(M\)' holds at maximum material condition"),
+    # two targets of one face are no plane, though with all others they fix the part
+    ({**features(*(target(f"t{i}", x) for i, x in enumerate((10.0, 90.0)))), "alignment": {"datums": ["A", "t0-t1", "C"]}},
+     r"\[alignment\] datums: the datum 't0-t1' is on 2 points of one face"),
+    # a point on its own fixes all of its place: after two of them nothing is left to a third
+    ({**features(*(target(f"t{i}", x) for i, x in enumerate((10.0, 90.0, 50.0)))),
+      "alignment": {"datums": ["A", "t0", "t1", "t2"]}}, "the datum 't2' fixes nothing"),
     # characteristics
+    (asked(what="size", features=["bore"], association="tangent"), "'bore' is a cylinder, which has no association 'tangent'"),
     (asked(what="symmetry", features=["A"], datums=["B"], tolerance_mm=0.1), "is a symmetry: the median plane"),
     (asked(what="concentricity", features=["bore"], datums=["A"], tolerance_mm=0.1), 'ask for "coaxiality"'),
     (asked(what="size", lower_mm=29.0), "names no feature: give features"),
