@@ -58,8 +58,16 @@ ALIKE = """() => {
   const further = {'tbody': 5, 'pre': 40, 'article ul': 12};
   for (const [of, kept] of Object.entries(further))
     for (const one of document.querySelectorAll(of)) [...one.children].slice(kept).forEach(child => child.remove());
+  const seen = {};
+  for (const word of document.querySelectorAll('article pre span, article code span')) {
+    if (word.children.length || word.closest('a, th, h1, h2, h3, h4, h5, h6')) continue;
+    const around = [...Array(4)].reduce((way, _) => [...way, way.at(-1).parentElement], [word]);
+    const sort = around.map(one => `${one.tagName} ${one.className}`).join();
+    seen[sort] = (seen[sort] || 0) + 1;
+    if (seen[sort] > 5) word.remove();
+  }
 }"""
-"""Takes away what is like what stands before it: further rows of a long table, words of long code, items of long lists."""
+"""Takes away what is like what stands before it: further rows of a long table, words of code of a sort, items of lists."""
 
 WHOLE = ("index", "search", "genindex", "tutorial", "posterior", "python")
 """A page of each sort, read by axe with what stands around its text, and for the contrast of colours, the theme's."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.ensembles import run_ensembles
 from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
 from cmm_uq.kinds.shift_plate.model import plane_model
 from cmm_uq.kinds.shift_plate.placed_plate import placed_plate
@@ -93,6 +96,18 @@ def test_what_is_left_is_the_noise(estimate: PlaneEstimate) -> None:
     assert abs(estimate.sigma.mean() - NOISE) < 4 * estimate.sigma.std()
 
 
+@pytest.fixture
+def for_means(monkeypatch: pytest.MonkeyPatch) -> None:
+    """128 walkers of 100 steps: what is held to a bound is a mean. Scatter and convergence are those of :func:`estimate`."""
+    monkeypatch.setattr("cmm_uq.inference.ensembles.MOST_STEPS", 100)
+    short = partial(run_ensembles, steps_at_once=100)
+    monkeypatch.setattr(
+        "cmm_uq.kinds.shifting.smooth_model.run_ensembles",
+        lambda *given, effective_samples, steps_at_once: short(*given, effective_samples=effective_samples),
+    )
+
+
+@pytest.mark.usefixtures("for_means")
 @pytest.mark.parametrize(("plane", "chain"), [("xy", "YXZ"), ("zx", "XYZ"), ("xy", "XFYZ")])
 def test_compensated_by_the_table_the_machine_measures_the_plate_rightly(plane: str, chain: str) -> None:
     """Another road to the same errors: the error map's own kinematics, on distances that no placing was part of."""
