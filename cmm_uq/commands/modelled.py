@@ -28,7 +28,8 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
 
     Raises
     ------
-    CmmUqError : an unknown effect, too many observations or placings, or a measurement to set aside that is not there.
+    CmmUqError : an unknown effect, one that cannot be of this artefact, too many observations or placings, or a measurement to
+        set aside that is not there.
     """
     if len(artefact.noise_scale) > OBSERVATIONS.most:
         raise CmmUqError(
@@ -51,6 +52,8 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
             fix="Set fewer measurements aside, or record what the machine reads",
         )  # fmt: skip
     named = effects(job.facts.model.effects, where="job.toml [model] effects")
+    if unfit := next(filter(None, (effect.unfit(artefact.points) for effect in named)), None):
+        raise unfit
     model = MeasurementModel(artefact, named, None if stated is None else stated * MICROMETRE, used)
     _refuse_open_sizes(model, job.recording_path)
     _refuse_hidden_noise(model, job.recording_path)

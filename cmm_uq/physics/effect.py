@@ -162,6 +162,10 @@ class Effect(ABC):
         CmmUqError : a column or a machine's figure is missing.
         """
 
+    def unfit(self, points: Points) -> CmmUqError | None:
+        """Why a job of these points cannot name it, if so."""
+        return None
+
     def lean(self, points: Points) -> Floats:
         """Angle between the axes of ``plane`` less 90°, rad, for one unit of the coefficient: () or (n,).
 

@@ -9,7 +9,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, say
 from cmm_uq.physics.effect import Amount, Effect, Harmonic, Parameter
-from cmm_uq.points import AXES, Floats, Points
+from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.units import MICROMETRE, unit
 
 
@@ -96,28 +96,38 @@ class ArtefactSag(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`.
-
-        Raises
-        ------
-        CmmUqError : the points of a measurement do not lie on one line.
-        """
+        """See :meth:`Effect.basis`: nothing of points that do not lie on one line."""
         basis = np.zeros((len(points), 3, 1))
         for rows in points.rows_of_groups:
-            first = points.xyz[rows[np.argmin(points.point[rows])]]
-            bar = points.xyz[rows[np.argmax(np.linalg.norm(points.xyz[rows] - first, axis=1))]] - first
+            bar, about = _bar(points, rows)
             length = float(np.linalg.norm(bar))
-            if length == 0:
-                continue
-            level = 1 - (bar[2] / length) ** 2
-            about = points.xyz[rows] - points.xyz[rows].mean(axis=0)
-            place = about @ bar / length**2
-            if np.linalg.norm(about - place[:, None] * bar, axis=1).max() > _OFF_LINE * length:
-                raise CmmUqError(f"{self.name} shortens a bar or a gauge, and the points of measurement "
-                                 f"{points.measurement[rows[0]]} do not lie on one line", where="job.toml [model] effects",
-                                 fix="Leave it out; what bends a plate by its own weight is artefact_bending")  # fmt: skip
-            basis[rows, :, 0] = MICROMETRE * level * place[:, None] * bar / length
+            if length > 0 and _on_line(bar, about):
+                level = 1 - (bar[2] / length) ** 2
+                basis[rows, :, 0] = MICROMETRE * level * (about @ bar / length**2)[:, None] * bar / length
         return basis
+
+    def unfit(self, points: Points) -> CmmUqError | None:
+        """See :meth:`Effect.unfit`: of a plate, a triangle, a sphere."""
+        beside = [rows[0] for rows in points.rows_of_groups if not _on_line(*_bar(points, rows))]
+        if not beside:
+            return None
+        return CmmUqError(
+            f"{self.name} shortens a bar or a gauge, and the points of measurement {points.measurement[beside[0]]} do not "
+            "lie on one line", where="job.toml [model] effects",
+            fix="Leave it out; what bends a plate by its own weight is artefact_bending",
+        )  # fmt: skip
+
+
+def _bar(points: Points, rows: Ints) -> tuple[Floats, Floats]:
+    """From the first of some points to the farthest from it, (3,); and all of them about their middle, (n, 3), mm."""
+    xyz = points.xyz[rows]
+    first = xyz[np.argmin(points.point[rows])]
+    return xyz[np.argmax(np.linalg.norm(xyz - first, axis=1))] - first, xyz - xyz.mean(axis=0)
+
+
+def _on_line(bar: Floats, about: Floats) -> bool:
+    along = (about @ bar / max(float(bar @ bar), np.finfo(np.float64).tiny))[:, None] * bar
+    return bool(np.linalg.norm(about - along, axis=1).max() <= _OFF_LINE * np.linalg.norm(bar))
 
 
 EFFECTS: tuple[Effect, ...] = (ProbeRadius(), ProbeLobing(), ArtefactSag())

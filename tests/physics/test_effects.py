@@ -134,7 +134,9 @@ def test_what_does_not_lie_on_a_line_does_not_sag_as_a_bar() -> None:
     corners = np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0], [0.0, 300.0, 0.0], [300.0, 300.0, 0.0]])
     flat = Points(corners, np.ones(4, int), np.arange(1, 5), np.ones(4, int), POINTS.machine, {}, np.arange(2, 6))
     with pytest.raises(CmmUqError, match=r"measurement 1 do not lie on one line.*artefact_bending"):
-        CATALOGUE["artefact_sag"].displacement(flat, {"um": 6.0})
+        raise CATALOGUE["artefact_sag"].unfit(flat) or AssertionError
+    assert CATALOGUE["artefact_sag"].unfit(POINTS) is None
+    assert not np.any(CATALOGUE["artefact_sag"].displacement(flat, {"um": 6.0}))
 
 
 def test_a_gauge_that_is_measured_forth_and_back_sags_from_its_first_face_to_the_farthest() -> None:
