@@ -57,9 +57,19 @@ MANY = 1000
 COVERAGE = 0.95
 
 
+ITERATED = 50
+"""Points that one of a feature counts for that is found anew each time, not by a derivative: a zone, an inscribed element."""
+
+
 def affordable(draws: int, plan: Plan) -> int:
-    """So many virtual measurements, or fewer of a plan of many points."""
-    return max(draws // 10, min(draws, draws * MANY // len(plan.points)))
+    """So many virtual measurements, or fewer of a plan of many points, or of features that are found anew in each."""
+    own = {one.name: one.association for one in plan.features}
+    found_anew = {
+        (name, how) for one in plan.characteristics for name in (*one.features, *one.datums)
+        if (how := (name in one.features and one.association) or own.get(name, "least_squares")) != "least_squares"
+    }  # fmt: skip
+    points = len(plan.points) + ITERATED * sum(len(plan.feature(name).points) for name, _ in found_anew if name in own)
+    return max(draws // 10, min(draws, draws * MANY // points))
 
 
 def part_found(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from cmm_uq import __version__
-from cmm_uq.commands.part import judged, part_found
+from cmm_uq.commands.part import affordable, judged, part_found
 from cmm_uq.commands.part_machine import machine_found
 from cmm_uq.commands.part_plan import plan_of, refuse_unfit
 from cmm_uq.documents.as_json import as_json
@@ -28,6 +29,20 @@ from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys
 
 TRIALS = 4000
+
+
+def test_features_that_are_found_anew_each_time_have_fewer_virtual_measurements_by_default() -> None:
+    """The plate has 60 points, of its bore 24: one zone of it counts as 1200 more, so that 158 730 are made; two as 2400."""
+    plan = plan_of(plate_of(by_results(), **THERE))
+    assert affordable(200_000, plan) == 200_000
+    bore = next(one for one in plan.characteristics if "bore" in one.features)
+    others = tuple(one for one in plan.characteristics if one is not bore)
+    one = replace(plan, characteristics=(*others, replace(bore, association="maximum_inscribed")))
+    assert affordable(200_000, one) == 200_000 * 1000 // (60 + 50 * 24)
+    both = replace(
+        one, characteristics=(*one.characteristics, replace(bore, name="by zone", association="minimum_zone"))
+    )
+    assert affordable(200_000, both) == 200_000 * 1000 // (60 + 2 * 50 * 24)
 
 
 @cache
