@@ -41,9 +41,6 @@ _MEASURED_KELVIN, _ASSUMED_KELVIN = 0.3, 1.0
 _FAR_KELVIN = 3.0
 """The same, one time in three, where a thermometer is wrong, hangs elsewhere, or the artefact came from another room."""
 
-_CHANGED_KELVIN = 0.5
-"""The same about the mean of all set-ups: what is warm from another room is so in all of them, and rooms change slowly."""
-
 _TEMPERATURE = 0.3
 """Weight of the artefact's temperature: rooms and thermometers are mostly right; of two dates, nothing is likelier."""
 
@@ -129,8 +126,7 @@ def temperatures(own: Owner, weight: float) -> Iterable[Effect]:
     far = replace(own, size=_FAR_KELVIN, weight=weight, mostly=kelvin / _FAR_KELVIN)
     yield TEMPERATURE.made(far)
     if len(np.unique(own.points.measurement)) > 1:
-        changing = min(kelvin, _CHANGED_KELVIN)
-        yield SET_UP_TEMPERATURE.made(replace(own, size=changing, weight=weight * _TEMPERATURE, mostly=1.0))
+        yield SET_UP_TEMPERATURE.made(replace(far, weight=weight * _TEMPERATURE))
 
 
 def temperature_of(facts: ArtefactFacts, points: Points) -> Effect:
