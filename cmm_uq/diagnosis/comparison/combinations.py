@@ -322,7 +322,7 @@ class _Search:
                 if length > 0:
                     numbers.append(i)
                     forms.append(form / length)
-        return np.array(numbers, dtype=np.intp), np.array(forms).reshape(len(forms), -1).T
+        return np.array(numbers, dtype=np.intp), np.array(forms).T
 
     def pairs_like(self, index: int) -> list[tuple[int, int]]:
         """Pairs of other known effects that together leave next to nothing of one, and neither of them does alone.
