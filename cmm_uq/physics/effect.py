@@ -24,9 +24,6 @@ CONTRACT, FURTHER, OWN = "contract", "further", "own"
 """Tiers: effects that every job file may count on, rarer ones that only some machines and recordings show, and faults of the
 artefact itself."""
 
-EVERYWHERE = 5.0
-"""How readily an error that every machine has to some degree is thought of, beside one of which that is not so."""
-
 PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1, OWN: 0.1}
 """How readily an effect of a tier is thought of, beside others: a judgement of how many machines show it. A fault of the
 artefact has a weight by what is known of that artefact."""
@@ -120,7 +117,7 @@ class Effect(ABC):
     shape : what shapes the basis, if anything.
     columns : columns that the recording must have.
     tier : ``contract`` or ``further``: how readily it is to be thought of.
-    everywhere : whether every machine has it to some degree, as scales and squareness.
+    everywhere : whether every machine has it to some degree, so that a diagnosis tries it together with all such.
     idealised_over : axis, or column, over which its form is the simplest of many that its mechanism can have, if it is that.
     imitated_by : nonparametric terms that could pass for it.
     stands_for : nonparametric terms that are nothing else than it.
@@ -151,7 +148,7 @@ class Effect(ABC):
     @property
     def prior_weight(self) -> float:
         """How readily it is thought of in a diagnosis, beside others."""
-        return EVERYWHERE if self.everywhere else PRIOR_WEIGHT[self.tier]
+        return PRIOR_WEIGHT[self.tier]
 
     @abstractmethod
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:

@@ -16,7 +16,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import say
 from cmm_uq.physics.common_size import CommonSize
-from cmm_uq.physics.effect import EVERYWHERE, OWN, PRIOR_WEIGHT, Effect, Nonparametric, Parameter
+from cmm_uq.physics.effect import OWN, PRIOR_WEIGHT, Effect, Nonparametric, Parameter
 from cmm_uq.physics.own_body import Body
 from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.physics.scales import EFFECTS as FURTHER_OF_SCALES
@@ -112,11 +112,6 @@ class OwnGeometry(OwnFault):
         )
         self.coefficients = effect.coefficients
         self.idealised_over = effect.idealised_over
-
-    @property
-    def prior_weight(self) -> float:
-        """See :attr:`Effect.prior_weight`: the machine that made it had that error as readily as this one has."""
-        return super().prior_weight * (EVERYWHERE if self.effect.everywhere else 1.0)
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
         """See :meth:`OwnFault.sized`: it deforms by the plausible size where it does so most, or as far as physics allows."""

@@ -78,13 +78,14 @@ def test_the_bridge_is_what_carriage_y_runs_on_in_the_usual_chain() -> None:
     assert vars(EVERY["thermal_gradient_ram"])["axis"] == "z"
 
 
-def test_rarer_effects_are_thought_of_a_tenth_as_readily_and_those_that_are_everywhere_five_times() -> None:
+def test_rarer_effects_are_thought_of_a_tenth_as_readily() -> None:
+    weights = {tier: {e.prior_weight for e in EVERY.values() if e.tier == tier} for tier in (CONTRACT, FURTHER)}
+    assert weights == {CONTRACT: {1.0}, FURTHER: {0.1}}
+
+
+def test_scales_and_squarenesses_are_what_every_machine_has() -> None:
     everywhere = {f"scale_{a}" for a in "xyz"} | {f"squareness_{plane}" for plane in ("xy", "yz", "zx")}
-    for name, effect in EVERY.items():
-        if effect.tier in (CONTRACT, FURTHER):
-            assert effect.prior_weight == (5.0 if name in everywhere else {CONTRACT: 1.0, FURTHER: 0.1}[effect.tier])
-    for name in everywhere:  # an artefact was made on a machine that has them too
-        assert EVERY[f"artefact_{name}"].prior_weight == 5 * EVERY["artefact_rotation_x_x"].prior_weight
+    assert {name for name, effect in EVERY.items() if effect.everywhere} == everywhere
 
 
 def test_only_straightness_rotation_hysteresis_and_drift_are_the_simplest_of_many_forms() -> None:

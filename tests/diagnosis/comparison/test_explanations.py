@@ -48,10 +48,8 @@ def test_what_needs_the_travel_is_no_candidate_where_the_job_does_not_give_it() 
 def test_a_candidate_has_the_weight_of_its_effect(ballbar_points: Points) -> None:
     weights = {name: e.weight for name, e in candidates(ballbar_points).items()}
     assert weights.pop("artefact_temperature") == 0.3, "a bar's own, as it is thought of beside the machine's"
-    every = {name for name in weights if name.startswith(("scale_", "squareness_")) and "curvature" not in name}
-    assert len(every) == 6
-    assert weights == {name: 5.0 if name in every else 0.1 if EVERY[name].tier == FURTHER else 1.0 for name in weights}
-    assert set(weights.values()) == {0.1, 1.0, 5.0}
+    assert weights == {name: 0.1 if EVERY[name].tier == FURTHER else 1.0 for name in weights}
+    assert set(weights.values()) == {0.1, 1.0}
 
 
 def test_a_fourth_of_an_idealised_effect_is_of_other_forms(ballbar_points: Points) -> None:
