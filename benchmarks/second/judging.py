@@ -77,12 +77,19 @@ def there(name: str, truth: dict, group: Iterable[str]) -> tuple[bool, bool]:
     return name in truth["hidden"], function or bool(set(group) & set(truth["hidden"]))
 
 
-def there_of_any(name: str, truth: dict, group: Iterable[str]) -> tuple[bool, bool]:
-    """The same by the rule before: of an artefact's fault any effect of the artefact is right."""
+def told(name: str, truth: dict, found: dict) -> tuple[float, bool]:
+    """Probability said of an effect that is named, and whether it is there.
+
+    Effects of an artefact that are one and the same in this recording are one statement: its probability is that of all
+    explanations that remain with any of them, whichever of them is named, and whether or not it is true.
+    """
+    said = float(found["effects"][name]["probability"])
     if truth["kind"] not in FAULTS:
-        return there(name, truth, group)
-    own = [each.startswith(OF_THE_ARTEFACT) for each in (name, *group)]
-    return own[0], any(own)
+        return said, there(name, truth, ())[0]
+    same = next((set(each) for each in truth["same"] if name in each), {name})
+    if len(same) > 1:
+        said = max(said, min(1.0, sum(p for p, effects in found.get("remaining", ()) if same & set(effects))))
+    return said, bool(same & set(truth["is"])) or name in truth["alike"]
 
 
 def covered(truth: dict, found: dict) -> list[tuple[str, bool]]:

@@ -64,9 +64,7 @@ def _found(axes: Any, both: list) -> None:
 
 
 def _said(axes: Any, pairs: list) -> None:
-    rows = [
-        (each["probability"], judging.there(name, t, ())[0]) for t, f in pairs for name, each in f["effects"].items()
-    ]
+    rows = [judging.told(name, t, f) for t, f in pairs for name in f["effects"]]
     axes.plot([0, 1], [0, 1], color="0.7")
     if rows:
         tenths = judging.tenths([said for said, _ in rows], [right for _, right in rows])

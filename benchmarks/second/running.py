@@ -91,7 +91,8 @@ def diagnosed(job: Path, *, whole: bool = False) -> dict[str, Any]:
         diagnosis.joint_posterior = sampled if whole else stopped
         said = cmm_uq.diagnose(job).results["diagnosis"]
     except ConsistentError as found:
-        return {"verdict": "consistent", "p": float(found.args[0]), "groups": [], "effects": {}, "withheld": []}
+        return {"verdict": "consistent", "p": float(found.args[0]), "groups": [], "effects": {}, "withheld": [],
+                "remaining": []}
     finally:
         diagnosis.joint_posterior = sampled
     return {
@@ -106,6 +107,7 @@ def diagnosed(job: Path, *, whole: bool = False) -> dict[str, Any]:
             for each in said["effects"]
         },
         "withheld": [each["effect"] for each in said.get("withheld", [])],
+        "remaining": [[each["probability"], each["effects"]] for each in said.get("remaining", [])],
     }  # fmt: skip
 
 
@@ -160,6 +162,6 @@ def completed(truths: list[dict[str, Any]], seed: int) -> list[dict[str, Any]]:
     """Truths of runs that were sealed before it was written down which effects a fault of the artefact is, with these."""
     return [
         {"name": each["name"], **case(seed, each["kind"], int(each["name"].split("-")[1])).truth}
-        if each["kind"] in FAULTS and "is" not in each else each
+        if each["kind"] in FAULTS and "same" not in each else each
         for each in truths
     ]  # fmt: skip

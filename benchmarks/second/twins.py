@@ -28,7 +28,7 @@ GEOMETRY: dict[str, Error] = {
 
 
 def right(seen: Seen, kind: str, words: str, moved: np.ndarray, unseen: float) -> dict[str, list[str]]:
-    """Names of effects of the artefact that a fault is, and of those that leave less than ``unseen`` of it.
+    """Names of effects of the artefact that a fault is, of those that leave less than ``unseen`` of it, and of which are one.
 
     Parameters
     ----------
@@ -46,7 +46,25 @@ def right(seen: Seen, kind: str, words: str, moved: np.ndarray, unseen: float) -
         own = ["artefact_form"]
     else:
         own = _parts(seen, kind, words, moved, unseen)
-    return {"is": own, "alike": [name for name in left if left[name] < unseen and name not in own]}
+    return {"is": own, "alike": [name for name in left if left[name] < unseen and name not in own],
+            "same": _same(seen, {name: field for name, field in among.items() if name in twins})}  # fmt: skip
+
+
+def _same(seen: Seen, twins: dict[str, np.ndarray]) -> list[list[str]]:
+    """Classes of twins that are one and the same deformation in this recording: a plate out of square is also one turned."""
+    classes: list[tuple[np.ndarray, list[str]]] = []
+    for name, field in twins.items():
+        (column,) = _columns(seen, field)
+        length = float(np.linalg.norm(column))
+        if length <= 1e-9 * float(np.linalg.norm(field)):
+            continue
+        form = column / length
+        of = next((names for other, names in classes if 1 - abs(float(form @ other)) < 1e-9), None)
+        if of is None:
+            classes.append((form, [name]))
+        else:
+            of.append(name)
+    return [names for _, names in classes if len(names) > 1]
 
 
 def _parts(seen: Seen, kind: str, words: str, moved: np.ndarray, unseen: float) -> list[str]:

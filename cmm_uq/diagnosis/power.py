@@ -19,10 +19,10 @@ from functools import cached_property
 import numpy as np
 from scipy import special
 
-from cmm_uq.diagnosis.comparison.combinations import Prior
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.diagnosis.comparison.lack_of_fit import DRAWS, statistic_of
+from cmm_uq.diagnosis.comparison.prior import Prior
 from cmm_uq.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.inference.noise import Components, Sizes
 from cmm_uq.model import MeasurementModel, Noise

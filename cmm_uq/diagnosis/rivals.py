@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cmm_uq.diagnosis.comparison.combinations import Combinations, Key, Prior
+from cmm_uq.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.diagnosis.comparison.search import Found, with_effects
 from cmm_uq.diagnosis.joint import Joint
@@ -136,8 +136,7 @@ def needed(combinations: Combinations) -> dict[Key, float]:
     One whose evidence is not three times that without a member is no other explanation than that without it: its probability
     goes there. (A recording that is consistent leaves open as well what it does not show.)
     """
-    prior = Prior(combinations.explanations, combinations.counts)
-    evidence = {key: one.log_posterior - prior.log(key) for key, one in combinations.found.items()}
+    evidence = {key: one.log_posterior - combinations.prior.log(key) for key, one in combinations.found.items()}
     total = dict(combinations.probability)
     for key in sorted(total, key=lambda key: -len(key)):
         fewer = [key - {i} for i in key if key - {i} in evidence]

@@ -8,9 +8,9 @@ from math import comb, sqrt
 import numpy as np
 from scipy import special
 
-from cmm_uq.diagnosis.comparison.combinations import EFFECTS
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.diagnosis.comparison.lack_of_fit import NOTHING, log_prior, tail_probability
+from cmm_uq.diagnosis.comparison.prior import EFFECTS
 from cmm_uq.diagnosis.detection import LONGEST, SHORTEST, Thresholds
 from cmm_uq.diagnosis.power import CERTAIN, Naming
 from cmm_uq.diagnosis.showing import View

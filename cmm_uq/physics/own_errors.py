@@ -112,6 +112,7 @@ class OwnGeometry(OwnFault):
         )
         self.coefficients = effect.coefficients
         self.idealised_over = effect.idealised_over
+        self.everywhere = effect.everywhere
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
         """See :meth:`OwnFault.sized`: it deforms by the plausible size where it does so most, or as far as physics allows."""

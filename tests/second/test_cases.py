@@ -13,7 +13,7 @@ import pytest
 from benchmarks.concealed.physics import UNIT, kind_of
 from benchmarks.second import noises
 from benchmarks.second.artefacts import LENGTH, Placed, real_bars
-from benchmarks.second.cases import DESIGNS, KINDS, NOTHING, Case, case, job, seal, visible
+from benchmarks.second.cases import DESIGNS, KINDS, NOTHING, Case, Seen, baseline, case, job, seal, visible
 from benchmarks.second.maps import JUMPS, SQUARENESS, concealed, error, without_expansion
 from benchmarks.second.twins import fields
 from cmm_uq.commands.reading import read_job
@@ -104,6 +104,31 @@ def test_every_fault_of_an_artefact_moves_observations_as_in_the_package(what: s
         assert outside(theirs, own, placed) < 1e-7, name
         if name != "artefact_pattern":
             assert outside(own, theirs, placed) < 1e-7, name
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_errors_of_a_plate_that_are_the_same_leave_nothing_of_one_another_and_all_of_the_others(number: int) -> None:
+    """By rank: as many different deformations as there are classes, and each class is one; a sheared plate is a turned one."""
+    made = case(20261126, "artefact, geometry", (4, 13, 22)[number])
+    white = np.eye(len(made.placed.D))
+    B = baseline(Seen(made.placed, made.named, made.certified, white, made.context, made.noise.sigma))
+    U, s, _ = np.linalg.svd(
+        B / np.where(np.linalg.norm(B, axis=0) > 0, np.linalg.norm(B, axis=0), 1.0), full_matrices=False
+    )
+    rest = U[:, s > 1e-10 * s[0]]
+
+    def column(name: str) -> np.ndarray:
+        seen = made.placed.D @ fields(made.placed)[name][:, :, 0].ravel()
+        return np.asarray(seen - rest @ (rest.T @ seen))
+
+    classes = made.truth["same"]
+    assert any({"artefact_squareness_xy", "artefact_rotation_y_y"} <= set(each) for each in classes)
+    for each in classes:
+        columns = np.column_stack([column(name) / np.linalg.norm(column(name)) for name in each])
+        assert np.linalg.matrix_rank(columns, tol=1e-6) == 1
+    several = np.column_stack([column(each[0]) / np.linalg.norm(column(each[0])) for each in classes])
+    assert np.linalg.matrix_rank(several, tol=1e-3) == len(classes) > 1
+    assert set(made.truth["is"]) in [set(each) for each in classes]
 
 
 def test_a_case_is_the_same_whenever_it_is_made_and_its_seal_with_it() -> None:

@@ -18,7 +18,7 @@ from benchmarks.second.judging import (
     same,
     tenths,
     there,
-    there_of_any,
+    told,
 )
 
 
@@ -80,9 +80,27 @@ def test_of_an_artefacts_fault_right_is_what_it_is_or_what_nobody_could_tell_fro
     assert there("scale_x", fault, {"scale_x", "scale_y"}) == (True, True)
     assert there("artefact_bending", fault, {"artefact_bending", "artefact_pattern"}) == (False, True)
     assert there("artefact_bending", fault, {"artefact_bending", "drift_x"}) == (False, False)
-    assert there_of_any("artefact_bending", fault, {"artefact_bending"}) == (True, True)
-    assert there_of_any("scale_x", fault, {"scale_x", "artefact_bending"}) == (False, True)
-    assert there_of_any("drift_x", TRUTH, {"drift_x", "scale_x"}) == (False, True)
+
+
+def test_effects_of_an_artefact_that_are_the_same_are_one_statement() -> None:
+    """Said 0.3 and 0.6 of two that are one, 0.05 of both at once: of the statement 0.95, whichever is named."""
+    fault = {"kind": "artefact, geometry", "hidden": {}, "is": ["artefact_a", "artefact_b"], "alike": ["artefact_pattern"],
+             "same": [["artefact_a", "artefact_b"], ["artefact_c", "artefact_d"]]}  # fmt: skip
+    found = said("artefact_a", "artefact_c", "artefact_pattern")
+    for name, p in (("artefact_a", 0.35), ("artefact_c", 0.2), ("artefact_pattern", 0.1)):
+        found["effects"][name] = {**found["effects"][name], "probability": p}
+    found["remaining"] = [
+        [0.3, ["artefact_a"]],
+        [0.6, ["artefact_b"]],
+        [0.05, ["artefact_a", "artefact_b"]],
+        [0.02, ["artefact_d"]],
+    ]
+    assert told("artefact_a", fault, found) == (pytest.approx(0.95), True)
+    assert told("artefact_c", fault, found) == (0.2, False)
+    assert told("artefact_pattern", fault, found) == (0.1, True)
+    assert told("artefact_a", {**TRUTH, "same": fault["same"]}, found) == (0.35, False)
+    del found["remaining"]
+    assert told("artefact_a", fault, found) == (0.35, True)
 
 
 def test_a_phase_is_held_on_the_circle_and_turned_half_where_the_amplitude_is_negative() -> None:

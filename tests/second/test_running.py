@@ -53,6 +53,7 @@ def test_the_page_counts_what_was_run_and_says_what_was_asked(
             "wanted": {"pattern": 9.0},
             "is": ["artefact_pattern"],
             "alike": [],
+            "same": [],
         },
     ]
     quiet = {"verdict": "consistent", "p": 0.5, "groups": [], "effects": {}, "seconds": 1.0}
@@ -92,7 +93,7 @@ def test_truths_of_earlier_runs_are_told_which_effects_a_fault_of_the_artefact_i
     """A record as it was written before, of an artefact whose temperature changed."""
     made = json.loads(json.dumps(case(20261124, "artefact, temperature", 0).truth))
     name = f"{KINDS.index('artefact, temperature'):02d}-0"
-    before = {"name": name, **{key: value for key, value in made.items() if key not in ("is", "alike")}}
+    before = {"name": name, **{key: value for key, value in made.items() if key not in ("is", "alike", "same")}}
     other = {"name": "00-0", "kind": "nothing, white"}
     after = completed([before, other], 20261124)
     assert after[0]["fault"] == "another temperature in every set-up"

@@ -15,17 +15,12 @@ from scipy import special
 
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.diagnosis.comparison.prior import EFFECTS, Prior, with_two
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.points import Floats, Ints
 
-EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
-"""Probability, beforehand, of none, one, two, three and four known effects that the job does not name."""
-
-FURTHER, MOST = 0.5, 12
-"""How many times less probable each further effect is where four are found, and the most that are looked for."""
-
-UNKNOWNS = (0.85, 0.12, 0.03)
-"""Of none, one and two nonparametric terms."""
+MOST = 12
+"""The most known effects that are looked for."""
 
 WINDOW = 7.0
 """A combination less probable than one of its parts by more than this, in logarithm, is not followed."""
@@ -55,13 +50,13 @@ class Combinations:
     ----------
     explanations : of which they are made.
     found : by the indices of their explanations.
-    counts : probability, beforehand, of none, one, two … known effects, up to a constant.
+    prior : their probability beforehand.
     imitated : nonparametric terms that leave next to nothing of an effect in this recording.
     """
 
     explanations: Sequence[Explanation]
     found: Mapping[Key, Combination]
-    counts: tuple[float, ...] = EFFECTS
+    prior: Prior
     imitated: Mapping[int, Key] = field(default_factory=dict)
 
     @cached_property
@@ -147,10 +142,10 @@ def explore(comparison: Comparison, before: Combinations | None = None, changed:
     before : what was found of the same ones, but for some that have other versions now.
     changed : these.
     """
-    found = _explored(comparison, before, changed, _counts(comparison) if before is None else before.counts)
+    found = _explored(comparison, before, changed, _counts(comparison) if before is None else before.prior.counts)
     # there may be more than were looked for; unknown functions may stand for several of them
-    while len(found.counts) - 1 <= min(found.most_members, MOST - 2):
-        found = _explored(comparison, found, frozenset(), _with_two(found.counts))
+    while len(found.prior.counts) - 1 <= min(found.most_members, MOST - 2):
+        found = _explored(comparison, found, frozenset(), with_two(found.prior.counts))
     return found
 
 
@@ -158,19 +153,15 @@ def _counts(comparison: Comparison) -> tuple[float, ...]:
     """Probability of none, one, two … known effects: of one more at least than are everywhere."""
     counts: tuple[float, ...] = EFFECTS
     while len(counts) - 1 <= len(everywhere(comparison)):
-        counts = _with_two(counts)
+        counts = with_two(counts)
     return counts
-
-
-def _with_two(counts: tuple[float, ...]) -> tuple[float, ...]:
-    return (*counts, counts[-1] * FURTHER, counts[-1] * FURTHER**2)
 
 
 def everywhere(comparison: Comparison) -> list[int]:
     """Effects that every machine has to some degree and this recording shows."""
     return [
         i for i in sorted(comparison.visible)
-        if (effect := comparison.explanations[i].effect) is not None and effect.everywhere
+        if (effect := comparison.explanations[i].effect) is not None and effect.everywhere and not effect.of_artefact
     ]  # fmt: skip
 
 
@@ -200,47 +191,12 @@ def _explored(
                 if not best & frozenset(pair):
                     search.settle(search.with_more(fewer, pair))
         search.settle_best(len(best), SETTLED)
-    return Combinations(comparison.explanations, search.settled, counts)
+    return Combinations(comparison.explanations, search.settled, search.prior)
 
 
 def keyed(versions: Iterable[Version]) -> Key:
     """Which explanations these are versions of."""
     return frozenset(v.explanation for v in versions)
-
-
-class Prior:
-    """Probability, beforehand, of every combination: of how many, and among as many by the product of their weights."""
-
-    def __init__(self, explanations: Sequence[Explanation], effects: tuple[float, ...] = EFFECTS) -> None:
-        self._weight = [(e.kind, float(np.log(e.weight))) for e in explanations]
-        self._counts = {
-            kind: np.log(counts) - np.log(_symmetric([e.weight for e in explanations if e.kind == kind], len(counts)))
-            for kind, counts in ((EFFECT, effects), (UNKNOWN, UNKNOWNS))
-        }
-
-    def log(self, key: Iterable[int]) -> float:
-        """Logarithm of the probability; minus infinity for a combination that is not considered."""
-        total, count = 0.0, dict.fromkeys(self._counts, 0)
-        for i in key:
-            kind, weight = self._weight[i]
-            if kind not in count:
-                return -np.inf
-            count[kind] += 1
-            total += weight
-        for kind, k in count.items():
-            if k >= len(self._counts[kind]):
-                return -np.inf
-            total += float(self._counts[kind][k])
-        return total
-
-
-def _symmetric(weights: Sequence[float], count: int) -> Floats:
-    """Sums over all sets of 0, 1, … members of the products of their weights (``count``,); one where there is no set."""
-    sums = np.zeros(count)
-    sums[0] = 1.0
-    for weight in weights:
-        sums[1:] += weight * sums[:-1]
-    return np.where(sums > 0, sums, 1.0)
 
 
 class _Search:
@@ -249,7 +205,7 @@ class _Search:
     def __init__(self, comparison: Comparison, known: Mapping[Key, Combination], counts: tuple[float, ...]) -> None:
         self.comparison = comparison
         self.known = known
-        self.prior = Prior(comparison.explanations, counts)
+        self.prior = Prior(comparison.explanations, counts, comparison.visible)
         self.candidates = {i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)}
         self.settled: dict[Key, Combination] = {}
         self._expanded: set[Key] = set()

@@ -9,10 +9,10 @@ from math import comb
 import numpy as np
 from scipy import special
 
-from cmm_uq.diagnosis.comparison.combinations import EFFECTS
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
 from cmm_uq.diagnosis.comparison.heavy_tails import tailed
+from cmm_uq.diagnosis.comparison.prior import EFFECTS
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.points import Floats
 

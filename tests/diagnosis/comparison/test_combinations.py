@@ -10,16 +10,14 @@ import pytest
 from scipy import special, stats
 
 from cmm_uq.diagnosis.comparison.combinations import (
-    EFFECTS,
-    UNKNOWNS,
     Combination,
     Combinations,
-    Prior,
     explore,
     log_evidence_together,
 )
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
+from cmm_uq.diagnosis.comparison.prior import EFFECTS, Prior
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Version
 from cmm_uq.diagnosis.noise import sigma_grid
 from cmm_uq.points import Floats
@@ -124,7 +122,8 @@ def test_two_that_are_one_and_the_same_share_their_probability() -> None:
 
 def of_sets(probability: dict[tuple[int, ...], float]) -> Combinations:
     explanations = rivals(np.random.default_rng(8), 4)
-    return Combinations(explanations, {frozenset(k): Combination((), np.log(p)) for k, p in probability.items()})
+    made = {frozenset(k): Combination((), np.log(p)) for k, p in probability.items()}
+    return Combinations(explanations, made, Prior(explanations))
 
 
 def test_one_that_explains_what_two_do_is_in_the_place_of_each() -> None:
@@ -141,19 +140,6 @@ def test_one_in_the_place_of_another_is_not_in_that_of_a_third_that_is_merely_le
     assert found.instead(both, 1) == {}
 
 
-def test_prior_probabilities_of_all_combinations_sum_to_one() -> None:
-    random = np.random.default_rng(7)
-    explanations = rivals(random, 5)
-    explanations[1] = replace(explanations[1], weight=0.1)
-    keys = [
-        set(key) for r in range(len(explanations) + 1) for key in itertools.combinations(range(len(explanations)), r)
-    ]
-    prior = Prior(explanations)
-    total = sum(np.exp(prior.log(key)) for key in keys)
-    assert total == pytest.approx(sum(EFFECTS) * sum(UNKNOWNS[:2]))
-    assert prior.log({1}) == pytest.approx(prior.log({0}) + np.log(0.1))
-
-
 @pytest.mark.parametrize("count", [2, 5, 7])
 def test_as_many_effects_are_found_as_act(count: int) -> None:
     """More than four are looked for where four are the most probable; where fewer are, nothing is otherwise than before."""
@@ -163,9 +149,9 @@ def test_as_many_effects_are_found_as_act(count: int) -> None:
     found = explore(comparison(np.asarray(observed), explanations))
     assert found.most_probable == frozenset(range(count))
     assert found.of_effects[found.most_probable] > 0.5
-    assert len(found.counts) == (len(EFFECTS) if count < 4 else len(EFFECTS) + 2 * -(-(count - 3) // 2))
-    assert found.counts[: len(EFFECTS)] == EFFECTS
-    assert np.allclose(np.divide(found.counts[5:], found.counts[4:-1]), 0.5)
+    assert len(found.prior.counts) == (len(EFFECTS) if count < 4 else len(EFFECTS) + 2 * -(-(count - 3) // 2))
+    assert found.prior.counts[: len(EFFECTS)] == EFFECTS
+    assert np.allclose(np.divide(found.prior.counts[5:], found.prior.counts[4:-1]), 0.5)
 
 
 def test_two_that_together_are_as_one_are_tried_in_its_place() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.diagnosis.comparison.prior import Prior
 from cmm_uq.diagnosis.comparison.search import asserted, with_rivals
 from cmm_uq.physics.effect import Nonparametric
 
@@ -23,7 +24,8 @@ RIVALS = (
 
 
 def combinations(probability: Mapping[tuple[int, ...], float]) -> Combinations:
-    return Combinations(RIVALS, {frozenset(key): Combination((), float(np.log(p))) for key, p in probability.items()})
+    made = {frozenset(key): Combination((), float(np.log(p))) for key, p in probability.items()}
+    return Combinations(RIVALS, made, Prior(RIVALS))
 
 
 def found(probability: Mapping[tuple[int, ...], float]) -> set[int]:
