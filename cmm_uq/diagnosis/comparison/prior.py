@@ -24,8 +24,8 @@ FURTHER = 0.5
 UNKNOWNS = (0.85, 0.12, 0.03)
 """Of none, one and two nonparametric terms."""
 
-OUT_OF_ADJUSTMENT = 0.5
-"""Probability that the scales and squarenesses of a machine, or of an artefact, belong together so."""
+OUT_OF_ADJUSTMENT = 0.1
+"""Probability that scales and squarenesses belong together so. One of two would be blamed readily for what an artefact does."""
 
 READILY = (1.0, 3.0)
 """Parameters of the beta distribution of how readily each of them then acts: mostly few of them, sometimes all."""
