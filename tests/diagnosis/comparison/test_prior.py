@@ -91,7 +91,7 @@ def test_errors_of_an_artefact_are_as_probable_together_as_its_weight_says() -> 
 
 
 def test_a_machine_out_of_adjustment_is_more_probable_than_six_coincidences() -> None:
-    """Beside thirty effects that act by themselves; a single one is about as probable as if all did so."""
+    """Beside thirty effects that act by themselves; a single one is as probable as if all did so, to a fifth."""
     counts = with_two(with_two(EFFECTS))
     others = [name for name, effect in every().items() if not effect.of_artefact and name not in MACHINE][:24]
     listed = explanations(*MACHINE, *others)
@@ -99,8 +99,8 @@ def test_a_machine_out_of_adjustment_is_more_probable_than_six_coincidences() ->
         Prior(each, counts) for each in (listed, [replace(explanation, effect=None) for explanation in listed])
     )
     assert prior.log(range(6)) - alone.log(range(6)) > np.log(1000)
-    assert prior.log({0}) == pytest.approx(alone.log({0}), abs=0.1)
-    assert prior.log({6}) == pytest.approx(alone.log({6}), abs=0.1)
+    assert prior.log({0}) == pytest.approx(alone.log({0}), abs=0.2)
+    assert prior.log({6}) == pytest.approx(alone.log({6}), abs=0.2)
 
 
 def test_several_effects_at_once_are_no_combination_and_more_than_are_counted_is_none() -> None:
