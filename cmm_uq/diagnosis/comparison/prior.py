@@ -24,11 +24,12 @@ FURTHER = 0.5
 UNKNOWNS = (0.85, 0.12, 0.03)
 """Of none, one and two nonparametric terms."""
 
-OUT_OF_ADJUSTMENT = 0.1
-"""Probability that scales and squarenesses belong together so. One of two would be blamed readily for what an artefact does."""
+OUT_OF_ADJUSTMENT = 0.02
+"""Probability that scales and squarenesses belong together so: enough for six of them, little for two that look like a fault
+of an artefact."""
 
-READILY = (1.0, 3.0)
-"""Parameters of the beta distribution of how readily each of them then acts: mostly few of them, sometimes all."""
+READILY = (3.0, 1.0)
+"""Parameters of the beta distribution of how readily each of them then acts: mostly all of them, or nearly so."""
 
 
 def with_two(counts: tuple[float, ...]) -> tuple[float, ...]:
