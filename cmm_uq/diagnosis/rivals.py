@@ -136,7 +136,7 @@ def needed(combinations: Combinations) -> dict[Key, float]:
     One whose evidence is not three times that without a member is no other explanation than that without it: its probability
     goes there. (A recording that is consistent leaves open as well what it does not show.)
     """
-    evidence = {key: one.log_posterior - combinations.prior.log(key) for key, one in combinations.found.items()}
+    evidence = {key: one.log_posterior - one.log_prior for key, one in combinations.found.items()}
     total = dict(combinations.probability)
     for key in sorted(total, key=lambda key: -len(key)):
         fewer = [key - {i} for i in key if key - {i} in evidence]

@@ -14,7 +14,6 @@ from cmm_uq.diagnosis.asserting import HOLDS_ZERO, Withheld, _holds_zero, _phase
 from cmm_uq.diagnosis.comparison import search
 from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.diagnosis.comparison.prior import Prior
 from cmm_uq.diagnosis.comparison.search import Found, ModelComparison, asserted, in_place_of
 from cmm_uq.diagnosis.diagnosis import LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
@@ -53,8 +52,7 @@ def combinations(*members: tuple[tuple[int, ...], float]) -> Combinations:
         *(Explanation(say(name), EFFECT, member, imitated_by=(term,)) for name in ("one", "two", "three")),
         Explanation(say("function"), UNKNOWN, member, term=term),
     ]
-    made = {frozenset(key): Combination((), float(np.log(p))) for key, p in members}
-    return Combinations(explanations, made, Prior(explanations))
+    return Combinations(explanations, {frozenset(key): Combination((), float(np.log(p))) for key, p in members})
 
 
 def test_a_group_is_what_could_stand_in_the_place_of_an_effect() -> None:

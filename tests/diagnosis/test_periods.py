@@ -11,7 +11,6 @@ import pytest
 from cmm_uq.diagnosis.asserting import UNRESOLVED, _too_little, settled
 from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.diagnosis.comparison.prior import Prior
 from cmm_uq.diagnosis.comparison.search import Found
 from cmm_uq.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.diagnosis.periods import Mode, _peaks
@@ -96,7 +95,7 @@ def searched(probability: float, other: float) -> Found:
     found = {frozenset(key): Combination((), float(np.log(p))) for key, p in each.items() if p > 0}
     readings = SimpleNamespace(artefact=SimpleNamespace(points=SimpleNamespace(readings={"x": np.array([0.0, 400.0])})))
     first = SimpleNamespace(explanations=explanations, model=readings)
-    combinations = Combinations(explanations, found, Prior(explanations))
+    combinations = Combinations(explanations, found)
     return cast("Found", SimpleNamespace(first=first, combinations=combinations, chosen=frozenset({0})))
 
 

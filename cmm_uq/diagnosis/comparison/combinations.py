@@ -15,7 +15,7 @@ from scipy import special
 
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.diagnosis.comparison.prior import EFFECTS, Prior, with_two
+from cmm_uq.diagnosis.comparison.prior import ALIKE, EFFECTS, Prior, with_two
 from cmm_uq.diagnosis.comparison.stack import Version
 from cmm_uq.points import Floats, Ints
 
@@ -36,10 +36,11 @@ Key = frozenset[int]
 
 @dataclass(frozen=True)
 class Combination:
-    """Explanations that hold together, the size of each at its best, and the log posterior up to a constant."""
+    """Explanations that hold together, the size of each at its best, the log posterior up to a constant, and its log prior."""
 
     versions: tuple[Version, ...]
     log_posterior: float
+    log_prior: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +51,13 @@ class Combinations:
     ----------
     explanations : of which they are made.
     found : by the indices of their explanations.
-    prior : their probability beforehand.
+    counts : probability, beforehand, of none, one, two … known effects that act by themselves.
     imitated : nonparametric terms that leave next to nothing of an effect in this recording.
     """
 
     explanations: Sequence[Explanation]
     found: Mapping[Key, Combination]
-    prior: Prior
+    counts: tuple[float, ...] = EFFECTS
     imitated: Mapping[int, Key] = field(default_factory=dict)
 
     @cached_property
@@ -142,10 +143,10 @@ def explore(comparison: Comparison, before: Combinations | None = None, changed:
     before : what was found of the same ones, but for some that have other versions now.
     changed : these.
     """
-    found = _explored(comparison, before, changed, _counts(comparison) if before is None else before.prior.counts)
+    found = _explored(comparison, before, changed, _counts(comparison) if before is None else before.counts)
     # there may be more than were looked for; unknown functions may stand for several of them
-    while len(found.prior.counts) - 1 <= min(found.most_members, MOST - 2):
-        found = _explored(comparison, found, frozenset(), with_two(found.prior.counts))
+    while len(found.counts) - 1 <= min(found.most_members, MOST - 2):
+        found = _explored(comparison, found, frozenset(), with_two(found.counts))
     return found
 
 
@@ -191,7 +192,7 @@ def _explored(
                 if not best & frozenset(pair):
                     search.settle(search.with_more(fewer, pair))
         search.settle_best(len(best), SETTLED)
-    return Combinations(comparison.explanations, search.settled, search.prior)
+    return Combinations(comparison.explanations, search.settled, counts)
 
 
 def keyed(versions: Iterable[Version]) -> Key:
@@ -245,12 +246,12 @@ class _Search:
         self._expanded.add(key)
         known = self.settled[key]
         fixed = float(self.comparison.log_evidence_of(known.versions)[0])
-        base = known.log_posterior - self.prior.log(key) - fixed
+        base = known.log_posterior - known.log_prior - fixed
         for i, (total, version) in self.comparison.beside(known.versions, self.candidates).items():
             if i in key or i not in self.candidates:
                 continue
             larger = key | {i}
-            estimate = base + total + self.prior.log(larger)
+            estimate = base + total + self.prior.log(larger, alike=self.alike((*known.versions, version)))
             if larger in self.settled or estimate <= self._waiting.get(larger, (-np.inf, ()))[0]:
                 continue
             self._waiting[larger] = estimate, (*known.versions, version)
@@ -311,8 +312,18 @@ class _Search:
             self.settled[key] = self.known[key]
         if key not in self.settled:
             evidence, settled = log_evidence_together(self.comparison, versions)
-            log_posterior = evidence + self.prior.log(key)
-            self.settled[key] = Combination(settled, log_posterior)
+            log_prior = self.prior.log(key, alike=self.alike(settled))
+            self.settled[key] = Combination(settled, evidence + log_prior, log_prior)
+
+    def alike(self, versions: Iterable[Version]) -> bool:
+        """Whether those of a machine out of adjustment show errors of one order of magnitude."""
+        shown = [v.amplitude * self._shown(v.explanation) for v in versions if v.explanation in self.prior.machine]
+        return len(shown) > 0 and max(shown) <= ALIKE * min(shown)
+
+    def _shown(self, index: int) -> float:
+        """How much of an effect the observations show where its coefficient is as large as physics allows."""
+        columns = self.comparison.explanations[index].members[0].columns
+        return float(np.linalg.norm(columns / self.comparison.noise_scale[:, None]))
 
     def _unknown(self, key: Key) -> bool:
         return any(self.comparison.explanations[i].kind == UNKNOWN for i in key)

@@ -13,6 +13,8 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.diagnosis.comparison.stack import AMPLITUDES
+from cmm_uq.physics.catalogue import every
 from cmm_uq.points import Floats
 
 EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
@@ -24,12 +26,17 @@ FURTHER = 0.5
 UNKNOWNS = (0.85, 0.12, 0.03)
 """Of none, one and two nonparametric terms."""
 
-OUT_OF_ADJUSTMENT = 0.02
-"""Probability that scales and squarenesses belong together so: enough for six of them, little for two that look like a fault
-of an artefact."""
+OUT_OF_ADJUSTMENT = 0.05
+"""Probability that scales and squarenesses belong together so, where nothing is said of any of them."""
 
-READILY = (3.0, 1.0)
+READILY = (6.0, 1.0)
 """Parameters of the beta distribution of how readily each of them then acts: mostly all of them, or nearly so."""
+
+ALIKE = 10.0
+"""Ratio within which what is shown of them then lies."""
+
+_NARROWER = float(np.log(AMPLITUDES / 3))
+"""By how much each further one is more probable at its size: three of the sizes that are tried lie so near the first."""
 
 
 def with_two(counts: tuple[float, ...]) -> tuple[float, ...]:
@@ -45,6 +52,10 @@ class Prior:
     explanations : of which combinations are made.
     counts : probability of none, one, two … known effects that act by themselves.
     visible : explanations of which a recording shows anything; all by default.
+
+    Attributes
+    ----------
+    machine : scales and squarenesses that may belong together: those that are seen, where the job names none.
     """
 
     def __init__(
@@ -56,21 +67,29 @@ class Prior:
         self.counts = counts
         self._weight = [(e.kind, float(np.log(e.weight))) for e in explanations]
         shown = range(len(explanations)) if visible is None else visible
-        self._machine = _everywhere(explanations, shown, of_artefact=False)
+        self.machine = _everywhere(explanations, shown, of_artefact=False)
         self._artefact = _everywhere(explanations, shown, of_artefact=True)
-        together = self._machine | self._artefact
+        if len(_everywhere(explanations, range(len(explanations)), of_artefact=False)) < _in_catalogue():
+            self.machine = self._artefact = frozenset()  # the job says what the machine is like
+        together = self.machine | self._artefact
         effects = [i for i, e in enumerate(explanations) if e.kind == EFFECT]
         weights = [e.weight for e in explanations]
         self._alone = _of_counts([weights[i] for i in effects], counts)
         self._beside = _of_counts([weights[i] for i in effects if i not in together], counts)
         self._unknown = _of_counts([e.weight for e in explanations if e.kind == UNKNOWN], UNKNOWNS)
-        self._of_machine = _of_subsets(len(self._machine), 1.0)
+        self._of_machine = _of_subsets(len(self.machine), 1.0)
         self._of_artefact = _of_subsets(
             len(self._artefact), float(np.mean([weights[i] for i in self._artefact] or [1.0]))
         )
 
-    def log(self, key: Iterable[int]) -> float:
-        """Logarithm of the probability; minus infinity for a combination that is not considered."""
+    def log(self, key: Iterable[int], *, alike: bool = False) -> float:
+        """Logarithm of the probability; minus infinity for a combination that is not considered.
+
+        Parameters
+        ----------
+        alike : whether those of a machine out of adjustment are of one order of magnitude. Sizes of single effects are spread
+            evenly over the logarithm of what is possible; of these the first is, and the others lie about it.
+        """
         effects, rest, machine, artefact, functions = 0, 0, 0, 0, 0
         of_effects = of_rest = of_functions = 0.0
         for i in key:
@@ -81,7 +100,7 @@ class Prior:
             if kind != EFFECT:
                 return -np.inf
             effects, of_effects = effects + 1, of_effects + weight
-            if i in self._machine:
+            if i in self.machine:
                 machine += 1
             elif i in self._artefact:
                 artefact += 1
@@ -91,11 +110,17 @@ class Prior:
             return -np.inf
         of_functions += float(self._unknown[functions])
         alone = float(self._alone[effects]) + of_effects
-        if not self._machine and not self._artefact:
+        if not self.machine:
             return of_functions + alone
         together = float(self._beside[rest] + self._of_machine[machine] + self._of_artefact[artefact]) + of_rest
+        together += max(machine - 1, 0) * _NARROWER * alike
         either = np.logaddexp(np.log(1 - OUT_OF_ADJUSTMENT) + alone, np.log(OUT_OF_ADJUSTMENT) + together)
         return of_functions + float(either)
+
+
+def _in_catalogue() -> int:
+    """How many scales and squarenesses a machine has."""
+    return sum(effect.everywhere and not effect.of_artefact for effect in every().values())
 
 
 def _everywhere(explanations: Sequence[Explanation], shown: Iterable[int], *, of_artefact: bool) -> frozenset[int]:

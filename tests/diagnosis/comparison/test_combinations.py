@@ -17,7 +17,7 @@ from cmm_uq.diagnosis.comparison.combinations import (
 )
 from cmm_uq.diagnosis.comparison.evidence import Comparison
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.diagnosis.comparison.prior import EFFECTS, Prior
+from cmm_uq.diagnosis.comparison.prior import EFFECTS
 from cmm_uq.diagnosis.comparison.stack import AMPLITUDES, Version
 from cmm_uq.diagnosis.noise import sigma_grid
 from cmm_uq.points import Floats
@@ -123,7 +123,7 @@ def test_two_that_are_one_and_the_same_share_their_probability() -> None:
 def of_sets(probability: dict[tuple[int, ...], float]) -> Combinations:
     explanations = rivals(np.random.default_rng(8), 4)
     made = {frozenset(k): Combination((), np.log(p)) for k, p in probability.items()}
-    return Combinations(explanations, made, Prior(explanations))
+    return Combinations(explanations, made)
 
 
 def test_one_that_explains_what_two_do_is_in_the_place_of_each() -> None:
@@ -149,9 +149,9 @@ def test_as_many_effects_are_found_as_act(count: int) -> None:
     found = explore(comparison(np.asarray(observed), explanations))
     assert found.most_probable == frozenset(range(count))
     assert found.of_effects[found.most_probable] > 0.5
-    assert len(found.prior.counts) == (len(EFFECTS) if count < 4 else len(EFFECTS) + 2 * -(-(count - 3) // 2))
-    assert found.prior.counts[: len(EFFECTS)] == EFFECTS
-    assert np.allclose(np.divide(found.prior.counts[5:], found.prior.counts[4:-1]), 0.5)
+    assert len(found.counts) == (len(EFFECTS) if count < 4 else len(EFFECTS) + 2 * -(-(count - 3) // 2))
+    assert found.counts[: len(EFFECTS)] == EFFECTS
+    assert np.allclose(np.divide(found.counts[5:], found.counts[4:-1]), 0.5)
 
 
 def test_two_that_together_are_as_one_are_tried_in_its_place() -> None:

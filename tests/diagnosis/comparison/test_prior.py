@@ -17,8 +17,8 @@ from cmm_uq.physics.catalogue import every
 MEMBER = (Member(np.ones((3, 1))),)
 MACHINE = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
 OTHERS = ("straightness_x_y", "rotation_x_z", "straightness_y_z")
-MANY = (0.4, 0.25, 0.15, 0.08, 0.05, 0.03, 0.02, 0.02)
-"""Of none to seven effects, as many as there are in these tests."""
+MANY = (0.4, 0.2, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02, 0.01, 0.01)
+"""Of none to ten effects, as many as there are in these tests."""
 
 
 def explanations(*names: str, weight: float = 1.0) -> list[Explanation]:
@@ -34,7 +34,7 @@ def subsets(count: int) -> Iterable[tuple[int, ...]]:
 def test_all_combinations_together_have_probability_one(weight: float) -> None:
     """The counts sum to one, but for two unknown functions, where there is one."""
     twins = explanations("artefact_scale_x", "artefact_squareness_xy", weight=weight)[:2]
-    listed = [*explanations("scale_x", "squareness_xy", "straightness_x_y", "rotation_x_z"), *twins]
+    listed = [*explanations(*MACHINE, "straightness_x_y", "rotation_x_z"), *twins]
     prior = Prior(listed, MANY)
     by_themselves = sum(MANY[: len(listed)])  # as many effects as there are
     of_rest = sum(MANY[:3])  # those that are no scale and no squareness
@@ -81,8 +81,8 @@ def test_errors_of_an_artefact_are_as_probable_together_as_its_weight_says() -> 
     """With twice the weight of the machine, the odds of any error to none are twice those of the machine."""
     own = [f"artefact_{name}" for name in ("scale_x", "scale_y", "squareness_xy")]
     for weight in (0.3, 2.0):
-        listed = [*explanations("scale_x", "scale_y", "squareness_xy")[:3], *explanations(*own, weight=weight)]
-        prior = Prior(listed, MANY)
+        listed = [*explanations(*MACHINE)[:6], *explanations(*own, weight=weight)]
+        prior = Prior(listed, MANY, {0, 1, 3, 6, 7, 8, 9})
         machine, artefact = (np.exp(part) for part in (prior._of_machine, prior._of_artefact))
         ways = np.array([1, 3, 3, 1])
         assert ways @ artefact == pytest.approx(1)
@@ -109,3 +109,24 @@ def test_several_effects_at_once_are_no_combination_and_more_than_are_counted_is
     assert prior.log({6}) == -np.inf
     assert prior.log(range(5)) == -np.inf
     assert np.isfinite(prior.log(range(4)))
+
+
+def test_where_the_job_names_some_of_them_the_others_act_by_themselves() -> None:
+    """As without any that belong together; that a recording does not show some is another matter."""
+    listed = explanations(*MACHINE[1:], *OTHERS)
+    prior, alone = Prior(listed), Prior([replace(explanation, effect=None) for explanation in listed])
+    assert not prior.machine
+    assert [prior.log(range(k)) for k in range(5)] == pytest.approx([alone.log(range(k)) for k in range(5)])
+    assert Prior(explanations(*MACHINE, *OTHERS), EFFECTS, {1, 2, 6}).machine == {1, 2}
+
+
+def test_sizes_of_one_order_of_magnitude_are_more_probable_together() -> None:
+    """Each beyond the first is one of three sizes in place of one of seven; of one effect nothing changes."""
+    prior = Prior(explanations(*MACHINE), with_two(with_two(EFFECTS)))
+    assert prior.log({0}, alike=True) == prior.log({0})
+    spread, alike = (prior.log(range(6), alike=each) for each in (False, True))
+    assert spread < alike < spread + 5 * np.log(7 / 3)
+    # what acts by itself beside them is as probable in both
+    by_itself = np.log((1 - OUT_OF_ADJUSTMENT) * with_two(with_two(EFFECTS))[6] * UNKNOWNS[0])
+    together = [np.exp(each) - np.exp(by_itself) for each in (spread, alike)]
+    assert together[1] / together[0] == pytest.approx((7 / 3) ** 5)

@@ -9,7 +9,6 @@ import pytest
 
 from cmm_uq.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.diagnosis.comparison.prior import Prior
 from cmm_uq.diagnosis.comparison.search import asserted, with_rivals
 from cmm_uq.physics.effect import Nonparametric
 
@@ -24,8 +23,7 @@ RIVALS = (
 
 
 def combinations(probability: Mapping[tuple[int, ...], float]) -> Combinations:
-    made = {frozenset(key): Combination((), float(np.log(p))) for key, p in probability.items()}
-    return Combinations(RIVALS, made, Prior(RIVALS))
+    return Combinations(RIVALS, {frozenset(key): Combination((), float(np.log(p))) for key, p in probability.items()})
 
 
 def found(probability: Mapping[tuple[int, ...], float]) -> set[int]:
