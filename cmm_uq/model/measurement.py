@@ -203,7 +203,7 @@ class MeasurementModel:
         while True:
             try:
                 return self._iterated(most)
-            except CmmUqError:
+            except (CmmUqError, np.linalg.LinAlgError):
                 first = self._solved(self.linearised(self._beforehand), most)
                 if first.condition <= _ILL_CONDITIONED or first.rank == 1:
                     raise
