@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,12 +15,14 @@ from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.messages import say
 from cmm_uq.model import Estimate, MeasurementModel
+from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.display import of_last_digit
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.model.noise import noise_of
 from cmm_uq.points import Floats
 from cmm_uq.screening.copies import counted_with
 from cmm_uq.screening.finding import finding
+from cmm_uq.screening.moved import moved_stretches, recurring_points, words_of_point, words_of_stretch
 from cmm_uq.screening.screened import Finding, gross_outliers
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, unit
@@ -28,18 +30,38 @@ from cmm_uq.units import MICROMETRE, unit
 
 def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Finding]]:
     """The model without gross outliers, and what they are; the figures of performance still count them."""
-    artefact, used, found = model.artefact, model.used.copy(), []
+    artefact, used = model.artefact, model.used.copy()
     chosen, estimate = np.flatnonzero(used), model.estimate()
     least = of_last_digit(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
-    for index, times in gross_outliers(estimate.linear, artefact.measurement[chosen], least):
-        i = int(chosen[index])
-        used[i] = False
-        why = say(
-            "{what} is {times:.1f} of its standard deviations off what the others say",
-            what=artefact.words_of(i), times=times,
-        )  # fmt: skip
-        found.append(replace(finding("outlier", artefact.points, artefact.rows[i], why), set_aside=True))
-    return replace(model, used=used), found
+    outliers = gross_outliers(estimate.linear, artefact.measurement[chosen], least)
+    times_off = {int(chosen[index]): times for index, times in outliers}
+    used[list(times_off)] = False
+    return replace(model, used=used), [replace(each, set_aside=True) for each in _told(artefact, times_off)]
+
+
+def _told(artefact: Artefact, times_off: Mapping[int, float]) -> Iterator[Finding]:
+    """Outliers one by one, but those of one cause together, where the worst of them stands."""
+    points, untold = artefact.points, dict(times_off)
+    rows = {i: int(artefact.rows[i][0]) for i in times_off}
+    outliers = np.array(sorted(set(rows.values())), dtype=np.int64)
+    causes = [
+        *((each, words_of_point) for each in recurring_points(points, outliers)),
+        *((each, words_of_stretch) for each in moved_stretches(points, outliers)),
+    ]
+    for i, times in times_off.items():
+        if i not in untold:
+            continue
+        for together, words in causes:
+            if rows[i] in together:
+                off = [untold.pop(j) for j in tuple(untold) if rows[j] in together]
+                yield finding("outlier", points, together, words(points, together, off))
+                break
+        else:
+            why = say(
+                "{what} is {times:.1f} of its standard deviations off what the others say",
+                what=artefact.words_of(i), times=times,
+            )  # fmt: skip
+            yield finding("outlier", points, artefact.rows[i], why)
 
 
 def with_noise(model: MeasurementModel) -> tuple[MeasurementModel, Estimate, float | None]:
